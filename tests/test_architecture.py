@@ -369,6 +369,7 @@ def modules_loaded(request: pytest.FixtureRequest) -> set[str]:
 
 
 @pytest.mark.parametrize("command", ["solve", "prove", "compare", "speeds"])
+@pytest.mark.slow
 def test_everyday_commands_load_what_they_need_alone(command: str) -> None:
     """Half a second: pint reads unusual units, SciPy decides what few problems ask, branch and bound what is not known."""
     words = [command, "problems/ep4.toml"]

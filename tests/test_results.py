@@ -177,6 +177,7 @@ def test_its_text_is_its_report(name: str) -> None:
 
 
 @each
+@pytest.mark.slow
 def test_it_is_drawn_into_axes(name: str) -> None:
     result = made(name)
     if name in ("Branch", "Description"):

@@ -11,7 +11,7 @@ from benchmarks.judges import Designs, exactly
 from benchmarks.reports.designs.hard_designs import INFEASIBLE, OPTIMAL, RIGHT, confirmed_value, judged
 from benchmarks.rivals import best_known
 from benchmarks.suites import HARD_COUNT, Target, hard_family, hard_problem
-from tmsopt import Problem
+from tmsopt import Problem, solve
 from tmsopt.models import from_coefficients
 
 x = ca.SX.sym("x")
@@ -86,3 +86,13 @@ def test_infeasible_is_wrong_where_a_design_is_known() -> None:
     known = Target(index, "infeasible", 0.0, 0.0, {}, "a guess", 0.0)
     assert judged(index, 1, known).label == INFEASIBLE
     assert judged(index, 1, replace(known, value=math.nan)).label == RIGHT
+
+
+@pytest.mark.slow
+def test_ends_of_several_formulations_are_told_apart() -> None:
+    """Beside a pole a search goes on with a0 as a variable; evolution on eigenvalues found -1.168982558."""
+    problem = hard_problem(158, 3)
+    design = solve(problem)
+    assert design.status == "optimal"
+    assert design.value <= -1.168982558
+    assert confirmed_value(problem, design.parameters, design.value) == ""

@@ -39,6 +39,7 @@ def problem(coefficients: Any, free: Any, **asked: Any) -> Problem:
         ((1, X - 2, Y), {"x": (0, 3), "y": (0, 3)}, {"constraints": {"curve": "x**2 + y == 2"}}),  # x ≤ √2
     ],
 )
+@pytest.mark.slow
 def test_boxes_without_a_stable_design(coefficients: Any, free: Any, asked: Any) -> None:
     stated = problem(coefficients, free, **asked)
     assert any_stable(stated, SECONDS).any is False

@@ -350,6 +350,7 @@ def test_every_operation_is_what_it_is(text: str) -> None:
 
 @scip
 @pytest.mark.parametrize("text", ONE_OF_EACH)
+@pytest.mark.slow
 def test_no_value_is_below_the_bound(text: str) -> None:
     """Values at 30 001 points, 0 and 1 among them, their least within 1e-6 of the true one; a bound is moved by as much."""
     _, ends = ONE_OF_EACH[text]
@@ -424,6 +425,7 @@ def drawn_expression(rng: np.random.Generator, depth: int) -> str:
 
 @scip
 @pytest.mark.parametrize("seed", [*range(8), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(8, 60))])
+@pytest.mark.slow
 def test_what_is_possible_is_never_called_impossible(seed: int) -> None:
     """Values that an expression has at points of the box, its corners and its middle among them, it can have."""
     rng = np.random.default_rng(seed)

@@ -254,6 +254,7 @@ FILES = sorted(
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow if n == "point_mass_robot" else ()) for n in FILES]
 )
+@pytest.mark.slow
 def test_every_digit_of_the_problem_files(name: str) -> None:
     assert wrong_digits(printed(tmsopt.solve(tmsopt.load(PROBLEMS / f"{name}.toml")))) == []
 

@@ -245,6 +245,7 @@ def problems(tmp_path: Path) -> dict[str, tmsopt.Problem]:
 
 
 @pytest.mark.parametrize("kind", ["wheels", "skates", "plain", "lag"])
+@pytest.mark.slow
 def test_results_are_written_for_every_kind(kind: str, tmp_path: Path) -> None:
     """Reports in both units, JSON, a page of the explorer whose file is the same problem."""
     problem = problems(tmp_path)[kind]

@@ -287,6 +287,7 @@ def test_no_problem_that_comes_along_needs_pint() -> None:
     assert ended.stdout.split() == ["False"]
 
 
+@pytest.mark.slow
 def test_json_names_seconds_only_where_there_are_seconds() -> None:
     """A system of one's own, as a dimensionless bicycle, is in no unit of time."""
     own = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])

@@ -79,6 +79,14 @@ ZIEGLER = from_matrices(M=[[3, 1], [1, 1]], K=[["2 - p", "p - 1"], [-1, 1]])
 """2 s⁴ + (7 − 2 p) s² + 1: a double pair at p = 7/2 − √2."""
 
 
+def test_the_entry_of_a_root_on_the_axis_says_how_it_grows() -> None:
+    """A Jordan block of two beside a lossy mode: rounding leaves 1e-17 of the real part, which is shown as 0."""
+    model = from_hamiltonian([["1", "1", "0"], ["0", "1", "0"], ["0", "0", "-1j*g"]])
+    data = tmsopt.solve(tmsopt.Problem(model, fixed={"g": 0.3})).to_json()
+    assert [(r["multiplicity"], r.get("growth")) for r in data["roots"]] == [(2, "t"), (1, None)]
+    assert [(r["multiplicity"], r.get("growth")) for r in data["eigenfrequencies"]] == [(2, "t"), (1, None)]
+
+
 @pytest.mark.parametrize(
     ("model", "at", "growth", "exact"),
     [

@@ -191,6 +191,7 @@ def test_a_page_is_whole_and_asks_for_nothing(name: str) -> None:
 
 
 @each
+@pytest.mark.slow
 def test_headings_go_down_one_by_one(name: str) -> None:
     levels = [level for level, _ in page(name).headings]
     assert levels[0] == 1

@@ -96,6 +96,7 @@ def one_by_one(solution, row):
     return realised, ratio, violated, problem.objective and float(problem.objective(found[0]))
 
 
+@pytest.mark.slow
 def test_at_once_they_are_those_of_one_by_one(solution):
     alone, together = rounded_designs(solution)
     assert [row.digits for row in together] == [2, 3, 4, 6]

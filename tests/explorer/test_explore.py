@@ -90,6 +90,7 @@ def test_an_exceptional_point_is_found_beside_an_optimum_that_is_none() -> None:
 
 
 @pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)
+@pytest.mark.slow
 def test_what_it_saves_is_the_same_system(path: Path, tmp_path: Path) -> None:
     problem = tmsopt.load(path)
     data = data_of(page_of(problem))
@@ -107,6 +108,7 @@ def test_what_it_saves_is_the_same_system(path: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)
+@pytest.mark.slow
 def test_sliders_reach_what_is_possible(path: Path) -> None:
     problem = tmsopt.load(path)
     for p in data_of(page_of(problem))["parameters"]:

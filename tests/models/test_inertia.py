@@ -123,6 +123,7 @@ def test_a_design_that_is_not_stable_has_none(tmp_path):
     assert "radius of gyration" not in CliRunner().invoke(main, ["solve", str(file)]).stdout
 
 
+@pytest.mark.slow
 def test_who_says_what_is_left_out():
     words = "without wheels, rotational inertia or trail"
     design = tmsopt.solve("problems/benchmark.toml")

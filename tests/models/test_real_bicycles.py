@@ -128,6 +128,7 @@ def changed(own, x):
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if CHANGES[n][1] not in ("0", "none")])
+@pytest.mark.slow
 def test_the_change_is_enough_and_no_smaller_one_is(name):
     """Of 40000 changes 2 % smaller, half of them near this one, none is. Rounding moves the abscissa by up to 0.012 (optimal-2)."""
     own = bicycle(name)
@@ -187,6 +188,7 @@ def least_gains(own, v):
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.slow
 def test_the_gains_are_the_least(name):
     for v, cell in ((4.0, GAINS[name][0]), (3.0, GAINS[name][5])):
         assert float(cell) == pytest.approx(least_gains(bicycle(name), v), abs=6e-4)

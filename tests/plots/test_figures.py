@@ -566,6 +566,7 @@ def test_one_figure_is_written_whole(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["bicycle.svg"]
 
 
+@pytest.mark.slow
 def test_all_figures_go_into_a_new_directory(tmp_path, monkeypatch):
     """With two figures that are quick to draw, in this process."""
     quick = Table({name: GALLERY[name] for name in ("bicycle", "experiment")})

@@ -423,6 +423,7 @@ NAMES = (
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.slow
 def test_every_picture_is_drawn_on_the_axes_given_or_on_its_own(results, name):
     draw, ax = getattr(plots, f"draw_{name}"), ax_of()
     assert draw(results[name], ax) is ax

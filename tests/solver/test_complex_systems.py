@@ -165,9 +165,9 @@ def test_no_words_of_the_double_are_shown(command: str) -> None:
 
 def test_json_has_eigenfrequencies_beside_roots() -> None:
     found: dict[str, Any] = tmsopt.solve("problems/loss_only_dimer.toml").to_json()
-    assert found["eigenfrequencies"] == [
-        {"re": -found["roots"][0]["im"], "im": found["roots"][0]["re"], "multiplicity": 2}
-    ]
+    (root,) = found["roots"]
+    of_block = {"multiplicity": 2, "defective": True, "geometric_multiplicity": 1}  # an EP2: one eigenvector
+    assert found["eigenfrequencies"] == [{"re": -root["im"], "im": root["re"], **of_block}]
     assert "eigenfrequencies" not in tmsopt.solve("problems/coupled_pair.toml").to_json()
 
 

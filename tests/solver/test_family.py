@@ -68,6 +68,7 @@ MEMBERS = {
         for n in MEMBERS
     ],
 )
+@pytest.mark.slow
 def test_a_member_is_solved_as_alone_and_whatever_came_before(name: str) -> None:
     """The same optimum as without a family; the very same bits in a family of its own."""
     varied, member, values = MEMBERS[name]

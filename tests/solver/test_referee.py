@@ -165,6 +165,7 @@ OPEN = [
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("coefficients", "asked", "best"), OPEN)
+@pytest.mark.slow
 def test_there_is_no_best_design_where_a_root_goes_to_infinity(
     coefficients: Any, asked: Any, best: float, sign: int
 ) -> None:

@@ -56,6 +56,7 @@ AMOUNTS = {
 
 
 @pytest.mark.parametrize("key", AMOUNTS)
+@pytest.mark.slow
 def test_amounts_in_closed_form(key):
     design = failed(key)
     assert design.status == "infeasible"

@@ -81,6 +81,7 @@ def test_optimised_benchmark_of_the_paper():
 
 
 @pytest.mark.parametrize(("zeta_B", "zeta_H"), [(-0.9, -0.3), (-0.5, -0.45), (-1.4, -0.1), (-0.3, -0.6)])
+@pytest.mark.slow
 def test_ep4_for_other_heights_and_both_tilts(zeta_B, zeta_H):
     law = laws.ep4_chi_H_1(zeta_B, zeta_H)
     sign = math.copysign(1, float(law.tan_lambda_s))
@@ -98,6 +99,7 @@ def test_ep4_for_other_heights_and_both_tilts(zeta_B, zeta_H):
 
 
 @pytest.mark.parametrize("pattern", [name for name in PATTERNS if name != "resonance"])
+@pytest.mark.slow
 def test_every_pattern_is_located(pattern):
     """The 60-digit coefficients of the design are those of the pattern, to what double parameters can hold."""
     free = {**BOX, "zeta_B": (-1.2, -0.05), "chi_B": (0.1, 5), "chi_H": (0.7, 1.3)}  # both tilts: test_sides.py

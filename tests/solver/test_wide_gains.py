@@ -36,6 +36,7 @@ def placed(parameters: dict[str, float], root: float) -> Array:
         (2.53, ((-409, 409), (-319, 0), (-328, 328), (0, 171)), {"torque": "torque_per_degree <= 0.3"}, -2.97),
     ],
 )
+@pytest.mark.slow
 def test_gains_that_place_all_roots_are_not_overlooked(
     speed: float, ends: tuple[tuple[float, float], ...], limits: dict[str, str], root: float, seed: int
 ) -> None:

@@ -35,8 +35,10 @@ _DIGITS = 150  # slopes are differences over 2⁻¹⁰⁰ of a parameter
 _SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from what a structure tolerates up to 5e-7
 _LINE = 1e-6  # relative distance from the worst root up to which another is on the limit too
 _STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # of Newton's method; designs judged; basis vectors added to the nearest point
+_GONE = 1e-24  # of its natural size: what is left of a cₖ after these steps, where the slopes are not all but singular
 _RANK = 1e-9  # of the steepest direction, below which one moves nothing
 _MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
+_LEAST = 1e-3  # of its range: natural size of a parameter near 0
 _FINEST = 1e-20  # relative: steps of a parameter that is 0
 _BITS = 60  # behind the point, of the coordinates of the lattice
 _NOTHING = 1e-14  # of the size of roots: less is rounding
@@ -53,12 +55,14 @@ class _Cluster:
         root: of the ideal design, on or above the real axis.
         along: unit vector along the limit, the inside of which is on its left.
         exactly: whether the limit is an equality.
+        anywhere: whether the mean of its roots may be where it is, instead of at the root.
     """
 
     case: Case
     root: Root
     along: complex
     exactly: bool
+    anywhere: bool = False
 
     @property
     def place(self) -> complex:
@@ -67,7 +71,7 @@ class _Cluster:
 
     def parts(self) -> Iterator[tuple[int, bool]]:
         """Order k of each cₖ, and whether it is its real part; without those that are 0 or free to move."""
-        for k in range(1, self.root.multiplicity + 1):
+        for k in range(2 if self.anywhere else 1, self.root.multiplicity + 1):
             for real in (True, False):
                 if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.along.imag == 0)):
                     yield k, real
@@ -96,6 +100,21 @@ def held(
                 if set(again.violations) <= set(problem.asked_of_roots):
                     return design, _structured(problem, design, checked, again), {}
     return parameters, checked, amounts
+
+
+def multiple_roots_exist(problem: Problem, parameters: Mapping[str, float]) -> bool:
+    """Whether a design within rounding of one has exactly the multiple roots that this one has to rounding.
+
+    There Newton's method, in 150 digits, gains digits with every step; where equations are all but singular it stalls.
+    """
+    roots = problem.values(parameters)["structure"].roots
+    clusters = [
+        _Cluster(Case(), r, 1j, True, True) for r in roots if r.multiplicity > 1 and r.im >= 0 and (r.re or r.im)
+    ]
+    target, _, size = _aims(clusters, 0.0) if clusters else (np.empty(0),) * 3
+    with flint.ctx.workdps(_DIGITS):
+        _, off, _ = _solved(problem, parameters, clusters, list(problem.free), target, size)
+        return all(abs(float(x)) <= _GONE * scale for x, scale in zip(off, size.tolist(), strict=True))
 
 
 def abscissa_as_stored(solution: Solution) -> str:
@@ -156,32 +175,46 @@ def _nearest(
 ) -> Iterator[dict[str, float]]:
     """Doubles close to a design whose clusters are spread along their limits, the most promising first."""
     target, leeway, size = _aims(clusters, spread)
-    widths = np.array([abs(parameters[n]) or np.ptp(problem.free[n]) for n in names])
     with flint.ctx.workdps(_DIGITS):
-        at = {n: flint.arb(x) for n, x in parameters.items()}
-        known, slopes = _off(problem, at, clusters, target), []
-        for n, width in zip(names, widths.tolist(), strict=True):
-            step = flint.arb(width) * flint.arb(2) ** -100
-            moved = _off(problem, {**at, n: at[n] + step}, clusters, target)
-            slopes.append([float((b - a) / step) for a, b in zip(known, moved, strict=True)])
-        slope = np.array(slopes)
-        if not np.all(np.isfinite(slope)):
-            return
-        inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
-        for _ in range(_STEPS):
-            steps = widths * (inverse @ (np.array([float(x) for x in known]) / size))
-            at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(names, steps.tolist(), strict=True)}
-            known = _off(problem, at, clusters, target)
+        at, _, slope = _solved(problem, parameters, clusters, names, target, size)
         start = {n: float(at[n]) for n in names}
         off = [float(x) for x in _off(problem, {**at, **{n: flint.arb(x) for n, x in start.items()}}, clusters, target)]
         aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
-    if not np.all(np.isfinite([*off, *start.values()])):
+    if not np.all(np.isfinite([*off, *start.values(), *slope.ravel()])):
         return
+    widths = _widths(problem, parameters, names)
     units = np.maximum([math.ulp(x) for x in start.values()], _FINEST * widths)
     rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / (_MOVE * widths))])
     for counts in _rounded(rows, np.array([*(off / leeway), *(aside / (_MOVE * widths))])):
         moves = zip(start.items(), counts, units.tolist(), strict=True)
         yield {**parameters, **{n: x + count * unit for (n, x), count, unit in moves}}
+
+
+def _widths(problem: Problem, parameters: Mapping[str, float], names: Sequence[str]) -> Array:
+    """Natural sizes of parameters."""
+    return np.array([max(abs(parameters[n]), _LEAST * np.ptp(problem.free[n])) for n in names])
+
+
+def _solved(
+    problem: Problem, parameters: Mapping[str, float], clusters: Sequence[_Cluster], names: Sequence[str],
+    target: Array, size: Array,
+) -> tuple[dict[str, Any], list[Any], Array]:  # fmt: skip
+    """A design after some steps of Newton's method with the first slopes, what is off there, and those slopes."""
+    widths = _widths(problem, parameters, names)
+    at = {n: flint.arb(x) for n, x in parameters.items()}
+    known, slopes = _off(problem, at, clusters, target), []
+    for n, width in zip(names, widths.tolist(), strict=True):
+        step = flint.arb(width) * flint.arb(2) ** -100
+        moved = _off(problem, {**at, n: at[n] + step}, clusters, target)
+        slopes.append([float((b - a) / step) for a, b in zip(known, moved, strict=True)])
+    slope = np.array(slopes)
+    if np.all(np.isfinite(slope)):
+        inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
+        for _ in range(_STEPS):
+            steps = widths * (inverse @ (np.array([float(x) for x in known]) / size))
+            at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(names, steps.tolist(), strict=True)}
+            known = _off(problem, at, clusters, target)
+    return at, known, slope
 
 
 def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Array]:
@@ -209,7 +242,9 @@ def _off(problem: Problem, parameters: Mapping[str, Any], clusters: Sequence[_Cl
         z = [z for z, m in isolated_roots(a) for _ in range(m)]
         place, c = flint.acb(cluster.place), [flint.acb(1)]
         z.sort(key=lambda z: float(abs(z - place)))
-        for root in z[: cluster.root.multiplicity]:
+        own = z[: cluster.root.multiplicity]
+        place = sum(own, flint.acb(0)) / len(own) if cluster.anywhere else place
+        for root in own:
             t = (root - place) / flint.acb(cluster.along)
             c = [a - t * b for a, b in zip([*c, 0], [0, *c], strict=True)]
         found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]

@@ -150,7 +150,7 @@ def regular(coefficients: Array) -> Array:
 
 
 def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Abscissa and damping ratio; nan at designs at which a coefficient does not exist."""
+    """Abscissa and damping ratio, each kept for when it is asked; nan where a coefficient does not exist."""
     assert isinstance(values, Values)
     a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
     exist, a = np.all(np.isfinite(a), axis=-1), regular(a)
@@ -160,7 +160,10 @@ def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
     else:
         z = roots(a)
         found = z.real.max(axis=-1), np.min(-z.real / (np.abs(z) + 1e-300), axis=-1)
-    return np.where(exist, found[0], np.nan), np.where(exist, found[1], np.nan)
+    abscissa, ratio = (np.where(exist, each, np.nan) for each in found)
+    values.define("abscissa", abscissa)
+    values.define("damping_ratio", ratio)
+    return abscissa, ratio
 
 
 def _array_frequency(values: Mapping[str, Any]) -> Array:

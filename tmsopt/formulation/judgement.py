@@ -1,6 +1,6 @@
 """Many designs judged at once, by arrays: what they are worth and what they violate in their worst cases."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,27 +47,31 @@ def judged(problem: Problem, columns: Mapping[str, Array]) -> Judged:
     """
     shape = next(iter(columns.values())).shape
     nominal = problem.ordered(columns)
-    applied = [case.applied(nominal) for case in problem.cases if not case.direction]
-    own, every = values_of(problem, nominal, shape), (len(applied) or 1, *shape)
-    stacked = {n: np.stack([np.broadcast_to(p[n], shape) for p in applied or [nominal]]) for n in nominal}
-    values = values_of(problem, stacked, every)  # all cases at once: one by one takes as often the time of small arrays
+    applied = [case.applied(nominal) for case in problem.cases if not case.direction] or [nominal]
+    every = (len(applied), *shape)
+    # All cases at once: one by one takes as often the time of small arrays. What is one number stays one.
+    values = _values(problem, {n: _stacked([p[n] for p in applied], len(shape)) for n in nominal})
     conditions = list(problem.conditions.values())
     asked = [e for e in (problem.objective, *conditions) if e]
+    worst_of: dict[str, Array] = {}
     for name, worst in WORSE.items():
         if len(applied) > 1 and any(name in e.names for e in asked):
-            found = values[name].max(axis=0) if worst > 0 else values[name].min(axis=0)
-            own.define(name, found)
-            values.define(name, np.broadcast_to(found, every))
+            found = np.broadcast_to(values[name], every)
+            worst_of[name] = found.max(axis=0) if worst > 0 else found.min(axis=0)
+            values.define(name, np.broadcast_to(worst_of[name], every))
     moves = _moves(values, every).all(axis=0)
     worth = None
     if problem.objective is not None:
         goal = _graded(problem.objective, problem.sign, values, every)
         worth = np.where(moves, goal.max(axis=0), np.nan)
-    beyond = [  # an equality is one of the nominal design
+    equal = np.array([c.equality for c in conditions], dtype=bool)
+    own = values_of(problem, nominal, shape) if equal.any() else values  # an equality is one of the nominal design
+    for name, found in worst_of.items() if own is not values else ():
+        own.define(name, found)
+    beyond = [
         c.sign * _evaluated(c, own, shape) if c.equality else _graded(c, c.sign, values, every).max(axis=0)
         for c in conditions
     ]
-    equal = np.array([c.equality for c in conditions], dtype=bool)
     return Judged(worth, np.where(moves, np.stack(beyond), np.nan) if beyond else np.empty((0, *shape)), equal)
 
 
@@ -87,8 +91,19 @@ def _graded(asked: Expression, sign: float, values: Values, shape: tuple[int, ..
 
 def values_of(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
     """Everything derived from designs, as arrays of one shape."""
-    arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
+    return _values(problem, {n: np.broadcast_to(np.asarray(x, dtype=float), shape) for n, x in parameters.items()})
+
+
+def _values(problem: Problem, arrays: Mapping[str, Array]) -> Values:
     return Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
+
+
+def _stacked(each: Sequence[Any], axes: int) -> Array:
+    """A parameter in all cases, along a first axis, as far as it differs; broadcast together these give all designs."""
+    first = np.asarray(each[0], dtype=float)
+    if all(x is each[0] for x in each):
+        return first.reshape(1, *(first.shape or (1,) * axes))
+    return np.stack([x.reshape(x.shape or (1,) * axes) for x in np.broadcast_arrays(first, *each[1:])])
 
 
 def _moves(values: Values, shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -179,4 +179,4 @@ def efficient(points: Sequence[FrontPoint], slack: Sequence[float]) -> list[Fron
         )
         if not beaten and not same:
             kept.append(p)
-    return sorted(kept, key=lambda p: p.objectives)
+    return sorted(kept, key=lambda p: [float(f"{x:.9g}") for x in p.objectives])  # rounding decides no tie

@@ -1,7 +1,7 @@
 """Multi-start: IPOPT from many designs, ended early when enough of them agree."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
 
@@ -17,6 +17,7 @@ from tmsopt.formulation.starts import complete, designs, opposite, worth
 from tmsopt.progress import begin
 from tmsopt.records import Array
 from tmsopt.roots import roots
+from tmsopt.solver.basins.leaders import SAME, led, starting
 from tmsopt.solver.sample import NARROW
 from tmsopt.solver.workspace import Candidate, Workspace
 
@@ -27,10 +28,7 @@ _ENOUGH_SAMPLED, _ENOUGH_NARROW, _HOPELESS_SAMPLED = 3, 8, 8
 """The same where the starts come from a sample of the box, which counts; more where little is feasible."""
 
 HOPELESS_AFAR = 3  # the same where no design of the sample comes near to meeting all limits
-_WAY = np.arange(1, 8) / 8  # from a design to where a start ended, looked at for what is worse
-_LEVEL = 1e-3  # of the difference of its ends: what may be worse on the way for numeric roots
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
-_SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _SCATTER = 0.01  # of the size of the roots: in double precision those beside a 4-fold one are off by 4e-4
 _RESIDUAL = 1e-11  # of the equations: an n-fold root is off by its n-th root
@@ -48,7 +46,7 @@ _SUCCESS = "Solve_Succeeded"
 def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate]:
     """Where every start ended that was tried, in order; a design near the optimum, where one is given, before all."""
     run, part, options = Runner(work, nlp), work.part, work.options
-    left = [*range(len(work.sample.refined))] if work.sample else []
+    left = [*range(len(work.sample.leaders))] if work.sample else []
     starts, candidates = min(options.starts, most or options.starts), list[Candidate]()
     begin(options.progress, "searching", "start")
     if options.near:
@@ -64,7 +62,7 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
         hopeful = work.sample is None and any(c.feasible for c in candidates)
         candidates.append(_otherwise(run, design, run.ended(design, near, hopeful)))
         if not options.exhaustive:  # which starts from every design
-            candidates += [candidates[-1]] * min(_led(work, candidates[-1], left), starts - len(candidates))
+            candidates += [candidates[-1]] * min(led(work, candidates[-1], left), starts - len(candidates))
         if options.progress:
             options.progress(len(candidates), starts, _best(work, candidates))
         if not options.exhaustive and _settled(work, candidates, left):
@@ -108,45 +106,6 @@ def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     return found
 
 
-def starting(
-    work: Workspace, ended: Sequence[Candidate] = (), left: list[int] | None = None
-) -> Iterator[tuple[dict[str, float], bool]]:
-    """Designs to start from, and whether each may be near an optimum: those of the sample first, by turns.
-
-    After the first of either kind, the one that is farthest from where starts `ended` meanwhile: those beside it would
-    end there too.
-
-    Args:
-        left: rows of the refined designs that are still to be started from; taken from it.
-    """
-    if work.sampler and work.sample:
-        refined, bold = work.sample.refined, work.sample.boldest
-        turns = [(refined, True, [*range(len(refined))] if left is None else left), (bold, False, [*range(len(bold))])]
-        while any(rows for _, _, rows in turns):
-            for seen, near, rows in turns:
-                if rows:
-                    reached = [work.sampler.space.points(work.design_at(c.run.x)) for c in ended if c.feasible]
-                    gaps = [min((float(np.linalg.norm(seen.u[k] - u)) for u in reached), default=0.0) for k in rows]
-                    first = near or len(rows) == len(seen)
-                    yield work.sampler.design(seen, rows.pop(0 if first else int(np.argmax(gaps)))), near
-    yield from ((design, False) for design in designs(work.part, work.options.seed, work.options.starts))
-
-
-def _led(work: Workspace, end: Candidate, left: list[int]) -> int:
-    """How many refined designs a straight way leads from, never up, to where a start ended; they are left no more."""
-    if not (work.sampler and work.sample and left and end.feasible and work.part.objective):
-        return 0
-    seen, near = work.sample.refined.take(np.array(left)), _SAME * (end.nlp.size + abs(end.objective))
-    u = seen.u[:, None] + _WAY[:, None] * (work.sampler.space.points(work.design_at(end.run.x)) - seen.u[:, None])
-    way = work.sampler.look(u.reshape(-1, work.sampler.space.size))
-    worth, violation = (x.reshape(len(left), -1).max(axis=1) for x in (way.worth, way.violation))
-    gain = seen.worth - end.objective
-    down = (worth <= seen.worth + _LEVEL * np.abs(gain) + near) & (violation <= seen.violation) & (gain >= -near)
-    down |= (np.abs(gain) <= near) & (seen.violation == 0)
-    left[:] = [row for row, is_led in zip(left, down.tolist(), strict=True) if not is_led]
-    return int(down.sum())
-
-
 def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[Candidate]:
     """Starts with one parameter of the best end moved to the other end of its range, as long as better ones result.
 
@@ -182,7 +141,7 @@ class Runner:
             if not np.all(np.isfinite(best.run.x)):
                 break
             ended = self._once(self.work.design_at(best.run.x), "near" if again % 2 == 0 else "far")
-            if best.feasible and (not ended.feasible or ended.objective >= best.objective - _SAME):
+            if best.feasible and (not ended.feasible or ended.objective >= best.objective - SAME):
                 break
             best = ended
         best = self._crossed(best)
@@ -202,7 +161,7 @@ class Runner:
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float], start: str) -> Candidate:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
-        if self.work.part.pattern is not None or worth(self.work.part, design) >= best.objective - _SAME:
+        if self.work.part.pattern is not None or worth(self.work.part, design) >= best.objective - SAME:
             return best
         kept = self._once(design, start)
         return kept if kept.feasible and kept.objective < best.objective else best
@@ -218,7 +177,7 @@ class Runner:
             others = (way for way in self.nlp.touchings(x, _MEETS) if _limits(way) != held)
             ends = [self._from(x, way, "near") for way in islice(others, 2 * _WAYS)]
             further = min(ends, key=rank, default=best)
-            if not (further.feasible and further.objective < best.objective - _SAME):
+            if not (further.feasible and further.objective < best.objective - SAME):
                 break
             best = further
         return best
@@ -238,7 +197,7 @@ def rank(candidate: Candidate) -> tuple[bool, float]:
 
 def same(a: float, b: float, size: float = 1.0) -> bool:
     """Whether two objectives, of this size or larger, count as the same optimum."""
-    return abs(a - b) <= _SAME * (size + abs(b))
+    return abs(a - b) <= SAME * (size + abs(b))
 
 
 def distinct(candidates: Sequence[Candidate], known: Sequence[Candidate] = ()) -> list[Candidate]:
@@ -298,7 +257,8 @@ def _settled(work: Workspace, candidates: list[Candidate], left: Sequence[int] =
         return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
     if sampled and failed >= _HOPELESS:  # which takes long; the sample is the judge of what was found
         return True
-    alone = int(np.sum(work.sample.refined.violation[[*left]] == 0)) if work.sample and left else 0
+    refined = work.sample.refined.violation if work.sample else np.empty(0)
+    alone = sum(refined[row] == 0 for row in left if row < refined.size)
     enough = is_enough(len(feasible) + alone, optima(feasible) + alone)
     if sampled:
         wide = work.sample is not None and work.sample.met > NARROW * work.sample.size

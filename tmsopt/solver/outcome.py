@@ -8,6 +8,7 @@ import numpy as np
 
 from tmsopt.checks.bound import bounded, instant_bound
 from tmsopt.checks.recheck import Checked, recheck
+from tmsopt.checks.stored import multiple_roots_exist
 from tmsopt.checks.worst_case import Worst, worst_cases
 from tmsopt.design.advice.remedies import Relaxation
 from tmsopt.design.cases import Case
@@ -24,6 +25,7 @@ from tmsopt.solver.newton import solutions
 from tmsopt.solver.workspace import Candidate, Workspace
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
+_MERGED = 1e-3  # of the objective: what a multiple root that is there for rounding alone may seem to gain
 _ALIKE = 3  # candidates of one objective looked at closely
 _EXACT, _POLISHED = 1e-8, 1e-9  # violation of rows and gradient, one of which a polished end is below
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
@@ -171,6 +173,22 @@ def survivor(work: Workspace, nlp: NLP, candidates: Sequence[Candidate]) -> Tria
         if not trial.checked.violations and point.stationarity <= _STATIONARY and honest(work, trial):
             break
     return kept
+
+
+def attained(work: Workspace, nlp: NLP, candidates: Sequence[Candidate], trial: Trial) -> Trial:
+    """A trial, or the next one, where it is ahead of that only by a multiple root that no design near it has.
+
+    Equations that are all but singular hold to rounding far from where they hold exactly.
+    """
+    best = trial.candidate.objective
+    most = best + _MERGED * (nlp.size + abs(best))
+    ours = [c for c in candidates if c.feasible and (c.nlp.variables, c.nlp.rows) == (nlp.variables, nlp.rows)]
+    worse = [c for c in ours if best < c.objective <= most and not same(c.objective, best, nlp.size)]
+    if not worse or nlp.cases or trial.checked.violations or multiple_roots_exist(work.problem, trial.parameters):
+        return trial
+    other = survivor(work, nlp, worse)
+    fit = other is not None and converged(other) and honest(work, other) and not other.checked.violations
+    return other if other is not None and fit else trial
 
 
 def honest(work: Workspace, trial: Trial) -> bool:

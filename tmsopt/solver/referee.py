@@ -14,7 +14,17 @@ from tmsopt.design.searches import Starts
 from tmsopt.formulation.nlp import NLP
 from tmsopt.solver.basins import Looked
 from tmsopt.solver.multistart import Runner, same
-from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, mass_advice, survivor, unclear
+from tmsopt.solver.outcome import (
+    Finding,
+    Trial,
+    ahead,
+    attained,
+    converged,
+    honest,
+    mass_advice,
+    survivor,
+    unclear,
+)
 from tmsopt.solver.sample import Sample, Sampler
 from tmsopt.solver.workspace import Candidate, Workspace
 
@@ -65,7 +75,8 @@ def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Tria
         return Standing(nlp, candidates, trial)
     standing = _appealed(work, work.sampler, work.sample, Standing(nlp, candidates, trial))
     if standing.trial is not None and standing.held is None:
-        standing = replace(standing, trial=_off_the_edge(work, work.sampler, standing.trial))
+        told = attained(work, standing.nlp, standing.candidates, standing.trial)
+        standing = replace(standing, trial=_off_the_edge(work, work.sampler, told))
     trial = standing.trial
     if standing.held is not None or trial is None or converged(trial) or trial.checked.violations:
         return standing
@@ -152,13 +163,18 @@ def endless(work: Workspace, finding: Finding) -> Finding:
 
     The root that is far away would go on to infinity.
     """
-    sizes = sorted(math.hypot(r.re, r.im) for r in finding.checked.structure.roots)
-    if finding.status != "optimal" or not sizes or sizes[-1] <= _RUNAWAY * sizes[(len(sizes) - 1) // 2]:
+    if finding.status != "optimal" or not runs_away(finding):
         return finding
     if work.problem.objective is None or _held_off(work.problem, finding):
         return finding
     words = f"no best design: it improves towards a singular mass matrix (a0 = 0); {mass_advice(work.problem)}"
     return replace(finding, status="not_converged", without_best=True, notes=(*finding.notes, words))
+
+
+def runs_away(finding: Finding) -> bool:
+    """Whether a root is so far away that a0 is all but 0."""
+    sizes = sorted(math.hypot(r.re, r.im) for r in finding.checked.structure.roots)
+    return bool(sizes) and sizes[-1] > _RUNAWAY * sizes[(len(sizes) - 1) // 2]
 
 
 def _held_off(problem: Problem, finding: Finding) -> bool:

@@ -83,6 +83,11 @@ class Sample:
     singular: bool
 
     @property
+    def leaders(self) -> Looked:
+        """Designs to start from: the refined ones, then the boldest."""
+        return self.refined.joined(self.boldest)
+
+    @property
     def far_off(self) -> bool:
         """Whether all designs stay away from what the limits allow."""
         return self.refined.far_off
@@ -157,14 +162,9 @@ class Sampler:
                 sought = self.nearer(ranked.take(few), _HALF if len(sought) else 1.0).joined(sought)
             sought = sought.take(sought.ranked)
             leaders = sought.take(apart(sought, 2 * _LEADERS))
-        refined = self.refined(leaders)
+        refined = self._with_basins(leaders, drawn) if met >= NARROW * len(drawn) else self.refined(leaders)
         if self.memory:
-            self.memory.keep(refined.u)
-        if met >= NARROW * len(drawn):
-            rows, reach = basins(drawn, *self.space.even(drawn.u))
-            own = [share * reach[:_BASINS, None] for share in _ROUNDS]
-            found = self.refined(drawn.take(rows[:_BASINS]), own, _FEWER)
-            refined = refined.joined(found.take(found.ranked[:_DEEPEST]))
+            self.memory.keep(refined.u[: len(leaders)])
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
         known = drawn.worth[np.isfinite(drawn.worth)]
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
@@ -232,6 +232,18 @@ class Sampler:
             order = np.lexsort((both.worth, both.violation, of))
             kept = both.take(order[np.searchsorted(of[order], rows)])
         return kept
+
+    def _with_basins(self, leaders: Looked, drawn: Looked) -> Looked:
+        """Leaders refined, and after them the best of the basins that the designs drawn show, refined alike."""
+        rows, reach = basins(drawn, *self.space.even(drawn.u))
+        count, start = len(leaders), leaders.joined(drawn.take(rows[:_BASINS]))
+        steps = [
+            np.concatenate([np.full((count, 1, self.space.size), far), share * reach[:_BASINS, None]])
+            for far, share in zip((*REACHES, REACHES[-1]), _ROUNDS, strict=True)
+        ]
+        found = self.refined(start, steps, _FEWER)
+        others = found.take(np.arange(count, len(found)))
+        return found.take(np.arange(count)).joined(others.take(others.ranked[:_DEEPEST]))
 
     def nearer(self, start: Looked, share: float = 1.0) -> Looked:
         """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way.

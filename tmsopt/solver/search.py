@@ -23,7 +23,7 @@ from tmsopt.records import Table
 from tmsopt.solver.basins.crossings import crossing_finding, search_elsewhere
 from tmsopt.solver.basins.exceptional import exceptional
 from tmsopt.solver.basins.plateau import off_plateau, on_plateau
-from tmsopt.solver.multistart import Runner, distinct, further, same, search
+from tmsopt.solver.multistart import Runner, distinct, further, optima, same, search
 from tmsopt.solver.outcome import (
     Finding,
     Trial,
@@ -36,7 +36,7 @@ from tmsopt.solver.outcome import (
     mass_advice,
     survivor,
 )
-from tmsopt.solver.referee import endless, held, ideal, outdone, refereed
+from tmsopt.solver.referee import endless, held, ideal, outdone, refereed, runs_away
 from tmsopt.solver.remedies.changes import relax
 from tmsopt.solver.remedies.needs import irreducible, steady
 from tmsopt.solver.sample import NARROW, Sampler
@@ -180,28 +180,37 @@ def without_any(work: Workspace, tried: int) -> Finding:
     return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
 
 
-def answered(problem: Problem, options: Options, asked: Problem) -> Mapping[str, float] | None:
-    """The optimum of a problem that is solved again: a stable one where the one that was `asked` wants that; or None.
+def answered(problem: Problem, options: Options, asked: Problem, thorough: bool = False) -> Mapping[str, float] | None:
+    """The optimum of a problem that is solved again; {} where it is not stable, though `asked` wants that; or None.
 
     As many starts are enough as a search takes to settle, for none that follow make an optimum worse; where these end
-    at nothing stable, all are made. That a sample sees nothing near ends none: what is just enough is a needle.
+    at nothing stable, all are made, but for a least abscissa that all of them agree on, unless a stable design is known
+    and it is to be `thorough`. That a sample sees nothing near ends none: what is just enough is a needle.
     """
     stable = steady(problem, asked)
     best: Finding | None = None
     for part in workspace(problem, options).parts():
-        finding = None if problem.cases else _settled(part)
-        settled = finding and finding.status == "optimal"
-        if not (settled and finding and not recheck(stable, finding.parameters, finding.cases).violations):
-            finding = explore(part).finding
+        settled = None if problem.cases else _settled(part, stable, thorough)
+        finding = settled or explore(part).finding
         best = finding if finding and (best is None or better(problem, finding, best)) else best
-    if best is None or best.status != "optimal" or recheck(stable, best.parameters, best.cases).violations:
+    if best is None or best.status != "optimal":
         return None
-    return best.parameters
+    return best.parameters if _meets(stable, best) else {}
 
 
-def _settled(part: Workspace) -> Finding | None:
+def _settled(part: Workspace, stable: Problem, thorough: bool) -> Finding | None:
+    """Where few starts end that settle it: at what is stable, or all of them at one least abscissa that is not."""
     nlp = part.formulate(())
-    return found(part, nlp, survivor(part, nlp, search(part, nlp, _SETTLED)), Starts())
+    ended = search(part, nlp, _SETTLED)
+    finding = found(part, nlp, survivor(part, nlp, ended), Starts())
+    agreed = not thorough and bounded(part.part) and all(c.feasible for c in ended) and optima(ended) == 1
+    if finding is None or finding.status != "optimal" or runs_away(finding):
+        return None
+    return finding if agreed or _meets(stable, finding) else None
+
+
+def _meets(problem: Problem, finding: Finding) -> bool:
+    return not recheck(problem, finding.parameters, finding.cases).violations
 
 
 def _reached(work: Workspace, names: Sequence[str]) -> tuple[Mapping[str, float] | None, bool]:

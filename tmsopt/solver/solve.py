@@ -131,7 +131,7 @@ def solved(
         return solution
     try:
         judged = _with_stability(solution, options, family, began)
-        needy, missed = with_need(judged, options, partial(answered, asked=problem))
+        needy, missed = with_need(judged, options, partial(answered, asked=problem, thorough=True))
         words = "a search for the least speed found the stable design from which this one was reached"
         return _led(needy, missed, words, options, family) if missed else needy
     except KeyboardInterrupt:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from benchmarks.judges import FEASIBLE, verdict
+from benchmarks.judges import FEASIBLE, exactly, verdict
 from benchmarks.reports.tables import Asked, median, page, share, table
 from benchmarks.suites.statements.remedies import File, infeasible_files, toml
 from tmsopt import Solution, load, solve
@@ -89,7 +89,10 @@ def _judged(changed: File, file: File) -> str:
         return f"refused: {error}"
     if again.status != "optimal":
         return again.status
-    if (beyond := verdict(again.problem, again.parameters).violation) > FEASIBLE:
+    beyond = verdict(again.problem, again.parameters).violation
+    if beyond > FEASIBLE and not again.problem.cases:  # beside a triple root eigenvalues are 1e-5 off
+        beyond = min(one.violation for one in exactly(again.problem, again.parameters))
+    if beyond > FEASIBLE:
         return f"violates by {beyond:.1e}"
     texts = [*file.get("constraints", {}).values(), *file["objective"].values()]
     about = any(word in str(text) for text in texts for word in _ROOTS)

@@ -5,6 +5,7 @@ import statistics
 import subprocess
 import sys
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 from tqdm import tqdm
@@ -38,25 +39,20 @@ def report(asked: Asked) -> str:
     if not before:
         return page("Beside an earlier version", asked, "TMSOPT_BEFORE names no checkout.")
     ours, theirs = (_started(Path(folder)) for folder in (_HERE, before))
-    rows: list[Sequence[object]] = []
+    pairs: dict[str, list[tuple[float, float]]] = {}
     for suite, count in _PROBLEMS.items():
-        some = range(asked.of(count, 3))
-        pairs = [(_seconds(ours, suite, k), _seconds(theirs, suite, k)) for k in tqdm(some, suite.split()[0])]
-        now, then = (statistics.median(each) for each in zip(*pairs, strict=True))
-        ratio = statistics.median(a / b for a, b in pairs)
-        total = sum(a for a, _ in pairs) / sum(b for _, b in pairs)
-        rows.append(
-            [
-                suite.split()[0].replace("_", " "),
-                len(pairs),
-                duration(then),
-                duration(now),
-                f"{ratio:.2f}",
-                f"{total:.2f}",
-            ]
-        )
+        name = suite.split()[0].replace("_", " ")
+        some = tqdm(range(asked.of(count, 3)), name)
+        pairs[name] = [(_seconds(ours, suite, k), _seconds(theirs, suite, k)) for k in some]
+    rows = [_row(*item) for item in (*pairs.items(), ("all", [*chain(*pairs.values())]))]
     header = ["suite", "problems", "median before", "median now", "median of the ratios", "ratio of the sums"]
     return page("Beside an earlier version", asked, "Processor time, each problem by turns.", table(header, rows))
+
+
+def _row(name: str, pairs: Sequence[tuple[float, float]]) -> list[object]:
+    now, then = (statistics.median(each) for each in zip(*pairs, strict=True))
+    ratio, total = statistics.median(a / b for a, b in pairs), sum(a for a, _ in pairs) / sum(b for _, b in pairs)
+    return [name, len(pairs), duration(then), duration(now), f"{ratio:.2f}", f"{total:.2f}"]
 
 
 def _started(checkout: Path) -> "subprocess.Popen[str]":

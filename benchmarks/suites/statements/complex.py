@@ -303,7 +303,8 @@ def _shown(system: _System, answer: Answer) -> str:
     again = [(complex(z["re"], z["im"]), z["multiplicity"]) for z in data["again"]["eigenfrequencies"]]
     if wrong := _differs(again, truth):
         return f"the saved file: {wrong}"
-    word = "stable" if most < 0 else "marginal" if most == 0 else "gain"
+    on_axis = max(m for z, m in truth if z.imag == most)  # every multiple one of these is defective
+    word = "stable" if most < 0 else "gain" if most > 0 else "growing" if on_axis > 1 else "marginal"
     if data["get"]["kind"] != word:
         return f"the page's kind is {data['get']['kind']}, not {word}"
     if data["again"]["stable"] is not (most < 0):

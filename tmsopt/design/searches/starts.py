@@ -29,7 +29,7 @@ def is_enough(searches: int, optima: int, most: float = _BETTER) -> bool:
 class Starts:
     """How many starts were tried, converged to a feasible point, and ended at the best one.
 
-    A design of a sample counts as a start, if a straight way down leads from it to where another start ended.
+    A design of a sample counts as a start, if a way down leads from it to where another start ended.
 
     Attributes:
         optima: different ones that starts ended at.

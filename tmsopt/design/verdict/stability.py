@@ -124,6 +124,7 @@ def joined(solution: Any) -> dict[str, Any]:
     growing: str = solution.stability.growth
     found: dict[str, Any] = {}
     top = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
+    near = _LINE * max((math.hypot(r.re, r.im) for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
 
     def of(m: MultipleRoot) -> dict[str, Any]:
         grows = {"growth": power_of_t(m.longest)} if growing and m.re == top and m.longest > 1 else {}
@@ -131,7 +132,7 @@ def joined(solution: Any) -> dict[str, Any]:
 
     for name, each in plain(solution, "roots eigenfrequencies").items():
         for entry, root in zip(each, solution.roots, strict=True) if each else ():
-            for meeting in (m for m in solution.meetings if (m.re, m.im) == (root.re, root.im)):
+            for meeting in (m for m in solution.meetings if math.hypot(m.re - root.re, m.im - root.im) <= near):
                 entry.update(of(meeting))
         found |= {name: each} if each or name == "roots" else {}
     first = {n: x for n, x in of(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}

@@ -10,6 +10,10 @@ from tmsopt.report.text import HEIGHT, WIDTH
 KEPT = "\xa0"  # a space where no line is broken
 
 
+_GIVING_WAY = (("warnings", 0), ("limits", 0), ("design", 0), ("limits", 1), ("answer", 0), ("conflict", 0))
+"""Parts that get shorter where there is not room for all, one after the other, to how few lines; 0: their `least`."""
+
+
 @dataclass(frozen=True)
 class Block:
     """A part of the report.
@@ -62,7 +66,7 @@ def fitted(parts: list[Block]) -> list[Block]:
     def height() -> int:
         return 2 + sum(len(wrapped(shown(part).lines)) for part in parts)
 
-    for name in ("warnings", "limits", "design", "answer", "conflict"):
+    for name, fewest in _GIVING_WAY:
         at = next((k for k, p in enumerate(parts) if p.name == name), None)
         if at is None:
             continue
@@ -70,7 +74,7 @@ def fitted(parts: list[Block]) -> list[Block]:
             parts[at] = replace(parts[at], lines=_paired(parts[at].lines))
             cut[name] = len(parts[at].lines)
             continue
-        while height() > HEIGHT and cut[name] > parts[at].least:
+        while height() > HEIGHT and cut[name] > (fewest or parts[at].least):
             cut[name] -= 1
     while height() > HEIGHT and "design" in cut and cut["design"] > 1:
         cut["design"] -= 1

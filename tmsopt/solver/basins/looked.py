@@ -1,6 +1,7 @@
 """Designs as points of the unit cube that were looked at: ranked, told apart, and the basins that they show."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,7 @@ class Looked:
         pairs = ((self.u, other.u), (self.worth, other.worth), (self.violation, other.violation))
         return Looked(*(np.concatenate(pair) for pair in pairs))
 
-    @property
+    @cached_property
     def ranked(self) -> NDArray[np.int_]:
         """Rows by violation, then by worth."""
         return np.lexsort((self.worth, self.violation))

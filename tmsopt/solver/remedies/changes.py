@@ -120,8 +120,11 @@ def _written(
         with suppress(InputError):  # no end of a range is beyond what is physical
             moved = with_limits(problem, text)
             fresh = text not in tried and not _unsettled(problem, moved, text)
-            if fresh and (design := answered(moved, work.options)):
+            design = answered(moved, work.options) if fresh else None
+            if design:
                 return text, design
+            if design is not None:  # found, but not stable: room shows a search nothing that it did not see
+                break
         tried.append(text)
     return {}, {}
 

@@ -30,7 +30,7 @@ _ASKED = 16  # sets of limits that are searched for designs at most
 _ANEW = 3  # times that limits in conflict are sought, where whole searches meet them after all
 
 Answered = Callable[[Problem, Options], Mapping[str, float] | None]
-"""The design that answers a problem where it is solved again, or None; see `search.answered`."""
+"""The design that answers a problem where it is solved again, {} or None; see `search.answered`."""
 
 Reached = Callable[[Sequence[str]], tuple[Mapping[str, float] | None, bool]]
 """A design that meets the constraints of these names, by a search like that of a problem which asks for no others; and

@@ -18,7 +18,8 @@ from tmsopt.formulation.formulate import design_of, formulate
 from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.models import Values
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Runner, same, starting
+from tmsopt.solver.basins.leaders import starting
+from tmsopt.solver.multistart import Runner, same
 from tmsopt.solver.outcome import Trial, survivor
 from tmsopt.solver.sample import Sampler
 from tmsopt.solver.workspace import Candidate, Workspace, workspace
