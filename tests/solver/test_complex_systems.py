@@ -1,6 +1,7 @@
 """Exceptional points of complex matrices beside closed forms: located, proved, traced, counted, split."""
 
 import math
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -272,6 +273,10 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met() -> None:
             value = float(row[1])
             if abs(value - math.sqrt(2)) < 1e-3 and "g" in row[-1].split(", "):
                 assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(row[1].split(".")[1])
+    branch, event = next((b, e) for b in traced.branches for e in b.events if e in near)
+    met = replace(event, parameters={**event.parameters, "g": math.sqrt(2) + 3.8e-10}, residual=6e-11)
+    cells = tmsopt.report.event_rows(replace(branch, events=(met,)), {"g": tmsopt.design.Unit()}, model)[1]
+    assert cells[1] == "1.4142136"  # two digits fewer than met
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from tmsopt.tracing.swallowtail import Swallowtail
 
 _LABEL = 40  # characters of what happens at a point of a front, if not all is wanted
 _DIGITS = 12
-_LOOSE = 1e-10  # mismatch of a coefficient beyond which a point has fewer digits
+_ROUNDING = 1e-14  # mismatch of a coefficient at which a point has them all
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
 
@@ -275,7 +275,7 @@ def event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = 
 
 def _digits(residual: float) -> int:
     """Of a point whose coefficients are met to so much: two less than that, for it may be off by some times more."""
-    return max(math.floor(-math.log10(residual)) - 2, 2) if residual > _LOOSE else _DIGITS
+    return min(max(math.floor(-math.log10(max(residual, _ROUNDING))) - 2, 2), _DIGITS)
 
 
 def _summary(branch: Branch, trace: Trace) -> str:
