@@ -1,7 +1,7 @@
 """Finding one's way: what a model or file is made of, the shape of files for editors, files to start from.
 
 In: a model, a problem, a file, or the name of an example. Out: a `Description`, a JSON Schema, texts of files. Open
-`describe` first: what is said of a model.
+`describing` first: what is said of a model.
 """
 
 import lazy_loader

@@ -1,5 +1,5 @@
 from .conversion import convert as convert, converted_file as converted_file
-from .describe import describe as describe
+from .describing import describe as describe
 from .description import (
     Description as Description, Word as Word, Words as Words, description_text as description_text,
 )
