@@ -380,6 +380,12 @@ TIMES = {"decay_rate": "1/s", "decay_time": "s", "frequency": "Hz"}
 """Quantities of time, of the roots and the unit of rates."""
 
 
+def test_a_decay_without_an_end_warns_of_nothing() -> None:
+    (time,) = (q for q in SI.quantities if q.name == "decay_time")
+    with np.errstate(over="raise", divide="raise"):
+        assert time.value({"w": 1.0, "g": 9.81, "abscissa": np.float64(-1e-310)}) == math.inf
+
+
 def test_the_parameters_of_the_contract() -> None:
     assert NATIVE.names == ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
     assert SI.names == ("w", "v", "g", "lambda_s", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")

@@ -76,7 +76,7 @@ def quotient(a: Any, b: Any) -> Any:
             return flint.arb("nan")
     if is_symbolic(a) or is_symbolic(b):
         return ca.if_else(b == 0, np.nan, a / b)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return chosen(np.equal(b, 0), np.nan, np.divide(a, b))
 
 
