@@ -577,7 +577,7 @@ def test_another_global_solver_is_asked_and_named(slow_plane: Solution, monkeypa
     """Whoever searched, the bound that holds without a search stays, under its own name."""
     monkeypatch.setattr(certifying, "SOLVER", TIMID)
     monkeypatch.setattr(answering, "count", lambda: count(2000))  # one that gives up at once comes to so many turns
-    bound = certify(slow_plane, seconds=3.0).bound  # its process takes one of them to start
+    bound = certify(slow_plane, seconds=8.0).bound  # its process takes one of them to start
     assert (bound.method, bound.value, bound.proven) == ("omega0", slow_plane.bound.value, False)
     assert (bound.solver, bound.nodes > 0) == ("Timid", True)
     report = design_report(replace(slow_plane, bound=bound), full=True)
