@@ -6,10 +6,11 @@ from functools import cached_property
 from typing import Any
 
 import casadi as ca
+import flint
 import numpy as np
 
 from benchmarks.judges.eigenvalues import Roots, eigenvalues, root_values
-from benchmarks.judges.exact import near_roots
+from benchmarks.judges.exact import DIGITS, near_roots
 from benchmarks.judges.text import NOWHERE, difference, evaluated, excess, sides
 from tmsopt import Problem
 from tmsopt.models import Values
@@ -176,19 +177,23 @@ class Exactly:
 
 
 def exactly(problem: Problem, design: Mapping[str, float]) -> Iterator[Exactly]:
-    """Of a design as stored, by roots isolated at 120 digits, and then of the multiple roots that it rounds."""
+    """Of a design as stored, by roots isolated at 120 digits, and then of the multiple roots that it rounds.
+
+    All the rest has those digits too: a square root that is nearly 0 is told from 0.
+    """
     at = Designs(problem)
     x = np.array([float(design[n]) for n in at.names])
+    known = problem.ordered({n: design[n] for n in at.names})
     box = max((max(lo - v, v - hi, 0.0) / max(1.0, abs(v)) for v, lo, hi in zip(x, at.lower, at.upper, strict=True)),
               default=0.0)  # fmt: skip
     try:
         for z in near_roots(problem, design):
-            with np.errstate(all="ignore"):
-                values = at.values(x[:, None])
+            with flint.ctx.workdps(DIGITS):
+                values = Values(problem.model, problem.parameter_set, {n: flint.arb(v) for n, v in known.items()})
                 for name, found in zip(_ROOTS, root_values(z), strict=True):
-                    values.define(name, np.array([found]))
-                worst = max((float(np.max(r.excess(values))) for r in at.rows), default=0.0)
-                value = float(np.max(evaluated(at.objective, values)))
+                    values.define(name, flint.arb(float(found)))
+                worst = max((float(r.excess(values)) for r in at.rows), default=0.0)
+                value = float(evaluated(at.objective, values))
             yield Exactly(value, max(worst, box) if np.isfinite(value) else NOWHERE, z)
     except (ZeroDivisionError, ValueError, OverflowError):
         yield Exactly(float("nan"), NOWHERE, np.array([]))

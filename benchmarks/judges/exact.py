@@ -23,12 +23,14 @@ ROUNDED = 1e-10
 SAME = 1e-8
 """Relative difference up to which two values count as the same."""
 
+DIGITS = 120
+"""Digits of what is called exact: products of five doubles are, and the tangent is right far beyond the answer."""
+
 MET = 1e-9
 """Violation that counts as none, relative to the size of the two sides."""
 
 _ULPS = 4.0
 _NEAR = 0.2  # of the largest root: distance of roots that rounding may have parted
-_DIGITS = 120  # products of five doubles are exact, and the tangent is right far beyond the answer
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.?\d*(?:e[-+]?\d+)?)")
 
 
@@ -52,7 +54,7 @@ def near_roots(problem: Problem, design: Mapping[str, float]) -> Iterator[Roots]
     Raises:
         ZeroDivisionError: where a coefficient does not exist, or the leading one is 0.
     """
-    with flint.ctx.workdps(_DIGITS):
+    with flint.ctx.workdps(DIGITS):
         exact = {n: flint.arb(v) for n, v in problem.ordered({n: design[n] for n in problem.free}).items()}
         a = [flint.arb(c) for c in problem.model.coefficients(exact, problem.parameter_set)]
         if not all(c.is_finite() for c in a) or a[0].contains(0):

@@ -1,6 +1,6 @@
 """Expressions and comparisons as text, evaluated by Python itself: not by the package that is judged."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,14 @@ from tmsopt.records import Array
 NOWHERE = 1e3
 """Abscissa, and violation, of a design where it does not exist."""
 
+
+def _arc(name: str) -> Callable[[Any], Any]:
+    """An inverse function that arrays and balls name differently."""
+    return lambda x: getattr(x, f"a{name}")() if hasattr(x, f"a{name}") else getattr(np, f"arc{name}")(x)
+
+
 _FUNCTIONS: dict[str, Any] = {name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)} | {
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
+    **{f"a{name}": _arc(name) for name in ("sin", "cos", "tan")},
     "min": np.minimum,
     "max": np.maximum,
     "pi": np.pi,
