@@ -337,6 +337,12 @@ def test_three_objectives_on_a_sphere():
     assert found.to_json()["nadir"] == pytest.approx([max(p.objectives[k] for p in found.points) for k in range(3)])
 
 
+def test_a_rounded_tie_does_not_decide_the_order_of_a_front():
+    values = [(1 + 1e-13, 1.0, 3.0), (1.0, 2.0, 2.0), (1 - 1e-13, 3.0, 1.0)]
+    points = [front_data.FrontPoint(each, None, ()) for each in values]
+    assert [p.objectives for p in front_data.efficient(points, [1e-12] * 3)] == values
+
+
 FLAT = {
     "free": {"Fr": (0.5, 1.5), "chi_B": (1.1, 1.9)},
     "fixed": {"chi_H": 1.2, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.3, "mu": 0.1},
