@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers import timid
 from helpers.oracles import polynomial_floats
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, Progress, Solution, certify, load, models, solve
-from tmsopt.branch_and_bound import SCIP, UNDECIDED, Crew, Decision, GlobalSolver, Task
+from tmsopt.branch_and_bound import SCIP, Crew, GlobalSolver
 from tmsopt.cli import every as main
 from tmsopt.design import Band, Bound
 from tmsopt.records import Array
@@ -558,18 +559,7 @@ def test_without_scip_the_error_says_what_to_install(slow_plane: Solution) -> No
         certify(slow_plane)
 
 
-class TimidSolver:
-    """What a second global solver is: it can be anything that decides tasks; this one never does."""
-
-    @staticmethod
-    def prepare() -> None: ...
-
-    @staticmethod
-    def decide(asked: Task) -> Decision:
-        return Decision(UNDECIDED, nodes=7)
-
-
-TIMID = GlobalSolver("Timid", "math", "", 0.0, TimidSolver.prepare, TimidSolver.decide)
+TIMID = GlobalSolver("Timid", "math", "", 0.0, timid.prepare, timid.decide)
 
 
 @pytest.mark.slow

@@ -1,0 +1,12 @@
+"""A second global solver, in a module of its own: its process imports nothing else, so that it soon starts."""
+
+from tmsopt.branch_and_bound.tasks import UNDECIDED, Decision, Task
+
+
+def prepare() -> None:
+    """Nothing to prepare."""
+
+
+def decide(_: Task) -> Decision:
+    """It can be anything that decides tasks; this one never does."""
+    return Decision(UNDECIDED, nodes=7)
