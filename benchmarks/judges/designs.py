@@ -10,7 +10,7 @@ import flint
 import numpy as np
 
 from benchmarks.judges.eigenvalues import Roots, eigenvalues, root_values
-from benchmarks.judges.exact import DIGITS, near_roots
+from benchmarks.judges.exact import DIGITS, near_roots, stored_values
 from benchmarks.judges.text import NOWHERE, difference, evaluated, excess, sides
 from tmsopt import Problem
 from tmsopt.models import Values
@@ -183,13 +183,12 @@ def exactly(problem: Problem, design: Mapping[str, float]) -> Iterator[Exactly]:
     """
     at = Designs(problem)
     x = np.array([float(design[n]) for n in at.names])
-    known = problem.ordered({n: design[n] for n in at.names})
     box = max((max(lo - v, v - hi, 0.0) / max(1.0, abs(v)) for v, lo, hi in zip(x, at.lower, at.upper, strict=True)),
               default=0.0)  # fmt: skip
     try:
         for z in near_roots(problem, design):
             with flint.ctx.workdps(DIGITS):
-                values = Values(problem.model, problem.parameter_set, {n: flint.arb(v) for n, v in known.items()})
+                values = stored_values(problem, design)
                 for name, found in zip(_ROOTS, root_values(z), strict=True):
                     values.define(name, flint.arb(float(found)))
                 worst = max((float(r.excess(values)) for r in at.rows), default=0.0)

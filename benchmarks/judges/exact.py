@@ -14,6 +14,7 @@ from scipy.spatial.distance import pdist, squareform
 from benchmarks.judges.eigenvalues import Roots, root_values
 from benchmarks.judges.system import FLOOR, System
 from tmsopt import Problem
+from tmsopt.models import Values
 from tmsopt.records import Array
 from tmsopt.roots import exact_roots
 
@@ -48,6 +49,12 @@ def confirmed(problem: Problem, design: Mapping[str, float], claimed: float) -> 
     return any(same(claimed, float(near.real.max())) for near in near_roots(problem, design))
 
 
+def stored_values(problem: Problem, design: Mapping[str, float]) -> Values:
+    """Everything but the roots, of the parameters as stored, in balls of the digits that hold at the time."""
+    stored = problem.ordered({n: design[n] for n in problem.free})
+    return Values(problem.model, problem.parameter_set, {n: flint.arb(v) for n, v in stored.items()})
+
+
 def near_roots(problem: Problem, design: Mapping[str, float]) -> Iterator[Roots]:
     """The roots of a design as stored, then of polynomials with multiple roots whose coefficients it rounds.
 
@@ -55,8 +62,7 @@ def near_roots(problem: Problem, design: Mapping[str, float]) -> Iterator[Roots]
         ZeroDivisionError: where a coefficient does not exist, or the leading one is 0.
     """
     with flint.ctx.workdps(DIGITS):
-        exact = {n: flint.arb(v) for n, v in problem.ordered({n: design[n] for n in problem.free}).items()}
-        a = [flint.arb(c) for c in problem.model.coefficients(exact, problem.parameter_set)]
+        a = [flint.arb(c) for c in stored_values(problem, design).coefficients]
         if not all(c.is_finite() for c in a) or a[0].contains(0):
             raise ZeroDivisionError("no roots")
         found = exact_roots(a)

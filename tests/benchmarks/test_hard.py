@@ -44,6 +44,14 @@ def test_the_judge_agrees_with_the_closed_form_beside_and_at_the_double_root() -
     assert values[1] == pytest.approx(-1, abs=1e-13)
 
 
+def test_the_judge_of_a_stored_design_knows_a_small_value_that_doubles_lose() -> None:
+    """√((x + 1)² − 1 − 2x) = |x|, and its inverse tangent: 0 in doubles at x = 2e-9."""
+    cancelled = "sqrt((x + 1)**2 - 1 - 2*x)"
+    problem = replace(DAMPED, minimize=f"atan({cancelled})", constraints={"c": f"{cancelled} <= 1e-9"})
+    (found,) = exactly(problem, {"x": 2e-9})
+    assert (found.value, found.violation) == pytest.approx((2e-9, 1e-9), rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("problem", "best"),
     [
