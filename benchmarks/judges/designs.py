@@ -177,10 +177,7 @@ class Exactly:
 
 
 def exactly(problem: Problem, design: Mapping[str, float]) -> Iterator[Exactly]:
-    """Of a design as stored, by roots isolated at 120 digits, and then of the multiple roots that it rounds.
-
-    All the rest has those digits too: a square root that is nearly 0 is told from 0.
-    """
+    """Of a design as stored, by isolated roots and quantities of 120 digits; then of the multiple roots it rounds."""
     at = Designs(problem)
     x = np.array([float(design[n]) for n in at.names])
     box = max((max(lo - v, v - hi, 0.0) / max(1.0, abs(v)) for v, lo, hi in zip(x, at.lower, at.upper, strict=True)),

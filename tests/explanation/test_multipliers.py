@@ -16,6 +16,7 @@ from helpers.structures import FORMS, native_60, pair, times
 from mpmath import mp
 
 import tmsopt
+from tmsopt.models import from_coefficients
 
 STEP = mp.mpf(10) ** -20  # of central differences at 80 digits: slopes right to 38
 
@@ -117,3 +118,20 @@ def test_a_limit_on_a_quantity_at_its_kink_has_one_gain() -> None:
     gained = (design.value - tmsopt.solve(looser).value) / step
     assert gained == pytest.approx(design.active["no_ballast_at_the_rear"], rel=2e-3)
     assert design.quantities["chi_T"] == pytest.approx(1, abs=1e-14)  # the limit is met, not approached
+
+
+def test_a_limit_that_one_design_alone_meets_buys_what_that_design_may_move() -> None:
+    """s² + 2xs + 1: abscissa −x up to x = 1, and more beyond; the least x with abscissa ≤ −1 + t is 1 − t."""
+    oscillator, edge = from_coefficients([1, "2*x", 1]), {"c": "abscissa <= -1"}
+    design = tmsopt.solve(tmsopt.Problem(oscillator, free={"x": (0, 5)}, minimize="x", constraints=edge))
+    assert design.active == pytest.approx({"c": 1}, abs=1e-6)
+
+
+def test_limits_that_say_the_same_buy_nothing_alone() -> None:
+    """Of x ≥ 1, 2x ≥ 2 and, at y = 0, x + y ≥ 1 any two remain when one is moved."""
+    limits = {"c": "x >= 1", "d": "2*x >= 2", "e": "x + y >= 1"}
+    box = {"x": (0, 5), "y": (0, 5)}
+    oscillator = from_coefficients([1, "2*x", "1 + y"])
+    design = tmsopt.solve(tmsopt.Problem(oscillator, free=box, minimize="x + 0.1*y", constraints=limits))
+    assert design.parameters == pytest.approx({"x": 1, "y": 0}, abs=1e-9)
+    assert design.active == pytest.approx(dict.fromkeys([*limits, "y.min"], 0), abs=1e-9)

@@ -175,3 +175,11 @@ def test_the_least_speed_of_a_pattern_is_told_by_whichever_name(name: str) -> No
     assert need is not None
     assert need.parameter == "Fr"
     assert need.value == pytest.approx(float(tmsopt.laws.epset(zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.38)), rel=1e-6)
+
+
+def test_a_limit_that_is_moved_by_its_seventh_digit_is_shown_as_it_is() -> None:
+    """s² + 2xs + 1 comes to −1 and no further."""
+    oscillator = tmsopt.models.from_coefficients([1, "2*x", 1])
+    asked = tmsopt.Problem(oscillator, free={"x": (0, 5)}, minimize="x", constraints={"c": "abscissa <= -1.000001"})
+    lines = infeasible_lines(tmsopt.solve(asked, throw=False))
+    assert "smallest change found: abscissa <= -1 instead of -1.000001 (c)" in lines

@@ -5,7 +5,7 @@ Newton solves the optimality conditions of the active set that IPOPT found.
 
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -33,6 +33,7 @@ _SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM
 _STEPS = 12
 _STALLED = 1e-14  # relative step of Newton's method, below which it ends once the steps no longer shrink
 _STATIONARY = 1e-9
+_DEPENDENT = 1e-9  # singular value of gradients of length 1 below which limits are dependent
 _SINGULAR = 1e11  # size of a solution, for a right side of size 1, that betrays a singular matrix
 _ROUNDINGS = 32 * float(np.finfo(float).eps)  # shifts of high degrees are sums of sums
 _ACTIVE = 1e-5  # slack below which a bound may be active although its multiplier is nearly 0
@@ -132,6 +133,43 @@ def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
             return _polished(_Conditions(expand, limits.settings, *ends), run)
 
     return polish
+
+
+def gains(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
+    """What relaxing some limits at once buys to first order: limits → the sum of their multipliers.
+
+    Where limits are dependent, many multipliers explain the gradient; it is the least sum that they can have.
+
+    Returns:
+        Takes indices of inequalities: of rows, and beyond them of variables.
+    """
+    own = np.concatenate([point.row_multipliers, point.bound_multipliers])
+    held = np.abs(own) > _STATIONARY * (1 + np.abs(own).max(initial=0.0))
+    _, slope, rows, jacobian = (
+        part.full() for name in ("grad_f", "jac_g") for part in nlp.derived[1][name](point.x, nlp.settings)
+    )
+    columns = np.hstack([jacobian.T, np.eye(len(point.x))])[:, held]
+    lengths = np.linalg.norm(columns, axis=0)
+    known = np.all(np.isfinite(lengths) & (lengths > 0))
+    dependent = known and np.linalg.matrix_rank(columns / lengths, tol=_DEPENDENT) < len(lengths)
+    lower, upper = np.array([*nlp.row_lower, *nlp.lower]), np.array([*nlp.row_upper, *nlp.upper])
+    value = np.concatenate([rows.ravel(), point.x])
+    signs = np.where(value - lower <= upper - value, -1.0, 1.0)  # of multipliers at a lower and at an upper limit
+    free = (lower == upper)[held]
+
+    def gain(limits: Sequence[int]) -> float:
+        if dependent:
+            from scipy.optimize import linprog  # a quarter of a second, paid only where multipliers are in question
+
+            asked = np.isin(np.arange(len(own)), limits)[held] * signs[held]
+            least = np.where(free | (signs[held] < 0), -np.inf, 0.0).tolist()
+            most = np.where(free | (signs[held] > 0), np.inf, 0.0).tolist()
+            found = linprog(asked, A_eq=columns, b_eq=-slope.ravel(), bounds=list(zip(least, most, strict=True)))
+            if found.success and found.fun is not None:
+                return float(found.fun)
+        return float(np.abs(own[limits]).sum())
+
+    return gain
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.searches import Starts
 from tmsopt.design.solution import OtherBranch
 from tmsopt.formulation.formulate import abscissa, design_of, matching
-from tmsopt.formulation.ipopt import Point
+from tmsopt.formulation.ipopt import Point, gains
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs
 from tmsopt.records import Array, Table
@@ -255,11 +255,16 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
     active: dict[str, float] = {}
     if problem.objective is None:
         return active
-    sign = problem.sign
+    sign, gain = problem.sign, gains(nlp, point)
     rows = zip(nlp.rows, point.row_multipliers.tolist(), nlp.row_lower, nlp.row_upper, strict=True)
-    for row, multiplier, lower, upper in rows:
+    inequalities: dict[str, list[int]] = {}
+    for k, (row, multiplier, lower, upper) in enumerate(rows):
         if row in problem.constraints and abs(multiplier) > _MULTIPLIER:
-            active[row] = active.get(row, 0.0) + (-sign * multiplier if lower == upper else abs(multiplier))
+            if lower == upper:
+                active[row] = active.get(row, 0.0) - sign * multiplier
+            else:
+                inequalities.setdefault(row, []).append(k)
+    active |= {name: gain(limits) for name, limits in inequalities.items()}
     of = problem.parameter_set
     for k, name in enumerate(problem.free):
         multiplier, x = float(point.bound_multipliers[k]), float(point.x[k])
@@ -268,7 +273,8 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
         at_end = min(abs(x - e) for e in ends) <= apart  # not where two sides of the box meet
         if abs(multiplier) > _MULTIPLIER and at_end:
             slope = 1 + x * x if of[name].tangent else 1.0  # d tan λ / dλ
-            active[f"{name}.{'max' if multiplier > 0 else 'min'}"] = abs(multiplier) * slope
+            end = "max" if abs(x - ends[1]) < abs(x - ends[0]) else "min"
+            active[f"{name}.{end}"] = gain([len(nlp.rows) + k]) * slope
     return active
 
 

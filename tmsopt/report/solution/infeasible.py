@@ -14,6 +14,7 @@ from tmsopt.design.unit_system import dimension_of, limit_text
 from tmsopt.records import Table
 
 _SIGN = re.compile(r"<=|>=|==")
+_AS_WRITTEN = 12  # digits: of a limit as it is, beside one that may differ from it in the sixth
 _OTHER = {"a0": "a mass matrix that is not singular (a0 = 0)", "coefficients": "coefficients that have values"}
 
 
@@ -115,7 +116,8 @@ def _needed(problem: Problem, bound: str, new: str) -> str:
     """What is needed of a parameter that its range does not allow."""
     name, end = bound.rsplit(".", 1)
     word, other = ("at least", "at most") if end == "max" else ("at most", "at least")
-    return f"{name} {word} {new} ({other} {unit_of(problem, bound).show(problem.free[name][end == 'max'])} is allowed)"
+    allowed = unit_of(problem, bound).show(problem.free[name][end == "max"], _AS_WRITTEN)
+    return f"{name} {word} {new} ({other} {allowed} is allowed)"
 
 
 def _nearest(solution: Solution, name: str) -> str:
@@ -142,10 +144,10 @@ def _changed(problem: Problem, name: str, new: str) -> str:
     """A limit as it is to be written, and the number that it has now."""
     if _end(problem, name):
         parameter, end = name.rsplit(".", 1)
-        old = unit_of(problem, name).number(problem.free[parameter][end == "max"])
+        old = unit_of(problem, name).number(problem.free[parameter][end == "max"], _AS_WRITTEN)
         return f"{parameter} {'up' if end == 'max' else 'down'} to {new} instead of {old}"
     limit = limit_of(problem.constraints[name])
-    return f"{new}{'' if limit is None else f' instead of {limit:.5g}'} ({_in_unit(problem, name)})"
+    return f"{new}{'' if limit is None else f' instead of {limit:.{_AS_WRITTEN}g}'} ({_in_unit(problem, name)})"
 
 
 def _in_unit(problem: Problem, name: str) -> str:
