@@ -90,6 +90,15 @@ def test_both_exchanged_ep3_of_three_masses() -> None:
     assert {s.structure for s in found} == {"CEP3"}
 
 
+def test_two_solutions_close_to_each_other_are_not_told_to_more_digits_than_hold() -> None:
+    """(s + 1)² + (y − 1/2) (y − 0.5000001): rounding of the 1 moves y by 1e-9, for the slope is 1e-7."""
+    y = ca.SX.sym("y")
+    model = from_coefficients([1, 2, 1 + (y - 0.5) * (y - 0.5000001)])
+    found = tmsopt.solve_all(tmsopt.Problem(model, free={"y": (0, 1)}, locate="EP2"), seconds=0)
+    for solution, errors, true in zip(found.solutions, found.errors, (0.5, 0.5000001), strict=True):
+        assert abs(solution.parameters["y"] - true) <= errors["y"] < 1e-7
+
+
 def test_coverage_says_how_much_was_looked_at() -> None:
     """w (n − 1)/(n − w − 2) solutions expected for w found in n hits (Boender and Rinnooy Kan 1987)."""
     coverage = tmsopt.solve_all(oscillators(0.3, 1.2), seconds=0).coverage

@@ -88,12 +88,14 @@ def taken(system: ca.Function, x: Array) -> Zero:
 def error(system: ca.Function, x: Array) -> Array:
     """How far each variable of a solution may be off: by what is left of the equations, and by their own rounding.
 
-    The rounding is seen where the solution is moved by units in the last place, beside what slopes say.
+    The rounding is seen where the solution is moved by units in the last place, beside what slopes say; that of sums
+    that swallow a small term is not, so one unit of the terms is counted besides.
     """
     value, jacobian = (np.array(part) for part in system(x))
     moves = np.random.default_rng(0).choice([-_ULPS, _ULPS], (_MOVES, len(x))) * np.finfo(float).eps * np.abs(x)
     noise = [np.abs(np.array(system(x + d)[0]) - value - jacobian @ d[:, None]) for d in moves]
-    left = np.abs(value) + 2 * np.max(noise, axis=0)
+    terms = np.finfo(float).eps * np.abs(jacobian) @ np.abs(x)[:, None]
+    left = np.abs(value) + 2 * np.max(noise, axis=0) + terms
     off = np.abs(np.linalg.pinv(jacobian)) @ left
     return np.asarray(off.ravel() + np.finfo(float).eps * np.abs(x))
 
