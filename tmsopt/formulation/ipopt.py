@@ -138,7 +138,8 @@ def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
 def gains(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
     """What relaxing some limits at once buys to first order: limits → the sum of their multipliers.
 
-    Where limits are dependent, many multipliers explain the gradient; it is the least sum that they can have.
+    Where limits are dependent, many multipliers explain the gradient; it is the least sum that they can have (Gauvin
+    and Dubeau, 1982).
 
     Returns:
         Takes indices of inequalities: of rows, and beyond them of variables.
