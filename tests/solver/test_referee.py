@@ -276,3 +276,11 @@ def test_long_work_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     beyond = problem([1, x, 1], WIDE, ("x >= 10",))
     assert tmsopt.solve(beyond, throw=False, progress=told.append).status == "infeasible"
     assert any(1 <= t.done <= t.most for t in told if t.what.startswith("searching for the least that limits must"))
+
+
+@pytest.mark.parametrize("coefficients", [[1, "c", 0], ["m", "c", 0]])
+def test_a_root_that_is_0_in_every_design_is_no_reason_to_see_another_run_away(coefficients) -> None:
+    """m s² + c s: roots 0 and −c/m, so that every design of positive c is as good as any."""
+    free = {"c": (0.1, 3)} | ({"m": (0.5, 2)} if "m" in coefficients else {})
+    design = tmsopt.solve(problem(coefficients, free))
+    assert (design.status, design.value, design.without_best) == ("optimal", 0, False)

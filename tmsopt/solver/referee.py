@@ -172,24 +172,25 @@ def endless(work: Workspace, finding: Finding) -> Finding:
 
 
 def runs_away(finding: Finding) -> bool:
-    """Whether a root is so far away that a0 is all but 0."""
-    sizes = sorted(math.hypot(r.re, r.im) for r in finding.checked.structure.roots)
+    """Whether a root is so far away from others that a0 is all but 0; from those that are 0 any other is."""
+    every = (math.hypot(r.re, r.im) for r in finding.checked.structure.roots)
+    sizes = sorted(size for size in every if size)
     return bool(sizes) and sizes[-1] > _RUNAWAY * sizes[(len(sizes) - 1) // 2]
 
 
 def _held_off(problem: Problem, finding: Finding) -> bool:
-    """Whether a limit that binds is about a parameter that a0 depends on."""
+    """Whether no parameter moves a0, or a limit that binds is about one that does."""
     about: set[str] = set()
     for name in finding.active:
         condition = problem.conditions.get(name)
         about |= set(condition.names) if condition else {name.rpartition(".")[0]}
     own = float(problem.values(finding.parameters).coefficients[0])
+    moving = set[str]()
     for name, (low, high) in problem.free.items():
-        step = _SHARE * (high - low)
-        moved = {**finding.parameters, name: finding.parameters[name] + step}
-        if name in about and float(problem.values(moved).coefficients[0]) != own:
-            return True
-    return bool(about - set(problem.free))  # a limit on a quantity, which may depend on all of them
+        moved = {**finding.parameters, name: finding.parameters[name] + _SHARE * (high - low)}
+        if float(problem.values(moved).coefficients[0]) != own:
+            moving.add(name)
+    return not moving or bool(about & moving or about - set(problem.free))  # of a quantity, which may depend on all
 
 
 def outdone(work: Workspace, finding: Finding) -> Finding:
