@@ -1,9 +1,8 @@
-"""Rounded designs are judged at once by arrays; here one by one, from exact roots and doubles."""
+"""Rounded designs beside the same by exact roots of decimals, worked out one by one."""
 
 import math
 from dataclasses import replace
 from fractions import Fraction
-from importlib import import_module
 
 import flint
 import pytest
@@ -15,7 +14,6 @@ from tmsopt.design import unit_of
 from tmsopt.explanation import rounded, rounded_designs
 from tmsopt.roots import exact_roots
 
-judge = import_module("tmsopt.checks.judge")
 QUARTIC = models.from_coefficients(["1", "a", "b", "c", "d"], name="quartic")
 BOX = {"a": (1.0, 9.0), "b": (1.0, 9.0), "c": (1.0, 9.0), "d": (0.5, 3.0)}
 
@@ -117,22 +115,6 @@ def test_at_once_they_are_those_of_one_by_one(solution):
     if solution.problem.model is QUARTIC:  # numeric roots beside this one are 1e-4 off
         assert [(row.realised, row.damping_ratio) for row in together] == [(-1.0, 1.0)] * 4
         assert not any(row.violations for row in together)
-
-
-def test_only_multiple_roots_are_isolated_one_by_one(monkeypatch):
-    isolated = []
-
-    def counted(problem, design):
-        isolated.append(design)
-        return real(problem, design)
-
-    real = judge.realised_roots
-    monkeypatch.setattr(judge, "realised_roots", counted)
-    for name in ("tms with limits", "wheels", "band"):
-        rounded_designs(tmsopt.solve(PROBLEMS[name]))
-        assert not isolated
-    rounded_designs(tmsopt.solve(PROBLEMS["whole numbers with EP4"]))
-    assert len(isolated) >= 4
 
 
 def test_a_limit_is_violated_by_as_much_as_in_the_recheck():

@@ -13,4 +13,5 @@ from .intervals import (
 )
 from .krawczyk import Refused as Refused, enclosed as enclosed, refined as refined
 from .operations import ARRAYS as ARRAYS, BALLS as BALLS
+from .rounding import Bounded as Bounded, as_bounded as as_bounded
 from .walk import NotAccepted as NotAccepted, operation_name as operation_name, steps as steps, walk as walk

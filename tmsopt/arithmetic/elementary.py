@@ -1,8 +1,8 @@
 """Elementary functions of whatever number a formula is given: floats, arrays, CasADi expressions, balls.
 
 A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), a power series of
-these (`flint.arb_series`), or an array of intervals (`Twofold`). A value that does not exist, or that the balls are too
-wide to tell, is a ball nan.
+these (`flint.arb_series`), or an array of numbers with bounds of their errors (`rounding.Bounded`). A value that does
+not exist, or that the balls are too wide to tell, is a ball nan.
 """
 
 import math
@@ -13,8 +13,8 @@ import casadi as ca
 import flint
 import numpy as np
 
+from tmsopt.arithmetic import rounding
 from tmsopt.arithmetic.formal import Formal
-from tmsopt.arithmetic.twofold import Twofold
 
 DIGITS = 60
 
@@ -105,7 +105,7 @@ def is_symbolic(x: Any) -> bool:
 
 def is_ball(x: Any) -> bool:
     """Whether x is a number of ball arithmetic, exact fractions and formulas of these among them."""
-    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal | Twofold)
+    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal | rounding.Bounded)
 
 
 def exact(x: Any) -> Any:
@@ -134,9 +134,9 @@ _FARTHEST = 2**20  # exponent of two of a fraction made of a ball
 
 def _chosen(a: Any, b: Any, sign: int) -> Any:
     """(a + b + sign |a − b|)/2, and exactly one of the two where it is certain which."""
+    if isinstance(a, rounding.Bounded) or isinstance(b, rounding.Bounded):
+        return sign * rounding.greater(sign * a, sign * b)
     difference = a - b
-    if isinstance(difference, Twofold):
-        return difference.chosen(sign, a, b)
     constant = difference[0] if isinstance(difference, flint.arb_series) else difference
     if sign * constant >= 0:
         return a

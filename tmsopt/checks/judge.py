@@ -1,32 +1,34 @@
-"""Many designs of one problem at once, in which nothing is free: what `recheck` and `certified` say of each.
+"""Many designs of one problem at once, in which nothing is free: what `recheck` and `certified` say of each, by arrays.
 
-The same doubles, by arrays of numbers with twice the digits and error bounds. What these leave in doubt is left to
-them: a nearly multiple root, a limit missed by no more than tolerance, a coefficient that does not exist.
+Double precision with bounds of its error. What these leave in doubt is left to them: a nearly multiple root, a limit
+missed by no more than tolerance, a coefficient that does not exist.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tmsopt import laws
-from tmsopt.arithmetic.twofold import Twofold, of_balls, twofold
+from tmsopt.arithmetic.rounding import Bounded, as_bounded
 from tmsopt.checks.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.checks.law_rows import SAME_LAW
-from tmsopt.checks.recheck import FEASIBLE, realised_roots
+from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
 from tmsopt.design.validate import SMALLEST
 from tmsopt.models import Values, tms
 from tmsopt.records import Array, Truth
-from tmsopt.roots import Root, is_stable
-from tmsopt.roots.isolated import Motions, motions
+from tmsopt.roots import is_stable
+from tmsopt.roots.discs import Motions, find_motions
 
 BLOCK = 8192
 """Designs at once: their numbers stay in the cache. No bit of an answer depends on it."""
+
+KNOWN = 5e-10
+"""Share of its size within which a number is known, or its design is left to the recheck: numbers are equal to 1e-9."""
 
 _UNIT = 2.0**-53  # relative rounding of a parameter
 _DOUBT = 2.0  # tolerances within which a limit is left to the recheck
@@ -81,50 +83,20 @@ def verdicts(problem: Problem, columns: Mapping[str, Array], reports: Sequence[s
         return None
 
 
-def realised(problem: Problem, designs: Sequence[Mapping[str, Any]]) -> tuple[Array, Array, Array]:
-    """Abscissa, damping ratio and greatest angular frequency of designs exactly as they are, nan where there is none.
-
-    By arrays; where these leave one in doubt, by roots isolated in ball arithmetic, one design after the other.
-
-    Args:
-        designs: each with a double or a ball for every parameter.
-    """
-    m, of = len(designs), problem.parameter_set
-    found, certain = np.full((3, m), np.nan), np.zeros(m, dtype=bool)
-    with suppress(Exception), np.errstate(all="ignore"):  # as in `verdicts`
-        columns = {n: of_balls([design[n] for design in designs]) for n in of.names}
-        coefficients = [_full(c, m) for c in problem.model.coefficients(columns, of)]
-        seen = motions(coefficients, [np.zeros(m)] * len(coefficients), 0.0)
-        (found[0], sure), (found[1], known) = seen.abscissa.nearest(), seen.damping_ratio.nearest()
-        found[2], certain = seen.frequency, seen.simple & sure & known
-    for k in np.flatnonzero(~certain).tolist():
-        found[:, k] = _motion_of(realised_roots(problem, designs[k]), problem.model.degree)
-    return found[0], found[1], found[2]
-
-
-def _motion_of(roots: Sequence[Root], degree: int) -> tuple[float, float, float]:
-    """The same three of given roots; of those that are fewer than the degree, one at infinity, the abscissa alone."""
-    if sum(root.multiplicity for root in roots) < degree:
-        return max((root.re for root in roots), default=np.nan), np.nan, np.nan
-    ratios = (-root.re / (math.hypot(root.re, root.im) or 1.0) for root in roots)
-    return roots[0].re, min(ratios) + 0.0, max(abs(root.im) for root in roots)
-
-
 def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
     model, of = problem.model, problem.parameter_set
     given = {n: np.float64(v) for n, v in problem.ordered({}).items()} | dict(columns)
     m = len(next(iter(columns.values())))
-    wide = Values(model, of, {n: Twofold(x) for n, x in given.items()})
-    off = model.coefficients({n: Twofold(x, 0.0, np.abs(x) * _UNIT) for n, x in given.items()}, of)
-    coefficients = [_full(c, m) for c in wide.coefficients]
-    found = motions(coefficients, [_full(c, m).off for c in off], STRUCTURE_TOLERANCE)
+    wide = Values(model, of, {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()})
+    coefficients = [_spread(c, m) for c in wide.coefficients]
+    found = find_motions(coefficients, STRUCTURE_TOLERANCE)
     certain = found.simple & _possible(problem, given)
 
     def settled(number: Any) -> Array:
         nonlocal certain
-        double, sure = _full(number, m).nearest()
-        certain = certain & sure
-        return double
+        spread = _spread(number, m)
+        certain = certain & (spread.holds(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
+        return np.asarray(spread.value)
 
     known = {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
     doubles = {name: settled(number) for name, number in known.items()}
@@ -150,10 +122,10 @@ def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[st
     )  # fmt: skip
 
 
-def _full(number: Any, m: int) -> Twofold:
+def _spread(number: Any, m: int) -> Bounded:
     """One number of each design."""
-    wide = twofold(number)
-    return Twofold(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.high, wide.low, wide.off)))
+    wide = as_bounded(number)
+    return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.value, wide.error)))
 
 
 def _column(number: Any, m: int) -> Array:
@@ -190,9 +162,7 @@ def _violations(problem: Problem, values: Values, found: Motions) -> tuple[dict[
     return amounts, doubt
 
 
-def _bounds(
-    problem: Problem, coefficients: Sequence[Twofold], settled: Callable[[Twofold], Array]
-) -> tuple[Array, Truth]:
+def _bounds(problem: Problem, coefficients: Sequence[Bounded], settled: Callable[[Any], Array]) -> tuple[Array, Truth]:
     """The bound of `instant_bound` on the abscissa of each design, and where it is one by relations.
 
     Coefficients that do not vary have relations of two: with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and with aₙ.
@@ -202,7 +172,7 @@ def _bounds(
     """
     model, of, n = problem.model, problem.parameter_set, problem.model.degree
     quotients = settled(abs(coefficients[-1] / coefficients[0]))
-    known = np.array([-(q ** (1 / n)) * (1 + ROUNDING) for q in quotients.tolist()])
+    known = -(quotients ** (1 / n)) * (1 + ROUNDING)
     if any(p.tangent for p in of.parameters) or not is_rational(model, of):
         return known, np.zeros(len(known), dtype=bool)
     least = np.full(len(known), np.inf)
@@ -210,14 +180,15 @@ def _bounds(
         up, down = coefficients[j] / coefficients[0] / math.comb(n, j), coefficients[n] / coefficients[j]
         for power, ratio, linear in ((j, up, j == 1), (n - j, down * math.comb(n, j), n == 1)):
             if power:
-                zero = settled(ratio.root(power))
+                root = ratio.root(power)
+                zero = settled(root) + root.error
                 least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is one of a derivative
     other = np.nextafter(-least, -np.inf)
     return np.maximum(other, known), other > known
 
 
 def _laws(
-    wide: Values, values: Values, coefficients: Sequence[Twofold], feasible: Truth, settled: Callable[[Any], Array]
+    wide: Values, values: Values, coefficients: Sequence[Bounded], feasible: Truth, settled: Callable[[Any], Array]
 ) -> dict[str, Array]:
     """Relative residual of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
     m = len(feasible)
@@ -225,14 +196,14 @@ def _laws(
     p = {n: settled(wide[n]) for n in names}
     shape = {n: p[n] for n in names[1:]}
     heights, tilt = {k: p[k] for k in ("zeta_B", "zeta_H")}, {"lambda_s": p["lambda_s"]}
-    number = _full(wide["Fr_c"], m)
-    exists = np.isfinite(number.high)
-    critical = np.where(exists, settled(number.where(exists, Twofold(np.ones(m)))), np.nan)
+    number = _spread(wide["Fr_c"], m)
+    exists = np.isfinite(number.value)
+    critical = np.where(exists, settled(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)
 
     def relative(numeric: Any, law: Any, applies: Any) -> Array:
         law = _column(law, m)
         residual = (numeric - law) / np.where(law == 0, 1.0, np.abs(law))
-        settled(Twofold(np.where(feasible & applies, residual, 0.0)))  # a law without a value
+        settled(np.where(feasible & applies, residual, 0.0))  # a law without a value
         return np.where(feasible & applies, residual, np.nan)
 
     stable = is_stable(np.stack([settled(c) for c in coefficients], axis=-1))

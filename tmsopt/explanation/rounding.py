@@ -11,8 +11,7 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.checks.judge import realised
-from tmsopt.checks.recheck import FEASIBLE, is_violated
+from tmsopt.checks.recheck import FEASIBLE, is_violated, realised_roots
 from tmsopt.checks.worst_case import peaks
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
@@ -85,7 +84,7 @@ def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) ->
         nominal = [{**solution.parameters, **{n: _exact(x, units[n]) for n, x in row.items()}} for row in written]
         each = [(k, case.applied(nominal[k])) for k, cases in enumerate(_cases(solution, nominal)) for case in cases]
         designs, owner = [design for _, design in each], np.array([k for k, _ in each])
-        motion = realised(problem, designs)
+        motion = np.array([_motion(problem, design) for design in designs]).T
     whose = np.concatenate([np.arange(m), owner])
     with np.errstate(all="ignore"):  # what has no value is nan or inf
         values = values_of(problem, _doubles([*nominal, *designs]), whose.shape)
@@ -103,6 +102,15 @@ def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) ->
         loss = abscissa - solution.abscissa
         found.append(Rounded(digits, shown, abscissa, loss, ratio, float(objective[k]), Table(violated[k])))
     return tuple(found)
+
+
+def _motion(problem: Problem, design: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Abscissa, damping ratio and greatest angular frequency of a design exactly as it is; nan where there is none."""
+    roots = realised_roots(problem, design)
+    if sum(root.multiplicity for root in roots) < problem.model.degree:  # one is at infinity
+        return max((root.re for root in roots), default=math.nan), math.nan, math.nan
+    ratios = (-root.re / (math.hypot(root.re, root.im) or 1.0) for root in roots)
+    return roots[0].re, min(ratios) + 0.0, max(abs(root.im) for root in roots)
 
 
 def worst(alone: Mapping[str, Rounded]) -> str:

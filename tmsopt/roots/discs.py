@@ -1,0 +1,99 @@
+"""Roots of many polynomials at once in double precision, each in a disc that holds the true one.
+
+Numeric roots have a backward error of 1e-13, so each true root lies in a disc that this and its distance from the
+others give (Smith, J. ACM 17, 137, 1970).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tmsopt.arithmetic.rounding import Bounded
+from tmsopt.records import Array, Complex, Truth
+from tmsopt.roots.numeric import roots
+from tmsopt.roots.quartics.quartic import quartic_factors
+
+_BACKWARD = 2e-13  # of numeric roots, twice what they promise
+_COVERED = 18.0  # roundings that count as none when structures are decided
+_FLOOR = 1e-3  # of the median root: the size that a smaller one counts as there
+_LARGEST = 1e40  # relative to the leading coefficient: beyond it a root may be no double
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Of each polynomial.
+
+    Attributes:
+        abscissa, damping_ratio: of the roots.
+        frequency: greatest |Im s|.
+        oscillates: whether a pair is rightmost.
+        scatter: how far numeric roots may be off.
+        simple: whether all this is certain, and no polynomial within the tolerance has a multiple root, or other roots
+            beside the rightmost one or pair.
+    """
+
+    abscissa: Bounded
+    damping_ratio: Bounded
+    frequency: Array
+    oscillates: Truth
+    scatter: Array
+    simple: Truth
+
+
+def find_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motions:
+    """Abscissa and damping ratio of polynomials, coefficients descending, each of shape (m,).
+
+    Args:
+        tolerance: relative change of a coefficient within which roots count as multiple.
+    """
+    a, off = (np.stack([getattr(c, part) for c in coefficients]) for part in ("value", "error"))
+    n = len(a) - 1
+    fit = np.isfinite(a).all(axis=0) & np.isfinite(off).all(axis=0)
+    fit &= (np.abs(a[0]) > 2 * off[0]) & (np.abs(a[0]) * _LARGEST > np.abs(a).max(axis=0))
+    z = _numeric(np.where(fit, a, (np.arange(n + 1) % n == 0)[:, None] * 1.0))
+    size = np.abs(z)
+    reach = np.maximum(size, _FLOOR * np.median(size, axis=0))
+    product = np.ones_like(size)
+    for i in range(n):
+        for j in range(i + 1, n):
+            apart = np.abs(z[i] - z[j])
+            product[i] *= apart
+            product[j] *= apart
+    moved = np.stack([np.prod(size[i] + reach, axis=0) for i in range(n)])
+    own = np.zeros_like(size)
+    for error in off:
+        own = own * size + error / np.abs(a[0])
+    error = n * (_BACKWARD * moved + own) / product
+    near = n * (1.1 * tolerance * moved + _COVERED * own) / product + error
+    top, rows = z.real.argmax(axis=0), np.arange(z.shape[1])
+    simple = fit & (near < size).all(axis=0)
+    right, reach_right = z[top, rows], near[top, rows]
+    for i in range(n):
+        for j in range(i + 1, n):
+            simple &= np.abs(z[i] - z[j]) > near[i] + near[j]
+        other = (right.real - z[i].real <= near[i] + reach_right) & (z[i].real != right.real)
+        simple &= ~other & ((z[i].real != right.real) | (np.abs(z[i].imag) == np.abs(right.imag)))
+    ratio, certain = _damping_ratio(z, error, size)
+    abscissa = Bounded(right.real + 0.0, error[top, rows])
+    return Motions(abscissa, ratio, z.imag.max(axis=0), right.imag != 0, error.max(axis=0), simple & certain)
+
+
+def _numeric(a: Array) -> Complex:
+    """Roots, shape (n, m)."""
+    found = quartic_factors(*a, compiled=False).roots if len(a) == 5 else roots(a.T)
+    return np.ascontiguousarray(found.T)
+
+
+def _damping_ratio(z: Complex, error: Array, size: Array) -> tuple[Bounded, Truth]:
+    """The least −Re s/|s|: 1 or −1 where it is that of a real root; and where it is certain which root has it."""
+    real, size = z.imag == 0, np.where(size > 0, size, 1.0)
+    ratio, off = np.where(real, np.inf, -z.real / size), 2 * error / size
+    place, rows = ratio.argmin(axis=0), np.arange(z.shape[1])
+    least, reach = ratio[place, rows], off[place, rows]
+    growing, alone = (real & (z.real > 0)).any(axis=0), np.ones(z.shape[1], dtype=bool)
+    for k in range(len(z)):
+        same = real[k] | (z[k] == z[place, rows]) | (z[k] == z[place, rows].conj())
+        alone &= same | (ratio[k] - off[k] > least + reach)
+    damped = np.where(growing, -1.0, np.where(real.all(axis=0), 1.0, 0.0))
+    return Bounded(least, reach).where(damped == 0, Bounded(damped, np.zeros_like(damped))), alone | (damped != 0)
