@@ -21,8 +21,8 @@ from tmsopt.design.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, R
 from tmsopt.design.validate import SMALLEST
 from tmsopt.models import Values, tms
 from tmsopt.records import Array, Truth
-from tmsopt.roots import is_stable
-from tmsopt.roots.discs import Motions, find_motions
+from tmsopt.roots import find_motions, is_stable
+from tmsopt.roots.discs import Motions
 
 BLOCK = 8192
 """Designs at once: their numbers stay in the cache. No bit of an answer depends on it."""

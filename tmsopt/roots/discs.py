@@ -1,7 +1,6 @@
 """Roots of many polynomials at once in double precision, each in a disc that holds the true one.
 
-Numeric roots have a backward error of 1e-13, so each true root lies in a disc that this and its distance from the
-others give (Smith, J. ACM 17, 137, 1970).
+The true roots lie in discs about numeric ones z, of radii n |p(z)|/(|a0| ∏ |z − zⱼ|) (Smith, J. ACM 17, 137, 1970).
 """
 
 from collections.abc import Sequence
@@ -14,7 +13,7 @@ from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics.quartic import quartic_factors
 
-_BACKWARD = 2e-13  # of numeric roots, twice what they promise
+_HORNER = 4 * np.finfo(float).eps  # times the degree and the terms: rounding of a complex polynomial's value
 _COVERED = 18.0  # roundings that count as none when structures are decided
 _FLOOR = 1e-3  # of the median root: the size that a smaller one counts as there
 _LARGEST = 1e40  # relative to the leading coefficient: beyond it a root may be no double
@@ -41,6 +40,7 @@ class Motions:
     simple: Truth
 
 
+@np.errstate(all="ignore")
 def find_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motions:
     """Abscissa and damping ratio of polynomials, coefficients descending, each of shape (m,).
 
@@ -61,10 +61,10 @@ def find_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motions:
             product[i] *= apart
             product[j] *= apart
     moved = np.stack([np.prod(size[i] + reach, axis=0) for i in range(n)])
-    own = np.zeros_like(size)
-    for error in off:
-        own = own * size + error / np.abs(a[0])
-    error = n * (_BACKWARD * moved + own) / product
+    own, terms, value = np.zeros_like(size), np.zeros_like(size), np.zeros_like(z)
+    for one, error in zip(a / a[0], off / np.abs(a[0]), strict=True):
+        own, terms, value = own * size + error, terms * size + np.abs(one), value * z + one
+    error = n * (np.abs(value) + n * _HORNER * terms + own) / product
     near = n * (1.1 * tolerance * moved + _COVERED * own) / product + error
     top, rows = z.real.argmax(axis=0), np.arange(z.shape[1])
     simple = fit & (near < size).all(axis=0)
