@@ -71,16 +71,16 @@ def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:
 
 def list_coefficients(x: Quotient, variable: Quotient) -> Coefficients:
     """Coefficients of a numerator in one variable alone, descending."""
-    terms = {powers[_place(x, variable)]: c for powers, c in x.over.to_dict().items()}
+    terms = {powers[_index_of(x, variable)]: c for powers, c in x.over.to_dict().items()}
     return [terms.get(k, flint.fmpq(0)) for k in range(max(terms), -1, -1)]
 
 
 def degree_in(x: Quotient, variable: Quotient) -> int:
     """Degree of the numerator in a variable."""
-    return int(x.over.degrees()[_place(x, variable)])
+    return int(x.over.degrees()[_index_of(x, variable)])
 
 
-def _place(x: Quotient, variable: Quotient) -> int:
+def _index_of(x: Quotient, variable: Quotient) -> int:
     names: tuple[str, ...] = x.over.context().names()
     return names.index(str(variable.over))
 

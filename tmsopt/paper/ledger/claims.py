@@ -43,7 +43,7 @@ def compute_entry(claim: Table) -> Entry:
     scope = open_scope(claim, {})
     shown = {name: _Shown(value) for name, value in scope.items()}
     printed, remark, otherwise, condition, against = (claim.get(field, "").format_map(shown) for field in _TEXTS)
-    computed = f"{_Shown(compute(claim['computed'], scope)):computed}" if "computed" in claim else ""
+    computed = _show_computed(compute(claim["computed"], scope)) if "computed" in claim else ""
     proved = are_true(claim.get("holds", []), scope)
     match claim["rule"]:
         case "decimal":
@@ -61,6 +61,10 @@ def compute_entry(claim: Table) -> Entry:
     return Entry(**told, **vars(outcome))
 
 
+def _show_computed(value: Any) -> str:
+    return format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_Shown(value)}"
+
+
 @dataclass(frozen=True)
 class _Shown:
     """A value of an expression within a text."""
@@ -72,12 +76,10 @@ class _Shown:
         match self.value:
             case list(parts):
                 return ", ".join(format(_Shown(part), form) for part in parts)
-            case flint.arb() | flint.fmpq() if form == "computed":
-                return format_digits(self.value)
             case Quotient(over=numerator):
                 return str(numerator)
             case number if form.isdigit():
                 return str(flint.arb(number).str(int(form), radius=False))
-            case number if form not in ("", "computed"):
+            case number if form:
                 return format(float(flint.arb(number).mid()), form)
         return str(self.value)

@@ -120,7 +120,7 @@ def _bind(target: ast.expr, value: Any) -> dict[str, Any]:
     if not isinstance(target, ast.Tuple):
         return {ast.unparse(target): value}
     pairs = zip(target.elts, value, strict=True)
-    return {name: part for one, of in pairs for name, part in _bind(one, of).items()}
+    return {name: found for pair in pairs for name, found in _bind(*pair).items()}
 
 
 def _walk_list(nodes: list[ast.expr], scope: Scope) -> list[Any]:
