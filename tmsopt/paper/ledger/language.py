@@ -117,10 +117,13 @@ def _solve(name: str, *operands: Any) -> dict[str, Any]:
 
 def _bind(target: ast.expr, value: Any) -> dict[str, Any]:
     """Names with their values, where one or several are assigned."""
-    if not isinstance(target, ast.Tuple):
-        return {ast.unparse(target): value}
-    pairs = zip(target.elts, value, strict=True)
-    return {name: found for pair in pairs for name, found in _bind(*pair).items()}
+    match target:
+        case ast.Name(id=name):
+            return {name: value}
+        case ast.Tuple(elts=parts):
+            pairs = zip(parts, value, strict=True)
+            return {name: found for pair in pairs for name, found in _bind(*pair).items()}
+    raise SyntaxError(f"'{ast.unparse(target)}' is no name")
 
 
 def _walk_list(nodes: list[ast.expr], scope: Scope) -> list[Any]:
