@@ -106,7 +106,7 @@ def is_stable(p: Coefficients) -> bool:
     return all(bool(quantity > 0) for quantity in lienard_chipart([c if p[0] > 0 else -c for c in p]))
 
 
-def exact_roots(p: Coefficients) -> list[Any]:
+def certified_roots(p: Coefficients) -> list[Any]:
     """Isolating balls of the roots of a polynomial with fractions, each as often as it is one."""
     return [z for z, multiplicity in isolated_roots(p) for _ in range(multiplicity)]
 
@@ -119,7 +119,7 @@ def ball_roots(p: Coefficients) -> list[Any]:
 
 def count_real_roots(p: Coefficients) -> int:
     """How many roots of a polynomial with fractions are real, with multiplicity."""
-    return sum(z.imag == 0 for z in exact_roots(p))
+    return sum(z.imag == 0 for z in certified_roots(p))
 
 
 def is_heavily_damped(p: Coefficients) -> bool:

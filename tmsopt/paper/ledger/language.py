@@ -14,8 +14,10 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
+import flint
+
 from tmsopt.arithmetic.elementary import rational
-from tmsopt.paper.ledger.algebra import make_ring, match_factors
+from tmsopt.paper.ledger.algebra import PRECISION, make_ring, match_factors
 from tmsopt.paper.ledger.vocabulary import VOCABULARY
 
 Scope = Mapping[str, Any]
@@ -99,7 +101,8 @@ def _apply(name: str, *operands: Any) -> Any:
     if isinstance(table, str):
         return compute(table, scope)
     if "guess" in table:
-        return _solve(name, *operands)
+        with flint.ctx.workdps(PRECISION):  # it is kept
+            return _solve(name, *operands)
     opened = open_scope(table, scope)
     return compute(table["value"], opened) if "value" in table else are_true(table["holds"], opened)
 

@@ -17,7 +17,13 @@ _FUNCTIONS = (
     *(abs, all, any, dict, int, len, list, max, min, range, sum),
     *(algebra.differentiate, algebra.depends_on, algebra.substitute, algebra.evaluate_at, algebra.vanishes_modulo),
     *(algebra.is_positive, algebra.list_coefficients, algebra.degree_in, algebra.factorise, algebra.resultant),
-    *(algebra.is_stable, algebra.is_heavily_damped, algebra.count_real_roots, algebra.exact_roots, algebra.ball_roots),
+    *(
+        algebra.is_stable,
+        algebra.is_heavily_damped,
+        algebra.count_real_roots,
+        algebra.certified_roots,
+        algebra.ball_roots,
+    ),
     *(algebra.tangent, algebra.kernel, algebra.det, algebra.sqrt, algebra.is_zero, algebra.round_to_six),
     *(copo, matrices, quadratic_pencil, Tilt, product, shift, evaluate, describe_design, draw_sample),
 )
