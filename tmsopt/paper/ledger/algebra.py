@@ -1,4 +1,8 @@
-"""Exact polynomials and quotients, balls, certified roots and Newton's method in balls."""
+"""Exact rational functions, certified roots, and Newton's method in balls: what `claims.toml` computes with.
+
+A polynomial in s is a list of coefficients in descending powers; they are fractions, rational functions, or balls that
+contain the true value. A comparison of balls is true only if it is certain.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import prod
@@ -10,190 +14,191 @@ from tmsopt.arithmetic.elementary import rational
 from tmsopt.arithmetic.identity import Quotient
 from tmsopt.arithmetic.krawczyk import enclosed, refined
 from tmsopt.roots.exact import isolated_roots
-from tmsopt.roots.polynomial import determinant, product, shift
+from tmsopt.roots.polynomial import determinant, product
 from tmsopt.roots.stability import lienard_chipart
 
 PRECISION = 80
 """Decimal digits carried by balls."""
 
-Polynomial: TypeAlias = Any  # flint.fmpq_mpoly
 Ball: TypeAlias = Any  # flint.arb
+Coefficients: TypeAlias = Sequence[Any]
 
 _SOLVED = PRECISION - 15  # decimal digits to which Newton's method goes
 _RADIUS = 50  # of the box in which a solution is proved
 
 
-def q(text: str | int) -> Any:
-    """An exact fraction from decimal or fraction text."""
-    return rational(text)
+def make_ring(names: str) -> dict[str, Quotient]:
+    """The variables of a ring of rational functions by their names."""
+    variables = flint.fmpq_mpoly_ctx.get(names.split(), "lex").gens()
+    return dict(zip(names.split(), (Quotient(x, x * 0 + 1) for x in variables), strict=True))
 
 
-def ring(names: str) -> tuple[Quotient, ...]:
-    """The variables of a ring of rational functions, as quotients."""
-    return tuple(Quotient(x, x * 0 + 1) for x in polynomials(names))
+# Rational functions
 
 
-def polynomials(names: str) -> tuple[Polynomial, ...]:
-    """The variables of a polynomial ring over the rationals."""
-    return tuple(flint.fmpq_mpoly_ctx.get(names.split(), "lex").gens())
+def differentiate(x: Quotient, variable: Quotient) -> Quotient:
+    """Derivative with respect to a variable."""
+    over, under = (part.derivative(str(variable.over)) for part in (x.over, x.under))
+    return Quotient(over * x.under - x.over * under, x.under**2)
 
 
-def vanishes(value: Quotient, modulo: Polynomial) -> bool:
-    """Whether a quotient is 0 where `modulo` is: its numerator is a multiple, its denominator is not."""
-    return bool(divmod(value.over, modulo)[1] == 0 and divmod(value.under, modulo)[1] != 0)
+def depends_on(x: Quotient, variable: Quotient) -> bool:
+    """Whether a quotient depends on a variable."""
+    return bool(differentiate(x, variable) != 0)
 
 
-def evaluate(polynomial: Polynomial, at: Mapping[str, Any]) -> Ball:
-    """Value of a polynomial at balls, by the names of its variables."""
-    return _evaluation(polynomial)(at)
+def evaluate_at(x: Quotient, values: Mapping[str, Any]) -> Any:
+    """A quotient at balls, fractions or quotients for all of its variables."""
+    return _evaluation(x.over)(values) / _evaluation(x.under)(values)
 
 
-def _evaluation(polynomial: Polynomial) -> Callable[[Mapping[str, Any]], Ball]:
-    """Its value as a function, for those who need it often."""
-    names = polynomial.context().names()
-    terms = [
-        (flint.arb(coefficient), [(name, power) for name, power in zip(names, powers, strict=True) if power])
-        for powers, coefficient in polynomial.to_dict().items()
-    ]
-
-    def value(at: Mapping[str, Any]) -> Ball:
-        each = (prod((at[name] ** power for name, power in factors), start=term) for term, factors in terms)
-        return sum(each, flint.arb(0))
-
-    return value
+def substitute(x: Quotient, /, **values: Any) -> Any:
+    """A quotient with values for some of its variables; a fraction where no variable is left."""
+    found = evaluate_at(x, make_ring(" ".join(x.over.context().names())) | values)
+    constant = isinstance(found, Quotient) and found.over.is_constant() and found.under.is_constant()
+    return sum(found.over.coeffs()) / found.under.leading_coefficient() if constant else found
 
 
-def substitute(polynomial: Polynomial, values: Mapping[str, Any]) -> Polynomial:
-    """A polynomial with some variables replaced by fractions."""
-    return polynomial.subs(dict(values))
+def is_positive(x: Quotient) -> bool:
+    """Whether numerator and denominator have coefficients of one sign, so that x > 0 where all variables are."""
+    return any(all(sign * c > 0 for c in [*x.over.coeffs(), *x.under.coeffs()]) and x != 0 for sign in (1, -1))
 
 
-def positive(polynomial: Polynomial) -> bool:
-    """Whether every coefficient is positive, so that the polynomial is, where all variables are positive."""
-    coefficients = list(polynomial.coeffs())
-    return bool(coefficients) and all(c > 0 for c in coefficients)
+def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:
+    """Whether a quotient is 0 where a polynomial is: its numerator is a multiple, its denominator is not."""
+    return bool(divmod(x.over, modulus.over)[1] == 0 and divmod(x.under, modulus.over)[1] != 0)
 
 
-def positive_quotient(value: Quotient) -> bool:
-    """Likewise for a quotient."""
-    return any(positive(sign * value.over) and positive(sign * value.under) for sign in (1, -1))
+def list_coefficients(x: Quotient, variable: Quotient) -> Coefficients:
+    """Coefficients of a numerator in one variable alone, descending."""
+    terms = {powers[_index_of(x, variable)]: c for powers, c in x.over.to_dict().items()}
+    return [terms.get(k, flint.fmpq(0)) for k in range(max(terms), -1, -1)]
 
 
-# Polynomials in one variable, coefficients descending
+def degree_in(x: Quotient, variable: Quotient) -> int:
+    """Degree of the numerator in a variable."""
+    return int(x.over.degrees()[_index_of(x, variable)])
 
 
-def stable(coefficients: Sequence[Any]) -> bool:
+def _index_of(x: Quotient, variable: Quotient) -> int:
+    names: tuple[str, ...] = x.over.context().names()
+    return names.index(str(variable.over))
+
+
+def factorise(x: Quotient) -> list[Quotient]:
+    """The irreducible factors of the numerator, once each."""
+    return [Quotient(factor, factor**0) for factor, _ in x.over.factor()[1]]
+
+
+def resultant(x: Quotient, y: Quotient, variable: Quotient) -> Quotient:
+    """Resultant of two numerators: it vanishes where both do for one value of the variable."""
+    found = x.over.resultant(y.over, str(variable.over))
+    return Quotient(found, found * 0 + 1)
+
+
+# Polynomials in s
+
+
+def is_stable(p: Coefficients) -> bool:
     """Whether every root lies in Re s < 0, certainly: Liénard–Chipart on fractions or balls."""
-    leading = coefficients[0]
-    if not (leading > 0 or leading < 0):
+    if not (p[0] > 0 or p[0] < 0):
         return False
-    signed = [c if leading > 0 else -c for c in coefficients]
-    return all(bool(quantity > 0) for quantity in lienard_chipart(signed))
+    return all(bool(quantity > 0) for quantity in lienard_chipart([c if p[0] > 0 else -c for c in p]))
 
 
-def real_roots(coefficients: Sequence[Any]) -> int:
-    """How many of its roots are real, with multiplicity, certainly."""
-    return sum(m for z, m in isolated_roots(coefficients) if z.imag == 0)
+def certified_roots(p: Coefficients) -> list[Any]:
+    """Isolating balls of the roots of a polynomial with fractions, each as often as it is one."""
+    return [z for z, multiplicity in isolated_roots(p) for _ in range(multiplicity)]
 
 
-def stable_left_of(coefficients: Sequence[Any], gamma: Any) -> bool:
-    """Whether every root lies in Re s < gamma, certainly."""
-    return stable(shift(coefficients, gamma))
+def ball_roots(p: Coefficients) -> list[Any]:
+    """Isolating balls of the simple roots of a polynomial with balls for coefficients."""
+    polynomial: Any = flint.acb_poly([flint.acb(c) for c in reversed(p)])
+    return list(polynomial.roots())
 
 
-def unstable(coefficients: Sequence[Any]) -> bool:
-    """Whether some root lies in Re s > 0, by isolating balls around the roots."""
-    return any(bool(z.real > 0) for z, _ in isolated_roots(coefficients))
+def count_real_roots(p: Coefficients) -> int:
+    """How many roots of a polynomial with fractions are real, with multiplicity."""
+    return sum(z.imag == 0 for z in certified_roots(p))
 
 
-def ball_roots(coefficients: Sequence[Ball]) -> list[Any]:
-    """Certified isolating balls of the simple roots of a polynomial with balls for coefficients."""
-    polynomial: Any = flint.acb_poly([flint.acb(c) for c in reversed(coefficients)])
-    found: list[Any] = polynomial.roots()
-    return found
-
-
-def heavily_damped(coefficients: Sequence[Any]) -> bool:
+def is_heavily_damped(p: Coefficients) -> bool:
     """Whether all roots of a polynomial with fractions are simple, real and negative."""
-    found = isolated_roots(coefficients)
-    return all(m == 1 and z.imag == 0 and bool(z.real < 0) for z, m in found)
+    return all(m == 1 and z.imag == 0 and bool(z.real < 0) for z, m in isolated_roots(p))
 
 
 # Systems of equations in balls
 
 
-def matched(
-    coefficients: Sequence[Polynomial], factors: Sequence[Sequence[Any]], guess: Mapping[str, float],
-    known: Mapping[str, Any],
-) -> dict[str, Ball]:  # fmt: skip
+def match_factors(
+    p: Coefficients, parts: Sequence[Coefficients], guess: Mapping[str, float], known: Mapping[str, Any]
+) -> dict[str, Ball]:
     """The unknowns near a guess with which a polynomial is its leading coefficient times monic factors, proved.
 
     Raises:
         ArithmeticError: where no unique solution is proved.
     """
     names = list(guess)
-    with flint.ctx.workdps(PRECISION):
-        sides = [_evaluation(equation) for equation in _differences(coefficients, factors)]
+    sides = [_evaluation(equation.over) for equation in _differences(p, parts)]
 
-        def system(at: Mapping[str, Any]) -> list[Any]:
-            return [side({**known, **at}) for side in sides]
+    def system(unknowns: Mapping[str, Any]) -> list[Any]:
+        return [side({**known, **unknowns}) for side in sides]
 
-        middle = refined(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
-        return dict(enclosed(system, middle, names, _RADIUS).balls)
+    middle = refined(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
+    return dict(enclosed(system, middle, names, _RADIUS).balls)
 
 
-def minors(matrix: Sequence[Sequence[Any]]) -> list[Any]:
-    """The determinants of a matrix with one more column than rows, each without one column."""
-    rows = [[[entry] for entry in row] for row in matrix]
-    return [
-        determinant([[e for k, e in enumerate(row) if k != leave] for row in rows])[0] for leave in range(len(rows) + 1)
+def tangent(p: Coefficients, parts: Sequence[Coefficients], names: str, point: Mapping[str, Any]) -> list[Ball]:
+    """The direction of the curve of one unknown more on which a polynomial has monic factors, at a point of it."""
+    rows = [equation.over for equation in _differences(p, parts)]
+    return kernel([[_evaluation(row.derivative(name))(point) for name in names.split()] for row in rows])
+
+
+def kernel(matrix: Sequence[Sequence[Any]]) -> list[Any]:
+    """The vector, up to a factor, that a matrix with one more column than rows maps to 0."""
+    leave = range(len(matrix) + 1)
+    return [(-1) ** k * det([[e for j, e in enumerate(row) if j != k] for row in matrix]) for k in leave]
+
+
+def det(matrix: Sequence[Sequence[Any]]) -> Any:
+    """A determinant."""
+    return determinant([[[entry] for entry in row] for row in matrix])[0]
+
+
+def _differences(p: Coefficients, parts: Sequence[Coefficients]) -> list[Any]:
+    """What must vanish for a polynomial to be its leading coefficient times the product of monic factors."""
+    return [a - p[0] * m for a, m in zip(p[1:], product(*parts)[1:], strict=True)]
+
+
+def _evaluation(polynomial: Any) -> Callable[[Mapping[str, Any]], Any]:
+    """The value of a polynomial as a function, for those who need it often."""
+    names = polynomial.context().names()
+    terms = [
+        (coefficient, [(name, power) for name, power in zip(names, powers, strict=True) if power])
+        for powers, coefficient in polynomial.to_dict().items()
     ]
 
+    def value(values: Mapping[str, Any]) -> Any:
+        return sum(
+            (prod((values[n] ** power for n, power in powers), start=c) for c, powers in terms), start=flint.fmpq(0)
+        )
 
-def _differences(coefficients: Sequence[Any], factors: Sequence[Sequence[Any]]) -> list[Any]:
-    """What must vanish for a polynomial to be its leading coefficient times the product of monic factors."""
-    return [a - coefficients[0] * m for a, m in zip(coefficients[1:], product(*factors)[1:], strict=True)]
-
-
-def slope(quotient: Quotient, name: str) -> Quotient:
-    """Derivative of a quotient with respect to a variable."""
-    over, under = quotient.over, quotient.under
-    return Quotient(over.derivative(name) * under - over * under.derivative(name), under**2)
+    return value
 
 
-def depends(quotient: Quotient, name: str) -> bool:
-    """Whether a quotient depends on a variable."""
-    return bool(slope(quotient, name) != 0)
+# Balls
 
 
-def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
-    """The vector, up to a factor, that a matrix with one more column than rows maps to 0."""
-    return [m if k % 2 == 0 else -m for k, m in enumerate(minors(matrix))]
+def sqrt(x: Any) -> Any:
+    """The square root of a ball, complex or not, or of a fraction as a ball."""
+    return (x if isinstance(x, flint.acb) else flint.arb(x)).sqrt()
 
 
-def jacobian(equations: Sequence[Polynomial], names: Sequence[str], at: Mapping[str, Any]) -> list[list[Ball]]:
-    """Derivatives of polynomials at balls, a row per polynomial."""
-    return [[evaluate(e.derivative(name), at) for name in names] for e in equations]
+def is_zero(x: Ball) -> bool:
+    """Whether a ball contains 0 and is within 1e-40 of it."""
+    return bool(x.contains(0) and abs(x) < rational("1e-40"))
 
 
-def tangent(
-    coefficients: Sequence[Polynomial], factors: Sequence[Sequence[Any]], names: Sequence[str], at: Mapping[str, Any]
-) -> list[Ball]:
-    """The direction of the curve of one unknown more on which a polynomial has monic factors, at a point of it."""
-    return kernel(jacobian(_differences(coefficients, factors), names, at))
-
-
-def composed(quotient: Quotient, at: Mapping[str, Quotient]) -> Quotient:
-    """A quotient with quotients put in for its variables."""
-
-    def put(polynomial: Any) -> Quotient:
-        names = polynomial.context().names()
-        total = 0 * at[names[0]]
-        for powers, coefficient in polynomial.to_dict().items():
-            term = total * 0 + coefficient
-            for name, power in zip(names, powers, strict=True):
-                term = term * at[name] ** power
-            total = total + term
-        return total
-
-    return put(quotient.over) / put(quotient.under)
+def round_to_six(x: Ball) -> Any:
+    """A ball to six decimals, as a fraction."""
+    return rational(f"{float(x.mid()):.6f}")

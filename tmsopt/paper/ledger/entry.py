@@ -1,7 +1,7 @@
-"""What a ledger is made of: a claim, what computing it gave, and the rules that turn this into a verdict."""
+"""What a ledger is made of, and the rules that turn what was computed into a verdict."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -34,27 +34,6 @@ class Outcome:
     printed: str = ""
     computed: str = ""
     remark: str = ""
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A statement of the paper with the computation that decides it.
-
-    Attributes:
-        key: unique name.
-        section: title of the section of the paper.
-        place: equation label, table, caption or text.
-        statement: what the paper says, in few words.
-        route: how it is computed, independently of the printed formula.
-        check: the computation.
-    """
-
-    key: str
-    section: str
-    place: str
-    statement: str
-    route: str
-    check: Callable[[], Outcome]
 
 
 @dataclass(frozen=True)
@@ -102,43 +81,17 @@ class Ledger(Tabular):
         return {"schema": SCHEMA} | plain(self, "source counts entries")
 
 
-def section(title: str) -> Callable[..., Callable[[Callable[[], Outcome]], Claim]]:
-    """A decorator for the claims of one section of the paper."""
-
-    def claim(key: str, place: str, statement: str, route: str) -> Callable[[Callable[[], Outcome]], Claim]:
-        return lambda check: Claim(key, title, place, statement, route, check)
-
-    return claim
-
-
-def entry_of(claim: Claim) -> Entry:
-    """Compute a claim.
-
-    Raises:
-        ArithmeticError: where the outcome is not explained, so that no entry can stand on words alone.
-    """
-    outcome = claim.check()
-    if outcome.verdict not in VERDICTS:
-        raise ArithmeticError(f"{claim.key}: no verdict '{outcome.verdict}'")
-    if outcome.verdict != EXACT and not outcome.remark:
-        raise ArithmeticError(f"{claim.key}: '{outcome.verdict}' without an explanation")
-    return Entry(
-        claim.key, claim.section, claim.place, claim.statement, outcome.printed, outcome.computed, claim.route,
-        outcome.verdict, outcome.remark,
-    )  # fmt: skip
-
-
 # Verdict rules
 
 
-def digits(value: Any) -> str:
+def format_digits(value: Any) -> str:
     """A ball or a fraction to 40 significant digits."""
     ball = value if isinstance(value, flint.arb) else flint.arb(value)
     text: str = ball.str(SHOWN, radius=False)
     return text
 
 
-def decimal(printed: str, value: Any, remark: str = "") -> Outcome:
+def judge_decimal(printed: str, value: Any, remark: str = "") -> Outcome:
     """Judge a printed decimal against a ball, or a fraction, that contains the true value.
 
     Exact if they are one number; the printed digits hold if the true value is within half a unit of the last;
@@ -149,7 +102,7 @@ def decimal(printed: str, value: Any, remark: str = "") -> Outcome:
     """
     fraction = Fraction(printed)
     claimed = flint.fmpq(fraction.numerator, fraction.denominator)
-    shown = digits(value)
+    shown = format_digits(value)
     if isinstance(value, flint.fmpq) and value == claimed:
         return Outcome(EXACT, printed, shown, remark)
     unit = flint.fmpq(1, 10 ** len(printed.partition(".")[2]))
@@ -168,31 +121,35 @@ def decimal(printed: str, value: Any, remark: str = "") -> Outcome:
     return Outcome(verdict, printed, shown, f"{words} {remark}".strip())
 
 
-def proof(holds: bool, remark: str = "", otherwise: str = "", printed: str = "", computed: str = "") -> Outcome:
+def judge_identity(
+    holds: bool, remark: str = "", otherwise: str = "", printed: str = "", computed: str = ""
+) -> Outcome:
     """Exact where a proof runs through; otherwise it does not hold, for the reason given."""
     if holds:
         return Outcome(EXACT, printed, computed, remark)
     return Outcome(FAILS, printed, computed, otherwise or "The proof does not run through.")
 
 
-def universal(
-    condition: str, under: bool, against: str, counterexample: bool, always: bool = False, printed: str = "",
-    computed: str = "", remark: str = "",
-) -> Outcome:  # fmt: skip
-    """Judge a general statement: proved always, proved under a condition and refuted outside it, or refuted.
+def judge_statement(
+    condition: str,
+    under: bool,
+    against: str,
+    counterexample: bool,
+    printed: str = "",
+    computed: str = "",
+    remark: str = "",
+) -> Outcome:
+    """Judge a general statement: proved under a condition and refuted outside it, or refuted.
 
     Args:
         condition: what must be added.
         under: whether the proof under the condition runs through.
         against: the counterexample in words.
         counterexample: whether it refutes the statement as printed.
-        always: whether the statement is proved as printed.
 
     Raises:
-        ArithmeticError: where nothing of this decides.
+        ArithmeticError: where it does not.
     """
-    if always and not counterexample:
-        return Outcome(EXACT, printed, computed, remark)
     if not counterexample:
         raise ArithmeticError(f"neither proved nor refuted: {condition}")
     parts = [f"Condition: {condition}."] if under else []

@@ -1,0 +1,85 @@
+"""The claims of `claims.toml`, each with the computation that decides it.
+
+A claim about a printed decimal is one table in that file, and nothing else:
+
+    [[section.claim]]
+    key = "Fr_EP4"
+    place = "text before Fig. fig00"
+    statement = "Fr_EP4 as a decimal"
+    route = "p(s) = a0 (s − ω0)⁴ solved for Fr, χ_B, tan λ_s and ω0 by interval Newton, 80 digits"
+    rule = "decimal"
+    printed = "2.236317517"
+    value = "ep4.Fr"
+
+The head of the file tells the other rules and what a table may have. What the expressions of `language` cannot tell
+becomes a function of `algebra`, and a word of `vocabulary`.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import flint
+
+from tmsopt.arithmetic.identity import Quotient
+from tmsopt.paper.ledger.entry import EXACT, Entry, format_digits, judge_decimal, judge_identity, judge_statement
+from tmsopt.paper.ledger.language import Table, are_true, compute, open_scope, read_tables
+
+_TEXTS = ("printed", "remark", "otherwise", "condition", "against")
+
+
+@cache
+def list_claims() -> tuple[Table, ...]:
+    """Every claim, in the order of the paper, with the title of its section."""
+    return tuple({"section": s["title"], **claim} for s in read_tables()["section"] for claim in s["claim"])
+
+
+def compute_entry(claim: Table) -> Entry:
+    """Compute a claim.
+
+    Raises:
+        ArithmeticError: where the outcome is not explained, or the explanation not proved: no entry stands on words.
+    """
+    scope = open_scope(claim, {})
+    shown = {name: _Shown(value) for name, value in scope.items()}
+    printed, remark, otherwise, condition, against = (claim.get(field, "").format_map(shown) for field in _TEXTS)
+    computed = _show_computed(compute(claim["computed"], scope)) if "computed" in claim else ""
+    proved = are_true(claim.get("holds", []), scope)
+    match claim["rule"]:
+        case "decimal":
+            outcome = judge_decimal(printed, compute(claim["value"], scope), remark)
+        case "identity":
+            outcome = judge_identity(proved, remark, otherwise, printed, computed)
+        case _:
+            refuted = are_true(claim["refutes"], scope)
+            outcome = judge_statement(
+                condition, bool(condition) and proved, against, refuted, printed, computed, remark
+            )
+    if (outcome.verdict != EXACT and not outcome.remark) or not are_true(claim.get("noted", []), scope):
+        raise ArithmeticError(f"{claim['key']}: '{outcome.verdict}' without an explanation that is proved")
+    told = {field: claim[field] for field in ("key", "section", "place", "statement", "route")}
+    return Entry(**told, **vars(outcome))
+
+
+def _show_computed(value: Any) -> str:
+    return format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_Shown(value)}"
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A value of an expression within a text."""
+
+    value: Any
+
+    def __format__(self, form: str) -> str:
+        """As it is, to so many digits, or as Python formats a float."""
+        match self.value:
+            case list(parts):
+                return ", ".join(format(_Shown(part), form) for part in parts)
+            case Quotient(over=numerator):
+                return str(numerator)
+            case number if form.isdigit():
+                return str(flint.arb(number).str(int(form), radius=False))
+            case number if form:
+                return format(float(flint.arb(number).mid()), form)
+        return str(self.value)

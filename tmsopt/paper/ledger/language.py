@@ -1,0 +1,179 @@
+"""The expressions of `claims.toml`: a small part of Python's, parsed and walked here, never run.
+
+An expression has exact numbers (0.1 is 1/10), names, texts, ``+ - * / **``, comparisons, ``and or not``, lists, calls,
+indices, fields such as ``ep4.Fr``, and ``[… for … in … if …]``. A name is, in this order: a variable or definition of
+the claim, a definition under ``[define]``, a word of `VOCABULARY`. Problem files are read by another parser: the ledger
+shares nothing with what it checks.
+"""
+
+import ast
+import operator
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import flint
+
+from tmsopt.arithmetic.elementary import rational
+from tmsopt.paper.ledger.algebra import PRECISION, make_ring, match_factors
+from tmsopt.paper.ledger.vocabulary import VOCABULARY
+
+Scope = Mapping[str, Any]
+Table = Mapping[str, Any]
+
+_OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: lambda a, b: (rational(a) if isinstance(a, int) else a) / b,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.Not: operator.not_,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.And: all,
+    ast.Or: any,
+}
+
+
+@cache
+def read_tables() -> Table:
+    """The whole of `claims.toml`."""
+    return tomllib.loads(resources.files(__package__).joinpath("claims.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def list_definitions() -> Mapping[str, tuple[list[str], Table]]:
+    """Parameters and table of each name under ``[define]``."""
+    heads = ((head.replace("(", " ").replace(",", "").strip(")").split(), head) for head in read_tables()["define"])
+    return {name: (parameters, read_tables()["define"][head]) for (name, *parameters), head in heads}
+
+
+def compute(text: str, scope: Scope) -> Any:
+    """Value of an expression.
+
+    Raises:
+        SyntaxError: for what is no expression of this language.
+    """
+    return _walk(_parse(text).value, scope)
+
+
+def are_true(texts: Iterable[str], scope: Scope) -> bool:
+    """Whether all of these statements are true, certainly; what is no statement is not."""
+    return all(compute(text, scope) is True for text in texts)
+
+
+def open_scope(table: Table, scope: Scope) -> Scope:
+    """A scope with the variables and definitions of a table, those of its setting first."""
+    both = read_tables()["setting"].get(table.get("setting"), {}), table
+    opened = {**scope, **make_ring(" ".join(part.get("variables", "") for part in both))}
+    for part in both:
+        for line in part.get("where", ()):
+            assignment = _parse(line)
+            opened |= _bind(assignment.targets[0], _walk(assignment.value, opened))
+    return opened
+
+
+@cache
+def _parse(text: str) -> Any:
+    return ast.parse(text).body[0]
+
+
+def _look_up(name: str, scope: Scope) -> Any:
+    if name in scope:
+        return scope[name]
+    if name not in list_definitions():
+        return VOCABULARY[name]
+    parameters, _ = list_definitions()[name]
+    return (lambda *operands: _apply(name, *operands)) if parameters else _apply(name)
+
+
+def _apply(name: str, *operands: Any) -> Any:
+    """What a definition stands for: a value, whether it holds, or a solved point."""
+    parameters, table = list_definitions()[name]
+    scope = dict(zip(parameters, operands, strict=True))
+    if isinstance(table, str):
+        return compute(table, scope)
+    if "guess" in table:
+        with flint.ctx.workdps(PRECISION):  # it is kept
+            return _solve(name, *operands)
+    opened = open_scope(table, scope)
+    return compute(table["value"], opened) if "value" in table else are_true(table["holds"], opened)
+
+
+@cache
+def _solve(name: str, *operands: Any) -> dict[str, Any]:
+    """A point: what is known of it, and the unknowns with which its polynomial has the factors, proved."""
+    parameters, table = list_definitions()[name]
+    scope = dict(zip(parameters, operands, strict=True))
+    known = {unknown: compute(text, scope) for unknown, text in table.get("known", {}).items()}
+    guess = {unknown: float(compute(str(text), scope | known)) for unknown, text in table["guess"].items()}
+    free = make_ring(" ".join([*guess, *known]))
+    return known | match_factors(compute(table["polynomial"], free), compute(table["factors"], free), guess, known)
+
+
+def _bind(target: ast.expr, value: Any) -> dict[str, Any]:
+    """Names with their values, where one or several are assigned."""
+    match target:
+        case ast.Name(id=name):
+            return {name: value}
+        case ast.Tuple(elts=parts):
+            pairs = zip(parts, value, strict=True)
+            return {name: found for pair in pairs for name, found in _bind(*pair).items()}
+    raise SyntaxError(f"'{ast.unparse(target)}' is no name")
+
+
+def _walk_list(nodes: list[ast.expr], scope: Scope) -> list[Any]:
+    """Values of the parts of a list or a call, those of a starred one in its place."""
+    found: list[Any] = []
+    for node in nodes:
+        found += _walk(node.value, scope) if isinstance(node, ast.Starred) else [_walk(node, scope)]
+    return found
+
+
+def _walk_loops(element: ast.expr, loops: list[ast.comprehension], scope: Scope) -> list[Any]:
+    if not loops:
+        return [_walk(element, scope)]
+    first, *rest = loops
+    scopes = ({**scope, **_bind(first.target, one)} for one in _walk(first.iter, scope))
+    chosen = (inner for inner in scopes if all(_walk(condition, inner) for condition in first.ifs))
+    return [value for inner in chosen for value in _walk_loops(element, rest, inner)]
+
+
+def _walk(node: ast.expr | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912 - one case per kind of node
+    match node:
+        case None:
+            return None
+        case ast.Constant(value=value):
+            return rational(repr(value)) if isinstance(value, float) else value
+        case ast.Name(id=name):
+            return _look_up(name, scope)
+        case ast.Attribute(value=owner, attr=name):
+            return _walk(owner, scope)[name]
+        case ast.Subscript(value=owner, slice=index):
+            return _walk(owner, scope)[_walk(index, scope)]
+        case ast.Slice(lower=lower, upper=upper, step=None):
+            return slice(_walk(lower, scope), _walk(upper, scope))
+        case ast.List(elts=parts):
+            return _walk_list(parts, scope)
+        case ast.ListComp(elt=element, generators=loops):
+            return _walk_loops(element, loops, scope)
+        case ast.Call(func=function, args=parts, keywords=named):
+            keywords = {str(one.arg): _walk(one.value, scope) for one in named}
+            return _walk(function, scope)(*_walk_list(parts, scope), **keywords)
+        case ast.UnaryOp(op=sign, operand=operand):
+            return _OPERATORS[type(sign)](_walk(operand, scope))
+        case ast.BinOp(left=left, op=sign, right=right):
+            return _OPERATORS[type(sign)](_walk(left, scope), _walk(right, scope))
+        case ast.BoolOp(op=sign, values=parts):
+            return _OPERATORS[type(sign)](_walk(part, scope) for part in parts)
+        case ast.Compare(left=left, ops=signs, comparators=others):
+            sides = _walk_list([left, *others], scope)
+            return all(_OPERATORS[type(sign)](*pair) for sign, *pair in zip(signs, sides, sides[1:], strict=False))
+    raise SyntaxError(f"'{ast.unparse(node)}' is no expression of the ledger")
