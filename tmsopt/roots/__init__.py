@@ -21,7 +21,8 @@ from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lien
 __all__ = [
     "CLASSES", "PATTERNS", "Classes", "Factors", "Motion", "Pattern", "Root", "Structure", "abscissa",
     "abscissa_and_damping", "backward_error", "composition", "determinant", "discriminant", "evaluate",
-    "exact_abscissa", "exact_longest", "exact_nullity", "exact_roots", "find_motions", "has_one_eigenvector", "hurwitz_minors",
+    "exact_abscissa", "exact_longest", "exact_nullity", "exact_roots", "find_motions", "has_one_eigenvector",
+    "hurwitz_minors",
     "is_regular", "is_stable", "jordan", "lienard_chipart", "may_be_real", "multiple_real_roots",
     "pattern", "pattern_distance", "product", "quadratic_pencil", "quartic_classes",
     "quartic_factors", "quartic_is_stable", "real_roots", "rebuilt", "roots", "routh", "shift", "structure",
