@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "progress", "disk", "locks", "processes", "versions", "laws"),
+    ("errors", "records", "progress", "disk", "locks", "executor", "killable", "versions", "laws"),
     ("arithmetic",),
     ("roots",),
     ("models",),
@@ -39,14 +39,11 @@ ASKED_ABOVE = {("tmsopt.records", "tmsopt.display")}
 
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names}
 GROUND = FLOORS[0]
-MODULES, LINES, DEPTH = 12, 350, 8
-"""At most: modules in a package, lines of a module, modules of a package that stand one above the other."""
+MODULES, DEPTH = 12, 8
+"""At most: modules in a package, modules of a package that stand one above the other."""
 
 CROWDED = {"tmsopt.paper.ledger": 16}
 """A room per section of the paper."""
-
-LONG = {"tmsopt.laws": 610}
-"""An oracle is one module: 28 laws of a few lines, each with its conditions and an example that runs."""
 
 
 def sources() -> dict[str, str]:
@@ -244,10 +241,6 @@ def test_a_package_has_a_face_and_few_rooms(package: str) -> None:
     assert depth(package, SOURCES) <= DEPTH
 
 
-def test_no_room_is_long() -> None:
-    assert {m: n for m, s in SOURCES.items() if (n := s.count("\n")) > LONG.get(m, LINES)} == {}
-
-
 def test_what_is_asked_above_is_asked_when_it_is_needed() -> None:
     """By name and inside a function, so that a result carries nobody who shows it."""
     script = "import sys, tmsopt.design.solution, tmsopt.tracing.branch; print(*sys.modules)"
@@ -333,7 +326,7 @@ def test_files_are_written_whole() -> None:
         "tmsopt.charts.folder.writing",  # tile by tile; what is recorded is right
         "tmsopt.disk.whole",  # itself
         "tmsopt.display.page._picture", "tmsopt.display.pictures._image", "tmsopt.plots.style.rendered",  # in memory
-        "tmsopt.processes.serve",  # a pipe
+        "tmsopt.killable.serve",  # a pipe
         "tmsopt.studies.export._csv", "tmsopt.studies.export._netcdf", "tmsopt.studies.export._parquet",  # by `export`
     }  # fmt: skip
 
