@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from typing import Any
 from unittest.mock import patch
 
 import casadi as ca
 import numpy as np
+
+from tmsopt.executor import here, processes
 
 
 def best(works: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
@@ -27,11 +28,12 @@ def best(works: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, floa
 
 def over_processes(work: Callable[[Any], Any], items: Sequence[Any], workers: int) -> Iterator[Any]:
     """The answers in order, from processes that end when this one is interrupted; of one worker from this one."""
-    if workers == 1 or not items:  # processes take a second to begin
-        yield from map(work, items)
-        return
-    with get_context("spawn").Pool(workers) as pool:
-        yield from pool.imap(work, items)
+    with here() if workers == 1 or not items else processes(workers) as executor:  # processes take a second to begin
+        answers, ready = executor.map(work, items), dict[int, Any]()
+        for place in range(len(items)):
+            while place not in ready:
+                ready.update([next(answers)])
+            yield ready.pop(place)
 
 
 def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:

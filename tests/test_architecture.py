@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "progress", "disk", "locks", "processes", "versions", "laws"),
+    ("errors", "records", "progress", "disk", "locks", "executor", "killable", "versions", "laws"),
     ("arithmetic",),
     ("roots",),
     ("models",),
@@ -299,7 +299,7 @@ def test_files_are_written_whole() -> None:
         "tmsopt.charts.folder.writing",  # tile by tile; what is recorded is right
         "tmsopt.disk.whole",  # itself
         "tmsopt.display.page._picture", "tmsopt.display.pictures._image", "tmsopt.plots.style.rendered",  # in memory
-        "tmsopt.processes.serve",  # a pipe
+        "tmsopt.killable.serve",  # a pipe
         "tmsopt.studies.export._csv", "tmsopt.studies.export._netcdf", "tmsopt.studies.export._parquet",  # by `export`
     }  # fmt: skip
 

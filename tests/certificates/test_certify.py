@@ -32,7 +32,7 @@ from tmsopt.report import design_report
 answering = import_module("tmsopt.branch_and_bound.answer")
 certifying = import_module("tmsopt.certificates.certify")
 interlaces = import_module("tmsopt.branch_and_bound.interlacing")
-started = import_module("tmsopt.processes")
+started = import_module("tmsopt.killable")
 lines = import_module("tmsopt.branch_and_bound.half_planes")
 
 pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")

@@ -20,6 +20,7 @@ import pytest
 
 from tmsopt.branch_and_bound import SCIP
 from tmsopt.cli import main
+from tmsopt.killable import Killable
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and shells of POSIX")
 
@@ -312,9 +313,13 @@ def test_what_is_said_beside_a_design_may_be_stopped(run: Run, monkeypatch: pyte
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 def test_what_a_global_solver_raises_is_heard(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     race = import_module("tmsopt.branch_and_bound.race")
-    failed = race._answer(math.sqrt, SimpleNamespace())
-    assert str(failed) == "TypeError: must be real number, not types.SimpleNamespace"
-    monkeypatch.setattr(race.Crew, "race", lambda *_: race._heard([failed]))
+    process = Killable()
+    try:
+        failed = process.call(math.sqrt, SimpleNamespace())
+        assert str(failed.exception()) == "must be real number, not types.SimpleNamespace"
+    finally:
+        process.end()
+    monkeypatch.setattr(race.Crew, "race", lambda *_: race._decisions([failed]))
     status, out, _ = run("solve", box(tmp_path), "--certify")
     assert status == 0
     assert "note: SCIP failed: TypeError: must be real number" in " ".join(out.split())

@@ -1,7 +1,6 @@
 """What branch and prune is made of: formulas multiplied out, and boxes that never lose a zero."""
 
 from fractions import Fraction
-from queue import SimpleQueue
 from typing import Any
 
 import flint
@@ -10,7 +9,7 @@ import pytest
 
 from tmsopt.arithmetic import variable
 from tmsopt.completeness import Puzzle, available, prune, tree
-from tmsopt.processes import Inbox, Worker
+from tmsopt.killable import Killable
 
 NAMES = ("x", "y", "z")
 ROUNDS = 60
@@ -61,8 +60,7 @@ def test_a_formula_multiplied_out_has_the_same_values(seed: int) -> None:
 @pytest.mark.skipif(not available(), reason="codac is not installed")
 def test_no_box_loses_a_zero() -> None:
     """Systems with a zero planted at a fraction, mid in the box or on an end of it, singular ones among them."""
-    inbox: Inbox = SimpleQueue()
-    worker = Worker(inbox)
+    worker = Killable()
     rng = np.random.default_rng(0)
     try:
         for _ in range(ROUNDS):
@@ -74,8 +72,7 @@ def test_no_box_loses_a_zero() -> None:
             reach = [(float(rng.choice([0, 1, 2.5])), float(rng.choice([0, 0.5, 3]))) for _ in NAMES]
             box = tuple((float(c) - lo, float(c) + hi) for c, (lo, hi) in zip(at, reach, strict=True))
             puzzle = Puzzle(tuple(equations), (), (), tuple(hi - lo for lo, hi in box))
-            worker.send(prune, puzzle, [box], [], 0.2, 50, 1e-7)
-            _, pruned = inbox.get(timeout=60)
+            pruned = worker.call(prune, puzzle, [box], [], 0.2, 50, 1e-7).result(timeout=60)
             left = [*pruned.left, *pruned.met, *pruned.small]
             assert any(all(lo <= c <= hi for c, (lo, hi) in zip(at, b, strict=True)) for b in left)
     finally:

@@ -1,7 +1,8 @@
 """Sub-problems side by side: what comes of them does not depend on how many processes there are, or on their fate."""
 
-import operator
 import os
+import threading
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -10,6 +11,7 @@ from helpers import shares
 
 import tmsopt
 from tmsopt import InputError
+from tmsopt.executor import EngineError
 from tmsopt.models import tms
 
 curve = import_module("tmsopt.fronts.curve")
@@ -30,50 +32,32 @@ def each(function, items, processes):
         return dict(side_by_side.each(function, ASK, items))
 
 
-def started(side_by_side):
-    """Wait until the processes beside this one work."""
-    while not all(other.ready for other in side_by_side._beside):
-        list(side_by_side._heard(wait=True))
-
-
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_every_item_has_its_answer(processes):
     found = each(shares.squared, range(9), processes)
     assert {k: square for k, (square, _) in found.items()} == {k: k**2 for k in range(9)}
 
 
-def test_a_process_that_works_takes_its_share():
+def test_processes_share_the_work():
     with team.Team(2) as side_by_side:
-        started(side_by_side)
-        workers = [pid for _, (_, pid) in side_by_side.each(shares.squared, ASK, range(4))]
-    assert sorted(workers.count(pid) for pid in set(workers)) == [2, 2]
-    assert os.getpid() in workers
+        workers = [pid for _, (_, pid) in side_by_side.each(shares.slowly_squared, ASK, range(8))]
+    assert len(set(workers)) == 2
+    assert os.getpid() not in workers
 
 
-def test_what_a_process_dies_of_is_done_here():
-    with team.Team(3) as side_by_side:
-        started(side_by_side)
-        items = [(k, os.getpid()) for k in range(9)]
-        assert dict(side_by_side.each(shares.dying_elsewhere, ASK, items)) == {k: k for k in range(9)}
-        assert not side_by_side._beside
+def test_an_item_that_ends_its_processes_is_an_error():
+    with team.Team(2) as side_by_side, pytest.raises(EngineError, match="exit code 3"):
+        dict(side_by_side.each(shares.dying_at_two, ASK, range(9)))
 
 
-def test_what_cannot_be_sent_is_done_here():
-    assert each(lambda ask, item: (item, os.getpid()), range(3), 2) == {k: (k, os.getpid()) for k in range(3)}
-
-
-def test_what_was_sent_before_something_that_cannot_be_is_done_here_too():
-    with team.Team(2) as side_by_side:
-        started(side_by_side)
-        given = [1, 2, 3, lambda: 0, 5]
-        assert sorted(k for k, _ in side_by_side.each(operator.is_, ASK, given)) == [*range(5)]
+def test_what_cannot_be_sent_is_solved_here():
+    assert team.can_send(ASK)
+    assert not team.can_send(replace(ASK, easier={0: threading.Lock()}))
 
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_round_knows_what_the_rounds_before_met_and_nothing_else(processes):
     with team.Team(processes) as side_by_side:
-        if processes > 1:
-            started(side_by_side)
         first = dict(side_by_side.each(shares.meeting, ASK, range(4)))
         known = side_by_side._known
         second = dict(side_by_side.each(shares.meeting, ASK, [7, 8]))

@@ -1,6 +1,7 @@
 """What a front has done side by side, in functions that other processes find."""
 
 import os
+import time
 
 import numpy as np
 
@@ -10,12 +11,17 @@ def squared(ask, item):
     return item**2, os.getpid()
 
 
-def dying_elsewhere(ask, item):
-    """A number; any process but the one that is named dies of it."""
-    number, home = item
-    if os.getpid() != home:
+def slowly_squared(ask, item):
+    """The same after a while, so that another process has time to begin."""
+    time.sleep(0.5)
+    return squared(ask, item)
+
+
+def dying_at_two(ask, item):
+    """A number; any process dies of 2."""
+    if item == 2:
         os._exit(3)
-    return number
+    return item
 
 
 def meeting(ask, item):

@@ -1,4 +1,4 @@
-"""Work for engines: rows that cost nothing, and some that end their worker, once or always."""
+"""Work for executors: items that cost nothing, and some that end their worker, once or always."""
 
 import os
 import signal
@@ -8,51 +8,40 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tmsopt.records import Table
-from tmsopt.studies import Row
-
 
 @dataclass(frozen=True)
 class Fake:
-    """Rows whose values follow from the unit they are solved in.
+    """A function of a number, which leaves a mark in a folder whenever it is called.
 
     Attributes:
-        folder: where every start of a row leaves a mark.
-        seconds: of sleep per row.
-        once, always: rows that end their worker by SIGKILL the first time, or every time.
-        leaves: rows that end it by ``os._exit(3)``.
-        raises: rows that raise.
+        seconds: of sleep in each call.
+        once, always: numbers that end their worker by SIGKILL the first time, or every time.
+        leaves: numbers that end it by ``os._exit(3)``.
+        raises: numbers that raise.
     """
 
     folder: Path
     seconds: float = 0.0
-    once: tuple[int, ...] = ()
-    always: tuple[int, ...] = ()
-    leaves: tuple[int, ...] = ()
-    raises: tuple[int, ...] = ()
+    once: Sequence[int] = ()
+    always: Sequence[int] = ()
+    leaves: Sequence[int] = ()
+    raises: Sequence[int] = ()
 
-    def __call__(self, numbers: tuple[int, ...]) -> Sequence[Row]:
-        rows: list[Row] = []
-        for number in numbers:
-            before = self.tries(number)
-            with (self.folder / str(number)).open("a") as marks:
-                marks.write("x")
-            if number in self.always or (number in self.once and not before):
-                os.kill(os.getpid(), signal.SIGKILL)
-            if number in self.leaves:
-                os._exit(3)
-            if number in self.raises:
-                raise KeyError(number)
-            time.sleep(self.seconds)
-            value = (rows[-1].objective if rows else 0.1) / 3 + number / 7
-            rows.append(Row(number, number, Table({"Fr": value}), "optimal", objective=value, host=str(os.getpid())))
-        return rows
-
-    def lost(self, number: int, cause: str) -> Row:
-        return Row(number, number, Table(), "quarantined", cause)
+    def __call__(self, number: int) -> tuple[float, int]:
+        before = self.tries(number)
+        with (self.folder / str(number)).open("a") as marks:
+            marks.write("x")
+        if number in self.always or (number in self.once and not before):
+            os.kill(os.getpid(), signal.SIGKILL)
+        if number in self.leaves:
+            os._exit(3)
+        if number in self.raises:
+            raise KeyError(number)
+        time.sleep(self.seconds)
+        return number / 7, os.getpid()
 
     def tries(self, number: int) -> int:
-        """How often a row was started."""
+        """How often it was called with a number."""
         marks = self.folder / str(number)
         return marks.stat().st_size if marks.exists() else 0
 
@@ -62,19 +51,29 @@ class Unloadable(Fake):
     """Work that no worker can load."""
 
     def __reduce__(self) -> tuple[type[int], tuple[str]]:
-        return int, ("not a study",)
+        return int, ("not a number",)
+
+
+@dataclass(frozen=True)
+class Big(Fake):
+    """Answers of a megabyte, which no pipe takes at once."""
+
+    def __call__(self, number: int) -> tuple[float, int]:
+        x, process = super().__call__(number)
+        return float(len(str(x) * 10**5)), process
 
 
 def main(folder: str) -> None:
     """A program whose workers would never end by themselves: the ids of two of them, then nothing."""
-    from tmsopt.studies.engines import processes
+    from tmsopt.executor import processes
 
-    seen: set[str] = set()
+    seen: set[int] = set()
     try:
-        for row in processes(Fake(Path(folder), 0.01), [(n,) for n in range(10**5)], workers=2):
-            if row.host not in seen:
-                seen.add(row.host)
-                print(row.host, flush=True)
+        with processes(2) as executor:
+            for _, (_, process) in executor.map(Fake(Path(folder), 0.01), range(10**5)):
+                if process not in seen:
+                    seen.add(process)
+                    print(process, flush=True)
     except KeyboardInterrupt:
         print("interrupted", flush=True)
 

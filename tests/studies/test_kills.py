@@ -33,7 +33,7 @@ def workers_of(pid: int) -> list[int]:
     found = subprocess.run(
         ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False
     )
-    return [int(line.split()[0]) for line in found.stdout.splitlines() if "tmsopt.processes" in line]
+    return [int(line.split()[0]) for line in found.stdout.splitlines() if "popen_loky" in line]
 
 
 @pytest.mark.long

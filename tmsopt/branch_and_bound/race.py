@@ -6,12 +6,11 @@ stopped at any moment, and what it prints is not seen.
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from queue import Empty, SimpleQueue
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.branch_and_bound.tasks import INFEASIBLE, UNDECIDED, Decision, Failed, GlobalSolver, Task
-from tmsopt.processes import Inbox, Worker
+from tmsopt.killable import Killable, ProcessEnded
 
 _TICK = 0.02  # seconds between looks
 _GRACE = 5.0  # seconds that a solver may take longer than it was given, as SCIP does in the midst of a relaxation
@@ -22,8 +21,7 @@ class Crew:
 
     def __init__(self, solver: GlobalSolver) -> None:
         self._solver = solver
-        self._idle: list[Worker] = []
-        self._inbox: Inbox = SimpleQueue()
+        self._idle: list[Killable] = []
 
     def __enter__(self) -> "Crew":
         return self
@@ -35,8 +33,7 @@ class Crew:
     def ahead(self, count: int) -> None:
         """Start processes that will be needed."""
         while len(self._idle) < count:
-            self._idle.append(Worker(self._inbox, apart=True))
-            self._idle[-1].send(_prepare, self._solver.prepare)
+            self._idle.append(Killable(self._solver.prepare))
 
     def race(self, tasks: Sequence[Task], tick: Callable[[], None] = lambda: None) -> list[Decision]:
         """Decisions on tasks, run all at once, until one is shown to have no feasible point.
@@ -48,55 +45,49 @@ class Crew:
         """
         self.ahead(len(tasks))
         began = time.monotonic()
-        answers: list[Decision | NotAccepted | Failed] = [Decision(UNDECIDED) for _ in tasks]
-        running = {self._idle.pop(): number for number in range(len(tasks))}
+        running: list[tuple[Killable, Future[Decision]]] = []
         try:
-            for worker, number in running.items():
-                worker.send(_answer, self._solver.decide, tasks[number])
-            while running:
+            for task in tasks:
+                process = self._idle.pop()
+                running.append((process, process.call(self._solver.decide, task)))
+            answers = [answer for _, answer in running]
+            while waiting := [answer for answer in answers if not answer.done()]:
                 tick()
-                try:
-                    worker, answer = self._inbox.get(timeout=_TICK)
-                except Empty:
-                    if any(isinstance(a, Decision) and a.verdict == INFEASIBLE for a in answers):
-                        break  # not before: one that is all but done is worth more than a new process
-                else:
-                    asked = running.pop(worker, None)
-                    if answer is None:  # stopped or crashed, now or between two questions
-                        worker.end()
-                        self._idle = [other for other in self._idle if other is not worker]
-                    elif asked is not None:
-                        answers[asked] = answer
-                        self._idle.append(worker)
+                finished, _ = wait(waiting, _TICK, FIRST_COMPLETED)
+                if not finished and any(_shows_infeasible(answer) for answer in answers):
+                    break  # not before: one that is all but done is worth more than a new process
                 late = time.monotonic() - began - _GRACE
-                for worker in [w for w, number in running.items() if tasks[number].seconds < late]:
-                    del running[worker]
-                    worker.end()
+                for task, (process, answer) in zip(tasks, running, strict=True):
+                    if task.seconds < late and not answer.done():
+                        process.end()
         finally:
-            for worker in running:
-                worker.end()
-        return _heard(answers)
+            for process, answer in running:
+                if answer.done() and not isinstance(answer.exception(), ProcessEnded):
+                    self._idle.append(process)
+                else:
+                    process.end()
+        return _decisions(answers)
 
 
-def _heard(answers: Sequence[Decision | NotAccepted | Failed]) -> list[Decision]:
-    decisions = [answer for answer in answers if isinstance(answer, Decision)]
+def _shows_infeasible(answer: "Future[Decision]") -> bool:
+    return answer.done() and not answer.exception() and answer.result().verdict == INFEASIBLE
+
+
+def _decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
+    """Decisions in the order of the tasks; undecided where a process was ended or crashed."""
+    decisions, refused, failed = list[Decision](), list[NotAccepted](), list[BaseException]()
     for answer in answers:
-        if isinstance(answer, Failed) and all(decision.verdict == UNDECIDED for decision in decisions):
-            raise answer
-        if isinstance(answer, NotAccepted) and not decisions:
-            raise answer
+        match answer.exception() if answer.done() else ProcessEnded():
+            case None:
+                decisions.append(answer.result())
+            case ProcessEnded():
+                decisions.append(Decision(UNDECIDED))
+            case NotAccepted() as error:
+                refused.append(error)
+            case error:
+                failed.append(error)
+    if failed and all(decision.verdict == UNDECIDED for decision in decisions):
+        raise Failed(f"{type(failed[0]).__name__}: {' '.join(str(failed[0]).split())}") from failed[0]
+    if refused and not decisions:
+        raise refused[0]
     return decisions
-
-
-def _prepare(prepare: Callable[[], None]) -> None:
-    with suppress(Exception):  # it is raised again, and heard, where there is a task
-        prepare()
-
-
-def _answer(decide: Callable[[Task], Decision], task: Task) -> Decision | NotAccepted | Failed:
-    try:
-        return decide(task)
-    except NotAccepted as error:
-        return error
-    except Exception as error:  # of the solver; raised again where somebody hears it
-        return Failed(f"{type(error).__name__}: {' '.join(str(error).split())}")

@@ -158,8 +158,8 @@ def _planned(asked: "Study | Sampling") -> "Study":
 def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, Any]) -> "tuple[Results, bool]":
     """The study with its rows, and whether it was stopped on the way."""
     from tmsopt import run_study
+    from tmsopt.executor import EngineError
     from tmsopt.studies import stored
-    from tmsopt.studies.engines import EngineError
 
     there: list[float] = []  # rows, when it began
 

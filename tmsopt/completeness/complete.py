@@ -5,7 +5,6 @@ import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from queue import Empty, SimpleQueue
 from typing import Any
 
 import flint
@@ -23,8 +22,8 @@ from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.formulation.nlp import Scale, reaches_of, scale_of
+from tmsopt.killable import Killable
 from tmsopt.models import Quantity, Values
-from tmsopt.processes import Inbox, Worker
 from tmsopt.progress import Counts
 from tmsopt.records import Table
 
@@ -98,14 +97,11 @@ class _Run:
     end: float
     seconds: float
     progress: Counts | None
-    inbox: Inbox = field(default_factory=SimpleQueue)
+    worker: Killable = field(default_factory=Killable)
     boxes: int = 0
     stopped: str = ""
     zeros: list[_Zero] = field(default_factory=list)
     left: list[tuple[Sheet, Box, str]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.worker = Worker(self.inbox, apart=True)
 
     def search(self, sheet: Sheet, puzzle: Puzzle, first: Box) -> None:
         """All zeros of a sheet in its box."""
@@ -148,14 +144,13 @@ class _Run:
         if self.progress:
             self.progress(min(self.seconds - left, self.seconds), self.seconds, self._found())
         if left > 0:
-            self.worker.send(prune, puzzle, boxes, proved, min(_TURN, left), most, least)
+            answer = self.worker.call(prune, puzzle, boxes, proved, min(_TURN, left), most, least)
             try:
-                _, answer = self.inbox.get(timeout=min(left, _LONGEST) + _TURN)
-                if answer is not None:
-                    return answer  # type: ignore[no-any-return]
-                self.stopped = "branch and prune ended by an error"
-            except Empty:
+                return answer.result(min(left, _LONGEST) + _TURN)  # type: ignore[no-any-return]
+            except TimeoutError:
                 pass
+            except Exception:  # of the process, or raised there
+                self.stopped = "branch and prune ended by an error"
         self.stopped = self.stopped or _TIME
         return Pruned(0, tuple(boxes), (), ())
 

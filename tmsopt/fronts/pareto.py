@@ -9,13 +9,13 @@ from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import Solution
 from tmsopt.design.verdict.status import NotSolved
 from tmsopt.errors import MOST_POINTS, Fault, InputError, count_faults
+from tmsopt.executor import cores
 from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import Asker, alone, best_first, point
 from tmsopt.fronts.surface import surface
-from tmsopt.fronts.team import AT_ONCE, Team
-from tmsopt.processes import cores
+from tmsopt.fronts.team import AT_ONCE, Team, can_send
 from tmsopt.progress import Steps, begin
 
 POINTS = 25
@@ -40,7 +40,7 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
         points: asked for along the front; kinks and ends of gaps come on top. Of three objectives, limits on each of
             the last two, at most 12: the front has about the square of that in points, and fewer where limits follow
             from one another or none can meet them.
-        workers: processes, this one among them, by default one per core, of which up to four are of use; the front is
+        workers: processes, by default one per core, of which up to four are of use; the front is
             the same for any number.
         options: ``starts`` per sub-problem beside the designs of the neighbours, 2 by default, ``seed`` and
             ``linear_solver`` and ``progress`` as of `solve`.
@@ -67,8 +67,9 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)
     began = time.perf_counter()
-    with Team(min(workers or cores(), AT_ONCE)) as team:
-        front = _front(team, Asker(problem, replace(how, progress=None)), points, how.progress)
+    ask = Asker(problem, replace(how, progress=None))
+    with Team(min(workers or cores(), AT_ONCE) if can_send(ask) else 1) as team:
+        front = _front(team, ask, points, how.progress)
     if front.interrupted:
         words = f"the user stopped the search after {front.solved} sub-problems; this is what is known of the front"
         front = replace(front, notes=(*front.notes, words))

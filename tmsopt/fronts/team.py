@@ -1,134 +1,79 @@
-"""Sub-problems of a front side by side: in this process, and in others that know what this one knows."""
+"""Sub-problems of a front side by side: each knows what was met before its round, wherever it is solved."""
 
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
-from queue import Empty, SimpleQueue
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
+from tmsopt.executor import Crash, EngineError, Executor, here, processes
 from tmsopt.fronts.subproblems import Asker, Workshop
-from tmsopt.processes import Inbox, Worker
 from tmsopt.solver.sample import REMEMBERED, Met
 
 AT_ONCE = 4
 """Sub-problems set at a time, at most, however many processes there are: what is asked next depends on them all."""
 
-_UNBEGUN = 2  # answers that a process owes which has not begun to work: that it has, and one more
-_LOOK = 1.0  # s; some systems do not hear Ctrl-C while they wait
-
 T = TypeVar("T")
 R = TypeVar("R")
 
 
-@dataclass(eq=False)
-class _Beside:
-    """A process beside this one.
-
-    Attributes:
-        queue: the places of what it is to answer, in its order; None for what is not waited for any more.
-        ready: whether it has begun to work.
-    """
-
-    worker: Worker
-    queue: list[int | None]
-    ready: bool = False
-
-
 class Team:
-    """This process and others beside it; to be closed.
+    """Workers that solve sub-problems; to be closed.
 
     What comes out is the same for any number of them: each sub-problem starts from what was known when its round began,
     and what a round has met is put together in the order of its items.
     """
 
-    def __init__(self, processes: int) -> None:
-        self._inbox: Inbox = SimpleQueue()
-        self._beside = [_Beside(Worker(self._inbox, apart=True), [None]) for _ in range(processes - 1)]
-        self._shop, self._known = Workshop(), Met()
-        for other in self._beside:
-            other.worker.send(_begun)
+    def __init__(self, workers: int) -> None:
+        self._executor: Executor = processes(workers) if workers > 1 else here()
+        self._carry, self._known = _Carrier(), Met()
 
     def __enter__(self) -> "Team":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        while self._beside:
-            self._beside.pop().worker.end()
+    def __exit__(self, *error: object) -> None:
+        self._executor.__exit__(*error)
 
-    def each(self, function: Callable[[Asker, T], R], ask: Asker, items: Sequence[T]) -> Generator[tuple[int, R]]:
-        """Places of the items with what the function makes of each, as they come."""
-        left, met = list(range(len(items))), dict[int, Met]()
-        share = max(1, len(items) // (1 + len(self._beside)))
-        for other in self._beside:  # of a round that was not ended
-            other.queue = [None] * len(other.queue)
-        while len(met) < len(items):
-            for other in self._beside:
-                while len(left) > 1 and len(other.queue) < (share if other.ready else _UNBEGUN):
-                    if not self._told(other, left[-1], function, ask, self._known, items[left[-1]]):
-                        left += self._given_up()
-                        break
-                    left.pop()
-            if not left and not self._working():
-                for other in self._beside:  # what has not even begun to work is not waited for
-                    left += [k for k in other.queue if k is not None]
-                    other.queue = [None] * len(other.queue)
-            if left:
-                k = left.pop(0)
-                result, met[k] = _carried(function, ask, self._known, items[k], self._shop)
-                yield k, result
-            for place, answer in self._heard(wait=not left and self._working()):
-                if place is None:
-                    continue
-                if answer is None:  # the process has ended; what it was to do is done here
-                    left.append(place)
-                else:
-                    result, met[place] = answer
-                    yield place, result
-        self._known = _joined(self._known, [met[k] for k in sorted(met)])
+    def each(self, function: Callable[[Asker, T], R], ask: Asker, items: Sequence[T]) -> Iterator[tuple[int, R]]:
+        """Places of the items with what the function makes of each, as they come.
 
-    def _working(self) -> bool:
-        return any(other.ready and any(k is not None for k in other.queue) for other in self._beside)
-
-    def _told(self, other: _Beside, place: int, *task: Any) -> bool:
-        try:
-            other.worker.send(_carried, *task)
-        except Exception:  # a model of the user's own may be nothing that can be sent
-            return False
-        other.queue.append(place)
-        return True
-
-    def _given_up(self) -> list[int]:
-        """End the processes beside this one; the places of what they owed."""
-        owed = [k for other in self._beside for k in other.queue if k is not None]
-        self.__exit__()
-        return owed
-
-    def _heard(self, wait: bool) -> Generator[tuple[int | None, Any]]:
-        """Places with the answers that have come; at least one, where there is one to wait for."""
-        while True:
-            try:
-                worker, answer = self._inbox.get(wait, _LOOK)
-            except Empty:
-                if wait:
-                    continue
-                return
-            other = next((other for other in self._beside if other.worker is worker), None)
-            if other is None:
-                continue
-            other.ready, wait = True, False
-            if answer is None:
-                self._beside.remove(other)
-                worker.end()
-                yield from ((place, None) for place in other.queue)
-            else:
-                yield other.queue.pop(0), answer
+        Raises:
+            EngineError: an item ends every process that tries it.
+        """
+        met = dict[int, Met]()
+        tasks = [(function, ask, self._known, item) for item in items]
+        with closing(self._executor.map(self._carry, tasks)) as answers:
+            for place, answer in answers:
+                if isinstance(answer, Crash):
+                    raise EngineError(f"a sub-problem of the front ends its process ({answer.cause})")
+                result, met[place] = answer
+                yield place, result
+        self._known = _joined(self._known, [met[place] for place in sorted(met)])
 
 
-_SHOP = Workshop()  # of a process beside
+@dataclass(frozen=True)
+class _Carrier:
+    """What a process keeps from one sub-problem to the next, and how it solves one."""
+
+    shop: Workshop = field(default_factory=Workshop)
+
+    def __call__(self, task: tuple[Callable[[Asker, T], R], Asker, Met, T]) -> tuple[R, Met]:
+        """What comes of an item, and what was met on the way."""
+        function, ask, known, item = task
+        self.shop.know(known)
+        result = function(replace(ask, shop=self.shop), item)
+        return result, Met(self.shop.known.refined, self.shop.known.leads)
 
 
-def _begun() -> bool:
+def can_send(thing: Any) -> bool:
+    """Whether another process can have it; a model of the user's own may be nothing that can be sent."""
+    import cloudpickle
+
+    try:
+        cloudpickle.dumps(thing)
+    except Exception:
+        return False
     return True
 
 
@@ -144,12 +89,3 @@ def _joined(before: Met, after: Sequence[Met]) -> Met:
         every_lead = (met.leads.get(box, {}).get(pattern, []) for met in (before, *after))
         leads.setdefault(box, {})[pattern] = max(every_lead, key=len)
     return Met(refined, leads)
-
-
-def _carried(
-    function: Callable[[Asker, T], R], ask: Asker, known: Met, item: T, shop: Workshop = _SHOP
-) -> tuple[R, Met]:
-    """What comes of an item, and what was met on the way."""
-    shop.know(known)
-    result = function(replace(ask, shop=shop), item)
-    return result, Met(shop.known.refined, shop.known.leads)

@@ -1,7 +1,7 @@
 """Study: one problem solved for thousands of rows of what varies in it.
 
 In: a study file, or `Study`. Out: `Results`, kept row by row in a store that survives any kill. Open `study` first,
-then `run`; `engines` carries rows out, `store` keeps them.
+then `run`; `store` keeps the rows.
 """
 
 import lazy_loader

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from tmsopt.design.unit_system import units_of
 from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
-from tmsopt.processes import cores
+from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, processes, silent
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, Truth, frame
-from tmsopt.studies.engines import Note, Unit, cluster, in_process, processes
-from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
 from tmsopt.studies.judging import RowBlock, applies, gathered, judged, shared_by
 from tmsopt.studies.load import load_study
@@ -40,6 +38,9 @@ _COMMIT = 1.0
 """s of rows in one transaction: what a kill may cost, and some 30 times what a transaction takes."""
 
 _WHAT = "solving rows"
+Unit = tuple[int, ...]
+"""Numbers of rows that are solved together: usually one, a block where neighbours start each other."""
+
 _FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
 
 
@@ -325,14 +326,32 @@ def _solved(
     study: Study, left: set[int], workers: int | None, scheduler: str | None, note: Note
 ) -> tuple[Generator[Row], str]:
     """Rows as they come, and the name of the engine."""
-    units = list(_units(study, left))
-    work = Solver(study)
-    if scheduler is not None:
-        return cluster(work, units, scheduler, note), scheduler
     count = workers or (1 if len(left) <= _FEW else cores())
+    if scheduler is not None:
+        return _rows(study, left, cluster(scheduler, note), note), scheduler
     if count == 1:
-        return in_process(work, units, note), "in process"
-    return processes(work, units, count, note), f"{count} processes"
+        return _rows(study, left, here(), note), "in process"
+    return _rows(study, left, processes(count, note), note), f"{count} processes"
+
+
+def _rows(study: Study, left: set[int], executor: Executor, note: Note) -> Generator[Row]:
+    """Rows as they come. A block that ends its worker is taken apart, a row that does is quarantined."""
+    solver, units = Solver(study), list(_units(study, left))
+    with executor:
+        while units:
+            taken_apart: list[Unit] = []
+            with closing(executor.map(solver, units)) as answers:
+                for place, answer in answers:
+                    unit = units[place]
+                    if not isinstance(answer, Crash):
+                        yield from answer
+                    elif len(unit) > 1:
+                        taken_apart += [(number,) for number in unit]
+                    else:
+                        note(f"row {unit[0]} is quarantined")
+                        cause = f" ({answer.cause})" if answer.cause else ""
+                        yield solver.lost(unit[0], f"ended its worker twice{cause}")
+            units = taken_apart
 
 
 def _units(study: Study, left: set[int]) -> Iterable[Unit]:

@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,8 +14,8 @@ from benchmarks.reports.tables import Asked, page, table, times
 from benchmarks.suites import PROBLEMS
 from benchmarks.timing import best, ipopt_runs
 from tmsopt import Study, load, over_grid, run_study
+from tmsopt.executor import Executor, cluster, here, processes
 from tmsopt.studies import Solver, definition, fill
-from tmsopt.studies.engines import cluster, in_process, processes
 from tmsopt.studies.store import open_store
 
 
@@ -58,8 +58,7 @@ def scaling(study: Study, workers: int) -> float:
 
     From the time that all of them have delivered until the last row: what it takes to start them is seconds, and once.
     """
-    solver, units = Solver(study), [(number,) for number in range(len(study))]
-    return _rate(processes(solver, units, workers) if workers else in_process(solver, units), max(workers, 1))
+    return _rate(study, processes(workers) if workers else here(), max(workers, 1))
 
 
 def dask_scaling(study: Study, workers: int) -> float:
@@ -68,12 +67,13 @@ def dask_scaling(study: Study, workers: int) -> float:
 
     local = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)  # type: ignore[no-untyped-call]
     with local:
-        units = [(number,) for number in range(len(study))]
-        return _rate(cluster(Solver(study), units, local.scheduler_address), workers)
+        return _rate(study, cluster(local.scheduler_address), workers)
 
 
-def _rate(rows: Iterable[Any], workers: int) -> float:
-    arrived = [time.perf_counter() for _ in rows]
+def _rate(study: Study, executor: Executor, workers: int) -> float:
+    with executor:
+        rows = executor.map(Solver(study), [(number,) for number in range(len(study))])
+        arrived = [time.perf_counter() for _ in rows]
     skip = 4 * workers
     return (len(arrived) - skip) / (arrived[-1] - arrived[skip - 1])
 

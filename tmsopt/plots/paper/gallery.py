@@ -6,10 +6,9 @@ functions, so that listing the figures loads nothing heavy.
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from tmsopt.processes import Inbox, Worker, cores
+from tmsopt.executor import Crash, cores, here, processes
 from tmsopt.records import Table
 
 if TYPE_CHECKING:
@@ -218,50 +217,15 @@ def pictures(items: Sequence[Item], endings: Sequence[str]) -> Generator[tuple[i
 
     Several are drawn by processes of their own, as many as are of use; what one of them fails at is drawn here.
     """
-    left = list(range(len(items)))
-    workers = min(cores(), len(items)) if len(items) > 1 else 0
-    if workers < 2:
-        yield from ((k, _picture(items[k], endings[k])) for k in left)
-        return
-    inbox: Inbox = SimpleQueue()
-    busy: dict[Worker, int] = {}
-    crew = [Worker(inbox) for _ in range(workers)]
-    try:
-        idle = list(crew)
-        while left or busy:
-            while idle and left:
-                busy[worker := idle.pop()] = k = left.pop(0)
-                worker.send(_attempt, items[k].name, endings[k])
-            try:
-                worker, picture = inbox.get(timeout=_LOOK)
-            except Empty:
-                continue
-            if worker not in busy:  # it has ended, with nothing to do
-                continue
-            k = busy.pop(worker)
-            if picture is not None:
-                idle.append(worker)
-            elif not idle and not busy and left:
-                idle.append(Worker(inbox))
-                crew += idle
-            yield k, picture or _picture(items[k], endings[k])
-    finally:
-        for worker in crew:
-            worker.end()
+    workers = min(cores(), len(items))
+    with processes(workers) if workers > 1 else here() as executor:
+        for place, picture in executor.map(_picture, zip([item.name for item in items], endings, strict=True)):
+            yield place, _picture((items[place].name, endings[place])) if isinstance(picture, Crash) else picture
 
 
-def _attempt(name: str, ending: str) -> bytes:
-    """A picture, empty where it cannot be drawn."""
-    try:
-        return _picture(GALLERY[name], ending)
-    except Exception:
-        return b""
-
-
-def _picture(item: Item, ending: str) -> bytes:
+def _picture(asked: tuple[str, str]) -> bytes:
+    """A figure by its name, and the ending of its file."""
     from tmsopt.plots.style import rendered
 
-    return rendered(item.make(), ending)
-
-
-_LOOK = 1.0  # s; some systems do not hear Ctrl-C while they wait
+    name, ending = asked
+    return rendered(GALLERY[name].make(), ending)

@@ -1,0 +1,482 @@
+"""Executors: a function called for many items, in this process, in processes of this machine or on a Dask cluster.
+
+A crash is data: an item that ends its worker becomes a `Crash`, and no other item is lost. Closing the iterator, Ctrl-C
+and the end of this process, even by kill -9, end the workers at once.
+"""
+
+import asyncio
+import math
+import os
+import pickle
+import re
+import signal
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from queue import Empty, SimpleQueue
+from typing import Any, Protocol, Self
+
+from tmsopt.errors import Fault, InputError
+
+PATIENCE = 10.0
+"""s for a Dask scheduler to answer."""
+
+Note = Callable[[str], None]
+"""Takes one line about workers that come, go and end."""
+
+_BATCH = 0.2  # s of work in one message
+_RECENT = 64  # batches whose mean time per item says how long the next ones take
+_AHEAD = 2  # batches in flight per worker: one is solved while the next is on its way
+_LOOK = 1.0  # s between looks at the workers; some systems do not hear Ctrl-C while they wait
+_TRIES = 2  # crashes after which an item is given up that had all workers for itself
+_STILLBORN = 3  # pools in a row whose workers end before they can do anything; then it is not chance
+_THREADS = ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMEXPR", "NUMBA")
+_ENVIRONMENT = {f"{name}_NUM_THREADS".replace("MAXIMUM_NUM", "MAXIMUM"): "1" for name in _THREADS} | {
+    "PYTHONFAULTHANDLER": "",  # or loky prints a traceback of every crash
+    "LOKY_MAX_MEMORY_LEAK_SIZE": "1e15",  # or it replaces workers that have built many solvers, with a warning
+}
+
+
+@dataclass(frozen=True)
+class Crash:
+    """The end of the workers that were given an item.
+
+    Attributes:
+        cause: such as ``signal 9``; empty where it is not known.
+    """
+
+    cause: str
+
+
+class EngineError(RuntimeError):
+    """An executor that cannot go on; the results it has yielded stand, and the other items can be given again."""
+
+
+class Executor(Protocol):
+    """Calls a function for items. A context manager; closing it ends the workers."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *error: object) -> None: ...
+
+    def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
+        """The place of each item with its result or `Crash`, in the order in which they finish.
+
+        Raises:
+            Exception: what the function raises.
+            EngineError: the workers cannot go on.
+        """
+        ...
+
+
+def silent(line: str) -> None:
+    """A `Note` that goes nowhere."""
+
+
+def cores() -> int:
+    """How many processes this one may keep busy: cores within affinity, quotas and LOKY_MAX_CPU_COUNT."""
+    import loky
+
+    return int(loky.cpu_count())
+
+
+def here() -> Executor:
+    """A loop in this process. A crash ends it."""
+    return _Loop()
+
+
+def processes(workers: int, note: Note = silent) -> Executor:
+    """Processes of this machine, with one thread each.
+
+    Raises:
+        InputError: for less than one worker.
+    """
+    if workers < 1:
+        raise InputError([Fault(f"{workers}; accepted: 1 or more, here up to {cores()} are of use", ("workers",))])
+    return _Spread(_LokyPool(workers, note), note)
+
+
+def cluster(address: str, note: Note = silent) -> Executor:
+    """The workers of the Dask scheduler at an address. They may come and go; with none left, items wait.
+
+    Raises:
+        InputError: `distributed` is not installed, no scheduler answers, or a worker has several threads or no tmsopt.
+    """
+    return _Spread(_DaskPool(address, note), note)
+
+
+class _Loop:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
+        return ((place, function(item)) for place, item in enumerate(items))
+
+
+class _Died(Exception):
+    """A worker ended while it had a call; its argument is the cause."""
+
+
+class _Pool(Protocol):
+    """Workers that take calls.
+
+    Attributes:
+        workers: how many there are now.
+    """
+
+    workers: int
+
+    def submit(self, *call: Any) -> Any:
+        """A future of a call in a worker; it has a done callback."""
+
+    def result(self, future: Any) -> Any:
+        """What a finished future has to say, or the exception of the call; `_Died` if its worker ended."""
+
+    def look(self) -> None:
+        """Once in a while: see how the workers are."""
+
+    def end(self) -> None:
+        """End all calls and workers."""
+
+
+class _Spread:
+    """Items over a pool."""
+
+    def __init__(self, pool: _Pool, note: Note) -> None:
+        self._pool, self._note = pool, note
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._pool.end()
+
+    def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
+        """Batches of items out and results in.
+
+        What was in flight when a worker ended is tried again with nothing else in flight: first a batch as it is, then
+        its items one by one.
+        """
+        try:
+            yield from self._results(function, list(items))
+        except BaseException:  # interrupted, closed or failed: what is in flight is of no use
+            self._pool.end()
+            raise
+
+    def _results(self, function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
+        import cloudpickle
+
+        pool, blob, inbox = self._pool, cloudpickle.dumps(function), SimpleQueue[Any]()
+        flying, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
+        recent, first, alone, last_error = deque[float](maxlen=_RECENT), 0, False, None
+
+        def send(batch: Sequence[int]) -> None:
+            future = pool.submit(blob, cloudpickle.dumps([items[place] for place in batch]))
+            flying[future] = batch
+            future.add_done_callback(inbox.put)
+
+        while flying or suspects or first < len(items):
+            if suspects and not flying:
+                alone = True
+                send(suspects.popleft())
+            while not suspects and not alone and first < len(items) and len(flying) < _AHEAD * max(1, pool.workers):
+                size = _batch_size(recent, len(items) - first, pool.workers)
+                send(range(first, first + size))
+                first += size
+            try:
+                future = inbox.get(timeout=_LOOK)
+            except Empty:
+                pool.look()
+                continue
+            batch, was_alone, alone = flying.pop(future), alone, False
+            try:
+                results, seconds, error = pickle.loads(pool.result(future))
+            except _Died as died:
+                cause, given_up = str(died), False
+                if not was_alone:
+                    suspects.append(batch)
+                elif len(batch) > 1:
+                    suspects.extendleft((place,) for place in reversed(batch))
+                else:
+                    crashes.update(batch)
+                    given_up = crashes[batch[0]] == _TRIES
+                    if not given_up:
+                        suspects.appendleft(batch)
+                if died.__cause__ is not last_error:  # one crash may end several batches
+                    told = "given up" if given_up else "tried again, alone"
+                    self._note(f"worker died{f' ({cause})' if cause else ''}; what it worked at is {told}")
+                last_error = died.__cause__
+                if given_up:
+                    yield batch[0], Crash(cause)
+                continue
+            yield from zip(batch, results, strict=False)  # fewer results where one item raised
+            if error is not None:
+                raise error
+            recent.append(seconds / len(batch))
+
+
+def _batch_size(recent: Sequence[float], left: int, workers: int) -> int:
+    """Items that take `_BATCH` seconds, as far as is known; fewer towards the end, so that all workers end together."""
+    if not recent:
+        return 1
+    wanted = math.ceil(_BATCH * len(recent) / max(sum(recent), 1e-9))
+    return max(1, min(wanted, 2 * len(recent), left // (_AHEAD * max(1, workers))))
+
+
+# In a worker
+
+
+@lru_cache(maxsize=4)
+def _load(blob: bytes) -> Callable[[Any], Any]:
+    """A function, kept with all that it has built."""
+    try:
+        function: Callable[[Any], Any] = pickle.loads(blob)
+    except Exception as error:
+        raise EngineError(f"workers cannot load the work: {error!r}") from error
+    return function
+
+
+def _call(blob: bytes, items: bytes) -> bytes:
+    """Pickled results of items, the seconds that they took, and the exception that ended them."""
+    import cloudpickle
+
+    results, error, began = list[Any](), None, time.perf_counter()
+    try:
+        function = _load(blob)
+        results.extend(map(function, pickle.loads(items)))
+    except Exception as raised:
+        error = raised
+    pickled: bytes = cloudpickle.dumps((results, time.perf_counter() - began, error))
+    return pickled
+
+
+def _begin(parent: int) -> None:
+    """What a process does first: Ctrl-C is for its parent alone, and it ends with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)  # the parent alone writes to stdout
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK / 2)
+        os.kill(os.getpid(), signal.SIGTERM if os.name == "nt" else signal.SIGKILL)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+# Processes of this machine
+
+
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """Hold Ctrl-C back in this thread and in the processes that it starts."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _LokyPool:
+    """A pool of loky, made anew when it breaks."""
+
+    def __init__(self, workers: int, note: Note) -> None:
+        self.workers, self._note, self._stuck = workers, note, False
+        self._pool: Any = None
+
+    def submit(self, *call: Any) -> Any:
+        for _ in range(_STILLBORN):
+            self._pool = self._pool or self._start()
+            with suppress(*_broken()), _no_interrupt():
+                return self._pool.submit(_call, *call)
+            self.end()
+        raise EngineError("worker processes end as soon as they start")
+
+    def result(self, future: Any) -> Any:
+        try:
+            return future.result()
+        except _broken() as error:  # `_call` itself raises nothing
+            raise _Died(_cause(error)) from error
+
+    def look(self) -> None:
+        """Free a pool that waits for the rest of a message whose worker was killed while it wrote."""
+        pool = self._pool
+        dead = pool is not None and any(worker.exitcode is not None for worker in [*pool._processes.values()])
+        if dead and self._stuck:
+            for worker in [*pool._processes.values()]:
+                worker.kill()
+            pool._result_queue._writer.close()  # the last one; the pool reads the end of the file, and breaks
+        self._stuck = dead
+
+    def end(self) -> None:
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            pool.shutdown(wait=True, kill_workers=True)
+
+    def _start(self) -> Any:
+        """A pool, one of whose workers has answered."""
+        from loky import ProcessPoolExecutor
+
+        cause = ""
+        for _ in range(_STILLBORN):
+            self._pool = pool = ProcessPoolExecutor(
+                self.workers, initializer=_begin, initargs=(os.getpid(),), env=_ENVIRONMENT
+            )  # its context runs no script of the user again
+            try:
+                with _no_interrupt():
+                    answer = pool.submit(os.getpid)
+                answer.result()
+                return pool
+            except _broken() as error:
+                cause = _cause(error)
+                self.end()
+        raise EngineError(f"worker processes end before they start{f' ({cause})' if cause else ''}")
+
+
+def _broken() -> tuple[type[Exception], ...]:
+    """What tells that a worker has ended, also while it was being started."""
+    from loky.process_executor import BrokenProcessPool
+
+    return BrokenProcessPool, OSError
+
+
+def _cause(error: BaseException) -> str:
+    """``signal 9`` or ``exit code 1``, as loky tells it."""
+    code = re.search(r"\w+\((-?\d+)\)", str(error))
+    if code is None:
+        return ""
+    return f"signal {code[1][1:]}" if code[1].startswith("-") else f"exit code {code[1]}"
+
+
+# A Dask cluster
+
+
+class _DaskPool:
+    """A client of a Dask scheduler, which itself tries a call again whose worker ended."""
+
+    def __init__(self, address: str, note: Note) -> None:
+        self._address, self._note = address, note
+        self._client: Any = None
+        self._known, self._futures = frozenset[str](), list[Any]()
+        self.workers, self._looked = -1, 0.0
+
+    def submit(self, *call: Any) -> Any:
+        self.look()
+        self._futures = [future for future in self._futures if not future.done()]
+        self._futures.append(self._client.submit(_call, *call, pure=False))
+        return self._futures[-1]
+
+    def result(self, future: Any) -> Any:
+        from distributed import KilledWorker
+
+        try:
+            return future.result()
+        except KilledWorker as error:
+            raise _Died("") from error
+        except (CancelledError, OSError) as error:
+            raise self._lost() from error
+
+    def look(self) -> None:
+        now, self._client = time.monotonic(), self._client or _connect(self._address)
+        if self._client.status != "running":
+            raise self._lost()
+        if now - self._looked < _LOOK:
+            return
+        self._looked = now
+        try:
+            threads = self._client.nthreads()
+        except OSError as error:
+            raise self._lost() from error
+        _check_threads(threads)
+        for place in threads.keys() - self._known:
+            _check_tmsopt(self._client, place)
+        self._known = frozenset(threads)
+        if not threads and self.workers:
+            self._note(f"no workers at {self._address}; rows wait until one joins")
+        self.workers = len(threads)
+
+    def end(self) -> None:
+        client, self._client, futures, self._futures = self._client, None, self._futures, []
+        if client is not None:
+            with suppress(Exception):  # the scheduler may be gone; where it is not, it forgets what is not started yet
+                client.cancel(futures)
+            with suppress(Exception):
+                client.close(timeout=PATIENCE)
+
+    def _lost(self) -> EngineError:
+        return EngineError(
+            f"the Dask scheduler at {self._address} is lost; rows that have come are kept, run again for the others"
+        )
+
+
+def _connect(address: str) -> Any:
+    """A client of the scheduler at an address.
+
+    Whether there is one is asked before, for a `Client` that cannot connect neither gives up at once nor quietly.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise _refused('a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"') from None
+    try:
+        with ThreadPoolExecutor(1) as thread:  # notebooks run a loop of their own in this one
+            kind = thread.submit(asyncio.run, _server_kind(address)).result()
+        reason = "" if kind == "Scheduler" else f"a Dask {kind.lower()} does"
+    except Exception as error:  # whatever listens there may answer anything
+        reason = str(error) or type(error).__name__
+    if reason:
+        raise _refused(
+            f"no Dask scheduler answers at '{address}' ({reason}); start one with 'dask scheduler', which prints its "
+            "address, tcp://HOST:8786, and workers with 'dask worker ADDRESS --nthreads 1'"
+        )
+    connect: Any = distributed.Client
+    return connect(address, timeout=PATIENCE, set_as_default=False)
+
+
+async def _server_kind(address: str) -> str:
+    from distributed import Security, rpc
+
+    security: Any = Security
+    connect: Any = rpc
+    with suppress(TimeoutError):
+        async with asyncio.timeout(PATIENCE):
+            async with connect(address, connection_args=security().get_connection_args("client")) as server:
+                return str((await server.identity())["type"])
+    raise OSError(f"nothing within {PATIENCE:.0f} s")
+
+
+def _check_threads(threads: dict[str, int]) -> None:
+    wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
+    if wrong:
+        raise _refused(
+            f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}: "
+            "start every worker with 'dask worker ADDRESS --nthreads 1'"
+        )
+
+
+def _check_tmsopt(client: Any, place: str) -> None:
+    def has_tmsopt() -> bool:  # travels whole, so it answers where tmsopt is missing
+        from importlib.util import find_spec
+
+        return find_spec("tmsopt") is not None
+
+    answer = client.run(has_tmsopt, workers=[place], on_error="return").get(place, OSError(place))
+    if isinstance(answer, Exception) and not isinstance(answer, OSError):  # one that is gone is no fault
+        raise _refused(f"worker {place} does not answer: {answer!r}; it needs the same Python and packages")
+    if answer is False:
+        raise _refused(f"worker {place} has no tmsopt: install the same version there and start it again")
+
+
+def _refused(message: str) -> InputError:
+    return InputError([Fault(message, ("scheduler",))])
