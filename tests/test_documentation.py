@@ -262,8 +262,8 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
         ("expressions", "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE"),
         ("quantities of a model", "models.stated.texts.MOST_QUANTITIES"),
         ("numbers of parameters", "models.exact.MOST_DIGITS units.text.LONGEST"),
-        ("CSV files of rows", "studies.vary.LARGEST studies.vary.LONGEST_LINE studies.vary.MOST_COLUMNS studies.validate.MOST_ROWS studies.validate.MOST_NUMBERS"),
-        ("a store that is received", "studies.store.database._NUMBERS disk.LARGEST_JSON studies.store.packing.LONGEST"),
+        ("CSV files of rows", "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS"),
+        ("a store that is received", "disk.LARGEST_JSON studies.store.LARGEST"),
         ("a chart", "charts.survey.MOST charts.received.MOST_TILES"),
     ],
 )  # fmt: skip

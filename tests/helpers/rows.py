@@ -1,19 +1,41 @@
 """Rows of a study for tests of its store, also in processes that load nothing else."""
 
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
-from tmsopt.records import Table
-from tmsopt.studies import Row
+import pytest
 
-STUDY: dict[str, Any] = {
-    "problem": {"parameters": {"mu": 0.1, "zeta_B": -0.4}, "objective": {"minimize": "abscissa"}},
-    "columns": {"mu": [0.1, 0.2, 0.3], "zeta_B": [-0.4, -0.5, -0.6]},
-    "seed": 7,
-}
+from tmsopt.design import load
+from tmsopt.studies import Row, Study
+
+STUDY = Study(
+    load(Path(__file__).parents[2] / "problems" / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7
+)
 
 
 def row(number: int, **given: Any) -> Row:
-    varied = Table({"mu": 0.1 * number})
     return Row(
-        number, 1000 + number, **({"varied": varied, "status": "optimal", "abscissa": -1 / (1 + number)} | given)
+        number,
+        1000 + number,
+        **({"varied": STUDY.varied(number), "status": "optimal", "abscissa": -1 / (1 + number)} | given),
     )
+
+
+def flat(row: Row) -> dict[str, Any]:
+    """All that a row says, but how long it took and where."""
+    found: dict[str, Any] = {}
+    for name, value in row.to_json().items():
+        some = {f"{name}.{key}": x for key, x in value.items()} if isinstance(value, Mapping) else {name: value}
+        found |= some if name not in ("seconds", "host") else {}
+    return found
+
+
+def assert_same(rows: Iterable[Row], others: Iterable[Row]) -> None:
+    """The same rows in any order: texts are equal, numbers to 1e-9 of their size; laws are rounding errors."""
+    pairs = zip(*(sorted(some, key=lambda row: row.number) for some in (rows, others)), strict=True)
+    for one, other in (map(flat, pair) for pair in pairs):
+        assert list(one) == list(other)
+        for name, value in one.items():
+            if value != other[name]:
+                assert value == pytest.approx(other[name], rel=1e-9, abs=1e-12), (name, one["number"])

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from helpers import oracles
+from helpers.rows import assert_same
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import Progress, laws
@@ -28,8 +29,20 @@ from tmsopt.models import tms
 from tmsopt.records import Table
 from tmsopt.report import study_table
 from tmsopt.solver import solve
-from tmsopt.studies import Row, Solver, Study, alone, definition, monte_carlo, over_grid, run_study, stored, summary
-from tmsopt.studies.store import open_store, read_store
+from tmsopt.studies import (
+    Row,
+    Solver,
+    Study,
+    alone,
+    load_study,
+    monte_carlo,
+    open_store,
+    over_grid,
+    read_store,
+    run_study,
+    stored,
+    summary,
+)  # fmt: skip
 
 EP4 = load("problems/ep4.toml")
 HEIGHTS = {"zeta_B": [-0.4, -0.8], "zeta_H": [-0.2, -0.3, -0.35]}
@@ -51,10 +64,6 @@ minimize = "abscissa"
 zeta_B = [-0.4, -0.8]
 zeta_H = [-0.2, -0.3, -0.35]
 """
-
-
-def identities(rows: Sequence[Any]) -> list[str]:
-    return [row.identity for row in sorted(rows, key=lambda r: r.number)]
 
 
 def command(*arguments: object) -> Result:
@@ -92,11 +101,10 @@ def test_every_row_obeys_the_laws_of_ep4() -> None:
 
 @pytest.mark.long
 def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -> None:
-    here = identities(run_study(GRID, workers=1).rows)
-    backwards = Solver(GRID)
-    assert identities([backwards((k,))[0] for k in reversed(range(6))]) == here
-    assert [alone(GRID, k).row.identity for k in range(6)] == here
-    assert identities(run_study(GRID, tmp_path / "s.sqlite", workers=2).rows) == here
+    here, backwards = run_study(GRID, workers=1).rows, Solver(GRID)
+    assert_same([backwards((k,))[0] for k in reversed(range(6))], here)
+    assert_same([alone(GRID, k).row for k in range(6)], here)
+    assert_same(run_study(GRID, tmp_path / "s.sqlite", workers=2).rows, here)
 
 
 @pytest.mark.slow
@@ -119,12 +127,12 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pyte
     with pytest.raises(KeyboardInterrupt):
         run_study(GRID, path, workers=1, progress=interrupt)
     with read_store(path) as store:
-        assert store.done() == {0, 1, 2}
+        assert store.done().tolist() == [0, 1, 2]
     resumed = run_study(GRID, path, workers=1)
     assert resumed.solved == 3
     assert sorted(tried) == list(range(6))
     monkeypatch.undo()
-    assert identities(resumed.rows) == identities(run_study(GRID, workers=1).rows)
+    assert_same(resumed.rows, run_study(GRID, workers=1).rows)
 
 
 @pytest.mark.slow
@@ -152,7 +160,7 @@ def test_failures_are_rows_with_a_cause() -> None:
     assert rows[2].violations["trail"] > 0
     told = summary(study, rows)
     assert dict(told.counts) == {"optimal": 1, "infeasible": 1, "failed": 1}
-    assert told.best is rows[0]
+    assert told.best == rows[0]
     assert sum(told.causes.values()) == 2
 
 
@@ -254,9 +262,9 @@ def test_a_valley_that_neither_end_knows_is_found_on_the_way_and_carried_both_wa
 @pytest.mark.slow
 def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 24).tolist()}, warm=True)
-    here = identities(run_study(study, workers=1).rows)
-    assert identities(run_study(study, workers=2).rows) == here
-    assert [alone(study, k).row.identity for k in (0, 11, 23)] == [here[k] for k in (0, 11, 23)]
+    here = run_study(study, workers=1).rows
+    assert_same(run_study(study, workers=2).rows, here)
+    assert_same([alone(study, k).row for k in (0, 11, 23)], [here[k] for k in (0, 11, 23)])
 
 
 @pytest.mark.slow
@@ -304,11 +312,11 @@ def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch:
 def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_path: Path) -> None:
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 10).tolist()}, warm=True)
     whole = run_study(study, workers=1).rows
-    with open_store(tmp_path / "s.sqlite", definition(study)) as store:
+    with open_store(tmp_path / "s.sqlite", study) as store:
         store.add(whole[:4])
     resumed = run_study(study, tmp_path / "s.sqlite", workers=1)
     assert resumed.solved == 6
-    assert identities(resumed.rows) == identities(whole)
+    assert_same(resumed.rows, whole)
 
 
 # What a row is solved with, and what is said of all
@@ -384,14 +392,10 @@ def test_the_command_solves_stores_and_shows_rows(file: Path) -> None:
     assert "grid over zeta_B (2) × zeta_H (3): 6 rows; 6 optimal" in again.stdout
 
     row = command(file, "--row", 4, "--json")
-    with read_store(Path("heights.sqlite")) as store:
-        kept = store.row(4).to_json()
+    kept = stored(load_study(file), "heights.sqlite").rows[4].to_json()
     solved = json.loads(row.stdout)
-    differing = {"seconds", "host", "schema", "solution"}
-    assert {k: v for k, v in solved.items() if k not in differing} == {
-        k: v for k, v in kept.items() if k not in differing
-    }
-    assert solved["solution"]["parameters"] == kept["parameters"]
+    assert_same([Row.from_json(solved)], [Row.from_json(kept)])
+    assert solved["solution"]["parameters"] == pytest.approx(kept["parameters"], rel=1e-9)
 
 
 @pytest.mark.slow
@@ -436,7 +440,7 @@ def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
         if store.exists():
             try:
                 with read_store(store) as opened:
-                    kept = opened.done()
+                    kept = set(opened.done().tolist())
             except InputError:
                 continue  # being made
     process.send_signal(ending)
@@ -448,25 +452,21 @@ def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
         data = json.loads(answer)
         assert data["run"] == {"store": str(store), "rows_found": 0, "interrupted": True}
         assert kept <= {row["number"] for row in data["table"]}
-    with read_store(store) as opened:
-        before = {n: opened.row(n) for n in opened.done()}
+    before = {row.number: row for row in stored(load_study(file), store).rows}
     assert kept <= before.keys()
     assert len(before) < 36
     assert command(file, "--workers", 2).exit_code == 0
-    with open_store(store, json.loads(json.dumps(read_store(store).definition()))) as opened:
-        rows = list(opened.rows())
+    rows = stored(load_study(file), store).rows
     assert [row.number for row in rows] == list(range(36))
     assert all(rows[n] == row for n, row in before.items())  # seconds too: they were not solved again
 
 
-@pytest.mark.parametrize(
-    ("number", "varied"), [(0, {}), (0, {"mu": 0.3}), (0, {"mu": 0.1, "Fr": 1.0}), (2, {"mu": 0.1}), (-1, {"mu": 0.1})]
-)
-def test_rows_that_a_study_cannot_have_are_refused(number: int, varied: dict[str, float], tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [2, -1])
+def test_rows_that_a_study_cannot_have_are_refused(number: int, tmp_path: Path) -> None:
     """In a store from somebody else: before anything is solved, and where its rows are shown."""
     study, path = over_grid("problems/ep4.toml", {"mu": [0.1, 0.2]}), tmp_path / "s.sqlite"
-    with open_store(path, definition(study)) as store:
-        store.add([Row(1, 1, Table({"mu": 0.2}), "failed"), Row(number, 1, Table(varied), "failed")])
+    with open_store(path, study) as store:
+        store.add([Row(1, 1, Table({"mu": 0.2}), "failed"), Row(number, 1, Table({"mu": 0.1}), "failed")])
     told: list[Progress] = []
     for call in (lambda: stored(study, path), lambda: run_study(study, path, progress=told.append)):
         with pytest.raises(InputError, match=f"row {number} is not of this study"):

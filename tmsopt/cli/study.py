@@ -50,7 +50,7 @@ FILE names a problem and what varies: title, problem = "ep4.toml" (or a table [p
   [tolerances]  of monte_carlo, by default those of the problem
 
 Rows go to the store, an SQLite file, as they are solved, once a second. The same command goes on where it was stopped,
-and shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.
+and shows the rows that are there already. A row solved again, by --row, processes or a cluster, is the same.
 
 A Dask cluster needs the same tmsopt on every worker, and one thread each: dask worker HOST:8786 --nthreads 1.
 

@@ -12,9 +12,9 @@ from tmsopt.design.files import SHAPE as PROBLEM
 from tmsopt.design.model_table import KEYS
 from tmsopt.models import MODELS, Parameter, ParameterSet, controlled, gain_names
 from tmsopt.roots.patterns.composed import pattern_names
-from tmsopt.studies.load import SHAPE as STUDY
+from tmsopt.studies.files import SHAPE as STUDY
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS
-from tmsopt.studies.validate import METHODS
+from tmsopt.studies.study import METHODS
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -7,7 +7,7 @@ from itertools import islice
 
 from tmsopt.design import ended, show_at, unit_at, unit_of
 from tmsopt.report.text import HEIGHT, WIDTH, columns, number, screen, yes_no
-from tmsopt.studies.row import Row
+from tmsopt.studies.rows import Row
 from tmsopt.studies.study import Study
 from tmsopt.studies.summary import Share, Summary
 

@@ -1,17 +1,15 @@
-from .export import (
-    FORMATS as FORMATS, check_export as check_export, columns as columns, export as export, header as header,
-)
-from .load import load_study as load_study
+from .export import FORMATS as FORMATS, check_export as check_export, export as export
+from .files import load_study as load_study, read_csv as read_csv
 from .monte_carlo import (
     Sampling as Sampling, check_unchanged as check_unchanged, monte_carlo as monte_carlo, planned as planned,
 )
 from .neighbours import blocks as blocks
-from .row import Row as Row
+from .rows import Row as Row, RowTable as RowTable, columns as columns, header as header
 from .run import Results as Results, fill as fill, run_study as run_study, stored as stored
-from .samples import (
+from .sampling import (
     Span as Span, grid as grid, latin_hypercube as latin_hypercube, sobol as sobol, sobol_note as sobol_note,
 )
 from .solving import Solver as Solver, alone as alone
+from .store import Store as Store, open_store as open_store, read_store as read_store
 from .study import Study as Study, definition as definition, over_grid as over_grid
 from .summary import Share as Share, summary as summary, wilson as wilson, yield_of as yield_of
-from .vary import read_csv as read_csv

@@ -3,10 +3,10 @@
 import csv
 import json
 import re
-from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,50 +16,7 @@ from tmsopt.disk import cell, headed, netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
 from tmsopt.progress import Listener, Steps, counted
 from tmsopt.records import Array
-from tmsopt.studies.judging import RowsInBlocks, table
-from tmsopt.studies.row import Row
-
-PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
-"""Of the header for the names in each table of a row. Parameters have none; one called as a field of the row, such as
-``seed``, is ``parameter.seed``. The header of a value so depends on nothing but its own name."""
-_FIELDS: dict[str, Any] = {}
-for _field in fields(Row):
-    _FIELDS[_field.name] = _field.type
-    if _field.name == "structure":
-        _FIELDS["stable"] = bool  # or None
-_LARGEST = 2**63 - 1
-Names = Mapping[str, Iterable[str]]
-_NO_NAMES: Names = {}
-
-
-@dataclass(frozen=True)
-class PartialColumn:
-    """The values of one name, one per row.
-
-    Attributes:
-        values: of float, int or bool; an object array of strings; nan where a number is absent.
-        present: which rows have a value: nan may also be one.
-    """
-
-    values: NDArray[Any]
-    present: NDArray[np.bool_]
-
-    @property
-    def numbers(self) -> NDArray[Any]:
-        """The values; truths of which some are absent as 1, 0 and nan."""
-        lacking = self.values.dtype == np.bool_ and not self.present.all()
-        return np.where(self.present, self.values, np.nan) if lacking else self.values
-
-
-class _Sparse:
-    def __init__(self) -> None:
-        self.values, self.places = array("d"), array("q")
-
-    def full(self, count: int) -> PartialColumn:
-        places = np.array(self.places, dtype=np.int64)
-        values, present = np.full(count, np.nan), np.zeros(count, dtype=bool)
-        values[places], present[places] = np.array(self.values), True
-        return PartialColumn(values, present)
+from tmsopt.studies.rows import PREFIXES, Names, PartialColumn, Row, columns
 
 
 @dataclass(frozen=True)
@@ -83,7 +40,7 @@ def export(
     rows: Iterable[Row],
     path: Path | str,
     metadata: Mapping[str, Any] | None = None,
-    names: Names = _NO_NAMES,
+    names: Names = MappingProxyType({}),
     progress: Listener | None = None,
 ) -> None:
     """Write rows to a file whose ending says how, one of `FORMATS`; doubles come back bit by bit.
@@ -232,88 +189,6 @@ FORMATS: Mapping[str, Format] = {
     "nc": Format(_netcdf, ("xarray", "netCDF4")),
 }
 """Ending → format; another one is added here."""
-
-
-def columns(rows: Iterable[Row], names: Names = _NO_NAMES) -> Mapping[str, PartialColumn]:
-    """Header → column, in the order of the fields of a row; 8 bytes per number while they are collected.
-
-    Args:
-        names: table of a row, such as ``laws`` → names that have a column whatever the rows have.
-    """
-    return _of_blocks(rows, names) if isinstance(rows, RowsInBlocks) else _of_each(rows, names)
-
-
-def _of_blocks(rows: RowsInBlocks, names: Names) -> Mapping[str, PartialColumn]:
-    """Columns made when they are asked for."""
-    single, count = _of_each(rows.singles, _NO_NAMES), len(rows.singles)
-    absent = PartialColumn(np.full(count, np.nan), np.zeros(count, dtype=bool))
-
-    def made(of: Callable[..., Any], *names: str, header: str) -> Callable[[], PartialColumn]:
-        alone = single.get(header, absent)
-        return lambda: PartialColumn(*of(rows, *names, (alone.values, alone.present)))
-
-    found: dict[str, Callable[[], PartialColumn]] = {}
-    for name in _FIELDS:
-        if name not in PREFIXES:
-            found[name] = made(table.field, name, header=name)
-            continue
-        starts = {key: c.present for h, c in single.items() if (key := _key(name, h)) is not None}
-        for key in dict.fromkeys([*names.get(name, ()), *table.keys(rows, name, starts)]):
-            found[header(name, key)] = made(table.keyed, name, key, header=header(name, key))
-    return table.Lazily(found)
-
-
-def _key(of: str, head: str) -> str | None:
-    """The name in a table of the rows that a header is of; None of another one's."""
-    others = (*(p for p in PREFIXES.values() if p), "parameter.")
-    if of != "parameters":
-        return head.removeprefix(PREFIXES[of]) if head.startswith(PREFIXES[of]) else None
-    if head.startswith("parameter.") and head.removeprefix("parameter.") in _FIELDS:
-        return head.removeprefix("parameter.")
-    return None if head in _FIELDS or head.startswith(others) else head
-
-
-def _of_each(rows: Iterable[Row], names: Names) -> dict[str, PartialColumn]:
-    plain: dict[str, list[Any] | array[float]] = {
-        name: array("d") if kind is float else [] for name, kind in _FIELDS.items() if name not in PREFIXES
-    }
-    tables = {name: {key: _Sparse() for key in names.get(name, ())} for name in PREFIXES}
-    count = 0
-    for row in rows:
-        for name, values in plain.items():
-            values.append(getattr(row, name))
-        for name, found in tables.items():
-            _collect(found, getattr(row, name), count)
-        count += 1
-    made: dict[str, PartialColumn] = {}
-    for name, kind in _FIELDS.items():
-        if name in plain:
-            present = (
-                np.array([v is not None for v in plain[name]], bool) if name == "stable" else np.ones(count, dtype=bool)
-            )
-            made[name] = PartialColumn(_array(plain[name], kind), present)
-        else:
-            made |= {header(name, key): sparse.full(count) for key, sparse in tables[name].items()}
-    return made
-
-
-def header(table: str, key: str) -> str:
-    """Of the values of one name in one table of the rows."""
-    return f"parameter.{key}" if table == "parameters" and key in _FIELDS else f"{PREFIXES[table]}{key}"
-
-
-def _collect(found: dict[str, _Sparse], table: Mapping[str, float], place: int) -> None:
-    for key, value in table.items():
-        sparse = found.setdefault(key, _Sparse())
-        sparse.values.append(value)
-        sparse.places.append(place)
-
-
-def _array(values: "list[Any] | array[float]", kind: Any) -> NDArray[Any]:
-    if kind is int:
-        fits = all(-_LARGEST <= v <= _LARGEST for v in values)  # a seed may be longer: then all are text
-        return np.array(values, dtype=np.int64) if fits else np.array([str(v) for v in values], dtype=object)
-    return np.array(values, dtype=object if kind is str else kind)
 
 
 def levels(columns: Mapping[str, PartialColumn]) -> dict[str, Array]:

@@ -18,10 +18,9 @@ from tmsopt.formulation.options import STARTS
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Column, Table
 from tmsopt.solver.solve import solve, solved_first
-from tmsopt.studies.store.definition import doubles
-from tmsopt.studies.store.opening import check_same, read_store
-from tmsopt.studies.study import Study, definition
-from tmsopt.studies.validate import MOST_ROWS, common_faults
+from tmsopt.studies.sampling import MOST_ROWS
+from tmsopt.studies.store import check_same, read_store
+from tmsopt.studies.study import Study, common_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
 """Of an error: uniform within ± tolerance; or normal, its standard deviation a third of the tolerance, cut off at
@@ -173,7 +172,7 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
         )
     except (InputError, KeyError, TypeError, ValueError):  # of another model, or a design that cannot be drawn around
         return
-    check_same(path, definition(drawn, doubles))
+    check_same(path, drawn)
 
 
 def _as_built(problem: Problem, design: Mapping[str, float]) -> tuple[Problem, tuple[str, ...]]:

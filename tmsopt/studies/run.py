@@ -1,7 +1,7 @@
 """A study carried out: rows by an engine, into a store."""
 
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
@@ -15,17 +15,14 @@ from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
 from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, processes, silent
 from tmsopt.progress import Listener, counted
-from tmsopt.records import Shown, Truth, frame
-from tmsopt.studies.export import columns, export, gridded
-from tmsopt.studies.judging import RowBlock, applies, gathered, judged, shared_by
-from tmsopt.studies.load import load_study
+from tmsopt.records import Shown, frame
+from tmsopt.studies.export import export, gridded
+from tmsopt.studies.files import load_study
 from tmsopt.studies.monte_carlo import Sampling, check_unchanged, planned
 from tmsopt.studies.neighbours import blocks
-from tmsopt.studies.row import Row
-from tmsopt.studies.solving import Solver
-from tmsopt.studies.store.definition import doubles
-from tmsopt.studies.store.opening import open_store, read_store
-from tmsopt.studies.store.store import Store
+from tmsopt.studies.rows import Part, Row, RowTable, columns
+from tmsopt.studies.solving import Solver, applies, judged
+from tmsopt.studies.store import Store, open_store, read_store
 from tmsopt.studies.study import Study, definition, names_of
 from tmsopt.studies.summary import Summary, summary
 from tmsopt.versions import SCHEMA
@@ -132,7 +129,7 @@ def run_study(
 ) -> Results:  # fmt: skip
     """Solve every row of a study that its store does not have yet.
 
-    The rows are the same, bit by bit, whoever solves them and in whatever order.
+    The rows are the same whoever solves them and in whatever order.
 
     Args:
         study: or the path of its file.
@@ -164,20 +161,20 @@ def run_study(
         check_unchanged(stated, store)
     asked = planned(stated, progress)
     if store is None:
-        found, seconds, engine = _carried_out(asked, _none(asked), workers, scheduler, note, progress)
-        return Results(asked, gathered(found.blocks, found.rows), found.count, seconds, engine)
-    stated_as = definition(asked, doubles)
+        made, seconds, engine = _carried_out(asked, [], workers, scheduler, note, progress)
+        rows = RowTable(asked, made)
+        return Results(asked, rows, len(rows), seconds, engine)
     counted(progress, "waiting for the store")
-    with open_store(path_of(store, "an SQLite file"), stated_as, fresh=fresh) as opened:
+    with open_store(path_of(store, "an SQLite file"), asked, fresh=fresh) as opened:
         for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
             note(line)
         counted(progress, "reading the store")
         there = _held(asked, opened)  # damage is said before any work
-        if there.count:
-            note(f"{there.count} of {len(asked)} rows are in {opened.path}")
-        made, seconds, engine = _carried_out(asked, there.done(asked), workers, scheduler, note, progress, opened)
-        rows = gathered([*there.blocks, *made.blocks], [*there.rows, *made.rows])
-        return Results(asked, rows, made.count, seconds, engine, there.count, opened.about())
+        found = _count(there)
+        if found:
+            note(f"{found} of {len(asked)} rows are in {opened.path}")
+        made, seconds, engine = _carried_out(asked, there, workers, scheduler, note, progress, opened)
+        return Results(asked, RowTable(asked, [*there, *made]), _count(made), seconds, engine, found, opened.about())
 
 
 def stored(study: Study, store: str | PathLike[str]) -> Results:
@@ -187,63 +184,27 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
         InputError: where there is no store.
     """
     with read_store(path_of(store, "an SQLite file")) as opened:
-        held = _held(study, opened)
-        return Results(study, gathered(held.blocks, held.rows), 0, 0.0, "", held.count, opened.about())
+        rows = RowTable(study, _held(study, opened))
+        return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
 
 
-@dataclass
-class _Held:
-    """Rows of a study in memory."""
-
-    blocks: list[RowBlock] = field(default_factory=list)
-    rows: list[Row] = field(default_factory=list)
-
-    @property
-    def count(self) -> int:
-        """How many there are."""
-        return sum(map(len, self.blocks)) + len(self.rows)
-
-    def done(self, study: Study) -> Truth:
-        """Of each row of the study, whether it is here."""
-        found = _none(study)
-        for block in self.blocks:
-            found[block.numbers] = True
-        found[[row.number for row in self.rows]] = True
-        return found
+def _count(parts: Iterable[Part]) -> int:
+    return sum(len(part["number"].values) for part in parts)
 
 
-def _none(study: Study) -> Truth:
-    return np.zeros(len(study), dtype=bool)
-
-
-def _held(study: Study, store: Store) -> _Held:
+def _held(study: Study, store: Store) -> list[Part]:
     """All rows of a store.
 
     Raises:
         InputError: for one that the study cannot have, or that is damaged.
     """
-    number, held = store.outside(len(study)), _Held()
-    if number is None:
-        held = _Held(list(store.blocks()), list(store.singles()))
-        wrong = [row.number for row in held.rows if row.varied != study.varied(row.number)]
-        wrong += [n for block in held.blocks if (n := _unlike(study, block)) is not None]
-        number = wrong[-1] if wrong else None
-    if number is None:
-        return held
-    message = (
-        f"row {number} is not of this study; --fresh moves the store aside, Store.forget([{number}]) removes the row"
-    )
-    raise InputError([Fault(message, file=str(store.path))])
-
-
-def _unlike(study: Study, block: RowBlock) -> int | None:
-    """The number of a row that the study gave other values; None where there is none."""
-    if block.shared != shared_by(study) or block.named("varied") != list(study.columns):
-        return int(block.numbers[0])
-    wrong = np.zeros(len(block), dtype=bool)
-    for name, column in study.columns.items():
-        wrong |= np.asarray(column)[block.numbers] != block.columns[f"varied.{name}"]
-    return int(block.numbers[wrong.argmax()]) if wrong.any() else None
+    parts = store.parts()
+    for part in parts:
+        for number in part["number"].values[[0, -1]].tolist():
+            if not 0 <= number < len(study):
+                advice = f"--fresh moves the store aside, Store.forget([{number}]) removes the row"
+                raise InputError([Fault(f"row {number} is not of this study; {advice}", file=str(store.path))])
+    return parts
 
 
 def _faults(study: object, workers: object, progress: object) -> Iterator[Fault]:
@@ -261,65 +222,56 @@ def fill(
     progress: Listener | None = None, note: Note = silent,
 ) -> tuple[int, float, str]:  # fmt: skip
     """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
-    done = _none(study)
-    done[list(store.done())] = True
-    made, seconds, engine = _carried_out(study, done, workers, scheduler, note, progress, store)
-    return made.count, seconds, engine
+    made, seconds, engine = _carried_out(study, _held(study, store), workers, scheduler, note, progress, store)
+    return _count(made), seconds, engine
 
 
 def _carried_out(
-    study: Study, done: Truth, workers: int | None, scheduler: str | None, note: Note, progress: Listener | None,
-    store: Store | None = None,
-) -> tuple[_Held, float, str]:  # fmt: skip
-    """The rows that are not done, in how many seconds, and by which engine; kept in a store as they come."""
-    began = time.perf_counter()
-    made, engine, left, before = _Held(), "", np.flatnonzero(~done), int(done.sum())
-    steps = counted(progress, _WHAT, "row")
+    study: Study, there: Sequence[Part], workers: int | None, scheduler: str | None, note: Note,
+    progress: Listener | None, store: Store | None = None,
+) -> tuple[list[Part], float, str]:  # fmt: skip
+    """The rows that are not there, in how many seconds, and by which engine; kept in a store as they come."""
+    began, made, engine, steps = time.perf_counter(), list[Part](), "", counted(progress, _WHAT, "row")
+    lacks = np.ones(len(study), dtype=bool)
+    for part in there:
+        lacks[part["number"].values] = False
+    count = len(study) - int(lacks.sum())
 
-    def told() -> None:
-        if steps:
-            steps(before + made.count, len(study))
-
-    if left.size:
-        told()
-    if left.size and applies(study):
-        engine, left = "in process", _judged(study, left, made, store, told)
-    if left.size:
-        wanted = set(left.tolist())
-        rows, engine = _solved(study, wanted, workers, scheduler, note)
-        with closing(rows):
-            _kept((row for row in rows if row.number in wanted), made, store, told)  # a block may be stored in part
-    return made, time.perf_counter() - began if engine else 0.0, engine
-
-
-def _judged(
-    study: Study, left: NDArray[np.int64], made: _Held, store: Store | None, told: Callable[[], None]
-) -> NDArray[np.int64]:
-    """Judge rows in blocks; the numbers of those that are still left."""
-    remaining = []
-    for block, some in judged(study, left):
-        if store is not None and len(block):
-            store.add_block(block)
-        made.blocks.append(block)
-        remaining.append(some)
-        told()
-    return np.concatenate(remaining)
-
-
-def _kept(rows: Iterable[Row], made: _Held, store: Store | None, told: Callable[[], None]) -> None:
-    """Take rows as they come, into a store once in a while."""
-    fresh, last = list[Row](), time.perf_counter()
-    try:
-        for row in rows:
-            made.rows.append(row)
-            fresh.append(row)
-            told()
-            if store is not None and time.perf_counter() - last >= _COMMIT:
-                store.add(fresh)
-                fresh, last = [], time.perf_counter()
-    finally:
+    def keep(part: Part) -> None:
         if store is not None:
-            store.add(fresh)  # interrupted or not, what was solved is kept
+            store.add_part(part)
+        made.append(part)
+        lacks[part["number"].values] = False
+
+    def tell(more: int) -> None:
+        nonlocal count
+        count += more
+        if steps:
+            steps(count, len(study))
+
+    if lacks.any():
+        tell(0)
+    if lacks.any() and applies(study):
+        engine = "in process"
+        for part in judged(study, np.flatnonzero(lacks)):
+            keep(part)
+            tell(_count([part]))
+    if lacks.any():
+        rows, engine = _solved(study, set(np.flatnonzero(lacks).tolist()), workers, scheduler, note)
+        fresh, last = list[Row](), time.perf_counter()
+        try:
+            with closing(rows):
+                for row in rows:
+                    if lacks[row.number]:  # a block may be stored in part
+                        fresh.append(row)
+                        tell(1)
+                    if time.perf_counter() - last >= _COMMIT:
+                        keep(columns(fresh))
+                        fresh, last = [], time.perf_counter()
+        finally:
+            if fresh:
+                keep(columns(fresh))  # interrupted or not, what was solved is kept
+    return made, time.perf_counter() - began if engine else 0.0, engine
 
 
 def _solved(

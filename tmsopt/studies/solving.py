@@ -1,14 +1,19 @@
-"""How the rows of a study are solved: each for itself, or from neighbour to neighbour."""
+"""How the rows of a study are solved, each for itself or from neighbour to neighbour, and judged at once where nothing
+is free.
+"""
 
 import platform
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from tmsopt.checks.judge import BLOCK, Verdicts, judgeable, verdicts
 from tmsopt.checks.law_rows import law_rows
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import amounts_text
@@ -18,9 +23,8 @@ from tmsopt.records import Table
 from tmsopt.solver.multistart import same
 from tmsopt.solver.solve import solve
 from tmsopt.solver.workspace import Family
-from tmsopt.studies.judging import judged_alone
 from tmsopt.studies.neighbours import blocks
-from tmsopt.studies.row import Row
+from tmsopt.studies.rows import Part, PartialColumn, Row, RowTable, full, header
 from tmsopt.studies.study import Study
 
 _AFAR = 1
@@ -36,7 +40,7 @@ class SolvedRow:
 
 
 def alone(study: Study, number: int) -> SolvedRow:
-    """One row solved without the others, to the same bits; with warm starts, with the other rows of its block.
+    """One row solved without the others, as in the study; with warm starts, with the other rows of its block.
 
     Raises:
         InputError: for a row that the study has not.
@@ -185,3 +189,59 @@ def _laws(solution: Solution) -> Mapping[str, float]:
     if solution.status != "optimal" or solution.problem.model is not tms:
         return {}
     return {row.name: row.relative for row in law_rows(solution) if row.applies}
+
+
+_STATUS = np.array(["optimal", "infeasible"], dtype=object)
+_STRUCTURES = np.array(["real", "pair"], dtype=object)
+_METHODS = np.array(["none", "omega0", "relation"], dtype=object)
+
+
+def applies(study: Study) -> bool:
+    """Whether rows of a study may be judged at once: only fixed parameters vary, and nothing is free."""
+    names = study.problem.parameter_set.names
+    return not study.warm and judgeable(study.problem) and all(name in names for name in study.columns)
+
+
+def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
+    """Columns of those rows that are certain; the others are left to be solved one by one.
+
+    Args:
+        numbers: of the rows, ascending.
+    """
+    given = {name: np.asarray(column) for name, column in study.columns.items()}
+    for first in range(0, len(numbers), BLOCK):
+        began, some = time.perf_counter(), numbers[first : first + BLOCK]
+        found = verdicts(study.problem, {name: column[some] for name, column in given.items()}, study.report)
+        if found is None:
+            return
+        if found.certain.any():
+            yield _part(some[found.certain], found, (time.perf_counter() - began) / len(some))
+
+
+def judged_alone(study: Study, number: int) -> Row | None:
+    """One row as among others; None where it is to be solved."""
+    parts = list(judged(study, np.array([number]))) if applies(study) else []
+    return RowTable(study, parts)[0] if parts else None
+
+
+def _part(numbers: NDArray[np.int64], found: Verdicts, seconds: float) -> Part:
+    """Columns; a violation or a law that does not apply is nan."""
+    certain, count = found.certain, len(numbers)
+    violations = {name: values[certain] for name, values in found.violations.items()}
+    wrong = np.logical_or.reduce([~np.isnan(values) for values in violations.values()] or [np.zeros(count, dtype=bool)])
+    bound, abscissa = found.bound[certain], full(found.abscissa[certain])
+    method = np.where(np.isfinite(bound), 1 + found.by_relation[certain], 0)
+    plain = {
+        "number": numbers, "status": _STATUS[wrong.astype(int)], "objective": found.objective[certain],
+        "damping_ratio": found.damping_ratio[certain], "structure": _STRUCTURES[found.oscillates[certain].astype(int)],
+        "bound": bound, "gap": found.gap[certain], "method": _METHODS[method], "seconds": np.full(count, seconds),
+        "host": np.full(count, platform.node(), dtype=object),
+    }  # fmt: skip
+    part = {name: full(values) for name, values in plain.items()} | {
+        "abscissa": abscissa,
+        "abscissa_realised": abscissa,
+    }
+    part |= {header("reports", text): full(values[certain]) for text, values in found.reports.items()}
+    laws = {header("laws", label): values[certain] for label, values in found.laws.items()}
+    some = laws | {header("violations", name): values for name, values in violations.items()}
+    return part | {head: PartialColumn(values, ~np.isnan(values)) for head, values in some.items()}

@@ -11,10 +11,7 @@ import numpy as np
 
 from tmsopt.design import rate_of
 from tmsopt.records import Array, Table, Truth, plain
-from tmsopt.studies.export import PREFIXES, PartialColumn, columns
-from tmsopt.studies.judging import RowsInBlocks
-from tmsopt.studies.judging.table import causes
-from tmsopt.studies.row import STATUSES, Row
+from tmsopt.studies.rows import PREFIXES, STATUSES, PartialColumn, Row, RowTable, columns
 from tmsopt.studies.study import Study
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -164,7 +161,7 @@ def _stable(table: Mapping[str, PartialColumn]) -> Truth:
 def _causes(rows: Sequence[Row]) -> Table[int]:
     each = ((row.cause, 1) for row in rows if row.status != "optimal")
     alike: dict[str, list[tuple[str, int]]] = {}
-    for text, count in causes(rows) if isinstance(rows, RowsInBlocks) else each:
+    for text, count in rows.causes() if isinstance(rows, RowTable) else each:
         alike.setdefault(_NUMBER.sub("#", text), []).append((text, count))
     counted = [(same[0][0], sum(count for _, count in same)) for same in alike.values()]
     ranked = sorted(counted, key=lambda pair: pair[1], reverse=True)

@@ -15,8 +15,7 @@ from benchmarks.suites import PROBLEMS
 from benchmarks.timing import best, ipopt_runs
 from tmsopt import Study, load, over_grid, run_study
 from tmsopt.executor import Executor, cluster, here, processes
-from tmsopt.studies import Solver, definition, fill
-from tmsopt.studies.store import open_store
+from tmsopt.studies import Solver, fill, open_store
 
 
 def quick_rows(rows: int) -> Study:
@@ -49,7 +48,7 @@ def overhead(study: Study, rounds: int) -> dict[str, float]:
 
 
 def _stored(study: Study, solver: Solver) -> None:
-    with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s.sqlite", definition(study)) as store:
+    with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s.sqlite", study) as store:
         fill(study, store, workers=1)
 
 

@@ -10,7 +10,12 @@ import numpy as np
 
 from tmsopt.errors import Fault, InputError, count_faults, short, table_faults
 from tmsopt.records import Array, Column
-from tmsopt.studies.validate import MOST_NUMBERS, MOST_ROWS
+
+MOST_ROWS = 10_000_000
+"""Rows of a study; one with more is another kind of question, such as a chart."""
+
+MOST_NUMBERS = 40_000_000
+"""Numbers in all columns, which are held in memory."""
 
 _DIGITS = 15  # of a decimal number, all of which a double holds
 
