@@ -23,7 +23,7 @@ from tmsopt.proofs import Proof, abscissa_formula, prove_design
 from tmsopt.roots import Root, pattern, product, roots
 from tmsopt.roots.patterns import implies, shown_patterns
 
-rational = import_module("tmsopt.proofs.rational")
+factored = import_module("tmsopt.proofs.factored")
 
 scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
@@ -342,10 +342,10 @@ def test_patterns_of_fractions_of_any_degree(factors: list[list[int]], name: str
     a = [flint.fmpq(-3, 7) * c for c in product(*factors)]
     asked = {"EP6", "EP3+CEP2", "EP3", "CEP2", "EP2", "3EP2", "weave", "resonance", "capsize"}
     asked |= {"weave+capsize", "EP2+weave", "CEP2+weave"}
-    assert {n for n in asked if rational.has(n, a)} == patterns
-    assert rational.multiple(a) == name
+    assert {n for n in asked if factored.has_pattern(n, a)} == patterns
+    assert factored.multiple_roots(a) == name
     moved = [a[0], a[1] + flint.fmpq(1, 10**40), *a[2:]]
-    assert rational.multiple(moved) == ""
+    assert factored.multiple_roots(moved) == ""
 
 
 def test_exact_fractions_are_decided_without_rounding() -> None:

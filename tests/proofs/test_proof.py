@@ -27,7 +27,7 @@ from tmsopt.proofs import Factored, Proof, prove_design
 from tmsopt.report import proof_text
 from tmsopt.roots import exact_roots, product
 
-rational = import_module("tmsopt.proofs.rational")
+factored = import_module("tmsopt.proofs.factored")
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -355,9 +355,9 @@ def test_nothing_free_and_not_exact_is_refused() -> None:
 )
 def test_patterns_of_fractions(factors: list[list[int]], patterns: set[str]) -> None:
     a = [flint.fmpq(-3, 7) * c for c in product(*factors)]
-    assert {n for n in tmsopt.roots.PATTERNS if rational.has(n, a)} == patterns
+    assert {n for n in tmsopt.roots.PATTERNS if factored.has_pattern(n, a)} == patterns
     moved = [a[0], a[1] + flint.fmpq(1, 10**40), *a[2:]]
-    assert not any(rational.has(n, moved) for n in ("EP4", "EP3", "2EP2", "CEP2", "EP2", "weave", "resonance"))
+    assert not any(factored.has_pattern(n, moved) for n in ("EP4", "EP3", "2EP2", "CEP2", "EP2", "weave", "resonance"))
 
 
 @pytest.mark.parametrize(
@@ -576,7 +576,7 @@ def test_stability_and_heavy_damping_of_random_polynomials() -> None:
         stable = all(z.re < 0 for z in truth)
         heavy = stable and all(z.im == 0 for z in truth)
         with flint.ctx.workdps(60):
-            exact = rational.factored([flint.fmpq(c.numerator, c.denominator) for c in a])
+            exact = factored.factored([flint.fmpq(c.numerator, c.denominator) for c in a])
             assert (exact.stable, exact.heavily_damped) == (stable, heavy)
             if all(z.multiplicity == 1 for z in truth):
                 balls = Factored((([flint.arb(flint.fmpq(c.numerator, c.denominator)) for c in a], 1),))

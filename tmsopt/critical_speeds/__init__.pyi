@@ -1,4 +1,3 @@
 from .crossings import crossings as crossings
 from .growth import Growth as Growth, growth as growth
-from .parametric import interpolated as interpolated
 from .speeds import Speeds as Speeds, speed_of as speed_of, speeds as speeds, stable_speeds as stable_speeds

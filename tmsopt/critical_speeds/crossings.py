@@ -1,34 +1,33 @@
 """Where the roots of a polynomial in s that depends on y meet, or meet the imaginary axis: all such places, exactly.
 
 The coefficients are polynomials with rational coefficients in that number y. A root 0, a root at infinity, a pair ± iω
-and a multiple root are then roots of polynomials in y: of aₙ, of a0, of the Hurwitz minor Δₙ₋₁ and of the discriminant.
-These are isolated in ball arithmetic, so that none is missed, however close to another. What holds for every y, such as
-a root 0, is split off before (`lasting`).
+and a multiple root are then roots of polynomials in y: of aₙ, of a0, of the resultant of the even and the odd part, and
+of the discriminant. These are isolated in ball arithmetic, so that none is missed, however close to another. Factors
+that hold for every y, such as a root 0, are split off before.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import flint
 
 from tmsopt.arithmetic.elementary import rational
-from tmsopt.critical_speeds.parametric import (
-    DIGITS,
-    Lasting,
-    Polynomial,
-    lasting,
-    of_values,
-    real_places,
-    trimmed,
-    value_at,
-)
 from tmsopt.models import Model
 from tmsopt.models.told import name_told, roots_told
 from tmsopt.roots.exact import exact_roots
 from tmsopt.roots.polynomial import Root
 from tmsopt.roots.stability import lienard_chipart
 
+Polynomial = Sequence[Any]
+"""Coefficients in y, exact fractions, ascending."""
+
+DIGITS = 120
+"""Of y: a k-fold root then scatters by 1e-120/k."""
+
+_RING = flint.fmpq_mpoly_ctx.get(["s", "y"], "lex")
+_S, _Y = _RING.gens()
 _SAME = 1e-12  # relative to the largest root: difference of two that are one; a k-fold one scatters by 1e-120/k
 _NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
 
@@ -90,29 +89,29 @@ def crossings(
         bands_alone: what roots do where bands end, which takes most of the time, is not looked at.
     """
     lower, upper = rational(lower), None if upper is None else rational(upper)
-    every = [trimmed(c) for c in coefficients]
-    a = every[next(k for k, c in enumerate(every) if c) :]
-    kinds, split = _conditions(a)
-    places = {kind: real_places(polynomial, lower, upper) for kind, polynomial in kinds.items() if polynomial}
+    degree = len(coefficients) - 1
+    terms = {(degree - k, j): x for k, c in enumerate(coefficients) for j, x in enumerate(map(rational, c))}
+    p = _RING.from_dict({powers: x for powers, x in terms.items() if x != 0})
+    a, split = _rows(p), _split(p)
+    places = {kind: _real_places(q, lower, upper) for kind, q in _conditions(a, split).items() if not q.is_zero()}
     named = {} if bands_alone else places
     found = [(y, *rest) for kind, ys in named.items() for y in ys for rest in _named(a, split, kind, y)]
     found.sort(key=lambda place: place[0])
     marks = sorted({y for ys in places.values() for y in ys})
     cells = list(_cells(marks, lower, upper))
-    states = [_state(value_at(a, middle)) for _, _, middle in cells]
-    marginal = [split is not None and _marginal(split, middle) for _, _, middle in cells]
+    states = [_state(_at(a, middle)) for _, _, middle in cells]
+    lasting = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
+    marginal = [any(lasting.values()) and _marginal(split, middle) for _, _, middle in cells]
     kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
     changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
-    always = {"infinity": len(a) < len(every)}
-    if split:
-        always |= {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
+    always = {"infinity": len(a) <= degree} | lasting
     return Crossings(
         tuple(Crossing(float(y), kind, root, first, changed[float(y)]) for y, kind, root, first in found),
         _bands(cells, [stable for stable, _ in states]),
         _bands(cells, [damped for _, damped in states]),
         tuple(kind for kind, holds in always.items() if holds),
         _bands(cells, marginal),
-        split.zeros if split else 0,
+        split.zeros,
     )
 
 
@@ -132,34 +131,91 @@ def each_told(model: Model, found: Iterable[Crossing]) -> tuple[Crossing, ...]:
     return tuple(replace(c, kind=name_told(model, c.kind), root=z) for c, z in zip(own, roots, strict=True))
 
 
-def _conditions(a: Sequence[Polynomial]) -> tuple[dict[str, Polynomial], Lasting | None]:
-    """Polynomials in y that vanish where something happens, and what holds for every y, if anything does."""
-    kinds = {"capsize": a[-1], "infinity": a[0]}
-    if len(a) > 1:
-        kinds |= {"weave": of_values(a, _mirrored), "EP2": of_values(a, _double)}
-    if all(kinds.values()):
-        return kinds, None
-    split = lasting(a)
-    kinds["capsize"] = trimmed((flint.fmpq_poly(split.mirrored[-1]) * flint.fmpq_poly(split.rest[-1])).coeffs())
-    kinds["weave"] = of_values(split.rest, _mirrored) if len(split.rest) > 1 else []
-    kinds["EP2"] = of_values(split.once, _double) if len(split.once) > 1 else []
-    return kinds, split
+@dataclass(frozen=True)
+class _Split:
+    """A polynomial p(s, y) = s^zeros · (factors), each part a list of coefficients in y, descending in s.
+
+    Attributes:
+        zeros: multiplicity of the root 0 that is there for every y.
+        mirrored: product of the different factors that are even in s: their roots are s and −s.
+        rest: product of the other factors; it shares no root with its mirror image for every y.
+        once: s (if it divides p), mirrored and rest: p without its repetitions.
+        repeated: whether a factor other than s is there more than once.
+        repeats_mirrored: whether one of those that are even is.
+    """
+
+    zeros: int
+    mirrored: list[Any]
+    rest: list[Any]
+    once: list[Any]
+    repeated: bool
+    repeats_mirrored: bool
 
 
-def _marginal(split: Lasting, y: Any) -> bool:
+def _split(p: Any) -> _Split:
+    zeros = int(min(power for power, _ in p.monoms()))
+    p /= _S**zeros
+    factors = [(f, times) for f, times in p.factor_squarefree()[1] if f.degrees()[0] > 0]
+    once = prod((f for f, _ in factors), start=_S**0)
+    mirrored = once.gcd(once.compose(-_S, _Y))
+    repeats_mirrored = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
+    rest, single = _rows(once / mirrored), _rows(once * _S if zeros else once)
+    return _Split(zeros, _rows(mirrored), rest, single, any(times > 1 for _, times in factors), repeats_mirrored)
+
+
+def _conditions(a: Sequence[Any], split: _Split) -> dict[str, Any]:
+    """Polynomials in y that vanish where something happens."""
+    even, odd = (_bivariate(split.rest[::-1][k::2]) for k in (0, 1))
+    once = _bivariate(split.once[::-1])
+    return {
+        "capsize": split.mirrored[-1] * split.rest[-1],
+        "infinity": a[0],
+        "weave": _rows(even.resultant(odd, "s"))[0] if len(split.rest) > 1 else flint.fmpq_poly(),
+        "EP2": _rows(once.discriminant("s"))[0] if len(split.once) > 1 else flint.fmpq_poly(),
+    }
+
+
+def _bivariate(rows: Sequence[Any]) -> Any:
+    """A polynomial in s and y from its coefficients, ascending in s."""
+    terms = {(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row.coeffs())}
+    return _RING.from_dict({powers: x for powers, x in terms.items() if x != 0})
+
+
+def _rows(p: Any) -> list[Any]:
+    """Coefficients of a polynomial in s and y, descending in s, as polynomials in y."""
+    degree, width = p.degrees()
+    rows = [[flint.fmpq(0)] * (width + 1) for _ in range(degree + 1)]
+    for (i, j), value in p.to_dict().items():
+        rows[degree - i][j] = value
+    return [flint.fmpq_poly(row) for row in rows]
+
+
+def _at(rows: Sequence[Any], y: Any) -> list[Any]:
+    """Coefficients for a y."""
+    return [row(y) for row in rows]
+
+
+def _real_places(polynomial: Any, lower: Any, upper: Any | None) -> list[Any]:
+    """Different real roots between two ends, as fractions that are right to the digits carried."""
+    with flint.ctx.workdps(DIGITS):
+        real = [rational(z.real) for z, _ in polynomial.numer().complex_roots() if z.imag == 0]
+    return sorted(y for y in real if y > lower and (upper is None or y < upper))
+
+
+def _marginal(split: _Split, y: Any) -> bool:
     """Whether no root is right of the axis, and those on it are simple, between two places; roots 0 aside."""
-    rest, mirrored = value_at(split.rest, y), value_at(split.mirrored, y)
+    rest, mirrored = _at(split.rest, y), _at(split.mirrored, y)
     if split.repeats_mirrored or not (len(rest) == 1 or _state(rest)[0]):
         return False
     return len(mirrored) == 1 or all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
 
 
-def _named(a: Sequence[Polynomial], split: Lasting | None, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
+def _named(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
     """What is at a place: kind, root, whether rightmost. A mirrored pair that is real is nothing."""
     if kind == "infinity":
         yield kind, Root(float("nan"), 0.0), False
         return
-    coefficients = _finite_part(value_at(a, y))
+    coefficients = _finite_part(_at(a, y))
     size = _size(a, y, coefficients)
     roots = _grouped(coefficients, size)
     if not roots:
@@ -169,9 +225,9 @@ def _named(a: Sequence[Polynomial], split: Lasting | None, kind: str, y: Any) ->
     def first(root: Root) -> bool:
         return root.re >= line - _SAME * size
 
-    def within(part: Sequence[Polynomial], root: Root) -> int:
+    def within(part: Sequence[Any], root: Root) -> int:
         """How often a root is one of a part."""
-        own = _grouped(_finite_part(value_at(part, y)), size)
+        own = _grouped(_finite_part(_at(part, y)), size)
         return sum(o.multiplicity for o in own if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME * size)
 
     if kind == "capsize":
@@ -179,11 +235,11 @@ def _named(a: Sequence[Polynomial], split: Lasting | None, kind: str, y: Any) ->
         yield kind, Root(0.0, 0.0, zero.multiplicity), first(zero)
     elif kind == "weave":
         for root in roots:
-            if abs(root.re) <= _SAME * size < root.im and (split is None or within(split.rest, root)):
+            if abs(root.re) <= _SAME * size < root.im and within(split.rest, root):
                 yield kind, Root(0.0, root.im, root.multiplicity), first(root)
     else:
         for root in roots:
-            if root.multiplicity > 1 and root.im >= 0 and (split is None or within(split.once, root) > 1):
+            if root.multiplicity > 1 and root.im >= 0 and within(split.once, root) > 1:
                 yield f"{'CEP' if root.im else 'EP'}{root.multiplicity}", root, first(root)
 
 
@@ -194,9 +250,9 @@ def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
     return coefficients[first:]
 
 
-def _size(a: Sequence[Polynomial], y: Any, coefficients: Sequence[Any]) -> float:
+def _size(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
     """A bound of the roots that is not 0 where they all come to 0: from the terms in y, which do not cancel."""
-    terms = value_at([[abs(c) for c in polynomial] for polynomial in a[len(a) - len(coefficients) :]], abs(y))
+    terms = [flint.fmpq_poly([*map(abs, c.coeffs())])(abs(y)) for c in a[len(a) - len(coefficients) :]]
     lead = abs(coefficients[0])
     ratios = ((k, t / lead) for k, t in enumerate(terms) if k and t != 0)
     return max((float((flint.arb(ratio) ** (flint.arb(1) / k)).mid()) for k, ratio in ratios), default=1.0)
@@ -244,23 +300,3 @@ def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) ->
         elif holds:
             bands.append((low, high))
     return tuple(bands)
-
-
-def _mirrored(a: Sequence[Any]) -> Any:
-    """Δₙ₋₁, which is 0 where two roots are s and −s."""
-    n = len(a) - 1
-    places = [2 * j - i for i in range(1, n) for j in range(1, n)]
-    return flint.fmpq_mat(n - 1, n - 1, [a[k] if 0 <= k <= n else flint.fmpq(0) for k in places]).det()
-
-
-def _double(a: Sequence[Any]) -> Any:
-    """The resultant of a polynomial and its derivative, by Euclid's algorithm."""
-    p = flint.fmpq_poly(a[::-1])
-    q, value = p.derivative(), flint.fmpq(1)
-    while q.degree() > 0:
-        rest = p % q
-        if rest.degree() < 0:
-            return flint.fmpq(0)
-        value = value * (-1) ** (p.degree() * q.degree()) * q[q.degree()] ** (p.degree() - rest.degree())
-        p, q = q, rest
-    return value * q[0] ** p.degree()

@@ -8,8 +8,9 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings, told
-from tmsopt.critical_speeds.parametric import Polynomial, interpolated
+from tmsopt.arithmetic.formal import Formal, variable
+from tmsopt.arithmetic.walk import NotAccepted
+from tmsopt.critical_speeds.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, told
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
@@ -19,9 +20,6 @@ from tmsopt.models import ParameterSet
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Table, Tabular, plain
 from tmsopt.solver.solve import solve
-
-_DIGITS = 120  # of what is no fraction, such as the tangent of an angle
-_STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
 
 
 @dataclass(frozen=True, repr=False)
@@ -179,11 +177,35 @@ def coefficients_over(problem: Problem, of: ParameterSet, own: Mapping[str, floa
     Raises:
         InputError: where they are none.
     """
-    at = _linear(problem, of, own, name)
-    a = interpolated(lambda x: problem.model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
-    if a is None or not any(any(c != 0 for c in p) for p in a):
+    try:
+        with flint.ctx.workdps(DIGITS):
+            native = of.native({**problem.exactly(own), name: variable(name)})
+            at = {n: _with_fractions(x) for n, x in problem.model.algebraic(native).items()}
+            a = [_powers(c) for c in problem.model.polynomial(**at)]
+    except (NotAccepted, TypeError, ZeroDivisionError):
+        a = []
+    if not any(x != 0 for c in a for x in c):
         raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
     return a
+
+
+def _with_fractions(x: Any) -> Any:
+    """A formula whose coefficients are fractions, right to the digits carried."""
+    return Formal({m: rational(c) for m, c in x.terms.items()}) if isinstance(x, Formal) else rational(x)
+
+
+def _powers(x: Any) -> Polynomial:
+    """The coefficients of a formula in one variable, ascending.
+
+    Raises:
+        NotAccepted: where it is no polynomial with exact coefficients.
+    """
+    found: dict[int, Any] = {}
+    for monomial, c in (x.terms if isinstance(x, Formal) else {(): exact(x)}).items():
+        if not isinstance(c, flint.fmpq) or any(symbol.argument is not None for symbol, _ in monomial):
+            raise NotAccepted("a formula that is no polynomial")
+        found[sum(power for _, power in monomial)] = c
+    return [found.get(k, flint.fmpq(0)) for k in range(max(found, default=0) + 1)]
 
 
 def _parameters(design: Any, whole: Problem, name: str, progress: Listener | None) -> dict[str, float]:
@@ -198,24 +220,3 @@ def _parameters(design: Any, whole: Problem, name: str, progress: Listener | Non
     if set(whole.free) <= {name}:
         return dict(whole.fixed)
     return dict(solve(whole, progress=progress, interruptible=False).parameters)
-
-
-def _linear(problem: Problem, of: ParameterSet, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
-    """The algebraic parameters as α + β x.
-
-    Raises:
-        InputError: where one is no such function.
-    """
-    with flint.ctx.workdps(_DIGITS):
-        typed = problem.exactly(own)
-        at = (of.native({**typed, name: flint.fmpq(k)}) for k in (1, 2, 3))
-        first, second, third = ({n: flint.arb(v) for n, v in problem.model.algebraic(d).items()} for d in at)
-        found = {}
-        for n, a in first.items():
-            slope, bend = second[n] - a, third[n] - second[n] - (second[n] - a)
-            if not abs(bend) < _STRAIGHT * (1 + abs(a)):
-                message = f"{n} is not linear in {name}, so the coefficients are no polynomials in it"
-                raise InputError([Fault(message, ("parameter",))])
-            moves = not slope.contains(0)
-            found[n] = (rational(a - slope) if moves else rational(a), rational(slope) if moves else flint.fmpq(0))
-    return found

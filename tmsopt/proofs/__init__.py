@@ -1,6 +1,6 @@
 """Prove: the exceptional point exists, by interval Newton in ball arithmetic.
 
-In: a solution. Out: a `Proof`: every number with its radius, or the reason why not. Open `prove` first, then
+In: a solution. Out: a `Proof`: every number with its radius, or the reason why not. Open `proof` first, then
 `existence`.
 """
 

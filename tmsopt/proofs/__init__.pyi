@@ -1,3 +1,2 @@
 from .factored import Factored as Factored, abscissa_formula as abscissa_formula
-from .proof import Proof as Proof, prove_design as prove_design
-from .prove import prove as prove
+from .proof import Proof as Proof, prove as prove, prove_design as prove_design

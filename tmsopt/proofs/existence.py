@@ -11,8 +11,7 @@ from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.nlp import Scale
 from tmsopt.models.exact import Written
-from tmsopt.proofs import rational
-from tmsopt.proofs.factored import Factored, of_pattern
+from tmsopt.proofs.factored import Factored, factored, has_pattern, of_pattern
 from tmsopt.proofs.system import ROUNDINGS, Chosen, Equations, choose, equations
 from tmsopt.roots import Pattern
 from tmsopt.roots.patterns.structure import nearest_unknowns
@@ -53,20 +52,15 @@ class Existing:
 
 def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | None:
     """The design itself, if its numbers are fractions and have the pattern exactly."""
-    a = exact_coefficients(problem, design)
-    if a is None or not rational.has(pattern.form, a):
+    a = design.coefficients(problem.model, problem.parameter_set)
+    if a is None or not has_pattern(pattern.form, a):
         return None
     if any(c.equality for c in problem.conditions.values()):
         return None
     balls = design.balls()
     tangents = {n: balls[n].tan() for n in balls if problem.parameter_set[n].tangent}
     tangents |= {n: e.ball() for n, e in design.tangents.items()}
-    return Existing(EXACT, a, balls, tangents, {}, rational.factored(a))
-
-
-def exact_coefficients(problem: Problem, design: Written) -> list[Any] | None:
-    """Coefficients as fractions, where the numbers of the design make them so."""
-    return design.coefficients(problem.model, problem.parameter_set)
+    return Existing(EXACT, a, balls, tangents, {}, factored(a))
 
 
 def beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:

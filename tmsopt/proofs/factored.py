@@ -1,14 +1,15 @@
-"""A polynomial as a product of factors in balls: its roots, and whether it is stable and heavily damped."""
+"""A polynomial as a product of factors in balls: its roots, whether it is stable, heavily damped, or has a pattern."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
 
 import flint
 
-from tmsopt.roots import Pattern, evaluate, lienard_chipart
-from tmsopt.roots.patterns.enclosed import Enclosed
+from tmsopt.roots import Pattern, composition, evaluate, lienard_chipart
+from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots
 
 Factor = Sequence[Any]
 """Monic coefficients, descending."""
@@ -28,7 +29,7 @@ class Factored:
             own = roots_of(factor)
             if own is None:
                 return None
-            found += [Enclosed(z.re, z.im, multiplicity) for z in own]
+            found += [replace(z, multiplicity=multiplicity * z.multiplicity) for z in own]
         if any(a.re.overlaps(b.re) and a.im.overlaps(b.im) for k, a in enumerate(found) for b in found[k + 1 :]):
             return None
         return tuple(sorted(found, key=lambda z: (-float(z.re), -float(z.im))))
@@ -61,11 +62,8 @@ class Factored:
         """Whether all roots are real and negative, multiple ones included."""
         if self.stable is False:
             return False
-        signs: list[bool | None] = []
-        for factor, _ in self.factors:
-            own = roots_of(factor)
-            signs.append(None if own is None else all(z.real for z in own))
-        return _every([self.stable, *signs])
+        each = (roots_of(factor) for factor, _ in self.factors)
+        return _every([self.stable, *(None if own is None else all(z.real for z in own) for own in each)])
 
 
 def of_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factored:
@@ -82,8 +80,6 @@ def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
 
 def _formula(factor: Factor) -> Any:
     """The largest real part of the roots of a factor, balls or series; None where they cannot be told apart."""
-    if len(factor) == 2:
-        return -factor[1]
     if len(factor) == 3:
         _, b, c = factor
         discriminant = b * b - 4 * c
@@ -92,7 +88,7 @@ def _formula(factor: Factor) -> Any:
     own = roots_of(constants)
     if own is None:
         return None
-    z = max(own, key=lambda z: float(z.re))
+    z = max(own, key=lambda z: (float(z.re), -abs(float(z.im))))
     if not any(isinstance(c, flint.arb_series) for c in factor):
         return z.re
     # The root moves by −Σ δc_k s^(n−k)/p′(s), with s anywhere in its ball.
@@ -102,53 +98,18 @@ def _formula(factor: Factor) -> Any:
     return flint.arb_series([z.re, -(change / slope).real], prec=2)
 
 
-def roots_of(factor: Factor) -> list[Enclosed] | None:
-    """Roots of a factor that are certainly simple; None where the balls cannot tell."""
-    nothing = flint.arb(0)
-    match [flint.arb(c) for c in factor]:
-        case [_, c]:
-            return [Enclosed(-c, nothing)]
-        case [_, b, c]:
-            discriminant = b * b - 4 * c
-            if discriminant > 0:
-                width = discriminant.sqrt()
-                far = (-b - width) / 2 if b > 0 else (width - b) / 2
-                return [Enclosed(far, nothing), Enclosed(-b - far if far.contains(0) else c / far, nothing)]
-            if discriminant < 0:
-                height = (-discriminant).sqrt() / 2
-                return [Enclosed(-b / 2, height), Enclosed(-b / 2, -height)]
-            return None
-        case balls:
-            return _isolated(balls)
-
-
-def _isolated(coefficients: Sequence[Any]) -> list[Enclosed] | None:
-    """Simple roots of a polynomial of any degree, isolated; None where that fails.
-
-    A ball that touches the real axis holds a real root if its mirror image meets no other ball: the conjugate of
-    its root is then in it too, and it holds one root only.
-    """
-    polynomial: Any = flint.acb_poly([flint.acb(c) for c in reversed(coefficients)])
-    balls = _balls(polynomial, flint.arb(10) ** (-3 * flint.ctx.dps // 4)) or _balls(polynomial, None)
-    if balls is None:
-        return None
-    found = []
-    for k, z in enumerate(balls):
-        if not z.imag.contains(0):
-            found.append(Enclosed(z.real, z.imag))
-        elif any(z.conjugate().overlaps(w) for j, w in enumerate(balls) if j != k):
-            return None
-        else:
-            found.append(Enclosed(z.real, flint.arb(0)))
-    return found if len(found) == len(coefficients) - 1 else None
-
-
-def _balls(polynomial: Any, tolerance: Any) -> list[Any] | None:
-    try:
-        found: list[Any] = polynomial.roots(tolerance)
-    except (ValueError, ZeroDivisionError):
-        return None
-    return found
+def roots_of(factor: Factor) -> Sequence[Enclosed] | None:
+    """Roots of a factor; None where the balls cannot tell. A pair on the imaginary axis has the real part 0 exactly."""
+    if len(factor) != 3:
+        return enclosed_roots(factor)
+    b, c = map(flint.arb, factor[1:])
+    nothing, discriminant = flint.arb(0), b * b - 4 * c
+    if discriminant > 0:
+        width = discriminant.sqrt()
+        far = (-b - width) / 2 if b > 0 else (width - b) / 2
+        return [Enclosed(far, nothing), Enclosed(-b - far if far.contains(0) else c / far, nothing)]
+    height = (-discriminant).sqrt() / 2
+    return [Enclosed(-b / 2, height), Enclosed(-b / 2, -height)] if discriminant < 0 else None
 
 
 def _rightmost(factor: Factor) -> Any:
@@ -182,3 +143,66 @@ def _every(signs: Sequence[bool | None]) -> bool | None:
 
 def _constant(value: Any) -> Any:
     return value[0] if isinstance(value, flint.arb_series) else flint.arb(value)
+
+
+def factored(coefficients: Sequence[Any]) -> Factored:
+    """Square-free factors of a polynomial with fractions (descending), with exact multiplicities."""
+    polynomial = flint.fmpq_poly(list(reversed(coefficients)))
+    parts: list[tuple[Any, int]] = polynomial.factor()[1]  # irreducible, so that those of degree 1 are exact
+    return Factored(tuple((_monic(part), int(multiplicity)) for part, multiplicity in parts))
+
+
+def _monic(part: Any) -> Factor:
+    return [flint.arb(c) for c in reversed((part / part.leading_coefficient()).coeffs())]
+
+
+def has_pattern(pattern: str, coefficients: Sequence[Any]) -> bool:
+    """Whether a polynomial with fractions has a pattern exactly, beside roots of other multiplicities.
+
+    Multiple roots are told apart by isolating them; for weave and resonance the even and the odd part of the polynomial
+    have a root s² < 0 in common.
+    """
+    try:
+        wanted = composition(pattern)
+    except ValueError:  # a tie of the rightmost line
+        return False
+    if coefficients[0] == 0:
+        return False
+    found = _multiple(coefficients)
+    kinds = {kind for kind, _, _ in wanted}
+    if "CEP" in kinds and kinds & {"weave", "resonance"} and _on_axis(coefficients, twice=True):
+        return False  # one double pair on the axis might count for both
+    return all(_has(kind, order, count, coefficients, found) for kind, order, count in wanted)
+
+
+def multiple_roots(coefficients: Sequence[Any]) -> str:
+    """Name of the pattern of all multiple roots of a polynomial with fractions, such as ``EP3+CEP2``; or empty."""
+    if coefficients[0] == 0:
+        return ""
+    found = sorted(_multiple(coefficients).items(), key=lambda item: (item[0][0] != "EP", -item[0][1]))
+    return "+".join(f"{count if count > 1 else ''}{kind}{order}" for (kind, order), count in found)
+
+
+def _has(kind: str, order: int, count: int, coefficients: Sequence[Any], found: Mapping[tuple[str, int], int]) -> bool:
+    if kind == "capsize":
+        return bool(coefficients[-1] == 0)
+    if kind in ("weave", "resonance"):
+        return _on_axis(coefficients, twice=kind == "resonance")
+    return found.get((kind, order), 0) == count
+
+
+def _multiple(coefficients: Sequence[Any]) -> Counter[tuple[str, int]]:
+    """How many multiple real roots and complex pairs there are of each multiplicity."""
+    found: Counter[tuple[str, int]] = Counter()
+    for factor, multiplicity in factored(coefficients).factors:
+        for z in (roots_of(factor) or ()) if multiplicity > 1 else ():
+            if z.real or z.im > 0:
+                found["EP" if z.real else "CEP", multiplicity] += 1
+    return found
+
+
+def _on_axis(coefficients: Sequence[Any], twice: bool) -> bool:
+    even, odd = (flint.fmpq_poly([(-1) ** k * c for k, c in enumerate(coefficients[::-1][i::2])]) for i in (0, 1))
+    common = even if odd.is_zero() else even.gcd(odd)
+    parts = [part for part, m in common.factor()[1] if not twice or m >= 2]
+    return any(z.real and z.re > 0 for part in parts for z in roots_of(_monic(part)) or ())

@@ -11,9 +11,8 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Values
 from tmsopt.models.exact import Written
-from tmsopt.proofs.existence import EXACT, Existing, exact_coefficients
-from tmsopt.proofs.factored import Factored, roots_of
-from tmsopt.proofs.rational import factored
+from tmsopt.proofs.existence import EXACT, Existing
+from tmsopt.proofs.factored import Factored, factored, roots_of
 from tmsopt.roots import exact_nullity, has_one_eigenvector
 
 
@@ -43,7 +42,7 @@ def as_stored(problem: Problem, design: Written) -> Existing | None:
     balls = design.balls()
     of = problem.parameter_set
     tangents = {n: b.tan() for n, b in balls.items() if of[n].tangent}
-    exact = exact_coefficients(problem, design)
+    exact = design.coefficients(problem.model, of)
     a = problem.model.coefficients(balls, of) if exact is None else exact
     if exact is not None and a[0] != 0:
         return Existing(EXACT, a, balls, tangents, {}, factored(a))
@@ -84,39 +83,21 @@ def stability(factored: Factored, of_H: bool = False) -> Verdict:
     Args:
         of_H: whether to say it of eigenfrequencies ω = i s.
     """
+    one, right, left, below = "a root", "right of the imaginary axis", "left of the imaginary axis", "left of the axis"
     if of_H:
-        return _of_eigenfrequencies(factored)
+        one, right, left, below = "an eigenfrequency", "above the real axis", "below the real axis", "below the axis"
     if factored.stable:
-        return Verdict(True, "all roots are left of the imaginary axis (Routh–Hurwitz signs in balls)")
+        every = "all eigenfrequencies" if of_H else "all roots"
+        return Verdict(True, f"{every} are {left} (Routh–Hurwitz signs in balls)")
     if factored.stable is None:
         return Verdict(None, "a Routh–Hurwitz sign cannot be told from 0; ask for more digits")
-    axis = [z for z in factored.roots or () if z.re == 0]
-    right = [z for z in factored.roots or () if z.re > 0]
-    left = [z for z in factored.roots or () if z.re < 0]
-    if axis and not right:
-        at = "a root is 0" if all(z.real for z in axis) else "a pair is imaginary"
-        simple = all(z.multiplicity == 1 for z in axis + left)
-        rest = ", the others left of the axis: on the boundary of stability" if simple else ""
-        return Verdict(False, at + rest)
-    return Verdict(
-        False, "a root is right of the imaginary axis" if right else "a root is not left of the imaginary axis"
-    )
-
-
-def _of_eigenfrequencies(factored: Factored) -> Verdict:
-    found = stability(factored)
-    if found.holds:
-        return Verdict(True, "all eigenfrequencies are below the real axis (Routh–Hurwitz signs in balls)")
-    if found.holds is None:
-        return found
     roots = factored.roots or ()
-    if any(z.re > 0 for z in roots):
-        return Verdict(False, "an eigenfrequency is above the real axis")
-    if not any(z.re == 0 for z in roots):
-        return Verdict(False, "an eigenfrequency is not below the real axis")
-    simple = all(z.multiplicity == 1 for z in roots if z.re == 0 or z.re < 0)
-    rest = ", the others below the axis: on the boundary of stability" if simple else ""
-    return Verdict(False, "an eigenfrequency is real" + rest)
+    axis = [z for z in roots if z.re == 0]
+    if not axis or any(z.re > 0 for z in roots):
+        return Verdict(False, f"{one} is {right if any(z.re > 0 for z in roots) else f'not {left}'}")
+    at = f"{one} is real" if of_H else "a root is 0" if all(z.real for z in axis) else "a pair is imaginary"
+    simple = all(z.multiplicity == 1 for z in roots if z.re <= 0)
+    return Verdict(False, at + f", the others {below}: on the boundary of stability" * simple)
 
 
 def heavy_damping(factored: Factored) -> Verdict:

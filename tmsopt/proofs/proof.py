@@ -1,30 +1,35 @@
-"""What is proved about one design, as data."""
+"""The existence of what a problem asks for, proved: solve first, then prove."""
 
 import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Unpack
 
 import flint
 
 from tmsopt.arithmetic.balls import Number, ProvedRoot, fraction, number
 from tmsopt.arithmetic.krawczyk import Refused
 from tmsopt.design.cases import Case
+from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
+from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import units_of
-from tmsopt.design.verdict.stability import CROSSING
-from tmsopt.errors import InputError, count_faults
+from tmsopt.design.verdict.stability import CROSSING, crossing_in_words
+from tmsopt.errors import Fault, InputError, count_faults
+from tmsopt.formulation.options import AskedOfSolve, options_of, taking
 from tmsopt.models.exact import Written, written
 from tmsopt.models.told import name_told, pattern_of, roots_told
-from tmsopt.proofs import rational
-from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
+from tmsopt.progress import begin
+from tmsopt.proofs.existence import Existing, beside, exactly
+from tmsopt.proofs.factored import multiple_roots
 from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, eigenvectors, heavy_damping, inside, limits, stability
 from tmsopt.records import Shown, Table, plain
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots.patterns.doubled import complex_shown
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 from tmsopt.roots.patterns.pattern import LINES
+from tmsopt.solver.solve import solved
 
 DIGITS = 30
 """Digits by default."""
@@ -130,6 +135,52 @@ class Proof(Shown):
         }
 
 
+@taking(AskedOfSolve)
+def prove(
+    design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[AskedOfSolve]
+) -> Proof:
+    """Prove that the design a problem asks for exists, in ball arithmetic, with what follows for its stability.
+
+    An interval Newton test (Krawczyk) on a_k = a0 c_k with the problem's equalities proves that exactly one solution
+    lies within a stated radius, and that it is the one the stored numbers stand for. What cannot be proved is refused
+    in `Proof.reason`, never guessed.
+
+    Args:
+        design: a solution; or a problem or its file, solved first.
+        digits: that every number is given to.
+        exact: parameter, or ``tan(lambda_s)`` → the number that it is exactly: an int, a Fraction, a ``flint.fmpq``,
+            text such as ``"-2/5"`` or ``"20 deg"``. Other numbers stand for the shortest decimals that print them.
+        options: of `solve`, e.g. ``starts``; of a solution ``progress`` alone.
+
+    Raises:
+        InputError: for a problem that asks nothing, options beside a solution, digits out of range, or exact numbers
+            that are not the design's.
+
+    Example:
+        >>> tmsopt.prove("problems/ep4.toml", digits=40).parameters["chi_B"].value[:42]  # the square root of 2
+        '1.4142135623730950488016887242096980785696'
+
+    More: docs/explanation/proofs.md
+    """
+    wrong = [name for name in options if name != "progress"]
+    if isinstance(design, Solution) and wrong:
+        message = f"found {', '.join(wrong)}; options are for solving, and this is solved: give the problem instead"
+        raise InputError([Fault(message, ("options",))])
+    how = options_of(options, AskedOfSolve)
+    found = solved(design, how)
+    problem = found.problem
+    if found.status != "optimal":
+        crossings = [crossing_in_words(m) for m in found.meetings if not m.exceptional]
+        reason = f"the problem is not solved ({found.status}): there is no design to prove"
+        if problem.pattern and crossings:
+            reason = f"none found: where roots meet is {crossings[0]}"
+        claim = f"a design of '{problem.title or 'the problem'}' exists"
+        return Proof(claim, False, reason, digits=digits, problem=problem)
+    begin(how.progress, f"proving to {digits} digits")
+    shown = found.of_polynomial
+    return prove_design(problem, found.parameters, shown.name, digits, exact, found.worst, shown.roots)
+
+
 def prove_design(
     problem: Problem, parameters: Mapping[str, float], structure: str, digits: int = DIGITS,
     exact: Mapping[str, Any] | None = None, case: Case | None = None, roots: Sequence[Root] = (),
@@ -209,8 +260,8 @@ def _patterns(problem: Problem, structure: str, roots: Sequence[Root]) -> list[P
 
 def _decided(problem: Problem, design: Written) -> list[Pattern]:
     """The pattern of all multiple roots of a design that is exact."""
-    a = exact_coefficients(problem, design)
-    name = rational.multiple(a) if a else ""
+    a = design.coefficients(problem.model, problem.parameter_set)
+    name = multiple_roots(a) if a else ""
     return [pattern_of(problem.model, name_told(problem.model, name))] if name else []
 
 

@@ -12,6 +12,7 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import exact, is_ball
+from tmsopt.arithmetic.formal import Formal
 from tmsopt.arithmetic.formulas import Formulas
 from tmsopt.arithmetic.identity import Field
 from tmsopt.arithmetic.rounding import Bounded
@@ -240,7 +241,7 @@ def _rebuilt(
         # The determinant of the entries themselves where numbers are exact: CasADi folds constants as doubles.
         if not any(map(is_ball, values.values())):
             return quick(values)
-        number = exact if all(isinstance(x, flint.fmpq | Bounded) for x in values.values()) else _ball
+        number = exact if all(isinstance(x, flint.fmpq | Bounded | Formal) for x in values.values()) else _ball
         return [number(c) for c in every(values)[lost:]]
 
     of = ParameterSet("stated", tuple(Parameter(n, "1", "parameter", latex(n)) for n in names), native=dict)
