@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tmsopt.cli.common import (
-    FIGURES,
-    REPORTS,
     answer,
     bad_input,
     check_output,
+    file_argument,
+    json_option,
     nominal_of,
     plane,
+    plot_option,
     report_option,
     saving,
     write_report,
@@ -71,12 +72,12 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @click.option(
     "--points", callback=_points, metavar="N[xM[xL]]", help="Grid points along the axes. [default: 400x300, 120x100x80]"
 )
 @click.option("--axes", help="Parameters, the horizontal one first, e.g. Fr,lambda_s. [default: as in FILE]")
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+@json_option
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Write the arrays (npz, nc, chart).")
 @click.option("--layers", help=f"Arrays of --output, among {','.join(_LAYERS)}. [default: all but margin]")
 @click.option(
@@ -90,7 +91,7 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
     "--workers", type=click.IntRange(1, 256), default=1, show_default=True,
     help="Threads; NumPy alone gains nothing by them.",
 )  # fmt: skip
-@click.option("--plot", type=click.Path(path_type=Path), help="Draw the chart (png, pdf, svg).")
+@plot_option("Draw the chart")
 @report_option
 @click.option(
     "--layer", default="kind", show_default=True,
@@ -111,8 +112,6 @@ def chart(
         import tmsopt
         from tmsopt.charts import USUAL, axes_of
 
-        check_output("--plot", plot, FIGURES)
-        check_output("--report", report, REPORTS)
         check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
         problem = nominal_of(tmsopt.load(file))
         free = axes_of(problem)

@@ -8,7 +8,7 @@ import click
 
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
-from tmsopt.cli.common import TYPED, answer
+from tmsopt.cli.common import TYPED, answer, bad_input
 from tmsopt.cli.ending import STATUS, ended
 from tmsopt.cli.explore import explore
 from tmsopt.cli.guide.convert import convert
@@ -61,7 +61,7 @@ class _Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
-        with ended():
+        with ended(), bad_input():
             return super().invoke(ctx)
 
 

@@ -5,7 +5,6 @@ import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ import click
 
 from tmsopt.cli.ending import BAD_INPUT, answering
 from tmsopt.cli.terminal import doing, quiet, shown
+from tmsopt.errors import MOST_STARTS, Fault, InputError
 
 if TYPE_CHECKING:
     from tmsopt import Problem
@@ -26,6 +26,11 @@ FIGURES = ("png", "pdf", "svg")
 REPORTS = ("html", "htm")
 """Endings of pages to hand on."""
 
+PATH = click.Path(path_type=Path)
+
+Option = Callable[[Callable[..., Any]], Callable[..., Any]]
+"""A decorator of a command."""
+
 _BLOCK = 5000  # rows of JSON made and written at once
 
 TYPED = "tmsopt.words"
@@ -34,37 +39,33 @@ TYPED = "tmsopt.words"
 
 @contextmanager
 def bad_input() -> Iterator[None]:
-    """Turn bad input into its messages on stderr and exit status 2."""
-    from tmsopt import InputError
+    """Turn bad input into its messages on stderr and exit status 2.
+
+    Where a problem has no design to look at, say so on stderr, with exit status 3 or 4.
+    """
+    from tmsopt import NotSolved
 
     try:
         yield
     except InputError as error:
         click.echo(str(error), err=True)
         sys.exit(BAD_INPUT)
-
-
-@contextmanager
-def a_design(problem: "Problem") -> Iterator[None]:
-    """Where a problem has no design to look at, say so on stderr, with exit status 3 or 4."""
-    from tmsopt import NotSolved
-
-    try:
-        yield
     except NotSolved as error:
-        status = error.solution.status
+        problem, status = error.solution.problem, error.solution.status
         click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)
-        raise SystemExit(INFEASIBLE if status == "infeasible" else NOT_CONVERGED) from None
+        sys.exit(INFEASIBLE if status == "infeasible" else NOT_CONVERGED)
+
+
+def refusal(message: str, *key: str) -> InputError:
+    """The error for one thing wrong with a command line."""
+    return InputError([Fault(message, key)])
 
 
 def named(option: str, given: Sequence[str], example: str) -> dict[str, str]:
     """What an option that may be repeated gives as NAME=VALUE, by name."""
-    from tmsopt import Fault, InputError
-
     pairs = [text.partition("=") for text in given]
-    if faults := [
-        Fault(f"found '{n}'; accepted: NAME=VALUE, such as {example}", (option,)) for n, e, _ in pairs if not e
-    ]:
+    faults = [Fault(f"found '{n}'; accepted: NAME=VALUE, such as {example}", (option,)) for n, e, _ in pairs if not e]
+    if faults:
         raise InputError(faults)
     return {name.strip(): value.strip() for name, _, value in pairs}
 
@@ -73,24 +74,52 @@ def check_output(option: str, path: Path | None, endings: Sequence[str], folders
     """Refuse a file that could not be written, before any work is done; what ends in one of `folders` is a folder."""
     if path is None:
         return
-    from tmsopt import Fault, InputError
-
     ending = path.suffix.lstrip(".").lower()
     if ending not in endings:
-        raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", (option,))])
+        raise refusal(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", option)
     try:
         problem = "is a directory" if path.is_dir() and ending not in folders else ""
         problem = problem or ("" if path.parent.is_dir() else "is in a directory that does not exist")
     except OSError as error:  # a name longer than the file system takes
         problem = f"is no name for a file here ({error.strerror})"
     if problem:
-        raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", (option,))])
+        raise refusal(f"'{path}' {problem}; give the path of a file to write", option)
 
 
-def report_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The option of commands whose result can be handed on as one page."""
-    what = "Write one page to hand on, with pictures, tables and the explorer (html)."
-    return click.option("--report", type=click.Path(path_type=Path), help=what)(command)
+file_argument = click.argument("file", type=PATH)
+json_option = click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of text.")
+seed_option = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
+
+
+def starts_option(text: str = "Starts tried at most. [default: 64]", default: int | None = None) -> Option:
+    """The option that limits how many starts a search has."""
+    many = click.IntRange(1, MOST_STARTS)
+    return click.option("--starts", type=many, default=default, show_default=default is not None, help=text)
+
+
+def output_option(endings: Sequence[str], text: str, *names: str) -> Option:
+    """An option that names a file to write, refused before any work is done where it could not be written."""
+
+    def check(_context: click.Context, option: click.Parameter, path: Path | None) -> Path | None:
+        check_output(option.opts[0], path, endings)
+        return path
+
+    return click.option(*(names or ("--output", "-o")), type=PATH, callback=check, help=text)
+
+
+def plot_option(what: str) -> Option:
+    """The option of commands that draw."""
+    return output_option(FIGURES, f"{what} (png, pdf, svg).", "--plot")
+
+
+def csv_option(what: str) -> Option:
+    """The option of commands that write a table."""
+    return output_option(("csv",), what, "--csv", "csv_file")
+
+
+report_option = output_option(
+    REPORTS, "Write one page to hand on, with pictures, tables and the explorer (html).", "--report"
+)
 
 
 def write_report(result: Any, path: Path | None, *files: Path, **more: Any) -> None:
@@ -106,11 +135,10 @@ def write_report(result: Any, path: Path | None, *files: Path, **more: Any) -> N
     from tmsopt.disk import read_text
 
     words = click.get_current_context().meta.get(TYPED, ())
-    with bad_input():
-        texts = {file.name: read_text(str(file), "TOML problem file") for file in files}
-        with saving("--report", path):
-            command = shlex.join(("tmsopt", *words))
-            tmsopt.save_report(result, path, command=command, files=texts, progress=shown(), **more)
+    texts = {file.name: read_text(str(file), "TOML problem file") for file in files}
+    with saving("--report", path):
+        command = shlex.join(("tmsopt", *words))
+        tmsopt.save_report(result, path, command=command, files=texts, progress=shown(), **more)
 
 
 @contextmanager
@@ -120,12 +148,18 @@ def saving(option: str, path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        found = "is there already; give another name" if isinstance(error, FileExistsError) else (
-            f"cannot be written: {error.strerror or error}"
-        )  # fmt: skip
+        there = isinstance(error, FileExistsError)
+        found = "is there already; give another name" if there else f"cannot be written: {error.strerror or error}"
         click.echo(f"{option}: '{path}' {found}", err=True)
         sys.exit(BAD_INPUT)
     click.echo(f"wrote {path}", err=True)
+
+
+def write_file(option: str, path: Path | None, write: Callable[[Path], object]) -> None:
+    """Write a file where one is asked for."""
+    if path is not None:
+        with saving(option, path):
+            write(path)
 
 
 def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
@@ -134,15 +168,11 @@ def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
     Raises:
         InputError: unless there are two, both free.
     """
-    from tmsopt import Fault, InputError
-
     free = list(problem.free)
     names = [n.strip() for n in axes.split(",")] if axes is not None else free[:2]
     if len(names) != 2 or names[0] == names[1] or not set(names) <= set(free):
-        message = (
-            f"found {axes or ', '.join(names) or 'none'}; accepted: two of the free parameters ({', '.join(free)})"
-        )
-        raise InputError([Fault(message, ("--axes",))])
+        found = axes or ", ".join(names) or "none"
+        raise refusal(f"found {found}; accepted: two of the free parameters ({', '.join(free)})", "--axes")
     return names[0], names[1]
 
 
@@ -165,10 +195,15 @@ def say_nominal(problem: "Problem", varied: Iterable[str] = ()) -> None:
         click.echo(f"the design for all scenarios, looked at for {values}", err=True)
 
 
-def write_json(data: dict[str, Any]) -> None:
-    """Write JSON to stdout; characters that it does not take are escaped."""
+def _json_text(data: Any) -> str:
+    """JSON for stdout; characters that it does not take are escaped."""
     narrow = not (sys.stdout.encoding or "utf").lower().startswith("utf")
-    said = json.dumps(data, indent=2, ensure_ascii=narrow, allow_nan=False)
+    return json.dumps(data, indent=2, ensure_ascii=narrow, allow_nan=False)
+
+
+def write_json(data: dict[str, Any]) -> None:
+    """Write JSON to stdout."""
+    said = _json_text(data)
     with quiet():
         click.echo(said)
 
@@ -182,17 +217,15 @@ def write_json_rows(data: dict[str, Any], key: str, rows: Sequence[Any]) -> None
     """
     from tmsopt.progress import counted
 
-    narrow = not (sys.stdout.encoding or "utf").lower().startswith("utf")
-    said = partial(json.dumps, indent=2, ensure_ascii=narrow, allow_nan=False)
     head = f'\n  "{key}": ['
-    before, _, after = said(data).partition(f"{head}]")
+    before, _, after = _json_text(data).partition(f"{head}]")
     if not rows:
         write_json(data)
         return
     steps = counted(None if sys.stdout.isatty() else shown(), "writing the answer", "row")
     for first in range(0, len(rows), _BLOCK):
         some = [row.to_json() for row in rows[first : first + _BLOCK]]
-        text = said(some)[1:-2].replace("\n", "\n  ")  # without its brackets, further in; strings have no line breaks
+        text = _json_text(some)[1:-2].replace("\n", "\n  ")  # without brackets, further in
         with quiet() if sys.stdout.isatty() else nullcontext():
             click.echo(f"{',' if first else before + head}{text}", nl=False)
         if steps:
@@ -204,9 +237,6 @@ def answer(as_json: bool, data: Callable[[], dict[str, Any]], text: Callable[[],
     """Write an answer that is in hand, as JSON or as text; a signal waits until it is written."""
     doing("writing the answer")
     with answering():
-        if as_json:
-            write_json(data())
-        else:
-            said = text()
-            with quiet():
-                click.echo(said)
+        said = _json_text(data()) if as_json else text()
+        with quiet():
+            click.echo(said)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import bad_input, check_output, options, saving
+import tmsopt
+from tmsopt.cli.common import PATH, REPORTS, check_output, file_argument, options, saving, seed_option, starts_option
 from tmsopt.cli.ending import answering
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
 \b
@@ -28,21 +28,16 @@ Exit status: 0 done, whatever the search found, 2 bad input.
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--output", "-o", type=click.Path(path_type=Path), help="The page to write. [default: FILE's name, ending in html]"
-)
+@file_argument
+@click.option("--output", "-o", type=PATH, help="The page to write. [default: FILE's name, ending in html]")
 @click.option("--open", "opened", is_flag=True, help="Show it in the browser.")
-@click.option("--starts", type=click.IntRange(1, MOST_STARTS), default=None, help="Tried at most. [default: 64]")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
+@starts_option("Tried at most. [default: 64]")
+@seed_option
 def explore(file: Path, output: Path | None, opened: bool, starts: int | None, seed: int) -> None:
     """Write one page that shows why a design of FILE is stable: sliders, chart, roots, growth, motion."""
-    with bad_input():
-        import tmsopt
-
-        path = Path(f"{file.stem}.html") if output is None else output
-        check_output("--output", path, ("html", "htm"))
-        page = tmsopt.explore(file, progress=shown(), **options(starts=starts, seed=seed))
+    path = output or Path(f"{file.stem}.html")
+    check_output("--output", path, REPORTS)
+    page = tmsopt.explore(file, progress=shown(), **options(starts=starts, seed=seed))
     with answering(), saving("--output", path):
         page.save(path)
     solution = page.solution

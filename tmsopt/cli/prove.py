@@ -5,21 +5,22 @@ from pathlib import Path
 
 import click
 
+import tmsopt
 from tmsopt.cli.common import (
     DONE,
     INFEASIBLE,
     NOT_CONVERGED,
-    REPORTS,
     answer,
-    bad_input,
-    check_output,
+    file_argument,
+    json_option,
     named,
     options,
     report_option,
+    seed_option,
+    starts_option,
     write_report,
 )
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
 \b
@@ -43,29 +44,24 @@ Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of text.")
-@click.option(
-    "--digits", type=click.IntRange(min=1, max=1000), default=30, show_default=True, help="Of every number."
-)  # fmt: skip
+@file_argument
+@json_option
+@click.option("--digits", type=click.IntRange(1, 1000), default=30, show_default=True, help="Of every number.")
 @click.option("--exact", multiple=True, metavar="NAME=VALUE", help="What a parameter is exactly, e.g. zeta_B=-1/3.")
-@click.option("--starts", type=click.IntRange(1, MOST_STARTS), default=None, help="Starts tried at most. [default: 64]")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
+@starts_option()
+@seed_option
 @report_option
 def prove(
     file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int, report: Path | None
 ) -> None:
     """Prove that the design which FILE asks for exists, and whether it is stable and heavily damped."""
-    with bad_input():
-        import tmsopt
-        from tmsopt.design import question_of
+    from tmsopt.design import question_of
 
-        check_output("--report", report, REPORTS)
-        given = named("--exact", exact, "zeta_B=-1/3")
-        problem = question_of(file)
-        asked = options(starts=starts, seed=seed)
-        solution = tmsopt.solve(problem, throw=False, interruptible=False, progress=shown(), **asked)
-        proof = tmsopt.prove(solution, digits, exact=given, progress=shown())
+    given = named("--exact", exact, "zeta_B=-1/3")
+    problem = question_of(file)
+    asked = options(starts=starts, seed=seed)
+    solution = tmsopt.solve(problem, throw=False, interruptible=False, progress=shown(), **asked)
+    proof = tmsopt.prove(solution, digits, exact=given, progress=shown())
     heading = problem.heading | {"status": solution.status}
     answer(as_json, lambda: heading | proof.to_json(), lambda: tmsopt.report.proof_text(problem, proof))
     write_report(proof, report, file, seed=seed, design=solution)

@@ -5,42 +5,43 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
 
+import tmsopt
 from tmsopt.cli.common import (
     DONE,
-    FIGURES,
     INFEASIBLE,
     NOT_CONVERGED,
-    REPORTS,
     answer,
-    bad_input,
-    check_output,
+    csv_option,
+    file_argument,
+    json_option,
     nominal_of,
     options,
+    plot_option,
+    refusal,
     report_option,
-    saving,
+    seed_option,
+    starts_option,
+    write_file,
     write_report,
 )
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import MOST_POINTS, MOST_STARTS
+from tmsopt.errors import MOST_POINTS, Fault, InputError
 
 if TYPE_CHECKING:
-    from tmsopt import Problem, Solution
     from tmsopt.report import Findings
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
-_CONTRACT = frozenset((
-    "schema", "title", "model", "status", "objective", "parameters", "units", "abscissa", "abscissa_realised",
-    "stable", "any_stable", "verdict", "growth", "verdict_is_exact", "multiplicity_is_exact", "defective",
-    "geometric_multiplicity", "roots", "eigenfrequencies",
-    "structure", "active", "violations", "missed_as_stored", "bound", "starts", "seconds", "inertia_margin",
-    "relaxation", "worst_case", "notes", "interrupted",
-))  # fmt: skip
+_CONTRACT = (
+    "schema title model status objective parameters units abscissa abscissa_realised stable any_stable verdict growth "
+    "verdict_is_exact multiplicity_is_exact defective geometric_multiplicity roots eigenfrequencies structure active "
+    "violations missed_as_stored bound starts seconds inertia_margin relaxation worst_case notes interrupted"
+)
 """Keys of JSON without --full."""
 
 _SOLVE_EXAMPLES = """
@@ -76,17 +77,17 @@ Command = Callable[..., Any]
 def _common(command: Command) -> Command:
     """Options that every solving command has."""
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table."),
+        json_option,
+        starts_option("Starts tried at most; of a front, new ones per point. [default: 64, of a front 2]"),
+        seed_option,
         click.option(
-            "--starts", type=click.IntRange(1, MOST_STARTS), default=None,
-            help="Starts tried at most; of a front, new ones per point. [default: 64, of a front 2]",
-        ),
-        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts."),
-        click.option(
-            "--linear-solver", type=click.Choice(["mumps", "spral"]), default="mumps", show_default=True,
+            "--linear-solver",
+            type=click.Choice(["mumps", "spral"]),
+            default="mumps",
+            show_default=True,
             help="Inside IPOPT.",
         ),
-    ):  # fmt: skip
+    ):
         command = option(command)
     return command
 
@@ -104,91 +105,107 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
 
 
 @click.command(epilog=_SOLVE_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @_common
-@click.option(
-    "--plot", type=click.Path(path_type=Path),
-    help="Draw growth rates and frequencies over the speed, or the front (png, pdf, svg).",
-)  # fmt: skip
+@plot_option("Draw growth rates and frequencies over the speed, or the front")
 @report_option
 @click.option("--over", help="What --plot draws over, e.g. lambda_s. [default: the speed, or the first free one]")
-@click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
+@csv_option("Write the points of a front.")
 @click.option(
-    "--points", type=click.IntRange(2, MOST_POINTS), default=None,
+    "--points",
+    type=click.IntRange(2, MOST_POINTS),
     help="Points of a front; of three objectives limits on each of two, 12 at most: about as many points as their "
     "square. [default: 25, or 12]",
-)  # fmt: skip
+)
 @click.option(
-    "--workers", type=click.IntRange(min=1), default=None,
+    "--workers",
+    type=click.IntRange(min=1),
     help="Processes for a front, which is the same for any number. [default: as many as cores, up to 4]",
-)  # fmt: skip
+)
 @click.option(
-    "--wheelbase", default=None,
+    "--wheelbase",
     help="Of a dimensionless bicycle (tms): show SI beside, for this wheelbase in m or with a unit. [1 if left out]",
-)  # fmt: skip
-@click.option("--rear-mass", default=None, help="Likewise, for this mass m_B of the rear frame, in kg or with a unit.")
+)
+@click.option("--rear-mass", help="Likewise, for this mass m_B of the rear frame, in kg or with a unit.")
 @click.option(
-    "--full", is_flag=True,
+    "--full",
+    is_flag=True,
     help="All there is to say, each part under its name: every number to 12 digits, gains of limits solved again, "
     "rounding, robustness, how multiple roots split. JSON has everything then.",
-)  # fmt: skip
+)
 @click.option(
-    "--certify", callback=_seconds, is_flag=False, flag_value="60", default=None, metavar="[SECONDS]",
+    "--certify",
+    callback=_seconds,
+    is_flag=False,
+    flag_value="60",
+    metavar="[SECONDS]",
     help="Prove within SECONDS that nothing better exists, or find it (SCIP). Write it after FILE. [60 if left out]",
-)  # fmt: skip
+)
 @click.option(
-    "--all", "every", is_flag=True,
+    "--all",
+    "every",
+    is_flag=True,
     help="Of a pattern that leaves no freedom: all designs in the box that have it, with a proof that they are all "
     "(codac), or a search.",
-)  # fmt: skip
-@click.option(
-    "--seconds",
-    type=click.FloatRange(0, min_open=True),
-    default=None,
-    help="Time for the proof of --all. [default: 60]",
 )
+@click.option("--seconds", type=click.FloatRange(0, min_open=True), help="Time for the proof of --all. [default: 60]")
 @click.pass_context
 def solve(
-    context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
-    plot: Path | None, report: Path | None, over: str | None, csv_file: Path | None, points: int | None,
-    workers: int | None, wheelbase: str | None, rear_mass: str | None, full: bool, certify: float | None,
-    every: bool, seconds: float | None,
-) -> None:  # fmt: skip
+    context: click.Context,
+    /,
+    file: Path,
+    as_json: bool,
+    plot: Path | None,
+    report: Path | None,
+    over: str | None,
+    csv_file: Path | None,
+    points: int | None,
+    workers: int | None,
+    wheelbase: str | None,
+    rear_mass: str | None,
+    full: bool,
+    certify: float | None,
+    every: bool,
+    seconds: float | None,
+    **search: Any,
+) -> None:
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
-    with bad_input():
-        import tmsopt
-        from tmsopt.cli.front import write_front
-        from tmsopt.design import question_of
+    from tmsopt.design import question_of
 
-        w, m_B = _scale("--wheelbase", wheelbase or "1", "m"), _scale("--rear-mass", rear_mass or "1", "kg")
-        check_output("--plot", plot, FIGURES)
-        check_output("--csv", csv_file, ("csv",))
-        check_output("--report", report, REPORTS)
-        problem = question_of(file, front=True)
-        _check_options(problem, _given(context), every)
-        if certify:
-            from tmsopt.certificates import check_installed
+    w, m_B = _scale("--wheelbase", wheelbase or "1", "m"), _scale("--rear-mass", rear_mass or "1", "kg")
+    problem = question_of(file, front=True)
+    _check_options(problem, _given(context), every)
+    if certify:
+        from tmsopt.certificates import check_installed
 
-            check_installed()
-    asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
+        check_installed()
+    asked, seed = options(**search), search["seed"]
     if every:
-        _solve_all(problem, as_json, asked | options(seconds=seconds), file, report)
+        designs = tmsopt.solve_all(problem, progress=shown(), **asked, **options(seconds=seconds))
+        answer(as_json, lambda: problem.heading | designs.to_json(), lambda: tmsopt.report.every_table(designs))
+        write_report(designs, report, file, seed=seed)
+        sys.exit(DONE if designs.solutions else INFEASIBLE)
     if problem.pareto:
         try:
-            asked |= options(points=points, workers=workers)
-            write_front(problem, asked, as_json, plot, csv_file, full, file, report)
-            return
+            front = tmsopt.pareto(problem, progress=shown(), **asked, **options(points=points, workers=workers))
         except tmsopt.NotSolved as error:
             solution, plot = error.solution, None
+        else:
+            answer(as_json, front.to_json, lambda: front.report(full))
+            write_file("--csv", csv_file, front.write_csv)
+            write_file("--plot", plot, lambda path: tmsopt.plots.save(tmsopt.plots.front_figure(front), path))
+            write_report(front, report, file, seed=seed, full=full)
+            sys.exit(INTERRUPTED if front.interrupted else DONE)
     else:
         solution = tmsopt.solve(problem, throw=False, progress=shown(), **asked)
         if certify and not solution.interrupted:
             solution = tmsopt.certify(solution, seconds=certify, progress=shown())
+    found = tmsopt.report.Findings()
     try:
-        wanted = full or not as_json
-        found = tmsopt.report.findings(solution, full, shown()) if wanted else tmsopt.report.Findings()
+        if full or not as_json:
+            found = tmsopt.report.findings(solution, full, shown())
     except KeyboardInterrupt:
-        solution, found = replace(solution, interrupted=True), tmsopt.report.Findings()
+        solution = replace(solution, interrupted=True)
     si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
     answer(
         as_json,
@@ -201,14 +218,12 @@ def solve(
     sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
 
 
-def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
+def _check_options(problem: "tmsopt.Problem", given: list[str], every: bool) -> None:
     """Refuse options that mean nothing for this problem.
 
     Raises:
         InputError: naming each of them.
     """
-    from tmsopt import Fault, InputError
-
     alone, scaled = ("--certify", "--full"), ("--wheelbase", "--rear-mass")
     wrong: dict[str, str] = {}
     if every:
@@ -233,11 +248,11 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
         raise InputError(faults)
 
 
-def _as_json(solution: "Solution", found: "Findings", full: bool) -> dict[str, Any]:
+def _as_json(solution: "tmsopt.Solution", found: "Findings", full: bool) -> dict[str, Any]:
     """The keys of the contract; everything, and what was found out beside, where all is wanted."""
     data = solution.to_json()
     if not full:
-        return {name: value for name, value in data.items() if name in _CONTRACT}
+        return {name: value for name, value in data.items() if name in _CONTRACT.split()}
     meaning = {
         "meaning": found.explanation and found.explanation.to_json(),
         "robustness": found.robustness and found.robustness.to_json(),
@@ -246,31 +261,15 @@ def _as_json(solution: "Solution", found: "Findings", full: bool) -> dict[str, A
     return data | {name: value for name, value in meaning.items() if value}
 
 
-def _solve_all(
-    problem: "Problem", as_json: bool, asked: dict[str, Any], file: Path, report: Path | None
-) -> NoReturn:  # fmt: skip
-    """Write all designs with a pattern, and end."""
-    import tmsopt
-
-    with bad_input():
-        found = tmsopt.solve_all(problem, progress=shown(), **asked)
-    answer(as_json, lambda: problem.heading | found.to_json(), lambda: tmsopt.report.every_table(found))
-    write_report(found, report, file, seed=asked["seed"])
-    sys.exit(DONE if found.solutions else INFEASIBLE)
-
-
 @click.command(epilog=_COMPARE_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @_common
-def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str) -> None:
+def compare(file: Path, as_json: bool, **search: Any) -> None:
     """Set the optimum of FILE beside the closed-form laws, and one formulation beside the other."""
-    with bad_input():
-        import tmsopt
-        from tmsopt.design import question_of
+    from tmsopt.design import question_of
 
-        problem = nominal_of(question_of(file))
-    asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
-    comparison = tmsopt.compare(problem, progress=shown(), **asked)
+    problem = nominal_of(question_of(file))
+    comparison = tmsopt.compare(problem, progress=shown(), **options(**search))
     answer(as_json, comparison.to_json, lambda: tmsopt.report.comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
 
@@ -284,7 +283,6 @@ def _given(context: click.Context) -> list[str]:
 
 def _scale(option: str, text: str, unit: str) -> float:
     """A positive length or mass of the command line."""
-    from tmsopt import Fault, InputError
     from tmsopt.units import with_unit
 
     try:
@@ -292,16 +290,14 @@ def _scale(option: str, text: str, unit: str) -> float:
             value = float(text)
         except ValueError:
             value = with_unit(text, unit)
-        if not 0 < value < float("inf"):
+        if not 0 < value < math.inf:
             raise ValueError(f"found {text}; accepted: a positive number of {unit}")
     except ValueError as error:
-        raise InputError([Fault(str(error), (option,))]) from None
+        raise refusal(str(error), option) from None
     return value
 
 
-def _draw(solution: "Solution", path: Path, over: str | None, w: float, m_B: float) -> None:
-    import tmsopt
-
+def _draw(solution: "tmsopt.Solution", path: Path, over: str | None, w: float, m_B: float) -> None:
     if not math.isfinite(solution.abscissa):
         click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         return
@@ -309,7 +305,6 @@ def _draw(solution: "Solution", path: Path, over: str | None, w: float, m_B: flo
     if solution.problem.model is tmsopt.models.tms:
         si = tmsopt.report.si_parameters(solution, w, m_B)
         unit = (si["g"] * si["w"]) ** 0.5
-    with bad_input():
-        drawn = tmsopt.growth(solution, over=over, progress=shown())
-    with saving("--plot", path):
-        tmsopt.plots.save(tmsopt.plots.growth_figure(drawn, solution.problem.title, unit), path)
+    drawn = tmsopt.growth(solution, over=over, progress=shown())
+    figure = tmsopt.plots.growth_figure(drawn, solution.problem.title, unit)
+    write_file("--plot", path, lambda path: tmsopt.plots.save(figure, path))

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tmsopt.cli.common import (
-    FIGURES,
-    REPORTS,
     bad_input,
     check_output,
+    file_argument,
+    json_option,
+    plot_option,
     report_option,
     saving,
     write_json,
@@ -59,7 +60,7 @@ Exit status: 0 done, failed rows included; 2 bad input.
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @click.option(
     "--store", type=click.Path(path_type=Path), help="SQLite file of the rows. [default: FILE's name.sqlite, here]"
 )
@@ -74,12 +75,9 @@ Exit status: 0 done, failed rows included; 2 bad input.
     "--export", "exports", type=click.Path(path_type=Path), multiple=True,
     help="Write all rows; the ending says how, as in rows.csv, rows.parquet, rows.nc. May be given again.",
 )  # fmt: skip
-@click.option(
-    "--plot", type=click.Path(path_type=Path),
-    help="Draw how the rows are distributed, or the objective over what varies (png, pdf, svg).",
-)  # fmt: skip
+@plot_option("Draw how the rows are distributed, or the objective over what varies")
 @report_option
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+@json_option
 def study(
     file: Path, store: Path | None, fresh: bool, row: int | None, workers: int | None, scheduler: str | None,
     exports: tuple[Path, ...], plot: Path | None, report: Path | None, as_json: bool,
@@ -90,8 +88,6 @@ def study(
 
         kept = {"--store": store, "--fresh": fresh, "--export": exports, "--plot": plot, "--report": report}
         _check_together(row, scheduler, workers, kept)
-        check_output("--plot", plot, FIGURES)
-        check_output("--report", report, REPORTS)
         for target in exports:
             from tmsopt.studies import check_export
 

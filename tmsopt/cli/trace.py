@@ -1,23 +1,27 @@
 """The command that traces a root pattern."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
+import tmsopt
 from tmsopt.cli.common import (
-    FIGURES,
-    REPORTS,
     answer,
-    bad_input,
-    check_output,
+    csv_option,
+    file_argument,
+    json_option,
     nominal_of,
     plane,
+    plot_option,
+    refusal,
     report_option,
-    saving,
+    seed_option,
+    starts_option,
+    write_file,
     write_report,
 )
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
 \b
@@ -36,47 +40,45 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @click.option("--pattern", help="Pattern to trace. [default: the one that FILE locates]")
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
-@click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write every point of every branch.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Draw the branches (png, pdf, svg).")
+@json_option
+@csv_option("Write every point of every branch.")
+@plot_option("Draw the branches")
 @report_option
 @click.option("--axes", help="Two parameters to draw over, e.g. Fr,chi_B. [default: two that vary]")
 @click.option(
-    "--step", type=click.FloatRange(min=1e-6, max=0.1), default=0.005, show_default=True,
+    "--step",
+    type=click.FloatRange(1e-6, 0.1),
+    default=0.005,
+    show_default=True,
     help="Longest step, in widths of the box.",
-)  # fmt: skip
-@click.option(
-    "--starts", type=click.IntRange(1, MOST_STARTS), default=48, show_default=True, help="Fruitless in a row, to stop."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
+@starts_option("Fruitless in a row, to stop.", 48)
+@seed_option
 def trace(
-    file: Path, pattern: str | None, as_json: bool, csv_file: Path | None, plot: Path | None,
-    report: Path | None, axes: str | None, step: float, starts: int, seed: int,
-) -> None:  # fmt: skip
+    file: Path,
+    pattern: str | None,
+    as_json: bool,
+    csv_file: Path | None,
+    plot: Path | None,
+    report: Path | None,
+    axes: str | None,
+    **asked: Any,
+) -> None:
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
-    with bad_input():
-        import tmsopt
-
-        check_output("--plot", plot, FIGURES)
-        check_output("--csv", csv_file, ("csv",))
-        check_output("--report", report, REPORTS)
-        problem = nominal_of(tmsopt.load(file))
-        if plot is None and axes is not None:
-            raise tmsopt.InputError([tmsopt.Fault("says what --plot draws; add --plot FILE", ("--axes",))])
-        if axes is not None:
-            plane(problem, axes)
-        found = tmsopt.trace(problem, pattern, step=step, starts=starts, seed=seed, progress=shown())
+    problem = nominal_of(tmsopt.load(file))
+    if axes is not None:
+        if plot is None:
+            raise refusal("says what --plot draws; add --plot FILE", "--axes")
+        plane(problem, axes)
+    found = tmsopt.trace(problem, pattern, progress=shown(), **asked)
     answer(as_json, found.to_json, lambda: tmsopt.report.trace_table(found))
-    write_report(found, report, file, seed=seed)
+    write_report(found, report, file, seed=asked["seed"])
     if not found.branches:
         click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
         raise SystemExit(3)
-    if csv_file is not None:
-        with saving("--csv", csv_file):
-            found.write_csv(csv_file)
+    write_file("--csv", csv_file, found.write_csv)
     if plot is not None:
-        with saving("--plot", plot):
-            drawn = plane(problem, axes or ",".join(found.varying[:2]))
-            tmsopt.plots.save(tmsopt.plots.trace_figure(found, *drawn), plot)
+        drawn = tmsopt.plots.trace_figure(found, *plane(problem, axes or ",".join(found.varying[:2])))
+        write_file("--plot", plot, lambda path: tmsopt.plots.save(drawn, path))

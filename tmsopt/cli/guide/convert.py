@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import bad_input, check_output
+from tmsopt.cli.common import file_argument, output_option
 from tmsopt.cli.guide.files import write_with_companions
 
 _EXAMPLES = """
@@ -23,19 +23,17 @@ Exit status: 0 done, 2 bad input, such as what has no counterpart in the other m
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @click.option("--to", default="whipple", show_default=True, metavar="[whipple]", help="The other model.")
 @click.option("--inertia", default="boxes", show_default=True, metavar="[boxes|none]", help="What a body is.")
 @click.option("--body", help="Size of the rear frame, such as 40x20x30cm.")
 @click.option("--front", help="Size of the front assembly, such as 10x10x30cm.")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="A new file (toml). [default: stdout]")
+@output_option(("toml",), "A new file (toml). [default: stdout]")
 def convert(file: Path, to: str, inertia: str, body: str | None, front: str | None, output: Path | None) -> None:
     """Make a problem of Whipple's bicycle of the point masses of FILE (tms)."""
-    with bad_input():
-        from tmsopt.guide import converted_file
+    from tmsopt.guide import converted_file
 
-        check_output("--output", output, ("toml",))
-        text = converted_file(file, to, inertia, body, front)
+    text = converted_file(file, to, inertia, body, front)
     if output is None:
         click.echo(text, nl=False)
     else:

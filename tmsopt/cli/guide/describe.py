@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import answer, bad_input, check_output
+import tmsopt
+from tmsopt.cli.common import answer, json_option, output_option
 from tmsopt.cli.guide.files import write_new
 
 _EXAMPLES = """
@@ -35,26 +36,19 @@ Exit status: 0 done, 2 bad input.
 
 @click.command(epilog=_EXAMPLES)
 @click.argument("what", metavar="NAME|FILE")
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of text.")
+@json_option
 def describe(what: str, as_json: bool) -> None:
     """Show symbols, units, signs and meanings of a model, or of the problem or study in FILE."""
-    with bad_input():
-        import tmsopt
-
-        found = tmsopt.describe(what)
+    found = tmsopt.describe(what)
     answer(as_json, found.to_json, found.report)
 
 
 @click.command(epilog=_OF_SCHEMA)
-@click.option(
-    "--output", "-o", type=click.Path(path_type=Path), help="Write a new file (json), never over one. [default: stdout]"
-)
+@output_option(("json",), "Write a new file (json), never over one. [default: stdout]")
 def schema(output: Path | None) -> None:
     """Write the JSON Schema of problem and study files, by which editors complete, explain and check them."""
-    with bad_input():
-        from tmsopt.guide import schema_text
+    from tmsopt.guide import schema_text
 
-        check_output("--output", output, ("json",))
     if output is None:
         click.echo(schema_text(), nl=False)
     else:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import bad_input, check_output, saving, write_json
+from tmsopt.cli.common import check_output, file_argument, output_option, refusal, saving, write_json
 from tmsopt.disk import write_text
 
 _OF_NEW = """
@@ -57,16 +57,14 @@ def write_with_companions(option: str, path: Path, text: str) -> None:
 
 
 @click.command(epilog=_OF_NEW)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @click.option("--model", default="tms", show_default=True, metavar="[tms|whipple|own]", help="What it is about.")
 def new(file: Path, model: str) -> None:
     """Write FILE, a commented problem to start from."""
-    with bad_input():
-        from tmsopt.guide import new_problem
+    from tmsopt.guide import new_problem
 
-        check_output("FILE", file, ("toml",))
-        text = new_problem(model)
-    write_with_companions("FILE", file, text)
+    check_output("FILE", file, ("toml",))
+    write_with_companions("FILE", file, new_problem(model))
 
 
 def _names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
@@ -77,24 +75,19 @@ def _names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[
 
 @click.command(epilog=_OF_EXAMPLE)
 @click.argument("name", required=False, shell_complete=_names)
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Another file (toml). [default: NAME.toml]")
+@output_option(("toml",), "Another file (toml). [default: NAME.toml]")
 @click.option("--json", "as_json", is_flag=True, help="Write the list as JSON.")
 def example(name: str | None, output: Path | None, as_json: bool) -> None:
     """Write the example NAME here; without a name, list all that come with tmsopt."""
-    with bad_input():
-        from tmsopt import Fault, InputError
-        from tmsopt.guide import example as text_of, examples
+    from tmsopt.guide import example as text_of, examples
 
-        check_output("--output", output, ("toml",))
-        if name is None and output is not None:
-            raise InputError([Fault("found no NAME; tmsopt example lists all", ("NAME",))])
-        text = None if name is None else text_of(name)
-    if name is not None and text is not None:
+    if name is not None:
         path = output or Path(f"{name.removesuffix('.toml')}.toml")
-        write_with_companions("NAME" if output is None else "--output", path, text)
+        write_with_companions("NAME" if output is None else "--output", path, text_of(name))
+    elif output is not None:
+        raise refusal("found no NAME; tmsopt example lists all", "NAME")
     elif as_json:
         write_json(examples())
     else:
-        listed = examples()
-        width = max(map(len, listed), default=0)
-        click.echo("\n".join(f"{name.ljust(width)}  {title}" for name, title in listed.items()))
+        width = max(map(len, examples()), default=0)
+        click.echo("\n".join(f"{name.ljust(width)}  {title}" for name, title in examples().items()))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import bad_input, check_output, saving
+from tmsopt.cli.common import file_argument, output_option, write_file
 from tmsopt.disk import write_text
 
 _EXAMPLES = """
@@ -21,20 +21,14 @@ Exit status: 0 done, 2 bad input.
 
 
 @click.command("import", epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--output", "-o", type=click.Path(path_type=Path), help="Write the problem file (toml). [default: stdout]"
-)
+@file_argument
+@output_option(("toml",), "Write the problem file (toml). [default: stdout]")
 @click.option("--speed", type=click.FloatRange(min=0), help="In m/s. [default: of FILE, or 5]")
 def import_(file: Path, output: Path | None, speed: float | None) -> None:
     """Make a problem file of a bicycle that BicycleParameters has measured."""
-    with bad_input():
-        from tmsopt.models import problem_text, read_bicycle
+    from tmsopt.models import problem_text, read_bicycle
 
-        check_output("--output", output, ("toml",))
-        text = problem_text(read_bicycle(file), speed)
+    text = problem_text(read_bicycle(file), speed)
     if output is None:
         click.echo(text, nl=False)
-        return
-    with saving("--output", output):
-        write_text(output, text)
+    write_file("--output", output, lambda path: write_text(path, text))

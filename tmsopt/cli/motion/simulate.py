@@ -5,18 +5,19 @@ from typing import Any
 
 import click
 
+import tmsopt
 from tmsopt.cli.common import (
-    FIGURES,
-    REPORTS,
-    a_design,
     answer,
-    bad_input,
-    check_output,
+    csv_option,
+    file_argument,
+    json_option,
     named,
     options,
+    plot_option,
+    refusal,
     report_option,
-    saving,
     say_nominal,
+    write_file,
     write_report,
 )
 from tmsopt.cli.terminal import shown
@@ -44,7 +45,7 @@ Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @click.option("--lean", type=float, metavar="DEGREES", help="Lean to the right at the start.")
 @click.option("--steer", type=float, metavar="DEGREES", help="Steer to the right at the start.")
 @click.option("--push", type=float, metavar="IMPULSE", help="Of steer torque at the start, in N m s.")
@@ -57,46 +58,35 @@ Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
 @click.option(
     "--points", type=click.IntRange(2, 1_000_000), default=1001, show_default=True, help="Times in the table."
 )
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
-@click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the motion.")
+@json_option
+@csv_option("Write the motion.")
 @click.option("--path", "whole", is_flag=True, help="With --csv: a controller's torques and the wheels' path too.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Draw the motion (png, pdf, svg).")
+@plot_option("Draw the motion")
 @report_option
 def simulate(
     file: Path, as_json: bool, csv_file: Path | None, whole: bool, plot: Path | None, report: Path | None,
     start: tuple[str, ...], at: tuple[str, ...], **asked: Any,
 ) -> None:  # fmt: skip
     """Show what the design of FILE does after a lean, a push of the handlebar, or in noise."""
-    with bad_input():
-        import tmsopt
-
-        check_output("--csv", csv_file, ("csv",))
-        check_output("--plot", plot, FIGURES)
-        check_output("--report", report, REPORTS)
-        if whole and csv_file is None:
-            raise tmsopt.InputError([tmsopt.Fault("says what --csv writes; add --csv FILE", ("--path",))])
-        states = {name: _number(name, text) for name, text in named("--start", start, "phidot=0.1").items()}
-        problem = tmsopt.load(file)
-        values = {name: _number(name, text, "--at") for name, text in named("--at", at, "v=1.5").items()}
-        say_nominal(problem, values)
-        with a_design(problem):
-            found = tmsopt.simulate(
-                problem, start=states or None, at=values or None, progress=shown(), **options(**asked)
-            )
+    if whole and csv_file is None:
+        raise refusal("says what --csv writes; add --csv FILE", "--path")
+    states = _numbers("--start", start, "phidot=0.1")
+    problem = tmsopt.load(file)
+    values = _numbers("--at", at, "v=1.5")
+    say_nominal(problem, values)
+    found = tmsopt.simulate(problem, start=states or None, at=values or None, progress=shown(), **options(**asked))
     answer(as_json, found.to_json, found.report)
-    if csv_file is not None:
-        with saving("--csv", csv_file):
-            found.write_csv(csv_file, whole=whole)
-    if plot is not None:
-        with saving("--plot", plot):
-            tmsopt.plots.save(tmsopt.plots.motion_figure(found), plot)
+    write_file("--csv", csv_file, lambda path: found.write_csv(path, whole=whole))
+    write_file("--plot", plot, lambda path: tmsopt.plots.save(tmsopt.plots.motion_figure(found), path))
     write_report(found, report, file, seed=asked["seed"])
 
 
-def _number(name: str, text: str, option: str = "--start") -> float:
-    from tmsopt import Fault, InputError
-
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError([Fault(f"found '{text}'; accepted: a number", (option, name))]) from None
+def _numbers(option: str, given: tuple[str, ...], example: str) -> dict[str, float]:
+    """What NAME=VALUE options give."""
+    found = {}
+    for name, text in named(option, given, example).items():
+        try:
+            found[name] = float(text)
+        except ValueError:
+            raise refusal(f"found '{text}'; accepted: a number", option, name) from None
+    return found

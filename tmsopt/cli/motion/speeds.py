@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import a_design, answer, bad_input, say_nominal
+import tmsopt
+from tmsopt.cli.common import answer, file_argument, json_option, say_nominal
 from tmsopt.cli.terminal import shown
 
 _EXAMPLES = """
@@ -33,17 +34,13 @@ def _ends(_context: click.Context, _option: click.Parameter, value: str | None) 
 
 
 @click.command(epilog=_EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @click.option("--parameter", metavar="NAME", help="What varies. [default: the speed]")
 @click.option("--between", callback=_ends, metavar="LOW,HIGH", help="The range to look through. [default: all]")
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+@json_option
 def speeds(file: Path, parameter: str | None, between: tuple[float, float] | None, as_json: bool) -> None:
     """Find every weave and capsize speed of FILE, and every speed at which roots meet."""
-    with bad_input():
-        import tmsopt
-
-        problem = tmsopt.load(file)
-        say_nominal(problem, [parameter] if parameter else ("v", "Fr"))
-        with a_design(problem):
-            found = tmsopt.speeds(problem, parameter, between=between, progress=shown())
+    problem = tmsopt.load(file)
+    say_nominal(problem, [parameter] if parameter else ("v", "Fr"))
+    found = tmsopt.speeds(problem, parameter, between=between, progress=shown())
     answer(as_json, found.to_json, lambda: tmsopt.report.speeds_table(found))

@@ -1,11 +1,11 @@
 """The command that recomputes the source paper."""
 
-import sys
 from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import DONE, answer, bad_input, check_output, saving
+import tmsopt
+from tmsopt.cli.common import answer, json_option, output_option, write_file
 from tmsopt.cli.terminal import shown
 from tmsopt.disk import write_text
 
@@ -22,18 +22,11 @@ Exit status: 0 when the ledger was computed, whatever the verdicts; 2 bad input.
 
 
 @click.command(epilog=_EXAMPLES)
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
-@click.option("--markdown", type=click.Path(path_type=Path), help="Write the ledger as a Markdown page (md).")
+@json_option
+@output_option(("md",), "Write the ledger as a Markdown page (md).", "--markdown")
 @click.option("--only", multiple=True, metavar="KEY", help="Compute these entries only; * and ? stand for any text.")
 def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
     """Recompute every number and statement of the source paper, with a verdict on each."""
-    with bad_input():
-        import tmsopt
-
-        check_output("--markdown", markdown, ("md",))
-        ledger = tmsopt.verify(shown(), only)
+    ledger = tmsopt.verify(shown(), only)
     answer(as_json, ledger.to_json, lambda: tmsopt.report.ledger_table(ledger))
-    if markdown is not None:
-        with saving("--markdown", markdown):
-            write_text(markdown, tmsopt.report.ledger_page(ledger))
-    sys.exit(DONE)
+    write_file("--markdown", markdown, lambda path: write_text(path, tmsopt.report.ledger_page(ledger)))
