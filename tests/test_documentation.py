@@ -264,7 +264,7 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
         ("numbers of parameters", "models.exact.MOST_DIGITS units.text.LONGEST"),
         ("CSV files of rows", "studies.vary.LARGEST studies.vary.LONGEST_LINE studies.vary.MOST_COLUMNS studies.validate.MOST_ROWS studies.validate.MOST_NUMBERS"),
         ("a store that is received", "studies.store.database._NUMBERS disk.LARGEST_JSON studies.store.packing.LONGEST"),
-        ("a chart", "charts.survey.MOST charts.received.MOST_TILES"),
+        ("a chart", "charts.survey.MOST charts.survey.MOST_TILES"),
     ],
 )  # fmt: skip
 def test_limits_of_what_is_read_are_those_in_force(line: str, constants: str) -> None:

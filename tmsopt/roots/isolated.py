@@ -97,7 +97,7 @@ def motions(coefficients: Sequence[Twofold], roundings: Sequence[Array], toleran
 
 def _numeric(a: Array) -> Complex:
     """Roots in doubles, shape (n, m)."""
-    found = quartic_factors(*a, compiled=False).roots if len(a) == 5 else roots(a.T)
+    found = quartic_factors(*a).roots if len(a) == 5 else roots(a.T)
     return np.ascontiguousarray(found.T)
 
 
