@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "progress", "disk", "locks", "executor", "killable", "versions", "laws"),
+    ("errors", "records", "progress", "deprecated", "disk", "locks", "executor", "killable", "versions", "laws"),
     ("arithmetic",),
     ("roots",),
     ("models",),
@@ -296,7 +296,7 @@ def test_files_are_written_whole() -> None:
     found = {place for m, s in SOURCES.items() for place in written(m, s)}
     assert found == {
         "tmsopt.cli.ending.streams",  # stdout
-        "tmsopt.charts.folder.writing",  # tile by tile; what is recorded is right
+        "tmsopt.charts.folder.write", "tmsopt.charts.folder.sync", "tmsopt.charts.folder._create",  # recorded last
         "tmsopt.disk.whole",  # itself
         "tmsopt.display.page._picture", "tmsopt.display.pictures._image", "tmsopt.plots.style.rendered",  # in memory
         "tmsopt.killable.serve",  # a pipe

@@ -264,7 +264,7 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
         ("numbers of parameters", "models.exact.MOST_DIGITS units.text.LONGEST"),
         ("CSV files of rows", "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS"),
         ("a store that is received", "disk.LARGEST_JSON studies.store.LARGEST"),
-        ("a chart", "charts.survey.MOST charts.received.MOST_TILES"),
+        ("a chart", "charts.survey.MOST charts.survey.MOST_TILES"),
     ],
 )  # fmt: skip
 def test_limits_of_what_is_read_are_those_in_force(line: str, constants: str) -> None:

@@ -172,7 +172,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     (folder / "c.toml").write_text(PLANE)
     (folder / "s.toml").write_text(ROWS)
-    tmsopt.chart(folder / "c.toml", points=(6, 5), engine="numpy", folder=folder / "c.chart")
+    tmsopt.chart(folder / "c.toml", points=(6, 5), folder=folder / "c.chart")
     tmsopt.run_study(folder / "s.toml", store=folder / "s.sqlite", workers=1)
     return folder
 

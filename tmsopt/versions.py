@@ -12,7 +12,7 @@ NEEDED = (
     "casadi", "numpy", "scipy", "matplotlib", "textalloc", "python-flint", "pydantic", "pint", "click", "lazy-loader",
     "threadpoolctl", "loky", "filelock",
 )  # fmt: skip
-EXTRA = ("pyscipopt", "codac", "numba", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
+EXTRA = ("pyscipopt", "codac", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
 """Distributions that tmsopt needs, and those of its extras certify, fast, cluster and data."""
 
 

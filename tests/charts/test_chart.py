@@ -16,13 +16,13 @@ from helpers import curves
 from helpers.curves import exact_polynomial, sturm
 from helpers.oracles import abscissa_60, certified_roots, polynomial_60
 
-from tmsopt.charts import chart, classify
+from tmsopt.charts import chart
 from tmsopt.cli import main
 from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.report import chart_table
-from tmsopt.roots import CLASSES
+from tmsopt.roots import CLASSES, classify, find_motion
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
@@ -156,10 +156,10 @@ def test_beside_ep4_roots_are_jointly_right_and_classes_exact(distance):
     rng = np.random.default_rng(3)
     c = np.array([comb(4, k) * (-OMEGA0) ** k for k in range(5)]) * np.ones((12, 1))
     c[:, 1:] *= 1 + distance * rng.uniform(-1, 1, (12, 4))
-    kind, real, alpha, _ = classify(c)
+    found = classify(list(c.T))
     unit = 20 * np.finfo(float).eps
     tolerance = abs(OMEGA0) * min(unit**0.25, 4 * unit / max(distance, 1e-300) ** 0.75)
-    for row, code, count, value in zip(c, kind, real, alpha, strict=True):
+    for row, code, count, value in zip(c, found.kind, found.real_roots, find_motion(list(c.T)).abscissa, strict=True):
         exact = [Fraction(x) for x in row.tolist()]
         assert CLASSES[code] == curves.kind(exact)
         assert count == sum(sturm(exact))
@@ -178,13 +178,13 @@ def test_classify_by_hand():
         (0, 1, 2, 3, 4): ("undefined", 0, math.nan),
         (1, -2, 3, -2, 2): ("weave", 0, 1.0),  # ±i, 1 ± i
     }
-    kind, real, alpha, _ = classify(np.array(list(rows), dtype=float))
-    assert [CLASSES[k] for k in kind] == [v[0] for v in rows.values()]
+    a = np.array(list(rows), dtype=float).T
+    found = classify(list(a))
+    assert [CLASSES[k] for k in found.kind] == [v[0] for v in rows.values()]
     expected_real = [1 if k == (1, 4, 8, 8, 3) else v[1] for k, v in rows.items()]
-    assert real.tolist() == expected_real  # different ones
-    assert alpha == pytest.approx([v[2] for v in rows.values()], abs=1e-7, nan_ok=True)
-    kind, *_ = classify(np.array([[1.0, np.nan, 1, 1, 1], [np.inf, 1, 1, 1, 1]]))
-    assert kind.tolist() == [0, 0]
+    assert found.real_roots.tolist() == expected_real  # different ones
+    assert find_motion(list(a)).abscissa == pytest.approx([v[2] for v in rows.values()], abs=1e-7, nan_ok=True)
+    assert classify([[1.0, np.inf], [np.nan, 1.0], 1.0, 1.0, 1.0]).kind.tolist() == [0, 0]
 
 
 def test_constraints_are_held_where_they_hold():

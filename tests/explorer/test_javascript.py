@@ -14,11 +14,10 @@ from helpers.javascript import page_script, run
 from helpers.oracles import routh_exact
 
 from tmsopt.arithmetic import exact
-from tmsopt.charts import classified, classify
 from tmsopt.design import Problem, load
 from tmsopt.explorer import kernel_script, model_script
 from tmsopt.models import Values, from_coefficients, from_matrices
-from tmsopt.roots import backward_error, quartic_classes, roots
+from tmsopt.roots import backward_error, classify, find_motion, quartic_classes, roots
 
 FOLDER = Path(__file__).parents[2] / "problems"
 FILES = (
@@ -77,6 +76,12 @@ def agree(found, ball, factor=1000):
     return abs(found - float(ball.mid())) <= factor * float(ball.rad()) + 1e-13 * abs(float(ball.mid())) + 1e-290
 
 
+def motion_of(a):
+    """Abscissae and damping ratios of rows of coefficients."""
+    found = find_motion(list(a.T))
+    return found.abscissa, found.damping_ratio
+
+
 WHOLE = """(rows) => {
   const a = new Float64Array(MODEL.degree + 1), out = new Float64Array(3);
   return rows.map((x) => {
@@ -99,12 +104,11 @@ def test_designs_of_a_box_are_as_in_python(name):
         for row, c in zip(x, a, strict=True):
             expected = balls(problem, row).coefficients
             assert all(agree(one, exact(other)) for one, other in zip(c, expected, strict=True))
-    expected_kind, _, _, _ = classify(python_coefficients(problem, x))
-    assert np.array_equal(kind, expected_kind)
+    assert np.array_equal(kind, classify(list(python_coefficients(problem, x).T)).kind)
     assert np.all(backward_error(a, re + 1j * im) <= JOINT)
     assert np.all(np.diff(re, axis=1) <= 0)
     assert np.array_equal(np.sort_complex(re + 1j * im), np.sort_complex(re - 1j * im))
-    _, _, alpha, ratio = classify(a)
+    alpha, ratio = motion_of(a)
     z = roots(a)
     tolerance, judged = distance(z)
     assert np.mean(judged) > 0.4
@@ -146,7 +150,7 @@ def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
     script = model_script(problem)
     assert [*script.constraints] == [*problem.conditions]
     x = designs(problem, FEW, seed=1)
-    alpha, ratio = classify(python_coefficients(problem, x))[2:]
+    alpha, ratio = motion_of(python_coefficients(problem, x))
     frequency = roots(python_coefficients(problem, x)).imag.max(axis=1)
     motion = np.stack([alpha, ratio, frequency], axis=1)
     found = np.array(run([page_script(problem)], DERIVED, list(zip(x.tolist(), motion.tolist(), strict=True))), float)
@@ -235,7 +239,7 @@ def test_kinds_are_exact_beside_boundaries_and_exceptional_points(degree):
         expected = np.stack([classes.kind, classes.real_roots], axis=1)
         stable = expected[:, 0] >= 3  # by the rounded conditions
     else:
-        signs = classified([*rows.T], {"kind", "real_roots"})
+        signs = classify(list(rows.T))
         expected = np.stack([signs.kind, signs.real_roots], axis=1)
         stable = [np.all(np.isfinite(c)) and c[0] != 0 and routh_exact(c) for c in rows]
         if degree < 4:  # by the rounded conditions, which may differ a rounding away from a boundary
@@ -393,7 +397,7 @@ def test_surveys_are_the_designs_one_by_one(file):
     every = np.repeat(x[None], len(xs) * len(ys), axis=0)
     every[:, i], every[:, j] = np.tile(xs, len(ys)), np.repeat(ys, len(xs))
     a = python_coefficients(problem, every)
-    kind, _, alpha, ratio = classify(a)
+    kind, (alpha, ratio) = classify(list(a.T)).kind, motion_of(a)
     assert np.array_equal(found["kind"], kind)
     regular = kind > 0
     z = roots(a[regular])

@@ -13,7 +13,7 @@ import pytest
 from helpers import curves
 from helpers.oracles import certified_roots, routh_exact
 
-from tmsopt.charts import chart, classified
+from tmsopt.charts import chart
 from tmsopt.checks import cover, omega0_bound
 from tmsopt.critical_speeds import growth
 from tmsopt.design import Problem
@@ -23,6 +23,8 @@ from tmsopt.plots import chart_figure, growth_figure
 from tmsopt.report import chart_table
 from tmsopt.roots import (
     CLASSES,
+    classify,
+    find_motion,
     hurwitz_minors,
     is_stable,
     lienard_chipart,
@@ -35,7 +37,6 @@ from tmsopt.roots import (
 from tmsopt.solver import solve
 
 ROUNDINGS = 30
-LAYERS = ("kind", "real_roots", "abscissa", "damping_ratio")
 
 
 def model(names, degree, polynomial):
@@ -293,7 +294,7 @@ def test_classes_of_any_degree_are_exact(degree):
     rows.append([0.0, *rows[0][1:]])
     rows.append([np.nan, *rows[0][1:]])
     c = np.array(rows)
-    found = classified(list(c.T), LAYERS)
+    found, motion = classify(list(c.T)), find_motion(list(c.T))
     for k, row in enumerate(rows[:-2]):
         exact = [Fraction(x) for x in row]
         assert CLASSES[found.kind[k]] == curves.kind(exact)
@@ -302,12 +303,9 @@ def test_classes_of_any_degree_are_exact(degree):
         off = [scatter(w, m, [*z[:j], *z[j + 1 :]]) for j, (w, m) in enumerate(z)]
         ends = [(w.real - d, w.real + d) for (w, _), d in zip(z, off, strict=True)]
         low, high = (max(end) for end in zip(*ends, strict=True))
-        assert low <= found.abscissa[k] <= high
+        assert low <= motion.abscissa[k] <= high
     assert found.kind[-2:].tolist() == [0, 0]
-    assert np.isnan(found.abscissa[-2:]).all()
-    only = classified(list(c.T), ("kind",))
-    assert np.array_equal(only.kind, found.kind)
-    assert only.abscissa is None
+    assert np.isnan(motion.abscissa[-2:]).all()
 
 
 def test_a_chart_of_a_cubic_is_that_of_the_routh_condition():

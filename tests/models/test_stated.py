@@ -15,7 +15,6 @@ from matplotlib.mathtext import MathTextParser
 from scipy.optimize import differential_evolution
 
 import tmsopt
-from tmsopt.charts import Grid, save_layers
 from tmsopt.cli import every as main
 from tmsopt.design import ROOT_NAMES
 from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
@@ -482,9 +481,8 @@ def test_a_chart_is_not_gone_on_with_after_the_model_changed(tmp_path: Path) -> 
 
 def test_axes_beside_layers_of_the_same_name(tmp_path: Path) -> None:
     problem = tmsopt.Problem(model=from_coefficients([1, ca.SX.sym("kind"), c]), free={"kind": (1, 9), "c": (0, 9)})
-    grid = Grid(("kind", "c"), (np.array([1.0, 9.0]), np.array([0.0, 9.0])))
-    layers = {"kind": np.zeros((2, 2), dtype=np.int8)}
-    save_layers(problem, grid, layers, tmp_path / "plane.npz")
+    found = tmsopt.chart(problem, points=(2, 2), layers=["kind"], boundaries=False)
+    found.save(tmp_path / "plane.npz")
     with np.load(tmp_path / "plane.npz") as data:
         assert data["parameter.kind"].tolist() == [1, 9]
         assert data["kind"].shape == (2, 2)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tmsopt.arithmetic import Bounded
-from tmsopt.roots import exact_roots, find_motions
+from tmsopt.roots import enclose_motions, exact_roots
 
 
 def polynomials(degree: int) -> np.ndarray:
@@ -21,7 +21,7 @@ def polynomials(degree: int) -> np.ndarray:
 def test_the_true_values_are_within_the_errors(degree: int, share: float) -> None:
     a = polynomials(degree)
     moved = a * (1 + share * np.random.default_rng(0).uniform(-1, 1, a.shape))
-    found = find_motions([Bounded(c, share * np.abs(c)) for c in a.T], 1e-12)
+    found = enclose_motions([Bounded(c, share * np.abs(c)) for c in a.T], 1e-12)
     for k in np.flatnonzero(found.simple).tolist():
         true = exact_roots([flint.fmpq(*float(c).as_integer_ratio()) for c in moved[k]])
         abscissa = max(root.re for root in true)
@@ -35,4 +35,4 @@ def test_the_true_values_are_within_the_errors(degree: int, share: float) -> Non
 def test_a_multiple_root_is_never_certain() -> None:
     for roots in ([-1, -1, -2, -3], [-1, -1, -1, -1], [1j, -1j, 1j, -1j], [0, 0, -1, -2]):
         a = np.poly(roots).real
-        assert not find_motions([Bounded(np.full(1, c), np.zeros(1)) for c in a], 1e-12).simple.any()
+        assert not enclose_motions([Bounded(np.full(1, c), np.zeros(1)) for c in a], 1e-12).simple.any()

@@ -5,7 +5,6 @@ in shape (1, n) or (m, 1); what depends on no axis is one number. What has the s
 a time, whose arrays stay in the cache.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +14,6 @@ import numpy as np
 
 from tmsopt.arithmetic.operations import ARRAYS
 from tmsopt.arithmetic.walk import Arithmetic, Instruction, NotAccepted, operation_name, steps
-from tmsopt.records import Array
 
 BLOCK = 2**14
 """Elements of a block: 128 kB an array."""
@@ -46,29 +44,16 @@ class Program:
         """Entries of the vector that the results depend on."""
         return {step.place[1] for step in self.steps if step.operation == ca.OP_INPUT}
 
-    def __call__(self, given: Mapping[int, Any], into: Mapping[int, Array] | None = None) -> list[Any]:
+    def __call__(self, given: Mapping[int, Any]) -> list[Any]:
         """The results for numbers and arrays, each of the shape that it depends on.
 
         Args:
             given: entry of the vector → its value.
-            into: entry of the result → array for it, used if it has the shape of all that is given together.
         """
         with np.errstate(all="ignore"):
-            return self._results(given, into or {})
+            return self._results(given)
 
-    def settled(self, given: Mapping[int, Any]) -> "Program":
-        """The same with some arguments given for good: what depends on them alone becomes a constant."""
-        known: dict[int, Any] = {}
-        with np.errstate(all="ignore"):
-            for k, step in enumerate(self.steps):
-                if step.operation == ca.OP_CONST or (step.operation == ca.OP_INPUT and step.place[1] in given):
-                    known[k] = _leaf(step, given)
-                elif step.operation not in (ca.OP_INPUT, ca.OP_OUTPUT) and all(o in known for o in step.operands):
-                    known[k] = _OPERATIONS[step.operation](*[known[o] for o in step.operands])
-        constants = {k: Instruction(ca.OP_CONST, constant=value) for k, value in known.items()}
-        return _pruned([constants.get(k, step) for k, step in enumerate(self.steps)])
-
-    def _results(self, given: Mapping[int, Any], into: Mapping[int, Array]) -> list[Any]:
+    def _results(self, given: Mapping[int, Any]) -> list[Any]:
         leaves = {k: _leaf(step, given) for k, step in enumerate(self.steps) if not step.operands}
         shape = np.broadcast_shapes(*(np.shape(v) for v in leaves.values()))
         whole, axes = _axes(shape), {k: _axes(np.shape(v)) for k, v in leaves.items()}
@@ -87,11 +72,9 @@ class Program:
                 else:
                     value = _OPERATIONS[step.operation](*[values[o] for o in step.operands])
             values.append(value)
-        uses = Counter(outputs.values())
-        for n, k in outputs.items():
+        for k in outputs.values():
             if values[k] is None:
-                usable = n in into and into[n].shape == shape and uses[k] == 1
-                values[k] = into[n] if usable else np.empty(shape)
+                values[k] = np.empty(shape)
         self._fill(values, left, set(outputs.values()), shape)
         return [values[outputs[n]] for n in sorted(outputs)]
 

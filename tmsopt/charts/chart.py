@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -11,27 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.charts.files import dataset, save_layers
-from tmsopt.charts.folder import Folder, complete, writing
-from tmsopt.charts.received import (
-    ABOUT,
-    MOST_TILES,
-    SCHEMA,
-    damaged,
-    number_of_tiles,
-    read_about,
-    read_axis,
-    read_layer,
-    read_record,
-)
-from tmsopt.charts.summary import Tally, total
-from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, survey
-from tmsopt.charts.tiles import TILE, Memory, computed
+from tmsopt.charts.export import make_dataset, save_layers
+from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_folder
+from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, survey
+from tmsopt.charts.tally import Tally, add_tallies
+from tmsopt.deprecated import ignore_option
 from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
 from tmsopt.disk import path_of
-from tmsopt.errors import Fault, InputError, call_faults, count_faults, list_faults, short, suggest
-from tmsopt.models import MODELS
+from tmsopt.errors import Fault, InputError, call_faults, count_faults
+from tmsopt.executor import Crash, here, processes
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Shown
 from tmsopt.roots import CLASSES
@@ -42,6 +31,11 @@ if TYPE_CHECKING:
 
 LARGEST = 20_000_000
 """Designs of a chart in memory, some 40 bytes each."""
+
+TILE = 2**18
+"""Designs of a tile: some 40 MB while it is computed."""
+
+_MOST_WORKERS = 256
 
 
 def _layer(name: str, meaning: str) -> Any:
@@ -60,8 +54,8 @@ class Chart(Shown):
         counts: over all designs.
         domain: the exact boundaries over a plane, if asked for.
         path: of its folder; None in memory.
-        run: of the process that computed it: ``engine``, ``seconds``, ``per_second``, of a folder also how many
-            ``designs`` were left to it; empty where the chart was only opened.
+        run: how it was computed: ``engine``, ``seconds``, ``per_second``, for a folder also how many ``designs`` were
+            left; empty where the chart was only opened.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # stable where c and k are positive
@@ -129,13 +123,10 @@ class Chart(Shown):
             OSError: when the file cannot be written.
         """
         names = tuple(self.layers) if layers is None else layers
-        faults = list_faults("layers", names, "['kind', 'abscissa']")
-        if faults := faults or [
-            Fault(f"found {short(n)}; {suggest(n, self.layers)}", ("layers",)) for n in names if n not in [*self.layers]
-        ]:
+        if faults := layer_faults(names, list(self.layers)):
             raise InputError(faults)
-        kept = {n: self.layers[n] for n in names}
-        save_layers(self.problem, Grid(self.axes, self.grid), kept, path_of(path, "the file to write"))
+        chosen = {n: self.layers[n] for n in names}
+        save_layers(self.problem, Grid(self.axes, self.grid), chosen, path_of(path, "the file to write"))
 
     def to_xarray(self) -> "Dataset":
         """Every layer over the axes, with units.
@@ -143,41 +134,50 @@ class Chart(Shown):
         Raises:
             InputError: where xarray is not installed.
         """
-        made: Dataset = dataset(self.problem, Grid(self.axes, self.grid), self.layers)
+        made: Dataset = make_dataset(self.problem, Grid(self.axes, self.grid), self.layers)
         return made
-
-    def _units(self) -> dict[str, str]:
-        """Units of the axes; nothing of a chart in a folder that does not hold its model, a system without units."""
-        try:
-            of = self.problem.parameter_set
-        except InputError:
-            return {}
-        return {n: of[n].unit for n in self.axes}
 
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
-        units = self._units()
-        grid, counts, plane = Grid(self.axes, self.grid), self.counts, self.path is None and len(self.grid) == 2
-        return {
-            "schema": 1, "title": self.about["title"], "model": self.about["problem"]["model"],
-            "axes": {
-                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} | {"unit": units.get(n, "1")}
-                for n, v in zip(self.axes, self.grid, strict=True)
-            },
-            **({} if plane else {"layers": list(self.layers)}), "classes": counts.shares,
-            "satisfied": None if counts.satisfied is None else counts.satisfied / counts.designs,
-            "least_abscissa": {"value": counts.least, **grid.at(counts.place)} if counts.place >= 0 else None,
-            **({"boundaries": self.domain and self.domain.to_json()} if plane or self.domain else {}),
-            "fallbacks": counts.fallbacks, **({} if self.path is None else {"path": str(self.path)}), **self.run,
-        }  # fmt: skip
+        counts, plane = self.counts, self.path is None and len(self.grid) == 2
+        of = self.asked.parameter_set if self.asked else None  # a folder may not hold its model
+        grid = Grid(self.axes, self.grid)
+        place = grid.design(counts.place) if counts.place >= 0 else None
+        data: dict[str, Any] = {
+            "schema": 1,
+            "title": self.about["title"],
+            "model": self.about["problem"]["model"],
+            "axes": {n: {**axis, "unit": of[n].unit if of else "1"} for n, axis in grid.describe().items()},
+        }
+        if not plane:
+            data["layers"] = list(self.layers)
+        data["classes"] = counts.shares
+        data["satisfied"] = None if counts.satisfied is None else counts.satisfied / counts.designs
+        data["least_abscissa"] = place and {"value": counts.least, **place}
+        if plane or self.domain:
+            data["boundaries"] = self.domain and self.domain.to_json()
+        data["fallbacks"] = counts.fallbacks
+        if self.path is not None:
+            data["path"] = str(self.path)
+        return data | dict(self.run)
 
 
+@ignore_option("engine")
 def chart(
-    problem: Given, axes: Sequence[str] | None = None, *, folder: str | Path | None = None,
-    points: Sequence[int] | None = None, layers: Sequence[str] | None = None,
-    quantities: Mapping[str, str] | None = None, single: bool = False, engine: str = "auto", workers: int = 1,
-    fresh: bool = False, tile: int = TILE, boundaries: bool = True, progress: Listener | None = None,
-) -> Chart:  # fmt: skip
+    problem: Given,
+    axes: Sequence[str] | None = None,
+    *,
+    folder: str | Path | None = None,
+    points: Sequence[int] | None = None,
+    layers: Sequence[str] | None = None,
+    quantities: Mapping[str, str] | None = None,
+    single: bool = False,
+    workers: int = 1,
+    fresh: bool = False,
+    tile: int = TILE,
+    boundaries: bool = True,
+    progress: Listener | None = None,
+) -> Chart:
     """Classify every design of a grid over the two or three free parameters; the others must be fixed.
 
     Equality constraints are left aside. A chart in a folder goes on where the same call was ended before.
@@ -190,15 +190,15 @@ def chart(
         layers: names among `tmsopt.charts.LAYERS`; by default all, in a folder all but the margin.
         quantities: name → expression, further layers.
         single: keep numbers in single precision.
-        engine: ``auto``, ``numpy`` or ``numba``; the numbers do not depend on it.
-        workers: threads.
+        workers: processes; 1 is this one.
         fresh: move a folder of that name aside.
-        tile: designs computed at a time by a worker.
+        tile: designs that a worker computes at a time.
         boundaries: also trace the exact boundary curves over a plane.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
-        InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged.
+        InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged; where a
+            worker crashes.
         OSError: where the disk is full; what is recorded stays right.
 
     Example:
@@ -210,41 +210,39 @@ def chart(
 
     More: docs/how_to/charts.md
     """
-    if faults := [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1),
-                  *call_faults("progress", progress)]:  # fmt: skip
+    faults = [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1)]
+    if faults := faults + call_faults("progress", progress):
         raise InputError(faults)
     steps = counted(progress, "charting", "design")
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
-    work = survey(problem, axes, points, wanted, quantities, engine, single)
+    work = survey(problem, axes, points, wanted, quantities, single)
     path, grid = None if folder is None else path_of(folder, "a folder"), work.grid
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or {LARGEST:.0e} or less"
         raise InputError([Fault(message, ("points",))])
-    if path is not None and (tiles := number_of_tiles(grid.shape, tile)) > MOST_TILES:
-        raise InputError([Fault(f"found {tile}, which makes {tiles} tiles; accepted: {MOST_TILES}", ("tile",))])
-    about = _about(work, (None if path is None else _kept_tile(path, fresh)) or tile)
-    where: AbstractContextManager[Memory | Folder] = (
-        nullcontext(Memory(grid, {n: work.dtype(n) for n in work.names})) if path is None
-        else writing(path, about, dict(zip(grid.axes, grid.values, strict=True)), fresh)
-    )  # fmt: skip
-    began = time.perf_counter()
-    with where as target:
-        left = complete(target.done, grid.tiles(about["tile"]))
-        before = done = sum(t.designs for t in target.done.values())
+    about = _describe(work, tile)
+    grid.tiles(tile)  # refuses too many
+    memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in work.dtypes.items()}
+    where = write_folder(path, about, grid, fresh) if path else nullcontext(Tiles(memory, tile))
+    with where as target, processes(workers) if workers > 1 else here() as executor:
+        began = time.perf_counter()
+        left = [rows for rows in grid.tiles(target.tile) if rows.start not in target.done]
+        done = before = sum(t.designs for t in target.done.values())
         if steps:
             steps(done, grid.size)
-        for rows, arrays, counts in computed(work, left, workers):
-            target.write(rows, arrays, counts)
-            done += counts.designs
+        for place, found in executor.map(work.compute, left):
+            if isinstance(found, Crash):
+                message = f"a process that computed {tile} designs ended ({found.cause}); give fewer workers"
+                raise InputError([Fault(message, ("workers",))])
+            target.write(left[place], *found)
+            done += found[1].designs
             if steps:
                 steps(done, grid.size)
     seconds = time.perf_counter() - began
-    run: dict[str, Any] = {"engine": work.engine} | ({} if path is None else {"designs": done - before})
-    run |= {"seconds": seconds, "per_second": (done - before) / seconds}
+    run = {"engine": "numpy", **({} if path is None else {"designs": done - before}), "seconds": seconds}
+    run["per_second"] = (done - before) / seconds
     edges = domain(work.problem, progress=progress) if boundaries and len(grid.axes) == 2 else None
-    if isinstance(target, Folder):
-        return _opened(target.path, run, edges, work.problem)
-    return Chart(about, grid.values, target.layers, total(target.done.values()), edges, None, run, work.problem)
+    return Chart(about, grid.values, target.layers, add_tallies(target.done.values()), edges, path, run, work.problem)
 
 
 def open_chart(path: str | Path) -> Chart:
@@ -262,67 +260,37 @@ def open_chart(path: str | Path) -> Chart:
 
     More: docs/how_to/charts.md
     """
-    return _opened(path_of(path, "a folder that tmsopt.chart made"))
+    path = path_of(path, "a folder that tmsopt.chart made")
+    about, problem, tiles = read_folder(path)
+    grid, counts = grid_of(about), add_tallies(tiles.done.values())
+    if counts.designs < grid.size:
+        message = f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to go on"
+        raise InputError([Fault(message)])
+    return Chart(about, grid.values, tiles.layers, counts, path=path, asked=problem)
 
 
-_MOST_WORKERS = 256
-
-
-def _about(work: Survey, tile: int) -> dict[str, Any]:
+def _describe(work: Survey, tile: int) -> dict[str, Any]:
     """All that makes a chart another one, as plain data."""
     problem, grid = work.problem, work.grid
+    stated: dict[str, Any] = {
+        "model": problem.model.name,
+        "fixed": dict(problem.fixed),
+        "constraints": {n: problem.constraints[n] for n in limits_of(problem)},
+    }
+    if problem.model.statement is not None:
+        stated["statement"] = dict(problem.model.statement)
+    layers: dict[str, Any] = {n: {"dtype": d.str} for n, d in work.dtypes.items()}
+    for name, expression in work.quantities.items():
+        layers[name]["expression"] = expression
     return {
-        "schema": SCHEMA, "title": problem.title,
-        "problem": {
-            "model": problem.model.name,
-            **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
-            "fixed": dict(problem.fixed),
-            "constraints": {n: t for n, t in problem.constraints.items() if not problem.conditions[n].equality},
-        },
-        "axes": {
-            n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)}
-            for n, v in zip(grid.axes, grid.values, strict=True)
-        },
-        "dimensions": list(grid.axes[::-1]), "shape": list(grid.shape),
-        "layers": {
-            n: {"dtype": np.lib.format.dtype_to_descr(work.dtype(n))}
-            | ({"expression": work.quantities[n]} if n in work.quantities else {})
-            for n in work.names
-        },
-        "classes": list(CLASSES), "versions": {"tmsopt": version("tmsopt")}, "tile": tile,
-    }  # fmt: skip
-
-
-def _kept_tile(path: Path, fresh: bool) -> int | None:
-    """The size of tiles of a chart that was begun; another one would change nothing but the record."""
-    if fresh or not path.exists():
-        return None
-    kept: int = read_about(path)["tile"]
-    return kept
-
-
-def _opened(
-    path: Path, run: Mapping[str, Any] | None = None, edges: Domain | None = None, asked: Problem | None = None
-) -> Chart:
-    about = read_about(path)
-    try:
-        asked = asked or _posed(about)
-    except ValueError as error:
-        raise damaged(path, f"{ABOUT} does not say what was charted ({error!s:.300})") from None
-    grid = Grid(tuple(about["axes"]), tuple(read_axis(path, n, axis) for n, axis in about["axes"].items()))
-    done, _ = read_record(path, about)
-    counts = total(done.values())
-    if left := complete(done, grid.tiles(about["tile"])):
-        message = f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to go on"
-        raise InputError([Fault(message + f" from row {left[0].start}")])
-    layers = {n: read_layer(path, n, about) for n in about["layers"]}
-    return Chart(about, grid.values, layers, counts, edges, path, run or {}, asked)
-
-
-def _posed(about: Mapping[str, Any]) -> Problem | None:
-    """The problem of a folder, but for equality constraints; None for a model of the user's own."""
-    said = about["problem"]
-    if "statement" in said or said["model"] not in MODELS:
-        return None
-    free = {n: (axis["min"], axis["max"]) for n, axis in about["axes"].items()}
-    return Problem(MODELS[said["model"]], said["fixed"], free, said["constraints"], title=about["title"])
+        "schema": SCHEMA,
+        "title": problem.title,
+        "problem": stated,
+        "axes": grid.describe(),
+        "dimensions": list(grid.axes[::-1]),
+        "shape": list(grid.shape),
+        "layers": layers,
+        "classes": list(CLASSES),
+        "versions": {"tmsopt": version("tmsopt")},
+        "tile": tile,
+    }

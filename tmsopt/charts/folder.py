@@ -1,169 +1,291 @@
-"""The folder of a large chart: its arrays as NumPy files, and a record of the tiles that are done.
+"""The layers of a chart, in memory or in a folder of NumPy files with a record of the tiles that are done.
 
     NAME.chart/about.json      what was charted, over what, in which layers; never changes
-    NAME.chart/axes/Fr.npy     values along an axis
+    NAME.chart/axes/Fr.npy     values along an axis, for other programs
     NAME.chart/layers/kind.npy a layer, shape of the grid
     NAME.chart/tiles.jsonl     a line for every finished tile, with its counts
+    NAME.chart/chart.lock      locked by the process that writes
 
 A tile is recorded once its numbers are on the disk, so that whenever a process ends, what is recorded is right.
 """
 
+import errno
 import json
+import math
 import os
 import shutil
-import sqlite3
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from tokenize import TokenError
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
-from tmsopt.charts.received import ABOUT, TILES, array_file, read_about, read_record
-from tmsopt.charts.summary import Tally
-from tmsopt.disk import aside, differences, resolved, whole
+from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid
+from tmsopt.charts.tally import Tally
+from tmsopt.design.problem import Problem
+from tmsopt.disk import aside, differences, from_json, read_lines, read_text, write_text
 from tmsopt.errors import Fault, InputError
-from tmsopt.locks import Lock, lock
+from tmsopt.models import MODELS
 
+SCHEMA = 1
+
+_ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
+_LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
 _SYNC = 1.0  # seconds between two records of finished tiles
+
+Layers = Mapping[str, NDArray[Any]]
 
 
 @dataclass
-class Folder:
-    """A chart's folder that is being written, by one process at a time.
+class Tiles:
+    """Layers that are filled tile by tile.
 
     Attributes:
-        done: first row → counts of the tiles that are recorded.
+        layers: arrays, or memory maps of files, which are written as files: a full disk is an error then.
+        tile: designs of a tile.
+        done: first row → counts of the tiles that are there.
+        record: the file that says so, for memory maps, and where its last whole line ends.
     """
 
-    path: Path
-    row: int
-    done: dict[int, Tally]
-    _layers: Mapping[str, tuple[IO[bytes], int]] = field(repr=False)
-    _record: IO[bytes] = field(repr=False)
-    _waiting: list[bytes] = field(default_factory=list, repr=False)
-    _synced: float = field(default_factory=time.monotonic, repr=False)
+    layers: Layers
+    tile: int
+    done: dict[int, Tally] = field(default_factory=dict)
+    record: tuple[Path, int] | None = None
+    _waiting: bytes = b""
+    _synced: float = field(default_factory=time.monotonic)
 
-    def write(self, rows: range, layers: Mapping[str, NDArray[Any]], counts: Tally) -> None:
-        """Write the layers of a tile; it is recorded by the next `sync`, which comes once a second."""
+    def write(self, rows: range, layers: Layers, counts: Tally) -> None:
+        """Put a tile into its place; in a folder the next `sync`, which comes once a second, records it."""
         for name, array in layers.items():
-            stream, offset = self._layers[name]
-            stream.seek(offset + rows.start * self.row * array.itemsize)
-            stream.write(np.ascontiguousarray(array).data)
+            layer = self.layers[name]
+            if isinstance(layer, np.memmap):
+                with open(str(layer.filename), "r+b") as stream:
+                    stream.seek(layer.offset + rows.start * array[0].nbytes)
+                    stream.write(array.data)
+            else:
+                layer.reshape(-1, layer.shape[-1])[rows.start : rows.stop] = array
         self.done[rows.start] = counts
-        line = {"row": rows.start, "rows": len(rows), **asdict(counts)}
-        line = {n: None if isinstance(v, float) and not np.isfinite(v) else v for n, v in line.items()}
-        self._waiting.append(json.dumps(line).encode() + b"\n")
+        least = counts.least if counts.place >= 0 else None
+        line = {"row": rows.start, "rows": len(rows), **asdict(counts), "least": least}
+        self._waiting += f"{json.dumps(line)}\n".encode()
         if time.monotonic() - self._synced > _SYNC:
             self.sync()
 
     def sync(self) -> None:
         """Bring everything written to the disk, then record it."""
-        if not self._waiting:
+        if self.record is None or not self._waiting:
             return
-        for stream, _ in self._layers.values():
+        path, end = self.record
+        for name in self.layers:
+            with (path.parent / _layer(name)).open("r+b") as stream:
+                os.fsync(stream.fileno())
+        with path.open("r+b") as stream:
+            stream.seek(end)
+            stream.truncate()
+            stream.write(self._waiting)
             stream.flush()
             os.fsync(stream.fileno())
-        self._record.write(b"".join(self._waiting))
-        self._record.flush()
-        os.fsync(self._record.fileno())
-        self._waiting.clear()
-        self._synced = time.monotonic()
+        self.record = path, end + len(self._waiting)
+        self._waiting, self._synced = b"", time.monotonic()
 
 
 @contextmanager
-def writing(path: Path, about: Mapping[str, Any], axes: Mapping[str, NDArray[Any]], fresh: bool) -> Iterator[Folder]:
-    """A folder to write tiles to, new or begun earlier for the same chart.
+def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> Iterator[Tiles]:
+    """Layers in a folder, new or begun earlier for the same chart, to be filled by one process at a time.
 
     Args:
-        about: plain data with the keys ``shape`` and ``layers`` (name → what it is, with its ``dtype``), and all that
-            makes a chart another one.
+        about: all that makes a chart another one, but for the versions and the size of the tiles.
         fresh: move a folder aside that is there already.
 
     Raises:
         InputError: for a folder of another chart, or a damaged one, or one that another process is writing; where the
             disk has no room.
     """
-    with ExitStack() as stack:
-        stack.callback(_locked(path).release)
-        if fresh and path.exists():
+    if fresh and os.path.lexists(path):
+        with _locked(path):
             aside(path)
+    try:
         if not path.exists():
-            _create(path, about, axes)
-        if changed := list(differences(read_about(path), about)):
-            said = "; ".join(changed)
-            message = f"holds another chart ({said}); give another name, or --fresh to move this one aside"
-            raise InputError([Fault(message, (str(path),))])
-        done, end = read_record(path, about)
-        places = {
-            n: array_file(path, f"layers/{n}.npy", about["shape"], layer["dtype"])
-            for n, layer in about["layers"].items()
-        }
-        record = stack.enter_context((path / TILES).open("r+b"))
-        record.truncate(end)
-        record.seek(end)
-        layers = {n: (stack.enter_context(place.open("r+b")), at) for n, (place, at) in places.items()}
-        folder = Folder(path, int(about["shape"][-1]), done, layers, record)
-        try:
-            yield folder
-        finally:
-            folder.sync()
-
-
-def _locked(path: Path) -> Lock:
-    """The right to write a chart.
-
-    Raises:
-        InputError: where another process has it, or nothing can be written.
-    """
-    try:
-        held = lock(resolved(path))
-    except (OSError, sqlite3.Error) as error:
+            _check_room(path, about, grid)
+            path.mkdir()
+        elif not any((path / n).exists() for n in (_ABOUT, _LOCK)):
+            raise _no_chart(path)
+    except OSError as error:
         raise _unwritten(path, error) from None
-    if held is None:
-        message = f"'{path}' is being written by another process; wait for it, or give another name"
-        raise InputError([Fault(message, ("--output",))])
-    return held
+    with _locked(path):
+        if not os.path.lexists(path / _ABOUT):
+            _create(path, about, grid)
+        there, _, tiles = read_folder(path)
+        ignored = {"versions": None, "tile": None}
+        if changed := list(differences(there | ignored, about | ignored)):
+            message = (
+                f"holds another chart ({'; '.join(changed)}); give another name, or --fresh to move this one aside"
+            )
+            raise InputError([Fault(message, (str(path),))])
+        try:
+            yield tiles
+        finally:
+            tiles.sync()
 
 
-def _unwritten(path: Path, error: Exception) -> InputError:
-    reason = getattr(error, "strerror", None) or error
-    return InputError([Fault(f"'{path}' cannot be written: {reason}", ("--output",))])
-
-
-def _create(path: Path, about: Mapping[str, Any], axes: Mapping[str, NDArray[Any]]) -> None:
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
     try:
-        _check_room(path.parent, about)
-        with whole(path, locked=True) as new:
-            for part in ("axes", "layers"):
-                (new / part).mkdir(parents=True)
-            for name, values in axes.items():
-                np.save(new / "axes" / f"{name}.npy", values)
-            shape = tuple(about["shape"])
-            for name, layer in about["layers"].items():
-                dtype = np.dtype(layer["dtype"])
-                with (new / "layers" / f"{name}.npy").open("wb") as stream:
-                    header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
-                    np.lib.format.write_array_header_1_0(stream, header)
-                    stream.truncate(stream.tell() + int(np.prod(shape)) * dtype.itemsize)
-            (new / TILES).touch()
-            (new / ABOUT).write_text(json.dumps(about, indent=2, ensure_ascii=False), encoding="utf-8")
+        held = FileLock(path / _LOCK, timeout=0).acquire()
+    except Timeout:
+        message = f"'{path}' is being written by another process; wait for it, or give another name"
+        raise InputError([Fault(message, ("--output",))]) from None
+    except OSError as error:
+        raise _unwritten(path, error) from None
+    with held:
+        yield
+
+
+def _layer(name: str) -> str:
+    return f"layers/{name}.npy"
+
+
+def _unwritten(path: Path, error: OSError) -> InputError:
+    return InputError([Fault(f"'{path}' cannot be written: {error.strerror or error}", ("--output",))])
+
+
+def _no_chart(path: Path) -> InputError:
+    message = (
+        f"'{path}' is no chart: it has no {_ABOUT}; give the folder that tmsopt chart FILE --output NAME.chart wrote"
+    )
+    return InputError([Fault(message)])
+
+
+def _check_room(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
+    each = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
+    needed, free = each * grid.size, shutil.disk_usage(path.parent).free
+    if needed > free:
+        raise OSError(errno.ENOSPC, f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
+
+
+def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
+    """Files of a new chart, about.json last: without it the folder is begun anew."""
+    try:
+        for part in ("axes", "layers"):
+            shutil.rmtree(path / part, ignore_errors=True)  # of a process that was killed right then
+            (path / part).mkdir()
+        for name, values in zip(grid.axes, grid.values, strict=True):
+            np.save(path / "axes" / f"{name}.npy", values)
+        for name, layer in about["layers"].items():
+            np.lib.format.open_memmap(path / _layer(name), "w+", np.dtype(layer["dtype"]), grid.shape)
+        (path / _TILES).touch()
+        write_text(path / _ABOUT, json.dumps(about, indent=2, ensure_ascii=False))
     except OSError as error:
         raise _unwritten(path, error) from None
 
 
-def _check_room(parent: Path, about: Mapping[str, Any]) -> None:
-    each = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
-    needed, free = each * int(np.prod(about["shape"])), shutil.disk_usage(parent).free
-    if needed > free:
-        message = f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free; ask for fewer layers or points"
-        raise InputError([Fault(message, ("--output",))])
+# Reading
 
 
-def complete(done: Iterable[int], tiles: Iterable[range]) -> list[range]:
-    """The tiles that are not recorded."""
-    known = set(done)
-    return [rows for rows in tiles if rows.start not in known]
+class _Axis(BaseModel):
+    min: FiniteFloat
+    max: FiniteFloat
+    points: Annotated[int, Field(ge=2, le=LONGEST)]
+
+
+class _Problem(BaseModel):
+    model: str
+    fixed: dict[str, FiniteFloat]
+    constraints: dict[str, str]
+
+
+_Name = Annotated[str, Field(pattern=r"^\w{1,200}$")]
+
+
+class _About(BaseModel):
+    number: Literal[1] = Field(alias="schema")
+    title: Annotated[str, Field(pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$")]  # it is shown on terminals
+    problem: _Problem
+    axes: Annotated[dict[_Name, _Axis], Field(min_length=2, max_length=3)]
+    layers: Annotated[dict[_Name, dict[str, str]], Field(min_length=1)]
+    tile: Annotated[int, Field(ge=1)]
+
+
+_TALLY = TypeAdapter(Tally)
+
+
+def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
+    """What a folder holds, which may come from anybody: about.json, the problem unless its model is missing, layers.
+
+    Raises:
+        InputError: where that is no folder of a chart, or a damaged one.
+    """
+    if not (path / _ABOUT).exists():
+        raise _no_chart(path)
+    name = _ABOUT
+    try:
+        about = from_json(read_text(str(_own(path, name)), "JSON file", _LONG_ABOUT), _LONG_ABOUT)
+        _About.model_validate(about, strict=True)
+        problem, grid, layers = _state_problem(about), grid_of(about), {}
+        if grid.size > MOST:
+            raise ValueError(f"more than {MOST:.0e} designs")
+        for layer, stated in about["layers"].items():
+            name = _layer(layer)
+            layers[layer] = _read_layer(_own(path, name), grid.shape, stated.get("dtype"))
+        name = _TILES
+        record = _own(path, name)
+        done, end = _read_record(record, about["tile"], grid)
+    except (OSError, ValueError, LookupError, TypeError, OverflowError, EOFError, TokenError) as error:
+        message = f"'{path}' is damaged: {name}: {error!s:.300}; give --fresh to chart anew and move this one aside"
+        raise InputError([Fault(message)]) from None
+    return about, problem, Tiles(layers, about["tile"], done, (record, end))
+
+
+def grid_of(about: Mapping[str, Any]) -> Grid:
+    """The grid that about.json states."""
+    axes = about["axes"]
+    return Grid(tuple(axes), tuple(np.linspace(a["min"], a["max"], a["points"]) for a in axes.values()))
+
+
+def _state_problem(about: Mapping[str, Any]) -> Problem | None:
+    """The problem, but for equality constraints; None for a model of the user's own."""
+    stated = about["problem"]
+    if "statement" in stated or stated["model"] not in MODELS:
+        return None
+    free = {n: (axis["min"], axis["max"]) for n, axis in about["axes"].items()}
+    return Problem(MODELS[stated["model"]], stated["fixed"], free, stated["constraints"], title=about["title"])
+
+
+def _own(path: Path, name: str) -> Path:
+    """A regular file in the folder, not reached through a link: what is elsewhere is not written."""
+    place = path.resolve() / name
+    if place.resolve() != place or not place.is_file():
+        raise ValueError("no file, or a symbolic link")
+    return place
+
+
+def _read_layer(place: Path, shape: tuple[int, ...], dtype: str | None) -> NDArray[Any]:
+    layer = np.lib.format.open_memmap(place, "r")
+    if layer.shape != shape or layer.dtype.str != dtype or not layer.flags.c_contiguous:
+        raise ValueError(f"not an array of shape {shape} and type {dtype}")
+    return layer
+
+
+def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], int]:
+    """First row → counts, and where the last whole line ends."""
+    done, end = dict[int, Tally](), 0
+    tiles = {rows.start: rows for rows in grid.tiles(tile)}
+    for line in read_lines(str(place), "JSON record", MOST_TILES * _LONG_LINE, _LONG_LINE):
+        if not line.endswith("\n"):
+            break  # it was being written
+        end += len(line)
+        told = from_json(line)
+        if told["least"] is None:
+            told["least"] = math.nan
+        row, counts = told["row"], _TALLY.validate_python(told)
+        if counts.designs != len(tiles.get(row, ())) * grid.shape[-1] or not -1 <= counts.place < grid.size:
+            raise ValueError(f"{line:.100} is no tile")
+        done[row] = counts
+    return done, end

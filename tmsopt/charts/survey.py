@@ -1,30 +1,37 @@
-"""Grids over two or three parameters, and what is known of their designs, computed a few rows at a time."""
+"""Grids over two or three parameters, and what is computed of their designs, a few rows at a time."""
 
 import math
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tmsopt.charts.expressions import ArrayFunction, array_function, parsed
-from tmsopt.charts.motion import Classified, classified, engine_of
+from tmsopt.charts.tally import Tally, count_tile
 from tmsopt.design.advice.names import example_of
+from tmsopt.design.array_function import ArrayFunction, array_function, parse_all
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
-from tmsopt.errors import Fault, InputError, list_faults, suggest, table_faults
+from tmsopt.errors import Fault, InputError, list_faults, short, suggest, table_faults
 from tmsopt.records import Array
+from tmsopt.roots import classify, find_motion
 
 LAYERS: Mapping[str, DTypeLike] = {
-    "kind": np.int8, "abscissa": np.float64, "damping_ratio": np.float64, "real_roots": np.int8, "satisfied": np.bool_,
+    "kind": np.int8,
+    "abscissa": np.float64,
+    "damping_ratio": np.float64,
+    "real_roots": np.int8,
+    "satisfied": np.bool_,
     "margin": np.float64,
-}  # fmt: skip
-"""What can be computed of every design; see `Chart`."""
+}
+"""Layers of every chart that can be asked for, and the numbers in them; see `Chart`."""
 
-USUAL = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied")
-"""Layers of a chart unless others are asked for."""
+USUAL = tuple(LAYERS)[:-1]
+"""Layers of a chart in a folder unless others are asked for."""
 
 USUAL_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
 """Points along two or three axes unless others are asked for."""
@@ -32,11 +39,11 @@ USUAL_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
 MOST = 10**9
 """Designs of a grid."""
 
-_WORTH_COMPILING = 5_000_000
-"""Designs for which numba is taken unless an engine is named: compiling takes as long as some millions in NumPy."""
-
 LONGEST = 10**6
 """Points along one axis."""
+
+MOST_TILES = 10**6
+"""Tiles of one chart."""
 
 
 @dataclass(frozen=True)
@@ -61,40 +68,41 @@ class Grid:
         """Number of designs."""
         return math.prod(self.shape)
 
-    @property
-    def rows(self) -> int:
-        """Number of lines along the first axis."""
-        return math.prod(self.shape[:-1])
-
-    def across(self) -> dict[str, Array]:
-        """The first axis, shape (1, n)."""
-        return {self.axes[0]: self.values[0][None, :]}
-
-    def up(self, rows: range) -> dict[str, Array]:
-        """Values of the other axes in a few rows, shape (len(rows), 1)."""
+    def columns(self, rows: range) -> dict[str, Array]:
+        """Parameters of a few rows: the first axis in shape (1, n), the others in shape (len(rows), 1)."""
         places = np.unravel_index(np.arange(rows.start, rows.stop), self.shape[:-1])
-        others = list(zip(self.axes, self.values, strict=True))[:0:-1]
-        return {n: values[at][:, None] for (n, values), at in zip(others, places, strict=True)}
+        others = zip(self.axes[:0:-1], self.values[:0:-1], places, strict=True)
+        return {self.axes[0]: self.values[0][None, :]} | {n: values[at][:, None] for n, values, at in others}
 
-    def at(self, place: int) -> dict[str, float]:
+    def describe(self) -> dict[str, dict[str, Any]]:
+        """Axis → its ends and number of points."""
+        axes = zip(self.axes, self.values, strict=True)
+        return {n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} for n, v in axes}
+
+    def design(self, place: int) -> dict[str, float]:
         """Parameters of a design by its place in the flat arrays."""
         indices = np.unravel_index(place, self.shape)[::-1]
         return {n: float(v[k]) for n, v, k in zip(self.axes, self.values, indices, strict=True)}
 
     def tiles(self, points: int) -> list[range]:
-        """All rows, in parts of about so many points."""
-        each = max(1, points // self.shape[-1])
-        return [range(k, min(k + each, self.rows)) for k in range(0, self.rows, each)]
+        """All rows, in parts of about so many points.
+
+        Raises:
+            InputError: for too many parts.
+        """
+        each, rows = max(1, points // self.shape[-1]), range(self.size // self.shape[-1])
+        if (count := len(rows[::each])) > MOST_TILES:
+            raise InputError([Fault(f"found {points}, which makes {count} tiles; accepted: {MOST_TILES}", ("tile",))])
+        return [rows[k : k + each] for k in rows[::each]]
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What is to be computed of every design of a grid.
+    """What to compute of every design of a grid.
 
     Attributes:
         layers: names among `LAYERS`.
         quantities: name → expression, further layers.
-        engine: ``numpy`` or ``numba``; the numbers do not depend on it.
         single: whether numbers are kept in single precision.
         before, after: what is computed before the roots, coefficients among it, and what takes them.
     """
@@ -103,138 +111,105 @@ class Survey:
     grid: Grid
     layers: tuple[str, ...]
     quantities: Mapping[str, str]
-    engine: str
     single: bool
     before: ArrayFunction = field(repr=False)
     after: ArrayFunction = field(repr=False)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Of all layers."""
-        return (*self.layers, *self.quantities)
+    def dtypes(self) -> dict[str, np.dtype[Any]]:
+        """Layer → the kind of its numbers."""
+        wanted = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*self.layers, *self.quantities)}
+        return {n: np.dtype(np.float32) if self.single and d == np.float64 else d for n, d in wanted.items()}
 
-    def dtype(self, name: str) -> np.dtype[Any]:
-        """Of a layer's numbers."""
-        wanted = np.dtype(LAYERS.get(name, np.float64))
-        return np.dtype(np.float32) if self.single and wanted == np.float64 else wanted
-
-    def room(self, rows: int) -> Array:
-        """Memory for the coefficients of so many rows, to be used again: new pages cost as much as the classes."""
-        return np.empty((self.problem.model.degree + 1, rows, self.grid.shape[-1]))
-
-    def tile(self, rows: range, room: Array | None = None) -> tuple[dict[str, NDArray[Any]], int]:
-        """The layers of a few rows, shape (len(rows), n), and how many roots took the slow way.
-
-        Args:
-            room: memory of this thread's own for as many rows or more.
-        """
-        shape, up = (len(rows), self.grid.shape[-1]), self.grid.up(rows)
+    def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
+        """The layers of a few rows, shape (len(rows), n), and their counts."""
+        began = time.perf_counter()
+        model, shape = self.problem.model, (len(rows), self.grid.shape[-1])
+        columns, fallbacks = {**self.problem.fixed, **self.grid.columns(rows)}, 0
         with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
-            a = (self.room(len(rows)) if room is None else room)[:, : len(rows)]
-            places = dict(zip(self.problem.model.coefficient_names(), a, strict=True))
-            values = self.before(up, places)
-            for name, whole in places.items():
-                if values[name] is not whole:
-                    whole[...] = values[name]
-            found = classified(list(a), self._needs, self.engine)
-            if self.problem.model.carrier is not None and found.damping_ratio is not None:
-                found = replace(found, damping_ratio=np.full_like(found.damping_ratio, np.nan))
-            known = {n: v for n in ("abscissa", "damping_ratio") if (v := getattr(found, n)) is not None}
-            values |= self.after(up | known) if self.after.names else {}
-            layers = {n: self._layer(n, found, values, shape) for n in self.names}
-        return layers, found.fallbacks
-
-    @property
-    def _needs(self) -> frozenset[str]:
-        """Layers that come from the coefficients."""
-        return frozenset(self.layers) | {n for n in self.after.inputs if n in LAYERS} | (
-            {"abscissa", "damping_ratio"} if self.after.others else set()
-        )  # fmt: skip
-
-    def _layer(self, name: str, found: Classified, values: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[Any]:
-        if name in self.quantities:
-            layer = values[_QUANTITY + name]
-        elif name in ("satisfied", "margin"):
-            margin = self._margin(values)
-            layer = margin >= 0 if name == "satisfied" else margin
-        else:
-            layer = getattr(found, name)
-        return np.ascontiguousarray(np.broadcast_to(layer, shape), dtype=self.dtype(name))
-
-    def _margin(self, values: Mapping[str, Any]) -> Any:
-        """Least difference by which the inequalities hold; nan where one does not exist."""
-        least: Any = np.inf
-        for name, condition in self.problem.conditions.items():
-            if not condition.equality:
-                least = np.minimum(least, -condition.sign * values[_CONDITION + name])
-        return least
+            values = self.before(columns)
+            coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
+            if {"kind", "real_roots"} & set(self.layers):
+                classes = classify(coefficients)
+                values |= {"kind": classes.kind, "real_roots": classes.real_roots}
+            if self.after.names or {"abscissa", "damping_ratio"} & set(self.layers):
+                motion = find_motion(coefficients)
+                fallbacks = motion.fallbacks
+                ratio = motion.damping_ratio if model.carrier is None else np.full(shape, np.nan)
+                found = {"abscissa": motion.abscissa, "damping_ratio": ratio}
+                values |= found | self.after(columns | found)
+            if {"satisfied", "margin"} & set(self.layers):
+                sides = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
+                values["margin"] = reduce(np.minimum, sides, np.inf)
+                values["satisfied"] = values["margin"] >= 0
+            values |= {n: values[_QUANTITY + n] for n in self.quantities}
+            given = {n: (np.broadcast_to(values[n], shape), dtype) for n, dtype in self.dtypes.items()}
+            layers = {n: np.ascontiguousarray(*array) for n, array in given.items()}
+        return layers, count_tile(layers, rows.start * shape[1], fallbacks, time.perf_counter() - began)
 
 
-_QUANTITY, _CONDITION = "quantity ", "condition "
+_QUANTITY, _LIMIT = "quantity ", "limit "
 """Before the names of outputs, which users choose."""
 
 
-def survey(
-    problem: Given, axes: Sequence[str] | None = None, points: Sequence[int] | None = None,
-    layers: Sequence[str] = USUAL, quantities: Mapping[str, str] | None = None, engine: str = "auto",
-    single: bool = False,
-) -> Survey:  # fmt: skip
-    """What is to be computed over a grid of the free parameters, checked.
+def limits_of(problem: Problem) -> dict[str, Any]:
+    """The constraints that hold on parts of a grid: all but equalities."""
+    return {n: c for n, c in problem.conditions.items() if not c.equality}
 
-    Args:
-        axes: the free parameters, the one that runs fastest first; by default in the order of the problem.
-        points: along each axis, by default those of `USUAL_POINTS`; the ends of the box are grid points.
-        layers: names among `LAYERS`.
-        quantities: name → expression, further layers.
-        engine: ``numpy``, ``numba``, or ``auto``: numba where it is installed and the grid is worth compiling for.
-        single: keep numbers in single precision.
+
+def survey(
+    problem: Given,
+    axes: Sequence[str] | None = None,
+    points: Sequence[int] | None = None,
+    layers: Sequence[str] = USUAL,
+    quantities: Mapping[str, str] | None = None,
+    single: bool = False,
+) -> Survey:
+    """What to compute over a grid of the free parameters, validated; arguments as of `chart`.
 
     Raises:
         InputError: unless two or three parameters are free and the axes name them; for other numbers of points,
-            unknown layers, bad expressions, unknown engines.
+            unknown layers, bad expressions.
     """
     problem = problem_of(problem)
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
-    if faults := [*list_faults("layers", layers, "['kind', 'abscissa']"),
-                  *table_faults("quantities", quantities or {}, "{'wheel_load': 'load_front/2'}")]:  # fmt: skip
-        raise InputError(faults)
-    faults = [Fault(f"found {n!r}; {suggest(n, LAYERS)}", ("layers",)) for n in layers if n not in tuple(LAYERS)]
-    extra = dict(quantities or {})
-    reserved = {*LAYERS, *names, "about"}
-    faults += [
-        Fault(f"found the name {n!r}; accepted: letters, digits and _, other than {' '.join(sorted(reserved))}",
-              ("quantities",))
-        for n in extra if n in reserved or not (n.isidentifier() and n.isascii())
-    ]  # fmt: skip
-    if not (layers or extra):
-        faults.append(Fault(f"found none; accepted: some of {' '.join(LAYERS)}", ("layers",)))
+    extra = {} if quantities is None else quantities
+    faults = layer_faults(layers, tuple(LAYERS))
+    faults += table_faults("quantities", extra, "{'wheel_load': 'load_front/2'}")
+    if not faults:
+        reserved = {*LAYERS, *names, "about"}
+        message = f"accepted: letters, digits and _, other than {' '.join(sorted(reserved))}"
+        wrong = [n for n in extra if n in reserved or not (n.isidentifier() and n.isascii())]
+        faults += [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in wrong]
+        if not (layers or extra):
+            faults.append(Fault(f"found none; accepted: some of {' '.join(LAYERS)}", ("layers",)))
     if faults:
         raise InputError(faults)
-    grid = Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True)))
-    if engine == "auto" and grid.size < _WORTH_COMPILING:
-        engine = "numpy"
-    return _over(problem, grid, tuple(dict.fromkeys(layers)), extra, engine_of(engine), single)
-
-
-def _over(
-    problem: Problem, grid: Grid, layers: tuple[str, ...], extra: Mapping[str, str], engine: str, single: bool
-) -> Survey:
-    wanted = {_QUANTITY + n: e for n, e in parsed(problem, extra).items()}
+    wanted = {_QUANTITY + n: e for n, e in parse_all(problem, extra).items()}
     if searched := [n for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
         message = f"uses {RADIUS}, which takes a search for every design; a chart has what is computed at once"
         raise InputError([Fault(message, ("quantities", n)) for n in searched])
     if {"satisfied", "margin"} & set(layers):
-        wanted |= {_CONDITION + n: c for n, c in problem.conditions.items() if not c.equality}
-    of_roots = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
-    others = {n: e for n, e in wanted.items() if n not in of_roots}
-    others |= parsed(problem, {n: n for n in problem.model.coefficient_names()})
-    settled = {**problem.fixed, **grid.across()}
+        wanted |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
+    wanted |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
+    late = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
     return Survey(
-        problem=problem, grid=grid, layers=layers, quantities=extra, engine=engine, single=single,
-        before=array_function(problem, others).settled(settled),
-        after=array_function(problem, of_roots).settled(settled),
-    )  # fmt: skip
+        problem,
+        Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
+        tuple(dict.fromkeys(layers)),
+        dict(extra),
+        single,
+        before=array_function(problem, {n: e for n, e in wanted.items() if n not in late}),
+        after=array_function(problem, late),
+    )
+
+
+def layer_faults(names: Any, accepted: Sequence[str]) -> list[Fault]:
+    """Faults of a list of layers."""
+    return list_faults("layers", names, "['kind', 'abscissa']") or [
+        Fault(f"found {short(n)}; {suggest(n, accepted)}", ("layers",)) for n in names if n not in accepted
+    ]
 
 
 def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -246,11 +221,9 @@ def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, .
     free = list(problem.free)
     if len(free) not in (2, 3):
         message = f"a grid has two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
-        of = problem.parameter_set
-        fixed = [*(n for n in ("Fr", "v") if n in problem.fixed), *problem.fixed]
-        freed = f"; write e.g. {example_of(of[fixed[0]])[1]}" if fixed else ""
-        advice = "; fix the others" if len(free) > 3 else freed
-        raise InputError([Fault(message + advice, ("parameters",))])
+        fixed = [n for n in ("Fr", "v", *problem.fixed) if n in problem.fixed]
+        freed = f"; write e.g. {example_of(problem.parameter_set[fixed[0]])[1]}" if fixed else ""
+        raise InputError([Fault(message + ("; fix the others" if len(free) > 3 else freed), ("parameters",))])
     if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free)):
         raise InputError([Fault(f"found {axes!r}; accepted: {' and '.join(free)}", ("axes",))])
     return tuple(axes or free)
@@ -262,9 +235,8 @@ def _sizes(points: Any, count: int) -> tuple[int, ...]:
     except (TypeError, ValueError):
         sizes = ()
     if len(sizes) != count or min(sizes) < 2 or max(sizes) > LONGEST or math.prod(sizes) > MOST:
-        message = (
-            f"found {points!r}; accepted: {('two', 'three')[count - 2]} whole numbers, each from 2 to {LONGEST}, "
-            f"their product {MOST:.0e} or less"
+        accepted = (
+            f"{('two', 'three')[count - 2]} whole numbers, each from 2 to {LONGEST}, their product {MOST:.0e} or less"
         )
-        raise InputError([Fault(message, ("points",))])
+        raise InputError([Fault(f"found {points!r}; accepted: {accepted}", ("points",))])
     return sizes

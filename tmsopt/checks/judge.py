@@ -21,7 +21,7 @@ from tmsopt.design.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, R
 from tmsopt.design.validate import SMALLEST
 from tmsopt.models import Values, tms
 from tmsopt.records import Array, Truth
-from tmsopt.roots import find_motions, is_stable
+from tmsopt.roots import enclose_motions, is_stable
 from tmsopt.roots.discs import Motions
 
 BLOCK = 8192
@@ -89,7 +89,7 @@ def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[st
     m = len(next(iter(columns.values())))
     wide = Values(model, of, {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()})
     coefficients = [_spread(c, m) for c in wide.coefficients]
-    found = find_motions(coefficients, STRUCTURE_TOLERANCE)
+    found = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
     certain = found.simple & _possible(problem, given)
 
     def settled(number: Any) -> Array:

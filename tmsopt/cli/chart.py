@@ -26,6 +26,7 @@ from tmsopt.cli.common import (
 )
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.cli.terminal import shown
+from tmsopt.deprecated import no_longer_needed
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -86,11 +87,8 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 )  # fmt: skip
 @click.option("--single", is_flag=True, help="Write numbers in single precision.")
 @click.option("--fresh", is_flag=True, help="Move a folder of --output aside instead of going on with it.")
-@click.option("--engine", default="auto", show_default=True, help="numba, numpy, or numba where installed (auto).")
-@click.option(
-    "--workers", type=click.IntRange(1, 256), default=1, show_default=True,
-    help="Threads; NumPy alone gains nothing by them.",
-)  # fmt: skip
+@click.option("--engine", hidden=True)
+@click.option("--workers", type=click.IntRange(1, 256), default=1, show_default=True, help="Processes.")
 @plot_option("Draw the chart")
 @report_option
 @click.option(
@@ -104,10 +102,12 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 @click.option("--boundaries/--no-boundaries", default=True, show_default=True, help="Trace the exact boundary curves.")
 def chart(
     file: Path, points: tuple[int, ...] | None, axes: str | None, as_json: bool, output: Path | None,
-    layers: str | None, quantities: dict[str, str], single: bool, fresh: bool, engine: str, workers: int,
+    layers: str | None, quantities: dict[str, str], single: bool, fresh: bool, engine: str | None, workers: int,
     plot: Path | None, report: Path | None, layer: str, cut: dict[str, str], boundaries: bool,
 ) -> None:  # fmt: skip
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
+    if engine is not None:
+        click.echo(no_longer_needed("--engine"), err=True)
     with bad_input(), _stopped(output):
         import tmsopt
         from tmsopt.charts import USUAL, axes_of
@@ -121,7 +121,7 @@ def chart(
         whole = folder is None and len(free) == 2  # in memory, and shown with all its layers and boundaries
         _check_plot(plot, layer, (*_LAYERS[:4], *quantities), len(free), cut)
         held = _held(problem, cut)
-        how: dict[str, Any] = {"quantities": quantities, "single": single, "engine": engine}
+        how: dict[str, Any] = {"quantities": quantities, "single": single}
         sizes = _sizes(points, len(free))
         if folder is None:
             _check_memory(sizes, output)

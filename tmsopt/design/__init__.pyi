@@ -1,4 +1,5 @@
 from .advice.remedies import Relaxation as Relaxation, moved_limits as moved_limits, with_limits as with_limits
+from .array_function import array_function as array_function
 from .cases import Band as Band, Case as Case
 from .expression import (
     Expression as Expression, ExpressionError as ExpressionError, parse_comparison as parse_comparison,

@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.models import Model, ParameterSet, Quantity, Values
 from tmsopt.records import Array
-from tmsopt.roots import Root, Structure, abscissa_and_damping, exact_roots, roots, structure
+from tmsopt.roots import Root, Structure, exact_roots, find_motion, roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
@@ -115,7 +115,6 @@ _RADIUS = "robustness radius, the least change of the parameters, in their weigh
 NO_RADIUS = Quantity(RADIUS, "1", _RADIUS, "r", lambda values: math.nan)
 """Where it was not searched for, the radius is not known."""
 
-_QUARTIC = 5  # coefficients of the degree that has formulas of its own
 
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
 
@@ -154,13 +153,8 @@ def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
     assert isinstance(values, Values)
     a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
     exist, a = np.all(np.isfinite(a), axis=-1), regular(a)
-    if a.shape[-1] == _QUARTIC:
-        motion = abscissa_and_damping(*np.moveaxis(a, -1, 0), compiled=False)
-        found = motion.abscissa, motion.damping_ratio
-    else:
-        z = roots(a)
-        found = z.real.max(axis=-1), np.min(-z.real / (np.abs(z) + 1e-300), axis=-1)
-    abscissa, ratio = (np.where(exist, each, np.nan) for each in found)
+    motion = find_motion(list(np.moveaxis(a, -1, 0)))
+    abscissa, ratio = (np.where(exist, each, np.nan) for each in (motion.abscissa, motion.damping_ratio))
     values.define("abscissa", abscissa)
     values.define("damping_ratio", ratio)
     return abscissa, ratio

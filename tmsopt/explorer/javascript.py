@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from tmsopt.arithmetic import NotAccepted, Program, operation_name, program
-from tmsopt.charts import array_function
+from tmsopt.design import array_function
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_QUANTITIES

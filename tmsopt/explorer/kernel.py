@@ -1,6 +1,6 @@
 """The elementwise formulas of polynomials, run on traced numbers, as JavaScript functions: they have no second home.
 
-As for numba, the names `where` and so on mean something else in the same functions. Those of quartics are taken from
+The names `where` and `one` mean something else in these functions. Those of quartics are taken from
 `tmsopt.roots.quartics`; the conditions of stability of the lower degrees from `lienard_chipart`.
 """
 
@@ -79,7 +79,7 @@ def _reflected(spelling: Spelling) -> Any:
 
 _FUNCTIONS = {
     np.sqrt: js.call("sqrt"), np.abs: js.call("abs"), np.absolute: js.call("abs"), np.maximum: js.call("max", 2),
-    np.minimum: js.call("min", 2),
+    np.minimum: js.call("min", 2), np.cbrt: js.call("cbrt"),
 }  # fmt: skip
 
 
@@ -137,16 +137,11 @@ def _where(condition: _Traced, yes: Any, no: Any) -> Any:
     return condition.tape.add(js.CHOOSE, condition, yes, no)
 
 
-def _cube_root(x: _Traced) -> _Traced:
-    """That of JavaScript: the package's own begins with the bits of a double, which are dear there."""
-    return x.tape.add(js.call("cbrt"), x)
-
-
 def _as_integer(condition: _Traced) -> _Traced:
     return condition.tape.add(js.CHOOSE, condition, 1.0, 0.0)
 
 
-_KNOWN: dict[str, Any] = {"where": _where, "one": _as_integer, "cube_root": _cube_root}
+_KNOWN: dict[str, Any] = {"where": _where, "one": _as_integer}
 for _each in (
     factors.ordered,
     factors.largest_root,

@@ -5,9 +5,10 @@ first; `patterns` says which roots meet, `quartics` takes millions at once.
 """
 
 from tmsopt.roots.count import may_be_real, real_roots
-from tmsopt.roots.discs import find_motions
+from tmsopt.roots.discs import enclose_motions
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
+from tmsopt.roots.many import classify, find_motion
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
 from tmsopt.roots.patterns.multiplicity import multiple_real_roots
@@ -19,11 +20,47 @@ from tmsopt.roots.quartics.quartic import Factors, Motion, abscissa_and_damping,
 from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart, routh
 
 __all__ = [
-    "CLASSES", "PATTERNS", "Classes", "Factors", "Motion", "Pattern", "Root", "Structure", "abscissa",
-    "abscissa_and_damping", "backward_error", "composition", "determinant", "discriminant", "evaluate",
-    "exact_abscissa", "exact_longest", "exact_nullity", "exact_roots", "find_motions", "has_one_eigenvector",
+    "CLASSES",
+    "PATTERNS",
+    "Classes",
+    "Factors",
+    "Motion",
+    "Pattern",
+    "Root",
+    "Structure",
+    "abscissa",
+    "abscissa_and_damping",
+    "backward_error",
+    "classify",
+    "composition",
+    "determinant",
+    "discriminant",
+    "enclose_motions",
+    "evaluate",
+    "exact_abscissa",
+    "exact_longest",
+    "exact_nullity",
+    "exact_roots",
+    "find_motion",
+    "has_one_eigenvector",
     "hurwitz_minors",
-    "is_regular", "is_stable", "jordan", "lienard_chipart", "may_be_real", "multiple_real_roots",
-    "pattern", "pattern_distance", "product", "quadratic_pencil", "quartic_classes",
-    "quartic_factors", "quartic_is_stable", "real_roots", "rebuilt", "roots", "routh", "shift", "structure",
-]  # fmt: skip
+    "is_regular",
+    "is_stable",
+    "jordan",
+    "lienard_chipart",
+    "may_be_real",
+    "multiple_real_roots",
+    "pattern",
+    "pattern_distance",
+    "product",
+    "quadratic_pencil",
+    "quartic_classes",
+    "quartic_factors",
+    "quartic_is_stable",
+    "real_roots",
+    "rebuilt",
+    "roots",
+    "routh",
+    "shift",
+    "structure",
+]

@@ -41,7 +41,7 @@ class Motions:
 
 
 @np.errstate(all="ignore")
-def find_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motions:
+def enclose_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motions:
     """Abscissa and damping ratio of polynomials, coefficients descending, each of shape (m,).
 
     Args:
@@ -81,7 +81,7 @@ def find_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motions:
 
 def _numeric(a: Array) -> Complex:
     """Roots, shape (n, m)."""
-    found = quartic_factors(*a, compiled=False).roots if len(a) == 5 else roots(a.T)
+    found = quartic_factors(*a).roots if len(a) == 5 else roots(a.T)
     return np.ascontiguousarray(found.T)
 
 

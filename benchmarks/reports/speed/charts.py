@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -46,22 +45,15 @@ def methods(points: int) -> Iterator[Method]:
     yield Method("loop of numpy.roots", "abscissa", _LOOP, lambda: [np.roots(a).real.max() for a in ready[:_LOOP]])
     yield Method(STACKED, "abscissa", len(ready), lambda: stacked(ready))
     across = int(np.sqrt(points))
-    for engine in engines():
-        for gives, layers in _LAYERS.items():
-            work = partial(charted, across, layers, engine)
-            width = sum(layer.itemsize for layer in charted(2, layers, engine).values())
-            yield Method(f"chart, {engine}", gives, across**2, work, width)
+    for gives, layers in _LAYERS.items():
+        width = sum(layer.itemsize for layer in charted(2, layers).values())
+        yield Method("chart", gives, across**2, partial(charted, across, layers), width)
 
 
-def charted(across: int, layers: tuple[str, ...], engine: str) -> dict[str, Any]:
+def charted(across: int, layers: tuple[str, ...]) -> dict[str, Any]:
     """Layers of a square chart of the plane."""
-    found = chart(PLANE, points=(across, across), layers=layers, engine=engine, boundaries=False)
+    found = chart(PLANE, points=(across, across), layers=layers, boundaries=False)
     return dict(found.layers)
-
-
-def engines() -> list[str]:
-    """Those that are installed."""
-    return ["numpy", *(["numba"] if find_spec("numba") else [])]
 
 
 def grid_coefficients(points: int) -> Array:

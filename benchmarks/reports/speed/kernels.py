@@ -52,21 +52,16 @@ def random(count: int, seed: int = 0) -> Array:
 def works(a: Array) -> dict[str, Work]:
     """What is timed, each from coefficients in memory to answers in memory."""
     rows = np.ascontiguousarray(a.T)
-    numba, numpy = {"compiled": True}, {"compiled": False}
     return {
         _EIGENVALUES: lambda: eigvals(companion(rows)).real.max(axis=1),
         "abscissa: `roots`": lambda: roots(rows).real.max(axis=1),
-        "abscissa and damping ratio, NumPy": lambda: abscissa_and_damping(*a, **numpy),
-        "abscissa and damping ratio, numba": lambda: abscissa_and_damping(*a, **numba),
-        "quadratic factors, NumPy": lambda: quartic_factors(*a, **numpy),
-        "quadratic factors, numba": lambda: quartic_factors(*a, **numba),
+        "abscissa and damping ratio: quartics by NumPy": lambda: abscissa_and_damping(*a),
+        "quadratic factors: quartics by NumPy": lambda: quartic_factors(*a),
         _BASELINE_CLASS: lambda: eigvals(companion(rows)).real.max(axis=1) < 0,
         "stable or not: `is_stable`": lambda: is_stable(rows),
-        "stable or not, NumPy": lambda: quartic_is_stable(*a, **numpy),
-        "stable or not, numba": lambda: quartic_is_stable(*a, **numba),
+        "stable or not: quartics by NumPy": lambda: quartic_is_stable(*a),
         "class and real roots: `is_stable` and `real_roots`": lambda: (is_stable(rows), real_roots(rows)),
-        "class and real roots, NumPy": lambda: quartic_classes(*a, **numpy),
-        "class and real roots, numba": lambda: quartic_classes(*a, **numba),
+        "class and real roots: quartics by NumPy": lambda: quartic_classes(*a),
     }
 
 

@@ -1,10 +1,9 @@
-"""Roots and classes of many quartics: jointly right on every kind of polynomial, the same in NumPy and by numba.
+"""Roots and classes of many quartics: jointly right on every kind of polynomial.
 
 Roots are judged by the coefficients that they rebuild, in the longest doubles of the machine; classes against
 `is_stable` and `real_roots`, which have tests of their own, and against exact arithmetic.
 """
 
-import importlib.util
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
@@ -29,7 +28,7 @@ from tmsopt.roots import (
     quartic_is_stable,
     real_roots,
 )
-from tmsopt.roots.quartics import cube_root, hard_factors, largest_root
+from tmsopt.roots.quartics import hard_factors, largest_root
 
 JOINTLY_RIGHT = 1e-13
 """The accuracy promised of rebuilt coefficients."""
@@ -39,12 +38,6 @@ DOUBT = [1.0, 0.3927315003875155, 5.90069031723172, -3.420867305216691e-159, 3.6
 """Coefficients that are not normal numbers have few digits, and so has what any roots give back."""
 
 Maker = Callable[[np.random.Generator, int], np.ndarray]
-engines = pytest.mark.parametrize("compiled", [False, True], ids=["NumPy", "numba"])
-
-
-def skip_without_numba(compiled: bool) -> None:
-    if compiled:
-        pytest.importorskip("numba")
 
 
 def expanded(z: np.ndarray) -> np.ndarray:
@@ -193,12 +186,10 @@ def made(family: str, n: int = COUNT) -> np.ndarray:
 
 
 @pytest.mark.slow
-@engines
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_factors_give_the_coefficients_back(family: str, compiled: bool) -> None:
-    skip_without_numba(compiled)
+def test_the_factors_give_the_coefficients_back(family: str) -> None:
     a = made(family)
-    found = quartic_factors(*a.T, compiled=compiled)
+    found = quartic_factors(*a.T)
     error = joint_error(a, found.roots)
     worst = int(np.argmax(error))
     assert error[worst] <= JOINTLY_RIGHT, f"{error[worst]} of {a[worst].tolist()}"
@@ -206,50 +197,31 @@ def test_the_factors_give_the_coefficients_back(family: str, compiled: bool) -> 
     assert found.fallbacks == 0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("family", FAMILIES)
-def test_both_engines_find_the_same_factors(family: str) -> None:
-    """To the last bit: the same formulas in the same order, and neither engine joins a product and a sum in one."""
-    pytest.importorskip("numba")
-    a = made(family)
-    one, other = (quartic_factors(*a.T, compiled=c) for c in (False, True))
-    assert np.array_equal(one.p, other.p)
-    assert np.array_equal(one.q, other.q)
-    motions = [abscissa_and_damping(*a.T, compiled=c) for c in (False, True)]
-    assert np.array_equal(motions[0].abscissa, motions[1].abscissa)
-    assert np.array_equal(motions[0].damping_ratio, motions[1].damping_ratio)
-
-
-@engines
-def test_abscissa_is_that_of_ball_arithmetic(compiled: bool) -> None:
+def test_abscissa_is_that_of_ball_arithmetic() -> None:
     """Roots at least a tenth of the largest apart move by less than (2/0.1)³ times the error of the coefficients."""
-    skip_without_numba(compiled)
     rng = np.random.default_rng(5)
     z = drawn(rng, 4000, log(rng, -0.5, 0.5))
     apart = np.abs(z[:, :, None] - z[:, None, :]) + 10 * np.eye(4)
     a = polynomials(z[apart.min(axis=(1, 2)) > 0.1 * np.abs(z).max(axis=1)][:150])
     assert len(a) == 150
-    found = abscissa_and_damping(*a.T, compiled=compiled)
+    found = abscissa_and_damping(*a.T)
     size = np.abs(a[:, 4]) ** 0.25
     expected = np.array([exact_abscissa(row.tolist()) for row in a])
     assert np.all(np.abs(found.abscissa - expected) <= 8000 * 1e-14 * 4 * size)
     assert np.median(np.abs(found.abscissa - expected) / size) < 1e-15
 
 
-@engines
 @pytest.mark.parametrize("family", ["normal", "random roots", "two-mass-skate designs", "near EP4", "roots at 0"])
-def test_abscissa_and_damping_are_those_of_the_roots(family: str, compiled: bool) -> None:
-    skip_without_numba(compiled)
+def test_abscissa_and_damping_are_those_of_the_roots(family: str) -> None:
     a = made(family)
-    found = abscissa_and_damping(*a.T, compiled=compiled)
-    z = quartic_factors(*a.T, compiled=compiled).roots
+    found = abscissa_and_damping(*a.T)
+    z = quartic_factors(*a.T).roots
     size = np.abs(z).max(axis=1)
     assert np.all(np.abs(found.abscissa - z.real.max(axis=1)) <= 4e-16 * size)
     ratio = np.min(np.where(z == 0, 0, -z.real / np.where(z == 0, 1, np.abs(z))), axis=1)
     assert np.abs(found.damping_ratio - ratio).max() <= 1e-15
 
 
-@engines
 @pytest.mark.parametrize(
     ("factors", "abscissa", "ratio"),
     [
@@ -267,36 +239,34 @@ def test_abscissa_and_damping_are_those_of_the_roots(family: str, compiled: bool
         ([[1, -2e200, 0], [1, 3, 2]], 2e200, -1.0),
     ],
 )
-def test_abscissa_and_damping_by_hand(
-    factors: list[list[float]], abscissa: float, ratio: float, compiled: bool
-) -> None:
-    skip_without_numba(compiled)
-    found = abscissa_and_damping(*np.polymul(*factors), compiled=compiled)
+def test_abscissa_and_damping_by_hand(factors: list[list[float]], abscissa: float, ratio: float) -> None:
+    found = abscissa_and_damping(*np.polymul(*factors))
     assert found.abscissa == pytest.approx(abscissa, rel=1e-14, abs=1e-320)
     assert found.damping_ratio == pytest.approx(ratio, rel=1e-14, abs=1e-320)
 
 
-@engines
-def test_the_factors_of_ep4_are_its_closed_form(compiled: bool) -> None:
+def test_the_factors_of_ep4_are_its_closed_form() -> None:
     """(s − ω0)⁴ within rounding of the coefficients; the roots themselves scatter by the fourth root of it."""
-    skip_without_numba(compiled)
     Fr, chi_B, T = laws.frep4(-0.4, -0.2)[0], laws.chib1(-0.4, -0.2), laws.tls(-0.4, -0.2)
     a = copo(Fr, 0.1, chi_B, 1.0, -0.4, -0.2, T)
-    found = quartic_factors(*a, compiled=compiled)
+    found = quartic_factors(*a)
     (p1, p2), (q1, q2) = found.p, found.q
     rebuilt = np.polymul([1, p1, q1], [1, p2, q2])
     assert rebuilt == pytest.approx(np.poly([float(laws.w01(-0.4, -0.2))] * 4), rel=1e-13)
 
 
+def test_options_of_earlier_versions_are_accepted() -> None:
+    with pytest.warns(DeprecationWarning, match="compiled= is no longer needed"):
+        assert quartic_is_stable(1, 4, 6, 4, 1, compiled=False)  # type: ignore[call-arg]
+
+
 # Fallback, shapes and what has no roots
 
 
-@engines
-def test_eigenvalues_are_the_last_resort_and_are_counted(compiled: bool) -> None:
-    skip_without_numba(compiled)
+def test_eigenvalues_are_the_last_resort_and_are_counted() -> None:
     a = np.array([[1.0, 2.0, 3.0, 4.0, 5.0], DOUBT, DOUBT])
-    assert quartic_factors(*a.T, compiled=compiled).fallbacks == 2
-    found = abscissa_and_damping(*a.T, compiled=compiled)
+    assert quartic_factors(*a.T).fallbacks == 2
+    found = abscissa_and_damping(*a.T)
     assert found.fallbacks == 2
     # two roots are those of s² + 0.39 s + 5.9, and the others are smaller than 1e-100
     assert found.abscissa[1] == pytest.approx(0, abs=1e-100)
@@ -312,63 +282,44 @@ def test_eigenvalues_give_the_factors_when_every_other_way_is_shut(monkeypatch: 
     assert np.allclose(rebuilt, a / a[:, :1], rtol=1e-11)
 
 
-@engines
 @pytest.mark.filterwarnings("error")
-def test_a_root_beyond_all_doubles_is_infinite_without_a_warning(compiled: bool) -> None:
+def test_a_root_beyond_all_doubles_is_infinite_without_a_warning() -> None:
     """5e-324 (s⁴ + …) − 1e308 s³ has a root at 2e631."""
-    skip_without_numba(compiled)
-    found = abscissa_and_damping(5e-324, -1e308, 1.0, 1.0, 1.0, compiled=compiled)
+    found = abscissa_and_damping(5e-324, -1e308, 1.0, 1.0, 1.0)
     assert found.abscissa == np.inf
 
 
-@engines
-def test_what_has_no_roots_is_nan_and_undefined(compiled: bool) -> None:
-    skip_without_numba(compiled)
+def test_what_has_no_roots_is_nan_and_undefined() -> None:
     a = np.ones((12, 5))
     a[0, 0] = 0
     a[np.arange(1, 6), np.arange(5)] = np.nan
     a[np.arange(6, 11), np.arange(5)] = np.inf
-    factors = quartic_factors(*a.T, compiled=compiled)
-    motion = abscissa_and_damping(*a.T, compiled=compiled)
+    factors = quartic_factors(*a.T)
+    motion = abscissa_and_damping(*a.T)
     none = np.arange(12) < 11
     for values in (factors.p[:, 0], factors.q[:, 1], motion.abscissa, motion.damping_ratio):
         assert np.array_equal(np.isnan(values), none)
     assert factors.fallbacks == motion.fallbacks == 0
-    found = quartic_classes(*a.T, compiled=compiled)
+    found = quartic_classes(*a.T)
     assert np.array_equal(found.kind == CLASSES.index("undefined"), none)
-    assert not quartic_is_stable(*a.T, compiled=compiled).any()
+    assert not quartic_is_stable(*a.T).any()
 
 
-@engines
-def test_coefficients_broadcast(compiled: bool) -> None:
-    skip_without_numba(compiled)
+def test_coefficients_broadcast() -> None:
     a3, a4 = np.linspace(1, 2, 3)[:, None], np.linspace(0.1, 0.2, 4)
     given = (1.0, 4.0, 6.0, a3, a4)
     full = [np.broadcast_to(c, (3, 4)).copy() for c in given]
-    assert np.array_equal(quartic_factors(*given, compiled=compiled).p, quartic_factors(*full, compiled=compiled).p)
-    assert abscissa_and_damping(*given, compiled=compiled).abscissa.shape == (3, 4)
-    assert quartic_classes(*given, compiled=compiled).kind.shape == (3, 4)
-    assert quartic_is_stable(*given, compiled=compiled).shape == (3, 4)
-    assert quartic_factors(1, 4, 6, 4, 1, compiled=compiled).p.shape == (2,)
-    assert abscissa_and_damping(1, 4, 6, 4, 1, compiled=compiled).abscissa.shape == ()
+    assert np.array_equal(quartic_factors(*given).p, quartic_factors(*full).p)
+    assert abscissa_and_damping(*given).abscissa.shape == (3, 4)
+    assert quartic_classes(*given).kind.shape == (3, 4)
+    assert quartic_is_stable(*given).shape == (3, 4)
+    assert quartic_factors(1, 4, 6, 4, 1).p.shape == (2,)
+    assert abscissa_and_damping(1, 4, 6, 4, 1).abscissa.shape == ()
     empty = np.empty((0, 2))
-    assert quartic_factors(1, 4, 6, 4, empty, compiled=compiled).p.shape == (0, 2, 2)
-    assert quartic_classes(1, 4, 6, 4, empty, compiled=compiled).kind.shape == (0, 2)
+    assert quartic_factors(1, 4, 6, 4, empty).p.shape == (0, 2, 2)
+    assert quartic_classes(1, 4, 6, 4, empty).kind.shape == (0, 2)
     with pytest.raises(ValueError, match="broadcast"):
-        quartic_factors(1.0, np.ones(2), np.ones(3), 1.0, 1.0, compiled=compiled)
-
-
-def test_without_numba_it_is_numpy_or_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr("tmsopt.roots.quartics.quartic.find_spec", lambda name: None)
-    assert quartic_is_stable(1, 4, 6, 4, 1)
-    with pytest.raises(ModuleNotFoundError, match=r"pip install \"tmsopt\[fast\]\""):
-        quartic_is_stable(1, 4, 6, 4, 1, compiled=True)
-
-
-def test_cube_root_to_nine_digits() -> None:
-    x = 10 ** np.random.default_rng(0).uniform(-100, 100, 10_000)
-    assert np.abs(cube_root(x) / np.cbrt(x) - 1).max() < 1e-9
+        quartic_factors(1.0, np.ones(2), np.ones(3), 1.0, 1.0)
 
 
 def test_largest_root_of_a_cubic_to_seven_digits_of_the_spread() -> None:
@@ -403,29 +354,25 @@ def on_a_boundary(rng: np.random.Generator, n: int) -> np.ndarray:
     return a + 10 ** rng.uniform(-17, -9, (2 * n, 1)) * rng.uniform(-1, 1, (2 * n, 5)) * [0, 1, 1, 1, 1]
 
 
-@engines
-def test_classes_are_those_of_the_definitions(compiled: bool) -> None:
+def test_classes_are_those_of_the_definitions() -> None:
     """On 1e5 designs, and where rounding decides or exact arithmetic must: near boundaries and exceptional points."""
-    skip_without_numba(compiled)
     rng = np.random.default_rng(3)
     few = [made(f, 20) for f in FAMILIES]  # exact arithmetic takes a tenth of a second for 200 of them
     designs = np.stack(tms.coefficients(wide_designs(7, 100_000)), axis=-1)
     a = np.concatenate([designs, -designs[:5000], on_a_boundary(rng, 500), made("normal", 5000), *few])
-    found = quartic_classes(*a.T, compiled=compiled)
+    found = quartic_classes(*a.T)
     kind, count = classes_by_definition(a)
     assert np.array_equal(found.kind, kind)
     assert np.array_equal(found.real_roots, count)
-    assert np.array_equal(quartic_is_stable(*a.T, compiled=compiled), found.kind >= CLASSES.index("stable"))
+    assert np.array_equal(quartic_is_stable(*a.T), found.kind >= CLASSES.index("stable"))
     assert min(np.bincount(found.kind, minlength=5)[1:]) > 100  # each class is there
     assert 0 < found.doubtful < 2000
 
 
-@engines
-def test_classes_are_those_of_exact_arithmetic(compiled: bool) -> None:
+def test_classes_are_those_of_exact_arithmetic() -> None:
     """Away from the boundary of stability, where the Routh table in doubles is right."""
-    skip_without_numba(compiled)
     a = np.stack(tms.coefficients(wide_designs(8, 60_000)), axis=-1)
-    found = quartic_classes(*a.T, compiled=compiled)
+    found = quartic_classes(*a.T)
     assert found.doubtful < 10
     for code in range(1, 5):
         for k in np.flatnonzero(found.kind == code)[:60]:
@@ -435,17 +382,15 @@ def test_classes_are_those_of_exact_arithmetic(compiled: bool) -> None:
             assert {1: positive + zero > 0, 2: positive + zero == 0, 3: negative < 4, 4: negative == 4}[code]
 
 
-@engines
-def test_real_roots_beside_a_double_one_are_counted_exactly(compiled: bool) -> None:
+def test_real_roots_beside_a_double_one_are_counted_exactly() -> None:
     """A double root, real or of a pair of pairs, whose coefficients are an ulp or so off: rounding cannot tell."""
-    skip_without_numba(compiled)
     rng = np.random.default_rng(8)
     r, b, c = rng.uniform(0.2, 2.0, (3, 200))
     double = np.array([np.polymul([1, 2 * x, x * x], [1, y, z]) for x, y, z in zip(r, b, c, strict=True)])
     twice = np.array([np.polymul([1, y, z], [1, y, z]) for y, z in zip(b, c, strict=True)])
     a = np.concatenate([double, twice, np.array([np.poly([-x] * 4) for x in r])])
     a = a * (1 + rng.integers(-2, 3, a.shape) * np.finfo(float).eps)
-    found = quartic_classes(*a.T, compiled=compiled)
+    found = quartic_classes(*a.T)
     assert found.real_roots.tolist() == [_different_real_roots(row) for row in a]
     assert found.doubtful > len(a) / 3
 
@@ -469,19 +414,7 @@ def _different_real_roots(a: np.ndarray) -> int:
     return left - right
 
 
-def test_both_engines_give_the_same_classes() -> None:
-    pytest.importorskip("numba")
-    rng = np.random.default_rng(11)
-    designs = np.stack(tms.coefficients(wide_designs(12, 150_000)), axis=-1)
-    a = np.concatenate([designs, on_a_boundary(rng, 200), *(made(f, 8) for f in FAMILIES)])
-    one, other = (quartic_classes(*a.T, compiled=c) for c in (False, True))
-    assert np.array_equal(one.kind, other.kind)
-    assert np.array_equal(one.real_roots, other.real_roots)
-    assert one.doubtful == other.doubtful
-    assert np.array_equal(*(quartic_is_stable(*a.T, compiled=c) for c in (False, True)))
-
-
 def test_the_program_judges_roots_as_the_test_does() -> None:
     a = made("two-mass-skate designs")
-    z = quartic_factors(*a.T, compiled=False).roots
+    z = quartic_factors(*a.T).roots
     assert np.abs(backward_error(a, z) - joint_error(a, z)).max() < 2e-15  # the rounding of its own sums

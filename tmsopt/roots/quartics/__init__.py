@@ -1,4 +1,4 @@
-"""Millions of quartics at once, by NumPy or numba.
+"""Millions of quartics at once.
 
 In: arrays of coefficients. Out: factors, abscissae, damping ratios and classes of stability, jointly right beside
 exceptional points. Open `quartic` first.

@@ -16,6 +16,7 @@ from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics import factors
 
 Rows = NDArray[np.int_]
+Step = Callable[[Array, Array], Array]
 
 GOOD = 4e-15
 """Backward error below which a Newton step is not worth its time."""
@@ -43,12 +44,12 @@ def hard_factors(c: Array) -> tuple[Array, Rows, int]:
         unit = np.zeros(c.shape[1], dtype=int)
         monic, unit[regular] = in_unit(c[:, regular])
         found, error = np.full((4, regular.size), np.nan), np.full(regular.size, np.inf)
-        for step, way in product((polish, _polish_balanced), _WAYS):
+        for (take, most), way in product(((_newton_step, np.inf), (_balanced_step, _NEAR)), _WAYS):
             left = _not_accepted(error)
             if left.size:
                 trial = way(monic[:, left])
                 trial_error = factors.error(*monic[:, left], *trial)
-                step(monic[:, left], trial, trial_error, _LATE_STEPS)
+                polish(monic[:, left], trial, trial_error, _LATE_STEPS, take, most)
                 _keep(left, found, error, trial, trial_error)
         left = _not_accepted(error)
         if left.size:
@@ -69,25 +70,18 @@ def in_unit(c: Array) -> tuple[Array, Rows]:
     return np.ldexp(c[1:], -exponent[0] - unit * power) / lead, unit
 
 
-def polish(monic: Array, found: Array, error: Array, steps: int) -> None:
-    """Newton steps, in place, on the columns that need them, while they lower the error."""
-    rows = np.flatnonzero(~(error <= GOOD))
-    for _ in range(steps):
-        if rows.size:
-            trial = np.stack(factors.newton(*monic[:, rows], *found[:, rows]))
-            left = factors.error(*monic[:, rows], *trial)
-            better = left < error[rows]
-            rows, left = rows[better], left[better]
-            found[:, rows], error[rows] = trial[:, better], left
-            rows = rows[left > GOOD]
+def _newton_step(monic: Array, found: Array) -> Array:
+    return np.stack(factors.newton(*monic, *found))
 
 
-def _polish_balanced(monic: Array, found: Array, error: Array, steps: int) -> None:
-    """The same with a slower step that keeps its digits where roots of one factor are far apart."""
-    rows = np.flatnonzero((error > GOOD) & (error < _NEAR))
+def polish(
+    monic: Array, found: Array, error: Array, steps: int, take: Step = _newton_step, most: float = np.inf
+) -> None:
+    """Newton steps, in place, on the columns that need them and whose error is not more than `most`, while it falls."""
+    rows = np.flatnonzero((error > GOOD) & (error <= most))
     for _ in range(steps):
         if rows.size:
-            trial = found[:, rows] + _balanced_step(monic[:, rows], found[:, rows])
+            trial = take(monic[:, rows], found[:, rows])
             left = factors.error(*monic[:, rows], *trial)
             better = left < error[rows]
             rows, left = rows[better], left[better]
@@ -96,7 +90,10 @@ def _polish_balanced(monic: Array, found: Array, error: Array, steps: int) -> No
 
 
 def _balanced_step(monic: Array, found: Array) -> Array:
-    """The shortest Newton step, every coefficient in units of its terms and every unknown in units of its own size."""
+    """The shortest Newton step, slower: it keeps its digits where roots of one factor are far apart.
+
+    Every coefficient is in units of its terms and every unknown in units of its own size.
+    """
     p1, q1, p2, q2 = found
     one, zero = np.ones_like(p1), np.zeros_like(p1)
     jacobian = np.array([[one, zero, one, zero], [p2, one, p1, one], [q2, p2, q1, p1], [zero, q2, zero, q1]])
@@ -110,7 +107,7 @@ def _balanced_step(monic: Array, found: Array) -> Array:
     regular = np.all(np.isfinite(balanced), axis=(0, 1)) & np.all(np.isfinite(target), axis=0)
     balanced, target = np.where(regular, balanced, 0.0), np.where(regular, target, 0.0)
     step = np.linalg.pinv(np.moveaxis(balanced, -1, 0)) @ target.T[:, :, None]
-    return np.asarray(step[:, :, 0].T * unknown)
+    return np.asarray(found + step[:, :, 0].T * unknown)
 
 
 def _not_accepted(error: Array) -> Rows:

@@ -1,7 +1,7 @@
 """The two real quadratic factors of a quartic (s² + p1 s + q1)(s² + p2 s + q2), as elementwise formulas.
 
-The formulas use arithmetic and NumPy functions of one number only, so that they serve arrays as they stand and,
-compiled, one number at a time. Divisions by 0 are meant: what is not finite has no error that is accepted.
+They use arithmetic, `where` and NumPy functions of numbers only, so that the explorer can write them as JavaScript.
+Divisions by 0 are meant: what is not finite has no error that is accepted.
 """
 
 from typing import Any
@@ -11,13 +11,9 @@ import numpy as np
 where: Any = np.where
 
 Real = Any
-"""A number or an array of numbers."""
+"""An array of numbers."""
 Four = tuple[Real, Real, Real, Real]
 """Four of them: p1, q1, p2, q2 or b1, b2, b3, b4."""
-
-_2, _4, _8 = np.uint64(2), np.uint64(4), np.uint64(8)
-_THIRD = np.uint64(0x2A9F7893782DA1CE)
-"""Two thirds of the bits of 1, less what makes the largest error least."""
 
 
 def monic(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> Four:
@@ -80,27 +76,9 @@ def largest_root(Q: Real, R: Real) -> Real:
     slope = 0.4082481899731565 + s * (
         -0.05554853544711957 + s * (0.01881765411563031 + s * (-0.007849651607672 + s * slope))
     )
-    A = cube_root(np.abs(R) + np.sqrt(np.maximum(S, 0.0)))
+    A = np.cbrt(np.abs(R) + np.sqrt(np.maximum(S, 0.0)))
     A = where(R < 0.0, -A, A)
     return where(S > 0.0, A + Q / A, np.sqrt(np.maximum(Q, 0.0)) * (1.0 + 2.0 * s * slope))
-
-
-def cube_root(x: Real) -> Real:
-    """Cube root of positive numbers, to 9 digits: a third of the exponent, then two steps of Halley's method."""
-    y = third_of_exponent(x)
-    for _ in range(2):
-        cube = y * y * y
-        y = y * (cube + 2.0 * x) / (2.0 * cube + x)
-    return y
-
-
-def third_of_exponent(x: Real) -> Real:
-    """Cube root of positive numbers within 4 %, from a third of their bits."""
-    bits = np.float64(x).view(np.uint64)
-    part = (bits >> _2) + (bits >> _4)
-    part = part + (part >> _4)
-    part = part + (part >> _8)
-    return np.uint64(part + _THIRD).view(np.float64)
 
 
 def error(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real, q2: Real) -> Real:

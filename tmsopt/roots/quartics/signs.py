@@ -1,13 +1,10 @@
-"""Signs that decide the class of a quartic, as elementwise formulas for arrays and, compiled, for single numbers."""
+"""Signs that decide the class of a quartic, as elementwise formulas."""
 
 from typing import Any
 
 import numpy as np
 
-Real = Any
-"""A number or an array of numbers."""
-
-where: Any = np.where
+from tmsopt.roots.quartics.factors import Real, where
 
 _BOUND = 1e-14
 """Relative to the sum of |terms|: 45 roundings, where no term below passes through more than 32."""

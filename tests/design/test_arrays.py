@@ -11,14 +11,12 @@ import pytest
 
 from benchmarks.suites import TEMPLATES
 from tmsopt.arithmetic import NotAccepted, program
-from tmsopt.charts import array_function, engine_of
-from tmsopt.design import NO_RADIUS, Problem, parse_comparison
+from tmsopt.design import NO_RADIUS, Problem, array_function, parse_comparison
 from tmsopt.errors import InputError
 from tmsopt.models import Quantity, Values, tms
 from tmsopt.roots import roots
 
 arrays = import_module("tmsopt.arithmetic.arrays")
-motion = import_module("tmsopt.charts.motion")
 
 NATIVE = Problem(
     model=tms,
@@ -162,15 +160,6 @@ def test_what_depends_on_one_axis_stays_on_it():
     assert {n: np.shape(v) for n, v in found.items()} == {"a3": (1, 11), "a4": (7, 1), "a2": (7, 11), "mass": ()}
 
 
-def test_settled_parameters_change_no_bit():
-    texts = {"x": "Fr_c * Fr + sin(lambda_s)", "y": "a2", "z": "chi_T"}
-    found, columns = array_function(NATIVE, texts), grid(NATIVE)
-    settled = found.settled({n: v for n, v in columns.items() if n != "lambda_s"})
-    assert len(settled.program.steps) < len(found.program.steps)
-    whole, part = found(columns), settled({"lambda_s": columns["lambda_s"]})
-    assert all(np.array_equal(whole[n], part[n], equal_nan=True) for n in texts)
-
-
 def test_root_quantities_are_given_or_computed():
     found, columns = array_function(NATIVE, {"x": "2 * abscissa", "y": "Fr"}), grid(NATIVE)
     alpha = np.random.default_rng(0).normal(size=(7, 11))
@@ -186,7 +175,7 @@ def test_a_formula_that_takes_no_symbols_is_evaluated_all_the_same():
     found = array_function(problem, {"x": "steps * lambda_s", "y": "Fr * lambda_s"})
     assert list(found.others) == ["x"]
     columns = grid(problem)
-    values = found.settled({"Fr": columns["Fr"]})({n: v for n, v in columns.items() if n != "Fr"})
+    values = found(columns)
     assert np.array_equal(values["x"], np.floor(columns["Fr"]) * columns["lambda_s"])
     assert np.array_equal(values["y"], columns["Fr"] * columns["lambda_s"])
 
@@ -239,20 +228,6 @@ def test_blocks_change_no_bit(shape, monkeypatch):
                 assert np.array_equal(one, other, equal_nan=True)
 
 
-def test_results_go_into_arrays_of_the_grid():
-    """Two results that are one value do not share an array; what depends on one axis is not spread."""
-    x = ca.SX.sym("x", 2)
-    found = program(ca.Function("f", [x], [ca.vertcat(x[0] * x[1], 2 * x[0], x[0] * x[1], x[0] + x[1])], {"cse": True}))
-    room = np.zeros((4, 3, 5))
-    first, second, third, fourth = found({0: np.arange(5.0)[None, :], 1: np.ones((3, 1))}, dict(enumerate(room)))
-    assert np.array_equal(first, third)
-    assert not np.shares_memory(first, room)
-    assert not np.shares_memory(third, room)
-    assert second.shape == (1, 5)
-    assert fourth is not None
-    assert np.array_equal(room[3], np.arange(1.0, 6.0) * np.ones((3, 1)))
-
-
 def test_a_program_is_the_casadi_function():
     """Point by point, for every operation alone: exactly rounded ones alike, CasADi's functions within 2 ulp."""
     rng = np.random.default_rng(6)
@@ -288,15 +263,6 @@ def test_an_empty_output_is_zero():
     assert program(ca.Function("f", [x], [ca.densify(ca.vertcat(x, ca.SX(1, 1)))]))({0: 3.0}) == [3.0, 0.0]
 
 
-def test_unknown_names_and_engines_are_refused():
+def test_unknown_names_are_refused():
     with pytest.raises(InputError, match=r"quantities\.x: .*unknown name 'Froude'"):
         array_function(NATIVE, {"x": "Froude"})
-    with pytest.raises(InputError, match="engine: found 'gpu'; accepted: auto numpy numba"):
-        engine_of("gpu")
-
-
-def test_without_numba_numpy_serves_and_numba_is_asked_for(monkeypatch):
-    monkeypatch.setattr(motion, "find_spec", lambda name: None)
-    assert engine_of("auto") == "numpy"
-    with pytest.raises(InputError, match=r'pip install "tmsopt\[fast\]"'):
-        engine_of("numba")

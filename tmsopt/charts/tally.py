@@ -1,4 +1,4 @@
-"""What a chart sums up of its designs, tile by tile: shares of the classes, the best design."""
+"""Counts over the designs of a chart, tile by tile: shares of the classes, the best design."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -39,31 +39,37 @@ class Tally:
         return {n: count / self.designs for n, count in zip(CLASSES, self.classes, strict=False)}
 
 
-def tally(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0, seconds: float = 0.0) -> Tally:
+def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0, seconds: float = 0.0) -> Tally:
     """Counts over a tile whose first design has the place `first`."""
-    kind, satisfied, alpha = layers.get("kind"), layers.get("satisfied"), layers.get("abscissa")
+    kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
     least, place = math.nan, -1
-    if alpha is not None:
-        allowed = alpha if satisfied is None or satisfied.all() else np.where(satisfied, alpha, np.nan)
+    if abscissa is not None:
+        allowed = np.where(True if satisfied is None else satisfied, abscissa, np.nan)
         best = np.fmin.reduce(allowed, axis=None)
         if np.isfinite(best):
             least, place = float(best), first + int(np.argmax(allowed == best))
     return Tally(
-        designs=next(iter(layers.values())).size,
-        classes=() if kind is None else tuple(int(np.count_nonzero(kind == c)) for c in range(len(CLASSES))),
-        satisfied=None if satisfied is None else int(np.count_nonzero(satisfied)), least=least, place=place,
-        fallbacks=fallbacks, seconds=seconds,
-    )  # fmt: skip
+        next(iter(layers.values())).size,
+        () if kind is None else tuple(np.bincount(kind.ravel(), minlength=len(CLASSES)).tolist()),
+        None if satisfied is None else int(np.count_nonzero(satisfied)),
+        least,
+        place,
+        fallbacks,
+        seconds,
+    )
 
 
-def total(parts: Iterable[Tally]) -> Tally:
+def add_tallies(tallies: Iterable[Tally]) -> Tally:
     """Counts of several tiles together; their order does not matter."""
-    every = list(parts)
-    known = [(t.least, t.place) for t in every if t.place >= 0]
-    least, place = min(known, default=(math.nan, -1))
+    every = list(tallies)
+    least, place = min(((t.least, t.place) for t in every if t.place >= 0), default=(math.nan, -1))
     satisfied = [t.satisfied for t in every if t.satisfied is not None]
     return Tally(
-        designs=sum(t.designs for t in every), classes=tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
-        satisfied=sum(satisfied) if satisfied else None, least=least, place=place,
-        fallbacks=sum(t.fallbacks for t in every), seconds=sum(t.seconds for t in every),
-    )  # fmt: skip
+        sum(t.designs for t in every),
+        tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
+        sum(satisfied) if satisfied else None,
+        least,
+        place,
+        sum(t.fallbacks for t in every),
+        sum(t.seconds for t in every),
+    )

@@ -4,7 +4,7 @@ import threading
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
@@ -16,8 +16,7 @@ from tmsopt.design.expression import Expression, ExpressionError
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.errors import Fault, InputError
-from tmsopt.models import Model, ParameterSet, Values
-from tmsopt.records import Array
+from tmsopt.models import Values
 
 _ROOT = tuple(q.name for q in ROOT_QUANTITIES)
 
@@ -30,65 +29,39 @@ class ArrayFunction:
         program: computes those that CasADi can write down of the parameters and the root quantities.
         written: names of these.
         others: those that it cannot, evaluated by the formulas of the model on whole arrays.
-        known: parameters that were given for good, see `settled`.
     """
 
-    model: Model = field(repr=False)
-    of: ParameterSet = field(repr=False)
+    problem: Problem
     program: Program = field(repr=False)
     written: tuple[str, ...]
     others: Mapping[str, Expression]
-    known: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
-    def __call__(self, columns: Mapping[str, Any], into: Mapping[str, Array] | None = None) -> dict[str, Any]:
+    def __call__(self, columns: Mapping[str, Any]) -> dict[str, Any]:
         """Values of the expressions, of a comparison left minus right; nan where one does not exist.
 
         Args:
-            columns: every parameter that is not settled, and root quantities where they are known already, as numbers
+            columns: every parameter, and root quantities where they are known already, as numbers
                 or arrays whose shapes broadcast. Axes of a grid are best given in shapes (1, n) and (m, 1).
-            into: name → array for the values, used if they have the shape of the grid.
 
         Returns:
             Name → value, of the shape that the expression depends on, which broadcasts to that of the grid.
         """
-        columns = {**self.known, **columns}
-        if unknown := [n for n in _ROOT if n not in columns and n in self.inputs]:
-            values = self._values(columns)
-            with np.errstate(all="ignore"):
-                columns |= {n: values[n] for n in unknown}
-        places = {k: into[n] for k, n in enumerate(self.written) if n in into} if into else {}
-        found = dict(zip(self.written, self.program(self._arguments(columns), places), strict=True))
-        if self.others:
-            values = self._values(columns)
-            found |= {n: np.asarray(e(values), dtype=float)[()] for n, e in self.others.items()}
-        return found
-
-    @property
-    def inputs(self) -> set[str]:
-        """Names of the parameters and root quantities that are not settled."""
-        return {(*self.of.names, *_ROOT)[k] for k in self.program.arguments}
+        of, known = self.problem.parameter_set, columns
+        names = (*of.names, *_ROOT)
+        inputs = {k: names[k] for k in self.program.arguments}
+        with np.errstate(all="ignore"):
+            if self.others or set(inputs.values()) - set(columns):  # the formulas of the model themselves, on arrays
+                given = {n: np.asarray(columns[n], dtype=float)[()] for n in of.names}
+                known = Values(self.problem.model, of, given, extra=ARRAY_ROOT_QUANTITIES)
+                for name in set(_ROOT) & set(columns):
+                    known.define(name, columns[name])
+            found = dict(zip(self.written, self.program({k: known[n] for k, n in inputs.items()}), strict=True))
+            return found | {n: np.asarray(e(known), dtype=float)[()] for n, e in self.others.items()}
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of the expressions."""
         return (*self.written, *self.others)
-
-    def settled(self, columns: Mapping[str, Any]) -> "ArrayFunction":
-        """The same with some parameters given for good: what depends on them alone is computed once, now."""
-        rest = self.program.settled(self._arguments(columns))
-        return replace(self, program=rest, known={**self.known, **columns})
-
-    def _arguments(self, columns: Mapping[str, Any]) -> dict[int, Any]:
-        return {k: columns[n] for k, n in enumerate((*self.of.names, *_ROOT)) if n in columns}
-
-    def _values(self, columns: Mapping[str, Any]) -> Values:
-        """The formulas of the model themselves, on arrays."""
-        with np.errstate(all="ignore"):
-            arrays = {n: np.asarray(columns[n], dtype=float)[()] for n in self.of.names}
-            values = Values(self.model, self.of, arrays, extra=ARRAY_ROOT_QUANTITIES)
-        for name in set(_ROOT) & set(columns):
-            values.define(name, columns[name])
-        return values
 
 
 def array_function(problem: Problem, expressions: Mapping[str, str | Expression]) -> ArrayFunction:
@@ -100,10 +73,10 @@ def array_function(problem: Problem, expressions: Mapping[str, str | Expression]
     Raises:
         InputError: for a text that is no expression of this problem.
     """
-    model, of, stated = problem.model, problem.parameter_set, parsed(problem, expressions)
+    of, stated = problem.parameter_set, parse_all(problem, expressions)
     with _as_written():
         symbols = {n: ca.SX.sym(n) for n in (*of.names, *_ROOT)}
-        values = Values(model, of, {n: symbols[n] for n in of.names}, extra=(NO_RADIUS,))
+        values = Values(problem.model, of, {n: symbols[n] for n in of.names}, extra=(NO_RADIUS,))
         for name in _ROOT:
             values.define(name, symbols[name])
         written = {n: s for n, e in stated.items() if (s := _symbolic(e, values)) is not None}
@@ -114,10 +87,10 @@ def array_function(problem: Problem, expressions: Mapping[str, str | Expression]
     except NotAccepted:  # an operation that only CasADi has: every expression by the formulas
         written, found = {}, Program(())
     others = {n: e for n, e in stated.items() if n not in written}
-    return ArrayFunction(model, of, found, tuple(written), others)
+    return ArrayFunction(problem, found, tuple(written), others)
 
 
-def parsed(problem: Problem, expressions: Mapping[str, str | Expression]) -> dict[str, Expression]:
+def parse_all(problem: Problem, expressions: Mapping[str, str | Expression]) -> dict[str, Expression]:
     """Expressions in the vocabulary of a problem; what is parsed already stays as it is.
 
     Raises:

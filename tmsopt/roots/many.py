@@ -1,0 +1,59 @@
+"""Classes and motion of many polynomials of one degree: quartics by formulas, others by Sturm and eigenvalues."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tmsopt.records import Array
+from tmsopt.roots.numeric import roots
+from tmsopt.roots.quartics.classes import Classes, count_classes, quartic_classes
+from tmsopt.roots.quartics.quartic import Motion, abscissa_and_damping, make_blocks
+
+_QUARTIC = 5
+"""Coefficients of the degree that has formulas of its own."""
+
+
+def classify(coefficients: Sequence[ArrayLike]) -> Classes:
+    """Classes of polynomials whose coefficients, highest power first, have shapes that broadcast.
+
+    Example:
+        >>> tmsopt.roots.classify([1, [3, -3], 2]).real_roots  # (s ± 1)(s ± 2)
+        array([2, 2], dtype=int8)
+
+    More: docs/how_to/charts.md
+    """
+    if len(coefficients) == _QUARTIC:
+        return quartic_classes(*coefficients)
+    rows, shape = _rows(coefficients)
+    kind, count = np.empty((2, len(rows)), np.int8)
+    for block in make_blocks(len(rows)):
+        kind[block], count[block] = count_classes(rows[block])
+    return Classes(kind.reshape(shape), count.reshape(shape), 0)
+
+
+def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
+    """Spectral abscissae and damping ratios; arguments as of `classify`.
+
+    Example:
+        >>> tmsopt.roots.find_motion([1, [2, 4], 5]).abscissa.round(9)  # -1 ± 2i, -2 ± i
+        array([-1., -2.])
+
+    More: docs/how_to/charts.md
+    """
+    if len(coefficients) == _QUARTIC:
+        return abscissa_and_damping(*coefficients)
+    rows, shape = _rows(coefficients)
+    alpha, ratio = np.full((2, len(rows)), np.nan)
+    regular = np.flatnonzero(np.all(np.isfinite(rows), axis=1) & (rows[:, 0] != 0))
+    for block in make_blocks(regular.size):
+        part = regular[block]
+        z = roots(rows[part])
+        alpha[part], ratio[part] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+    return Motion(alpha.reshape(shape), ratio.reshape(shape), regular.size)
+
+
+def _rows(coefficients: Sequence[ArrayLike]) -> tuple[Array, tuple[int, ...]]:
+    """Coefficients of shape (polynomials, degree + 1), and the shape that they broadcast to."""
+    a = np.stack(np.broadcast_arrays(*coefficients), axis=-1, dtype=float)
+    return a.reshape(-1, a.shape[-1]), a.shape[:-1]
