@@ -18,10 +18,9 @@ from tmsopt.completeness.conditions import Ends, Sheet, sheets
 from tmsopt.completeness.pruning import Box, Pruned, Puzzle, ends, partial, prune, tree
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.design.quantities import lifted_quantities
 from tmsopt.formulation.nlp import Scale, reaches_of, scale_of
 from tmsopt.killable import Killable
-from tmsopt.models import Quantity, Values
 from tmsopt.progress import Counts
 from tmsopt.records import Table, plain
 
@@ -222,23 +221,13 @@ def _sheets(problem: Problem) -> Iterator[Sheet]:
     """The equations, one for each way in which the roots may be small or large."""
     assert problem.pattern is not None
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
-    met: dict[str, Quantity] = {}
-
-    def note(quantity: Quantity, values: Values) -> None:
-        if quantity.equation is not None:
-            met[quantity.name] = quantity
-
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
-    values = Values(problem.model, problem.parameter_set, problem.ordered(middle), lift=note)
-    for name in ROOT_NAMES:
-        values.define(name, math.nan)
-    for equality in equalities:
-        equality(values)
+    lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
     scale = scale_of(problem)
     scale = Scale(_UNITS * scale.unit, scale.lead)
     held = problem.exactly(problem.fixed)
     for pieces in sheets(problem.pattern.form):
-        yield Sheet(problem, pieces, scale, equalities, tuple(met.values()), held)
+        yield Sheet(problem, pieces, scale, equalities, lifted, held)
 
 
 def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
