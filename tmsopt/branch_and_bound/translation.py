@@ -5,22 +5,26 @@ what the formula shares, the relaxation shares. Quotients, radicals and arctange
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import flint
 
-from tmsopt.arithmetic.intervals import INTERVALS, ball, interval
+from tmsopt.arithmetic.intervals import INTERVALS, Interval, ball, interval
 from tmsopt.arithmetic.walk import NotAccepted, walk
-from tmsopt.branch_and_bound.terms import CANCELLED, Term, constant, refuse_huge, scale_of
 from tmsopt.formulation.nlp import NLP
 
 FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance: rows may be off by so much."""
 
+_LEAST_POWER = -60  # of two, of a scale: what is smaller is as good as 0
+_HUGE = 1e15  # beyond which numbers are left to nobody: from 1e20 SCIP takes them for infinite
 _LARGE = 1e3  # numbers up to which a coefficient below 1e-9 counts for nothing: SCIP drops it
 _WHOLE = 1000  # exponent up to which a power is taken
+
+_CANCELLED = 2.0**-10
+"""Of the largest summand: rows are not scaled by less, lest they be held to less than a rounding."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +44,13 @@ class Translated:
     impossible: bool
 
 
-def translate(nlp: NLP, *, sharing: bool = True) -> Translated:
+def translate(nlp: NLP) -> Translated:
     """The SCIP model of an NLP.
-
-    Args:
-        sharing: give variables to what is used twice; otherwise all is multiplied out.
 
     Raises:
         NotAccepted: for an operation that cannot be written for SCIP.
     """
-    built = _Translation(sharing)
+    built = _Translation()
     x = [built.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
     objective, rows = walk(nlp.functions, x, built.arithmetic(), built.variable)
     for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
@@ -58,13 +59,43 @@ def translate(nlp: NLP, *, sharing: bool = True) -> Translated:
     return Translated(built.scip, tuple((v.symbol, v.scale) for v in x), least, built.impossible)
 
 
+@dataclass(frozen=True)
+class Term:
+    """A result on the way: an expression of SCIP with its degree and range.
+
+    Attributes:
+        expression: a number where it is _constant.
+        degree: 0, 1 or 2.
+        ball: its range.
+        size: bound on its summands, which may cancel.
+        tangent: what it is the arctangent of.
+        symbol, scale: of a variable, which is the expression divided by its scale.
+    """
+
+    expression: Any
+    degree: int
+    ball: Any
+    size: float
+    tangent: "Term | None" = None
+    symbol: Any = None
+    scale: float = 1.0
+
+    @property
+    def ends(self) -> Interval:
+        return interval(self.ball) if self.degree else (self.expression, self.expression)
+
+    @property
+    def unit(self) -> float:
+        """What a row of it is divided by to be about 1, a power of two; never more than 1."""
+        return max(_scale_of(max(map(abs, self.ends))), min(_CANCELLED * _scale_of(self.size), 1.0))
+
+
 class _Translation:
     """Collects variables and rows of a SCIP model; discarded once it is solved."""
 
-    def __init__(self, sharing: bool) -> None:
+    def __init__(self) -> None:
         import pyscipopt
 
-        self.sharing = sharing
         self.functions = pyscipopt
         self.scip = pyscipopt.Model()
         self.scip.hideOutput()
@@ -75,7 +106,7 @@ class _Translation:
 
     def free(self, lower: float, upper: float, over: Any = None) -> Term:
         """A variable, scaled by a power of two to about 1."""
-        scale = scale_of(max(abs(lower), abs(upper)))
+        scale = _scale_of(max(abs(lower), abs(upper)))
         ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
         self.count += 1
         symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
@@ -89,7 +120,7 @@ class _Translation:
 
     def variable(self, term: Term) -> Term:
         """The same, at most affine: what is of degree 2 gets a variable, once."""
-        if term.degree < 2 or not self.sharing:
+        if term.degree < 2:
             return term
         if id(term) not in self.known:
             new = self.defined(term.ball)
@@ -114,9 +145,9 @@ class _Translation:
 
     def arithmetic(self) -> dict[int, Any]:
         """CasADi's operations."""
-        nonlinear = {"exp": ca.OP_EXP, "log": ca.OP_LOG, "sin": ca.OP_SIN, "cos": ca.OP_COS}
+        functions = {"exp": ca.OP_EXP, "log": ca.OP_LOG, "sin": ca.OP_SIN, "cos": ca.OP_COS}
         return {
-            ca.OP_CONST: constant,
+            ca.OP_CONST: _constant,
             ca.OP_ADD: lambda a, b: self.sum(a, b, 1.0),
             ca.OP_SUB: lambda a, b: self.sum(a, b, -1.0),
             ca.OP_NEG: lambda a: self.times(a, -1.0),
@@ -124,7 +155,7 @@ class _Translation:
             ca.OP_MUL: self.product,
             ca.OP_SQ: self.square,
             ca.OP_DIV: self.quotient,
-            ca.OP_INV: lambda a: self.quotient(constant(1.0), a),
+            ca.OP_INV: lambda a: self.quotient(_constant(1.0), a),
             ca.OP_SQRT: self.root,
             ca.OP_POW: self.power,
             ca.OP_CONSTPOW: self.power,
@@ -135,7 +166,7 @@ class _Translation:
             ca.OP_FABS: self.size,
             ca.OP_FMAX: lambda a, b: self.extreme(a, b, 0.5),
             ca.OP_FMIN: lambda a, b: self.extreme(a, b, -0.5),
-            **{op: lambda a, name=name, op=op: self.applied(a, name, op) for name, op in nonlinear.items()},
+            **{op: lambda a, name=name, op=op: self.applied(a, name, op) for name, op in functions.items()},
         }
 
     def sum(self, a: Term, b: Term, sign: float) -> Term:
@@ -144,7 +175,7 @@ class _Translation:
 
     def times(self, a: Term, factor: float) -> Term:
         if 0 < abs(factor) < FEASIBILITY:
-            refuse_huge(a.ball, "a small multiple", _LARGE)
+            _refuse_huge(a.ball, "a small multiple", _LARGE)
         return Term(factor * a.expression, a.degree, factor * a.ball, abs(factor) * a.size)
 
     def product(self, a: Term, b: Term) -> Term:
@@ -155,10 +186,7 @@ class _Translation:
         return Term(a.expression * b.expression, 2, a.ball * b.ball, a.size * b.size)
 
     def square(self, a: Term) -> Term:
-        if a.degree == 0:
-            return constant(a.expression**2)
-        a = self.variable(a)
-        return Term(a.expression * a.expression, 2, INTERVALS[ca.OP_SQ](a.ball), a.size * a.size)
+        return replace(self.product(a, a), ball=INTERVALS[ca.OP_SQ](a.ball))
 
     def quotient(self, a: Term, b: Term) -> Term:
         """q with q b = a; where b may vanish, of any size."""
@@ -171,8 +199,6 @@ class _Translation:
 
     def root(self, a: Term) -> Term:
         """r ≥ 0 with r² = a."""
-        if a.degree == 0:
-            return constant(math.sqrt(a.expression)) if a.expression >= 0 else self.undefined()
         least, most = (max(e, 0.0) for e in a.ends)
         self.impossible |= a.ends[1] < 0
         r = self.free(math.nextafter(math.sqrt(least), 0), math.nextafter(math.sqrt(most), math.inf))
@@ -190,14 +216,14 @@ class _Translation:
         if abs(exponent) > _WHOLE:
             raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
         if a.degree > 0 and a.ball.is_finite():
-            refuse_huge(INTERVALS[ca.OP_POW](a.ball, b.ball), "a power")
+            _refuse_huge(INTERVALS[ca.OP_POW](a.ball, b.ball), "a power")
         if exponent < 0:
-            return self.quotient(constant(1.0), self.power(a, constant(-exponent)))
+            return self.quotient(_constant(1.0), self.power(a, _constant(-exponent)))
         if exponent != int(exponent):
             return self.fractional(a, exponent)
         if exponent == 0:
-            return constant(1.0)
-        half = self.power(a, constant(exponent // 2)) if exponent > 1 else constant(1.0)
+            return _constant(1.0)
+        half = self.power(a, _constant(exponent // 2)) if exponent > 1 else _constant(1.0)
         even = self.square(half) if exponent > 1 else half
         return self.product(even, a) if exponent % 2 else even
 
@@ -205,8 +231,6 @@ class _Translation:
         """a ≥ 0 to a positive power, 0 included."""
         least, most = (max(e, 0.0) for e in a.ends)
         self.impossible |= a.ends[1] < 0
-        if a.degree == 0:
-            return constant(least**exponent)
         a = self.variable(a)
         power = flint.arb(exponent)
         low, high = (flint.arb(e) ** power if math.isfinite(e) else flint.arb("inf") for e in (least, most))
@@ -215,11 +239,11 @@ class _Translation:
         return v
 
     def applied(self, a: Term, name: str, operation: int) -> Term:
-        """A function that SCIP has."""
+        """A function that SCIP has; CasADi itself computes those of numbers, but for the base of a power."""
         if a.degree == 0:
-            return constant(getattr(math, name)(a.expression))
+            return _constant(getattr(math, name)(a.expression))
         if name == "exp":
-            refuse_huge(INTERVALS[operation](a.ball), "exp")
+            _refuse_huge(INTERVALS[operation](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
             cosine, sine = self.on_circle(a.tangent)
             return sine if name == "sin" else cosine
@@ -229,7 +253,7 @@ class _Translation:
             self.scip.addCons(a.expression / a.scale == self.functions.exp(v.expression) / a.scale)
         else:
             # Others than exp are as small as their argument is known.
-            size = v.scale if name == "exp" else max(v.scale, CANCELLED)
+            size = v.scale if name == "exp" else max(v.scale, _CANCELLED)
             self.scip.addCons(v.expression / size == getattr(self.functions, name)(a.expression) / size)
         return v
 
@@ -248,8 +272,6 @@ class _Translation:
 
     def arctangent(self, t: Term) -> Term:
         """An angle, its sine and cosine through its tangent."""
-        if t.degree == 0:
-            return constant(math.atan(t.expression))
         t = self.variable(t)
         key = id(t)
         if key not in self.known:
@@ -268,8 +290,6 @@ class _Translation:
 
     def inverse(self, a: Term, name: str, operation: int) -> Term:
         """An angle whose sine or cosine is given."""
-        if a.degree == 0:
-            return constant(float(INTERVALS[operation](flint.arb(a.expression))))
         ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
         over = INTERVALS[operation](a.ball)
         angle = self.defined(over) if over.is_finite() else self.free(*ends)
@@ -278,8 +298,6 @@ class _Translation:
 
     def size(self, a: Term) -> Term:
         """|a|, which SCIP has."""
-        if a.degree == 0:
-            return constant(abs(a.expression))
         a = self.variable(a)
         lower, upper = a.ends
         if lower >= 0 or upper <= 0:
@@ -296,4 +314,22 @@ class _Translation:
     def undefined(self) -> Term:
         """What does not exist, for any design."""
         self.impossible = True
-        return constant(0.0)
+        return _constant(0.0)
+
+
+def _constant(value: float) -> Term:
+    if math.isfinite(value) and abs(value) > _HUGE:
+        raise NotAccepted(f"numbers beyond {_HUGE:g}")
+    return Term(float(value), 0, flint.arb(value), abs(float(value)))
+
+
+def _refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
+    if over.is_finite() and max(map(abs, interval(over))) > most:
+        raise NotAccepted(f"{name} of numbers beyond {most:g}")
+
+
+def _scale_of(size: float) -> float:
+    """What to divide a variable or row by that is at most so large."""
+    if not (math.isfinite(size) and size > 0):
+        return 1.0
+    return float(2.0 ** min(max(math.ceil(math.log2(size)), _LEAST_POWER), 0))

@@ -9,23 +9,20 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.balls import number
+from tmsopt.arithmetic.balls import Number, number
 from tmsopt.arithmetic.formal import variable
 from tmsopt.arithmetic.intervals import interval
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.completeness.conditions import Ends, Sheet, sheets
-from tmsopt.completeness.pruning import Box, Pruned, Puzzle, prune
-from tmsopt.completeness.statement import Completeness, Undecided
-from tmsopt.completeness.trees import ends, partial, tree
+from tmsopt.completeness.pruning import Box, Pruned, Puzzle, ends, partial, prune, tree
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.design.quantities import lifted_quantities
 from tmsopt.formulation.nlp import Scale, reaches_of, scale_of
 from tmsopt.killable import Killable
-from tmsopt.models import Quantity, Values
 from tmsopt.progress import Counts
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -40,6 +37,48 @@ _TURN, _LONGEST = 0.25, 1e6  # seconds
 _SMALL, _COARSE = 1e-7, 1e-2  # of the first box: what is smaller is not split
 _MOST = 400  # boxes so small, and they are no isolated designs: from then on ten times as large ones are small
 _SAID = 12  # places that are named
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """A part of the box of which nothing is proved.
+
+    Attributes:
+        ranges: of each free parameter.
+        reason: why not.
+    """
+
+    ranges: Table[tuple[float, float]]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """Whether the designs of a box with a pattern are all known.
+
+    Attributes:
+        complete: whether it is proved that the box holds `designs` and no other.
+        reason: why not, in words.
+        designs: free parameters of each that is proved to exist and to be the only one near, angles in radians.
+        limits: of each, the limit on which it lies as far as can be told, so that it may be just beyond; mostly empty.
+        boxes: that interval branch and prune looked at.
+        seconds: that it took.
+        undecided: where it did not decide.
+        stopped: whether Ctrl-C ended it.
+    """
+
+    complete: bool
+    reason: str = ""
+    designs: tuple[Table[Number], ...] = ()
+    limits: tuple[str, ...] = ()
+    boxes: int = 0
+    seconds: float = 0.0
+    undecided: tuple[Undecided, ...] = ()
+    stopped: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return plain(self) | {"seconds": round(self.seconds, 4)}
 
 
 def available() -> bool:
@@ -182,23 +221,13 @@ def _sheets(problem: Problem) -> Iterator[Sheet]:
     """The equations, one for each way in which the roots may be small or large."""
     assert problem.pattern is not None
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
-    met: dict[str, Quantity] = {}
-
-    def note(quantity: Quantity, values: Values) -> None:
-        if quantity.equation is not None:
-            met[quantity.name] = quantity
-
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
-    values = Values(problem.model, problem.parameter_set, problem.ordered(middle), lift=note)
-    for name in ROOT_NAMES:
-        values.define(name, math.nan)
-    for equality in equalities:
-        equality(values)
+    lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
     scale = scale_of(problem)
     scale = Scale(_UNITS * scale.unit, scale.lead)
     held = problem.exactly(problem.fixed)
     for pieces in sheets(problem.pattern.form):
-        yield Sheet(problem, pieces, scale, equalities, tuple(met.values()), held)
+        yield Sheet(problem, pieces, scale, equalities, lifted, held)
 
 
 def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -175,3 +175,21 @@ ARRAY_ROOT_QUANTITIES = (
     *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)), NO_RADIUS,
 )  # fmt: skip
 """The same for arrays of designs, by numeric roots."""
+
+
+def lifted_quantities(
+    model: Model, of: ParameterSet, parameters: Mapping[str, Any], expressions: Iterable[Callable[[Values], Any]]
+) -> tuple[Quantity, ...]:
+    """The quantities in expressions that have an equation of their own, by which a proof takes them as unknowns."""
+    found: dict[str, Quantity] = {}
+
+    def note(quantity: Quantity, values: Values) -> None:
+        if quantity.equation is not None:
+            found[quantity.name] = quantity
+
+    values = Values(model, of, parameters, lift=note)
+    for name in ROOT_NAMES:
+        values.define(name, math.nan)
+    for expression in expressions:
+        expression(values)
+    return tuple(found.values())

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
@@ -302,14 +302,13 @@ def _thinned(search: _Search) -> Front:
             words[i] += (names := change_names(s.left, s.right))
             changes += [(i, name, s.length) for name in names]
     spacing = sum(s.length for s in stretches if not s.gap) / max(search.points - 1, 1)
-    kept: list[int] = []
-    since = math.inf
-    ahead = _ahead(stretches, words)
-    for i in range(len(chain)):
-        since = since + stretches[i - 1].length if i else math.inf
-        if words[i] or min(since, ahead[i]) >= _CLOSE * spacing:
+    at = [*accumulate((s.length for s in stretches), initial=0.0)]
+    kept, last = list[int](), -math.inf
+    for i, x in enumerate(at):
+        ahead = next((at[k] for k in range(i + 1, len(at)) if words[k]), math.inf)
+        if words[i] or min(x - last, ahead - x) >= _CLOSE * spacing:
             kept.append(i)
-            since = 0.0
+            last = x
     place = {i: k for k, i in enumerate(kept)}
     proved = dict(search.team.each(_covered, search.ask, [chain[i].solution for i in kept]))
     notes = () if not search.exhausted else ("the search was ended: too many sub-problems; ask for more points",)
@@ -327,14 +326,6 @@ def _thinned(search: _Search) -> Front:
 
 def _covered(_: Asker, solution: Solution) -> Solution:
     return covered(solution)
-
-
-def _ahead(stretches: Sequence[_Stretch], words: Sequence[list[str]]) -> list[float]:
-    """Distance from each point to the next labelled one."""
-    distances = [math.inf] * len(words)
-    for i in range(len(words) - 2, -1, -1):
-        distances[i] = stretches[i].length + (0.0 if words[i + 1] else distances[i + 1])
-    return distances
 
 
 def _missing(ask: Asker, s: _Stretch) -> str:

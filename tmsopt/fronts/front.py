@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
+import numpy as np
+
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import units_of
@@ -167,16 +169,12 @@ def efficient(points: Sequence[FrontPoint], slack: Sequence[float]) -> list[Fron
     Args:
         slack: per objective, the difference that rounding explains.
     """
-    kept: list[FrontPoint] = []
-    for p in points:
-        beaten = any(
-            all(b <= a + t for a, b, t in zip(p.objectives, q.objectives, slack, strict=True))
-            and any(b < a - t for a, b, t in zip(p.objectives, q.objectives, slack, strict=True))
-            for q in points
-        )
-        same = any(
-            all(abs(a - b) <= t for a, b, t in zip(p.objectives, q.objectives, slack, strict=True)) for q in kept
-        )
-        if not beaten and not same:
-            kept.append(p)
-    return sorted(kept, key=lambda p: [float(f"{x:.9g}") for x in p.objectives])  # rounding decides no tie
+    values, allowed = np.array([p.objectives for p in points]), np.asarray(slack)
+    kept: list[int] = []
+    for k, own in enumerate(values):
+        off = values - own
+        beaten = (off <= allowed).all(axis=1) & (off < -allowed).any(axis=1)
+        if not beaten.any() and not (np.abs(off[kept]) <= allowed).all(axis=1).any():
+            kept.append(k)
+    chosen = (points[k] for k in kept)
+    return sorted(chosen, key=lambda p: [float(f"{x:.9g}") for x in p.objectives])  # rounding decides no tie

@@ -1,6 +1,5 @@
 """The square system whose solution has a root pattern: a_k = a0 c_k, and the problem's equalities."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,7 +9,7 @@ import numpy as np
 from tmsopt.arithmetic.krawczyk import Refused, slopes
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
 from tmsopt.formulation.nlp import ordinary, reaches_of, scale_of
 from tmsopt.models import Quantity, Values
 from tmsopt.proofs.factored import abscissa_formula
@@ -89,17 +88,8 @@ def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float
     beyond = [n for n in (RADIUS, "damping_ratio", ANGULAR_FREQUENCY) if any(n in c.names for c in equalities)]
     if beyond:
         raise Refused(f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest")
-    met: dict[str, Quantity] = {}
-
-    def note(quantity: Quantity, values: Values) -> None:
-        if quantity.equation is not None:
-            met[quantity.name] = quantity
-
-    values = Values(problem.model, problem.parameter_set, parameters, lift=note)
-    values.define("abscissa", math.nan)
-    for equality in equalities:
-        equality(values)
-    own = Equations(problem, pattern, equalities, tuple(met.values()), ordinary(scale_of(problem).unit))
+    lifted = lifted_quantities(problem.model, problem.parameter_set, parameters, equalities)
+    own = Equations(problem, pattern, equalities, lifted, ordinary(scale_of(problem).unit))
     units = reaches_of(problem)
     units |= {q.name: ordinary(abs(float(problem.values(parameters)[q.name]))) for q in own.lifted}
     units |= {n: own.unit**power for n, power in zip(own.of_pattern, pattern.powers, strict=True)}

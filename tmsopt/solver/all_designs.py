@@ -9,8 +9,7 @@ import numpy as np
 
 from tmsopt.arithmetic.balls import Number
 from tmsopt.checks.recheck import recheck
-from tmsopt.completeness.complete import SECONDS, completeness
-from tmsopt.completeness.statement import Completeness
+from tmsopt.completeness.complete import SECONDS, Completeness, completeness
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Solution
