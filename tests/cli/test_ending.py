@@ -267,9 +267,7 @@ def test_proofs_leave_what_is_proved(run: Run, monkeypatch: pytest.MonkeyPatch, 
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-@pytest.mark.parametrize(
-    "where", ["tmsopt.branch_and_bound.race Crew.race", "tmsopt.certificates.certify contradicted"]
-)
+@pytest.mark.parametrize("where", ["tmsopt.branch_and_bound.race Crew.race", "tmsopt.certificates.certify doubt"])
 def test_a_proof_that_is_stopped_leaves_the_design(
     run: Run, monkeypatch: pytest.MonkeyPatch, where: str, tmp_path: Path
 ) -> None:

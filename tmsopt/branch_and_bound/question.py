@@ -86,7 +86,7 @@ class Question:
             value = self._known(name)
             if value is not None and name not in build.shared:
                 build.take(name, value)
-                lift(build, value)
+                build.lifts.append(lift(build, value).lift)
         build.constraints()
         if self.limit is not None:
             build.optimise()

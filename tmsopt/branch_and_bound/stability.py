@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.branch_and_bound.answer import Answer, Clock, answer, contradicted
+from tmsopt.branch_and_bound.answer import Answer, Clock, answer, contradicted, doubt
 from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
 from tmsopt.branch_and_bound.scip import SCIP
@@ -107,4 +107,4 @@ def _admits(question: Question, best: Checked, known: Mapping[str, float], clock
     """Whether the question for a line just right of a known design admits that design, as put and as solved."""
     design = {n: known[n] for n in question.problem.free}
     wider = replace(question, limit=best.structure.abscissa + _MARGIN * question.unit)
-    return not contradicted(wider, design, clock)
+    return not doubt(wider, design) and not contradicted(wider, design, clock)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.branch_and_bound.answer import Clock, answer, contradicted
+from tmsopt.branch_and_bound.answer import Clock, answer, contradicted, doubt
 from tmsopt.branch_and_bound.half_planes import over
 from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
@@ -103,6 +103,8 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if known.proven:
         return replace(design, bound=known), False
     admitted = _question(design, -PROVEN)
+    if words := doubt(admitted, _free(design)):
+        return _in_vain(design, f"no bound: {words}"), False
     if contradicted(admitted, _free(design), clock):
         return _in_vain(design, f"no bound: {SOLVER.name}'s relaxation excludes the design that was found"), False
     proved, failed = math.inf, 0.0
