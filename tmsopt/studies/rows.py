@@ -212,7 +212,11 @@ class RowTable(Sequence[Row]):
         return self._row(int(places)) if isinstance(where, int) else tuple(map(self._row, places.tolist()))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, RowTable | tuple) and len(self) == len(other) and all(map(_same, self, other))
+        return (
+            isinstance(other, RowTable | tuple)
+            and len(self) == len(other)
+            and all(a == b for a, b in zip(self, other, strict=True))
+        )
 
     def __hash__(self) -> int:
         return hash(len(self))
@@ -316,10 +320,6 @@ class RowTable(Sequence[Row]):
 def _item(column: PartialColumn) -> Any:
     value = column.values.item()
     return math.nan if value != value else value  # noqa: PLR0124  # one nan, so that rows that are the same are equal
-
-
-def _same(one: Row, other: object) -> bool:
-    return one == other
 
 
 def _merged(parts: Sequence[Part]) -> dict[str, PartialColumn]:
