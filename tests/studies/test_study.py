@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from tmsopt.checks import law_rows
 from tmsopt.cli import every as main
 from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
+from tmsopt.executor import Crash
 from tmsopt.models import tms
 from tmsopt.records import Table
 from tmsopt.report import study_table
@@ -317,6 +318,35 @@ def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_pat
     resumed = run_study(study, tmp_path / "s.sqlite", workers=1)
     assert resumed.solved == 6
     assert_same(resumed.rows, whole)
+
+
+class Crashing:
+    """An executor whose workers die of row 3."""
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def map(self, function: Any, items: Sequence[Any]) -> Iterator[Any]:
+        for place, numbers in enumerate(items):
+            yield place, Crash("signal 9") if 3 in numbers else function(numbers)
+
+
+@pytest.mark.parametrize("warm", [False, True])
+def test_a_row_that_ends_its_worker_costs_itself_alone(
+    warm: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Of a block of neighbours too, which is taken apart."""
+    monkeypatch.setattr("tmsopt.studies.run.processes", lambda *_: Crashing())
+    study = over_grid(TWO, {"mu": np.linspace(0, 1, 6).tolist()}, warm=warm)
+    notes: list[str] = []
+    run_study(study, tmp_path / "s.sqlite", workers=2, note=notes.append)
+    rows = stored(study, tmp_path / "s.sqlite").rows
+    assert [row.status for row in rows] == ["optimal"] * 3 + ["quarantined"] + ["optimal"] * 2
+    assert rows[3].cause == "ended its worker twice (signal 9)"
+    assert notes == ["row 3 is quarantined"]
 
 
 # What a row is solved with, and what is said of all

@@ -3,7 +3,7 @@
 import math
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, overload
 
 import numpy as np
@@ -90,18 +90,17 @@ class Row:
         Raises:
             ValueError: for data that no row becomes.
         """
-        if not isinstance(data, Mapping):
-            raise ValueError(f"found {short(data)}; accepted: a table")
-        if missing := [f.name for f in _FIELDS if f.default is f.default_factory is MISSING and f.name not in data]:
-            raise ValueError(f"it lacks {', '.join(missing)}")
-        made = {f.name: _read(f.name, data[f.name], f.type) for f in _FIELDS if f.name in data}
-        if made["status"] not in STATUSES:
-            raise ValueError(f"status: found {short(made['status'])}; accepted: {' '.join(STATUSES)}")
-        return Row(**made)
+        try:
+            made = {f.name: _read(f.name, f.type, data[f.name]) for f in _FIELDS if f.name in data}
+            row = Row(**made)
+        except (AttributeError, OverflowError, TypeError) as error:
+            raise ValueError(f"{error}") from error
+        if row.status not in STATUSES:
+            raise ValueError(f"status: found {short(row.status)}; accepted: {' '.join(STATUSES)}")
+        return row
 
 
 _FIELDS = fields(Row)
-_WHOLE = 2**1023  # a larger one is no double
 _ABSENT = {"bound": -math.inf, "gap": math.inf}
 
 
@@ -117,29 +116,12 @@ def _text(number: float, absent: float) -> str | None:
     return None if number == absent or (math.isnan(number) and math.isnan(absent)) else str(number)
 
 
-def _read(name: str, value: Any, kind: Any) -> Any:
-    """The value of a field.
-
-    Raises:
-        ValueError: for one of another kind.
-    """
+def _read(name: str, kind: Any, value: Any) -> Any:
     if kind is float:
-        return _number(name, value, _ABSENT.get(name, math.nan))
+        return _ABSENT.get(name, math.nan) if value is None else float(value)
     if kind in (int, str, bool):
-        if type(value) is not kind:
-            raise ValueError(f"{name}: found {short(value)}; accepted: {kind.__name__}")
-        return value
-    if not isinstance(value, Mapping):
-        raise ValueError(f"{name}: found {short(value)}; accepted: names with numbers")
-    return Table({n: _number(f"{name}.{n}", v, math.nan) for n, v in value.items()})
-
-
-def _number(name: str, value: Any, absent: float) -> float:
-    if value is None:
-        return absent
-    if value in ("nan", "inf", "-inf") or type(value) is float or (type(value) is int and abs(value) <= _WHOLE):
-        return float(value)
-    raise ValueError(f"{name}: found {short(value)}; accepted: a number")
+        return kind(value)
+    return Table({n: math.nan if x is None else float(x) for n, x in value.items()})
 
 
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
@@ -230,7 +212,11 @@ class RowTable(Sequence[Row]):
         return self._row(int(places)) if isinstance(where, int) else tuple(map(self._row, places.tolist()))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, RowTable | tuple) and len(self) == len(other) and all(map(_same, self, other))
+        return (
+            isinstance(other, RowTable | tuple)
+            and len(self) == len(other)
+            and all(a == b for a, b in zip(self, other, strict=True))
+        )
 
     def __hash__(self) -> int:
         return hash(len(self))
@@ -334,10 +320,6 @@ class RowTable(Sequence[Row]):
 def _item(column: PartialColumn) -> Any:
     value = column.values.item()
     return math.nan if value != value else value  # noqa: PLR0124  # one nan, so that rows that are the same are equal
-
-
-def _same(one: Row, other: object) -> bool:
-    return one == other
 
 
 def _merged(parts: Sequence[Part]) -> dict[str, PartialColumn]:
