@@ -1,5 +1,6 @@
 """The rows of a study: one as plain data, many as columns of NumPy."""
 
+import json
 import math
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -77,6 +78,12 @@ class Row:
     def stable(self) -> bool | None:
         """Whether all roots lie left of the axis, ideal and as stored; None where there are none."""
         return None if not math.isfinite(self.abscissa) else self.abscissa < 0 and not self.abscissa_realised >= 0
+
+    @property
+    def identity(self) -> str:
+        """Everything but `seconds` and `host`, as text."""
+        kept = {name: value for name, value in self.to_json().items() if name not in ("seconds", "host")}
+        return json.dumps(kept, sort_keys=True)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: None is nan, or no bound; other infinities are text, ``"-inf"``."""

@@ -100,7 +100,7 @@ def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
     """Path → value of everything in plain data; texts as their words and their numbers."""
     match value:
         case dict():
-            yield f"{path}{{}}", " ".join(value)
+            yield f"{path}{{}}", " ".join(sorted(value))
             for name, inner in value.items():
                 if name not in _UNCOMPARED:
                     yield from _leaves(inner, f"{path}.{name}")
