@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "progress", "deprecated", "disk", "locks", "executor", "killable", "versions", "laws"),
+    ("errors", "records", "progress", "deprecated", "files", "executor", "killable", "versions", "laws"),
     ("arithmetic",),
     ("roots",),
     ("models",),
@@ -165,14 +165,14 @@ WRITERS = ("write_text", "write_bytes", "savefig", "to_netcdf", "to_csv", "to_pa
 
 
 def written(module: str, source: str) -> Iterator[str]:
-    """Functions that write a file but not to the place that `disk.whole` or `write_text` gives."""
+    """Functions that write a file but not to the place that `files.write_atomic` or `write_text` gives."""
     for function in nodes(source):
         if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
         safe = {
             inner
             for node in ast.walk(function)
-            if isinstance(node, ast.With) and any("whole(" in ast.unparse(item) for item in node.items)
+            if isinstance(node, ast.With) and any("write_atomic(" in ast.unparse(item) for item in node.items)
             for inner in ast.walk(node)
         }
         if any(isinstance(node, ast.Call) and node not in safe and _writes_file(node) for node in ast.walk(function)):
@@ -297,7 +297,7 @@ def test_files_are_written_whole() -> None:
     assert found == {
         "tmsopt.cli.ending.streams",  # stdout
         "tmsopt.charts.folder.write", "tmsopt.charts.folder.sync", "tmsopt.charts.folder._create",  # recorded last
-        "tmsopt.disk.whole",  # itself
+        "tmsopt.files.write_atomic",  # itself
         "tmsopt.display.page._picture", "tmsopt.display.pictures._image", "tmsopt.plots.style.rendered",  # in memory
         "tmsopt.killable.serve",  # a pipe
         "tmsopt.studies.export._csv", "tmsopt.studies.export._netcdf", "tmsopt.studies.export._parquet",  # by `export`
@@ -377,7 +377,7 @@ SMALL = dict.fromkeys(["tmsopt", *(f"tmsopt.{name}" for name in FLOOR), "tmsopt.
         ("tmsopt.plots.a", "import tmsopt.cli"),
         ("tmsopt.laws", "from tmsopt.roots import product"),
         ("tmsopt.laws", "from tmsopt.records import Table"),
-        ("tmsopt.disk", "from tmsopt.roots import product"),
+        ("tmsopt.files", "from tmsopt.roots import product"),
     ],
 )
 def test_a_breach_is_seen(module: str, source: str) -> None:
@@ -391,7 +391,7 @@ def test_a_breach_is_seen(module: str, source: str) -> None:
         ("tmsopt.paper.a", "from tmsopt import laws"),
         ("tmsopt.cli", "import tmsopt"),
         ("tmsopt.laws", "import numpy"),
-        ("tmsopt.disk", "from tmsopt.errors import InputError"),
+        ("tmsopt.files", "from tmsopt.errors import InputError"),
         ("tmsopt.solver.b", "from .solve import x"),
     ],
 )
@@ -407,7 +407,7 @@ def test_the_other_checks_see_what_they_look_for() -> None:
     assert writes("'print(1)'  # print(1)") == []
     for call in ("p.open('wb')", "open(p, mode='a')", "p.write_text(t)", "figure.savefig(p)", "np.savez(p, a=a)"):
         assert list(written("m", f"def f():\n    {call}")) == ["m.f"]
-        assert list(written("m", f"def f():\n    with whole(x) as p:\n        {call}")) == []
+        assert list(written("m", f"def f():\n    with write_atomic(x) as p:\n        {call}")) == []
     assert list(written("m", "def f():\n    p.open('rb')\n    open(p)\n    write_text(p, t)")) == []
     assert calls("eval('1')\nexec('1')\nmodel.eval()\nbuiltins.eval('1')", "eval", "exec") == [1, 2, 4]
     assert callers_of_ipopt({"a": "import casadi as ca\nca.nlpsol('s', 'ipopt', {})", "b": "x = 1"}) == ["a"]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.suites import SEED
 from benchmarks.timing import quantile
-from tmsopt.disk import write_text
+from tmsopt.files import write_text
 
 RESULTS = Path("benchmarks/results.md")
 """The file that keeps the tables."""

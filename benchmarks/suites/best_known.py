@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.judges import same
-from tmsopt.disk import write_text
+from tmsopt.files import write_text
 
 REFERENCES = Path("benchmarks/suites/references.json")
 OSCILLATORS = Path("benchmarks/suites/oscillators.json")

@@ -45,7 +45,7 @@ def test_version_as_json_says_what_is_installed(capsys: pytest.CaptureFixture[st
 
 
 def test_all_that_tmsopt_needs_or_can_use_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    extras = [PROJECT["optional-dependencies"][name] for name in ("certify", "fast", "cluster", "data")]
+    extras = [PROJECT["optional-dependencies"][name] for name in ("certify", "cluster", "data")]
     stated = {re.split("[<>=!~;\\[ ]", text)[0] for text in sum(extras, PROJECT["dependencies"])}
     assert set(json.loads(run(capsys, "--version", "--json")[1])["packages"]) == stated | {"ipopt"}
 

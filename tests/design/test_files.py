@@ -8,7 +8,7 @@ import pytest
 
 import tmsopt
 from tmsopt.design import question_of
-from tmsopt.disk import LARGEST
+from tmsopt.files import LARGEST
 
 STUDIES = set(Path("problems").glob("study_*.toml"))
 

@@ -9,7 +9,7 @@ import casadi as ca
 import pytest
 
 import tmsopt
-from tmsopt import disk, errors
+from tmsopt import errors, files
 from tmsopt.models import from_coefficients, from_matrices
 
 HEAD = "[parameters]\nchi_H = 1\nzeta_H = -0.2\nzeta_B = -0.4\nchi_B = 2\nFr = 1\nlambda_s = 0.3\n"
@@ -174,10 +174,10 @@ def test_a_file_that_names_itself(tmp_path: Path) -> None:
 
 def test_the_limit_of_a_file_is_stated(tmp_path: Path) -> None:
     path = tmp_path / "p.toml"
-    path.write_text(GOOD + "#" * (disk.LARGEST - len(GOOD)), encoding="utf-8")
+    path.write_text(GOOD + "#" * (files.LARGEST - len(GOOD)), encoding="utf-8")
     assert tmsopt.load(path).fixed
     assert refused(path, path.read_bytes() + b"#") == [
-        f"{path}: is larger than {disk.LARGEST} bytes; accepted: a TOML problem file of less"
+        f"{path}: is larger than {files.LARGEST} bytes; accepted: a TOML problem file of less"
     ]
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tmsopt.disk import headed, write_csv
 from tmsopt.errors import InputError
+from tmsopt.files import headed, write_csv
 from tmsopt.records import Table
 from tmsopt.studies import FORMATS, Row, check_export, columns, export
 

@@ -18,9 +18,9 @@ from tmsopt.charts.tally import Tally, add_tallies
 from tmsopt.deprecated import ignore_option
 from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
-from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults
 from tmsopt.executor import Crash, here, processes
+from tmsopt.files import path_of
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Shown
 from tmsopt.roots import CLASSES

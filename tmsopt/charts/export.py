@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.survey import Grid
 from tmsopt.design.problem import Problem
-from tmsopt.disk import netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
+from tmsopt.files import netcdf_errors, write_atomic
 from tmsopt.roots import CLASSES
 
 Layers = Mapping[str, NDArray[Any]]
@@ -28,7 +28,7 @@ def save_layers(problem: Problem, grid: Grid, layers: Layers, path: Path) -> Non
     if path.suffix.lower() == ".nc":
         check_netcdf()
         made = make_dataset(problem, grid, layers)
-        with whole(path) as place, netcdf_errors():
+        with write_atomic(path) as place, netcdf_errors():
             made.to_netcdf(place)
         return
     axes = _axes(grid, layers)
@@ -37,7 +37,7 @@ def save_layers(problem: Problem, grid: Grid, layers: Layers, path: Path) -> Non
     if problem.model.statement is not None:
         about["statement"] = dict(problem.model.statement)
     arrays: dict[str, Any] = {**dict(zip(axes, grid.values, strict=True)), **layers}
-    with whole(path) as place, place.open("wb") as stream:
+    with write_atomic(path) as place, place.open("wb") as stream:
         np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
 
 

@@ -30,8 +30,8 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid
 from tmsopt.charts.tally import Tally
 from tmsopt.design.problem import Problem
-from tmsopt.disk import aside, differences, from_json, read_lines, read_text, write_text
 from tmsopt.errors import Fault, InputError
+from tmsopt.files import differences, from_json, move_aside, read_lines, read_text, write_text
 from tmsopt.models import MODELS
 
 SCHEMA = 1
@@ -110,7 +110,7 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
     """
     if fresh and os.path.lexists(path):
         with _locked(path):
-            aside(path)
+            move_aside(path)
     try:
         if not path.exists():
             _check_room(path, about, grid)

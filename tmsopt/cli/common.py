@@ -132,7 +132,7 @@ def write_report(result: Any, path: Path | None, *files: Path, **more: Any) -> N
     if path is None:
         return
     import tmsopt
-    from tmsopt.disk import read_text
+    from tmsopt.files import read_text
 
     words = click.get_current_context().meta.get(TYPED, ())
     texts = {file.name: read_text(str(file), "TOML problem file") for file in files}

@@ -24,7 +24,7 @@ from tmsopt.cli.common import (
 )
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, answering
 from tmsopt.cli.terminal import doing, quiet, shown
-from tmsopt.disk import read_text
+from tmsopt.files import read_text
 from tmsopt.progress import Progress
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from tmsopt.design.advice.lines import line_advice
-from tmsopt.disk import path_of, read_text
 from tmsopt.errors import LISTED, Fault, InputError, short
+from tmsopt.files import path_of, read_text
 
 MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
 """Parts of a dotted key; lists and tables one in another; characters of a number, or of a name without quotes."""

@@ -8,13 +8,13 @@ from importlib.resources import files as resources
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.disk import path_of, write_text
 from tmsopt.display import document_parts as parts
 from tmsopt.display.document_designs import explored
 from tmsopt.display.markup import Chapter, facts, verbatim, words
 from tmsopt.display.page import badges
 from tmsopt.display.writers import WRITERS, report, title_of
 from tmsopt.errors import Fault, InputError, short
+from tmsopt.files import path_of, write_text
 from tmsopt.progress import Counts, Listener, counted
 from tmsopt.versions import installed
 

@@ -8,10 +8,10 @@ from typing import Any, Unpack
 
 from tmsopt.design import Given, Problem, Solution, problem_of
 from tmsopt.design.toml import read_page
-from tmsopt.disk import path_of, write_text
 from tmsopt.errors import Fault, InputError
 from tmsopt.explorer.known import known_designs
 from tmsopt.explorer.page import html_of
+from tmsopt.files import path_of, write_text
 from tmsopt.formulation.options import Asked
 from tmsopt.progress import Listener, counted
 from tmsopt.solver import solve

@@ -10,7 +10,7 @@ import numpy as np
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import units_of
-from tmsopt.disk import write_csv
+from tmsopt.files import write_csv
 from tmsopt.records import Tabular, plain
 
 

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 
-from tmsopt.disk import path_of, read_text, write_text
 from tmsopt.errors import Fault, InputError, at_first, short, suggest, visible
+from tmsopt.files import path_of, read_text, write_text
 from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.records import Table
 

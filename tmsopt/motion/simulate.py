@@ -11,8 +11,8 @@ import numpy as np
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.disk import write_csv
 from tmsopt.errors import Fault, InputError
+from tmsopt.files import write_csv
 from tmsopt.margins.surroundings import parameter_faults
 from tmsopt.models.told import told
 from tmsopt.motion.asked import Disturbance, asked_for

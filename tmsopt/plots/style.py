@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tmsopt.disk import path_of, whole
+from tmsopt.files import path_of, write_atomic
 
 STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
 """Fills of stability and heavy damping, lines, marked points, the weave boundary (Okabe–Ito)."""
@@ -81,7 +81,7 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
     assert figure is not None, "Axes without a figure"
     ending = path.suffix.lstrip(".").lower()
-    with whole(path) as temporary:
+    with write_atomic(path) as temporary:
         temporary.write_bytes(rendered(figure, ending))
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.disk import cell, headed, netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
+from tmsopt.files import cell, headed, netcdf_errors, write_atomic
 from tmsopt.progress import Listener, Steps, counted
 from tmsopt.records import Array
 from tmsopt.studies.rows import PREFIXES, Names, PartialColumn, Row, columns
@@ -60,7 +60,7 @@ def export(
     path = Path(path)
     check_export(path)
     try:
-        with whole(path) as temporary:
+        with write_atomic(path) as temporary:
             steps = counted(progress, f"writing {path.name}", "row")
             FORMATS[_ending(path)].write(columns(rows, names), temporary, json.dumps(metadata or {}), steps)
     except OSError as error:

@@ -16,8 +16,8 @@ from tmsopt.design.files import posed, question_of
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, within
-from tmsopt.disk import read_lines
 from tmsopt.errors import LISTED, Fault, InputError, count_faults, is_number, short, suggest, visible
+from tmsopt.files import read_lines
 from tmsopt.formulation.options import STARTS
 from tmsopt.records import Column
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling

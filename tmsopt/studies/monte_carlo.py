@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.verdict.status import NotSolved
-from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
+from tmsopt.files import path_of
 from tmsopt.formulation.options import STARTS
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Column, Table

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.disk import from_json
+from tmsopt.files import from_json
 from tmsopt.studies.rows import Part, PartialColumn, Row, columns, full
 
 _LONGEST = 1_000_000  # characters of a row, or of the head of a block

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.unit_system import units_of
-from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
 from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, processes, silent
+from tmsopt.files import path_of
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, frame
 from tmsopt.studies.export import export, gridded

@@ -21,9 +21,9 @@ import numpy as np
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-from tmsopt import disk
-from tmsopt.disk import differences, from_json
+from tmsopt import files
 from tmsopt.errors import Fault, InputError
+from tmsopt.files import differences, from_json
 from tmsopt.studies.old_stores import about_of, columns_of, parts_of
 from tmsopt.studies.rows import FIELDS, PREFIXES, STATUSES, Part, PartialColumn, Row, columns, full
 from tmsopt.studies.study import Study, definition
@@ -132,7 +132,7 @@ class Store:
         """Keep rows; when it returns they are safe from ``kill -9``. A row that is there stays as it is.
 
         Raises:
-            InputError: on a full disk.
+            InputError: on a full files.
         """
         self.add_part(columns(rows))
 
@@ -343,14 +343,14 @@ def _opened(path: Path, study: Study, fresh: bool, schema: int, lock: FileLock) 
             "definition": json.dumps(plain), "seed": json.dumps(plain.get("seed")), "created": _now(),
             "host": platform.node(), "platform": platform.platform(), "versions": json.dumps(today),
         }  # fmt: skip
-        if len(about["definition"]) > disk.LARGEST_JSON:
-            message = f"takes more than {disk.LARGEST_JSON} characters to define; give the values in a CSV file"
+        if len(about["definition"]) > files.LARGEST_JSON:
+            message = f"takes more than {files.LARGEST_JSON} characters to define; give the values in a CSV file"
             raise InputError([Fault(message, ("study",))])
-        with disk.whole(path, locked=True) as place, closing(_connect(place, "rwc")) as connection:
+        with files.write_atomic(path, locked=True) as place, closing(_connect(place, "rwc")) as connection:
             _create(connection, about, {name: values.tobytes() for name, values in kept.items()})
     check_same(path, study)  # what is refused is not changed
     if 0 < schema < SCHEMA:
-        with disk.whole(path, locked=True) as place, closing(_connect(path, "rw")) as old:
+        with files.write_atomic(path, locked=True) as place, closing(_connect(path, "rw")) as old:
             old.execute("PRAGMA journal_mode=DELETE")
             with closing(_connect(place, "rwc")) as new:
                 _copy(old, new)
@@ -434,7 +434,7 @@ def _move_aside(path: Path) -> Path:
     if path.exists():
         with suppress(sqlite3.Error), closing(_connect(path, "rw")) as connection:  # a damaged one is moved as it is
             connection.execute("PRAGMA journal_mode=DELETE")
-    return disk.aside(path, _COMPANIONS)
+    return files.move_aside(path, _COMPANIONS)
 
 
 def _holder(path: Path) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.unit_system import units_of
-from tmsopt.disk import write_csv
+from tmsopt.files import write_csv
 from tmsopt.records import Array, Table, Tabular, plain
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import check_output, file_argument, output_option, refusal, saving, write_json
-from tmsopt.disk import write_text
+from tmsopt.files import write_text
 
 _OF_NEW = """
 \b

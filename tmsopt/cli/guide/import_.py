@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import file_argument, output_option, write_file
-from tmsopt.disk import write_text
+from tmsopt.files import write_text
 
 _EXAMPLES = """
 \b

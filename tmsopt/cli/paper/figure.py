@@ -83,13 +83,13 @@ def _files(names: list[str], every: bool, output: Path | None, ending: str | Non
 
 
 def _draw(wanted: "list[Item]", files: list[Path]) -> None:
-    from tmsopt.disk import whole
+    from tmsopt.files import write_atomic
     from tmsopt.plots.paper import pictures
 
     steps = counted(shown(), "drawing", "figure")
     with closing(pictures(wanted, [path.suffix[1:].lower() for path in files])) as drawn:
         for done, (k, picture) in enumerate(drawn, start=1):
-            with saving("--output", files[k]), whole(files[k]) as temporary:
+            with saving("--output", files[k]), write_atomic(files[k]) as temporary:
                 temporary.write_bytes(picture)
             if steps:
                 steps(done, len(wanted), wanted[k].name)

@@ -7,7 +7,7 @@ import click
 import tmsopt
 from tmsopt.cli.common import answer, json_option, output_option, write_file
 from tmsopt.cli.terminal import shown
-from tmsopt.disk import write_text
+from tmsopt.files import write_text
 
 _EXAMPLES = """
 \b

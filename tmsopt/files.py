@@ -33,56 +33,41 @@ _NEIGHBOURS = 1000  # files of a folder that are looked at for one that was mean
 
 
 @contextmanager
-def whole(path: Path, *, locked: bool = False) -> Iterator[Path]:
-    """The name of a temporary file or folder beside `path`, which takes its place if all went well; a link stays one.
+def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
+    """A free name for a file or folder, which takes the place of `path` if all went well; a link stays one.
 
     A device or a pipe is given what is finished.
 
     Args:
-        locked: nobody else writes here (see `lock`): the name is always the same, free, and what a killed process left
-            under it is gone.
+        locked: nobody else writes here: the name is always the same, and what a killed process left there goes.
 
     Raises:
         OSError: with the name of `path`, when it cannot be written.
     """
     try:
-        target = resolved(path)
-        special = target.exists() and not (target.is_file() or target.is_dir())
-        if locked:
-            temporary = target.with_name(f".{target.name}.unfinished")
-            _remove(temporary)
-        else:
-            folder = None if special else target.parent
-            handle, name = tempfile.mkstemp(dir=folder, prefix=".tmsopt-", suffix=target.suffix)
-            os.close(handle)
-            temporary = Path(name)
         try:
+            target = path.resolve()
+        except RuntimeError as error:  # links in a circle
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from error
+        special = target.exists() and not (target.is_file() or target.is_dir())
+        folder = target.with_name(f".{target.name}.unfinished")
+        if locked:
+            _remove(folder)
+            folder.mkdir()
+        else:
+            folder = Path(tempfile.mkdtemp(dir=None if special else target.parent, prefix=".tmsopt-"))
+        try:
+            temporary = folder / target.name
             yield temporary
             if special:
                 with temporary.open("rb") as source, target.open("wb") as sink:
                     shutil.copyfileobj(source, sink)
-                return
-            if not locked:  # a temporary file is for its owner alone
-                umask = os.umask(0)
-                os.umask(umask)
-                os.chmod(temporary, 0o666 & ~umask)
-            os.replace(temporary, target)
+            else:
+                os.replace(temporary, target)
         finally:
-            _remove(temporary)
+            _remove(folder)
     except OSError as error:  # some know no file, or only the temporary one
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
-
-
-def resolved(path: Path) -> Path:
-    """Where a path leads, all links followed.
-
-    Raises:
-        OSError: for links in a circle.
-    """
-    try:
-        return path.resolve()
-    except RuntimeError as error:
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path)) from error
 
 
 @contextmanager
@@ -101,7 +86,7 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def aside(path: Path, companions: tuple[str, ...] = ()) -> Path:
+def move_aside(path: Path, companions: tuple[str, ...] = ()) -> Path:
     """Move a file or folder to ``name.1.ending``, or the first number that is free; its new place.
 
     Args:
@@ -274,7 +259,10 @@ def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]], unit
     Raises:
         OSError: when the file cannot be written.
     """
-    with whole(path_of(path, "the file to write")) as place, place.open("w", newline="", encoding="utf-8") as stream:
+    with (
+        write_atomic(path_of(path, "the file to write")) as place,
+        place.open("w", newline="", encoding="utf-8") as stream,
+    ):
         names = list(rows[0]) if rows else []
         writer = csv.writer(stream)
         writer.writerow(cell(headed(n, units.get(n, ""))) for n in names)
@@ -293,7 +281,7 @@ def write_text(path: str | PathLike[str], text: str, *, new: bool = False) -> No
     path = path_of(path, "the file to write")
     if new and os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
-    with whole(path) as place:
+    with write_atomic(path) as place:
         place.write_bytes(text.encode())
 
 

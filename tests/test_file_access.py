@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 import tmsopt
-from tmsopt.disk import from_json, whole, write_csv, write_text
 from tmsopt.errors import InputError
+from tmsopt.files import from_json, write_atomic, write_csv, write_text
 from tmsopt.plots import chart_figure, save
 from tmsopt.records import Table
 from tmsopt.studies import FORMATS, Row, export
@@ -134,7 +134,7 @@ def test_what_a_folder_is_made_under_is_no_link(tmp_path: Path) -> None:
     kept = tmp_path / "kept"
     kept.mkdir()
     (tmp_path / ".a.chart.unfinished").symlink_to(kept)
-    with whole(tmp_path / "a.chart", locked=True) as place:
+    with write_atomic(tmp_path / "a.chart", locked=True) as place:
         place.mkdir(parents=True)
         (place / "file").touch()
     assert list(kept.iterdir()) == []
