@@ -14,24 +14,23 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "progress", "deprecated", "files", "executor", "killable", "versions", "laws"),
-    ("arithmetic",),
+    ("errors", "records", "progress", "files", "deprecated", "executor", "killable", "versions", "laws"),
+    ("algebra",),
     ("roots",),
     ("models",),
-    ("units",),
-    ("design",),
-    ("formulation",),
-    ("tracing", "margins"),
-    ("checks", "charts", "completeness"),
-    ("branch_and_bound",),
-    ("solver",),
-    ("certificates", "proofs", "explanation", "diagnosis", "fronts", "critical_speeds", "studies", "paper"),
-    ("motion",),
+    ("problem",),
+    ("program",),
+    ("tracing", "boundaries"),
+    ("evaluation", "charts"),
+    ("global_search",),
+    ("search",),
+    ("proofs", "analysis", "fronts", "studies", "paper"),
+    ("dynamics",),
     ("report", "plots", "guide"),
     ("explorer",),
     ("display",),
     ("cli",),
-)  # fmt: skip
+)
 """From the ground up. A package may import what lies below it, and its own rooms; nobody on its own floor."""
 
 ASKED_ABOVE = {("tmsopt.records", "tmsopt.display")}
@@ -103,7 +102,7 @@ def breaches(modules: Mapping[str, str]) -> list[str]:
             elif {own, other} <= set(GROUND):
                 allowed = "laws" not in (own, other)
             elif other == "laws":  # what is checked shares nothing with the oracle; what checks may ask it
-                allowed = FLOOR[own] >= FLOOR["checks"]
+                allowed = FLOOR[own] >= FLOOR["evaluation"]
             else:
                 allowed = FLOOR[other] < FLOOR[own]
             if not allowed:
@@ -216,7 +215,7 @@ def test_a_package_has_a_face(package: str) -> None:
 
 def test_what_is_asked_above_is_asked_when_it_is_needed() -> None:
     """By name and inside a function, so that a result carries nobody who shows it."""
-    script = "import sys, tmsopt.design.solution, tmsopt.tracing.branch; print(*sys.modules)"
+    script = "import sys, tmsopt.problem.solution, tmsopt.tracing.branch; print(*sys.modules)"
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, check=True)
     assert not {"tmsopt.display", "tmsopt.report", "tmsopt.plots", "matplotlib"} & set(ended.stdout.split())
 
@@ -284,7 +283,7 @@ def test_nothing_prints_below_the_command_line() -> None:
 
 
 def test_ipopt_has_one_caller() -> None:
-    assert callers_of_ipopt(SOURCES) == ["tmsopt.formulation.ipopt"]
+    assert callers_of_ipopt(SOURCES) == ["tmsopt.program.ipopt"]
 
 
 def test_no_text_is_run_as_python() -> None:
@@ -306,8 +305,8 @@ def test_files_are_written_whole() -> None:
 
 def test_pint_is_named_in_one_module_and_inside_a_function() -> None:
     """Imported only when an unusual unit is written; that it is not before is tested in a fresh process in test_units."""
-    assert [m for m in SOURCES if "pint" in set(imports(m, SOURCES))] == ["tmsopt.units.text"]
-    top = ast.parse(SOURCES["tmsopt.units.text"]).body
+    assert [m for m in SOURCES if "pint" in set(imports(m, SOURCES))] == ["tmsopt.problem.units.text"]
+    top = ast.parse(SOURCES["tmsopt.problem.units.text"]).body
     assert not any("pint" in ast.unparse(n) for n in top if isinstance(n, ast.Import | ast.ImportFrom))
 
 
@@ -343,8 +342,8 @@ def test_everyday_commands_load_what_they_need_alone(command: str) -> None:
     loaded = f"import sys\ntry:\n    {script}\nfinally:\n    print(*sys.modules, file=sys.stderr)"
     ended = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, cwd=ROOT, check=False)
     modules = set(ended.stderr.split())
-    assert {"casadi", "tmsopt.solver.solve"} <= modules
-    assert not {"pint", "scipy", "matplotlib", "pandas", "tmsopt.branch_and_bound.stability"} & modules
+    assert {"casadi", "tmsopt.search.solve"} <= modules
+    assert not {"pint", "scipy", "matplotlib", "pandas", "tmsopt.global_search.stability"} & modules
 
 
 @pytest.mark.parametrize(
@@ -358,21 +357,21 @@ def test_the_public_list_is_reachable(name: str) -> None:
 # The checks themselves, on packages that break each rule
 
 
-SMALL = dict.fromkeys(["tmsopt", *(f"tmsopt.{name}" for name in FLOOR), "tmsopt.solver.solve", "tmsopt.plots.b"], "")
+SMALL = dict.fromkeys(["tmsopt", *(f"tmsopt.{name}" for name in FLOOR), "tmsopt.search.solve", "tmsopt.plots.b"], "")
 
 
 @pytest.mark.parametrize(
     ("module", "source"),
     [
         ("tmsopt.roots.a", "from tmsopt.models import tms"),
-        ("tmsopt.roots.a", "def f():\n    import tmsopt.solver.solve"),
-        ("tmsopt.models.a", "from tmsopt import design"),
-        ("tmsopt.models.a", "from ..solver import solve"),
-        ("tmsopt.design.a", "from tmsopt import laws"),
-        ("tmsopt.solver.a", "from tmsopt.proofs import prove"),
-        ("tmsopt.proofs.a", "from tmsopt.certificates import certify"),
-        ("tmsopt.design.a", "from importlib import import_module\nimport_module('tmsopt.charts')"),
-        ("tmsopt.design.a", "from tmsopt import solve"),
+        ("tmsopt.roots.a", "def f():\n    import tmsopt.search.solve"),
+        ("tmsopt.models.a", "from tmsopt import problem"),
+        ("tmsopt.models.a", "from ..search import solve"),
+        ("tmsopt.problem.a", "from tmsopt import laws"),
+        ("tmsopt.search.a", "from tmsopt.proofs import prove"),
+        ("tmsopt.proofs.a", "from tmsopt.analysis import explain"),
+        ("tmsopt.problem.a", "from importlib import import_module\nimport_module('tmsopt.charts')"),
+        ("tmsopt.problem.a", "from tmsopt import solve"),
         ("tmsopt.studies.a", "from tmsopt.plots import b"),
         ("tmsopt.plots.a", "import tmsopt.cli"),
         ("tmsopt.laws", "from tmsopt.roots import product"),
@@ -392,7 +391,7 @@ def test_a_breach_is_seen(module: str, source: str) -> None:
         ("tmsopt.cli", "import tmsopt"),
         ("tmsopt.laws", "import numpy"),
         ("tmsopt.files", "from tmsopt.errors import InputError"),
-        ("tmsopt.solver.b", "from .solve import x"),
+        ("tmsopt.search.b", "from .solve import x"),
     ],
 )
 def test_what_the_floors_allow_is_no_breach(module: str, source: str) -> None:

@@ -257,11 +257,11 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("line", "constants"),
     [
-        ("problem, study and bicycle files", "files.LARGEST design.toml.MOST_DEEP design.toml.MOST_PARTS"),
+        ("problem, study and bicycle files", "files.LARGEST problem.toml.MOST_DEEP problem.toml.MOST_PARTS"),
         ("faults that are listed", "errors.LISTED"),
         ("expressions", "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE"),
         ("quantities of a model", "models.stated.texts.MOST_QUANTITIES"),
-        ("numbers of parameters", "models.exact.MOST_DIGITS units.text.LONGEST"),
+        ("numbers of parameters", "models.exact.MOST_DIGITS problem.units.text.LONGEST"),
         ("CSV files of rows", "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS"),
         ("a store that is received", "files.LARGEST_JSON studies.store.LARGEST"),
         ("a chart", "charts.survey.MOST charts.survey.MOST_TILES"),

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import tmsopt
-from tmsopt.progress import Steps, counted
+from tmsopt.progress import Steps, start_steps
 from tmsopt.studies import planned
 
 PLANE = tmsopt.load("problems/chart.toml")
@@ -125,7 +125,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 def test_time_left_is_that_of_the_rate_since_the_first_count(clock: Clock) -> None:
     """40 rows of 100 were there; 20 more took 4 s, so the other 40 take 8."""
     told: list[tmsopt.Progress] = []
-    steps = counted(told.append, "solving rows", "row")
+    steps = start_steps(told.append, "solving rows", "row")
     assert steps is not None
     steps(40, 100)
     clock.now += 4.0
@@ -154,7 +154,7 @@ def test_time_left_is_told_once_the_rate_is_one(
     clock: Clock, steps: int, most: int, seconds: float, left: float | None
 ) -> None:
     told: list[tmsopt.Progress] = []
-    counts = counted(told.append, "solving rows", "row")
+    counts = start_steps(told.append, "solving rows", "row")
     assert counts is not None
     counts(0, most)
     clock.now += seconds
@@ -164,7 +164,7 @@ def test_time_left_is_told_once_the_rate_is_one(
 
 def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock: Clock) -> None:
     told: list[tmsopt.Progress] = []
-    steps = counted(told.append, "bounding the optimum", "s")
+    steps = start_steps(told.append, "bounding the optimum", "s")
     assert steps is not None
     steps(2.0, 60.0)
     assert told[-1].left == 58.0
@@ -173,7 +173,7 @@ def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock: Clock) ->
 def test_nobody_is_told_oftener_than_he_can_read(clock: Clock) -> None:
     """A million rows in a second, and a callback every 50 ms; the first and the last are told whenever they are."""
     told: list[tmsopt.Progress] = []
-    steps = counted(told.append, "solving rows", "row")
+    steps = start_steps(told.append, "solving rows", "row")
     assert steps is not None
     for done in range(1, 1001):
         clock.now += 1e-3
@@ -201,7 +201,7 @@ def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock: Clock) -> None
         called.append(told.done)
         clock.now += 0.1
 
-    steps = counted(listen, "solving rows", "row")
+    steps = start_steps(listen, "solving rows", "row")
     assert steps is not None
     for done in range(1, 101):
         clock.now += 0.1

@@ -237,9 +237,9 @@ def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
 
 
 def test_names_are_functions_whatever_was_imported_before() -> None:
-    """`tmsopt.solver.solve` is a room and a function; the public name is the function, in any order of imports."""
+    """`tmsopt.search.solve` is a room and a function; the public name is the function, in any order of imports."""
     script = (
-        "import tmsopt.solver.solve, tmsopt.charts.chart; import tmsopt; assert callable(tmsopt.solve); tmsopt.chart"
+        "import tmsopt.search.solve, tmsopt.charts.chart; import tmsopt; assert callable(tmsopt.solve); tmsopt.chart"
     )
     subprocess.run([sys.executable, "-c", script], check=True, cwd=PROBLEMS.parent)
 

@@ -1,28 +1,28 @@
 from . import laws as laws, models as models, plots as plots, report as report, roots as roots
-from .certificates import certify as certify
+from .proofs import certify as certify
 from .charts import Chart as Chart, chart as chart, open_chart as open_chart
-from .critical_speeds import Growth as Growth, Speeds as Speeds, growth as growth, speeds as speeds
+from .dynamics import Growth as Growth, Speeds as Speeds, growth as growth, speeds as speeds
 from .explorer import Explorer as Explorer, explore as explore
-from .design import (
+from .problem import (
     Band as Band, Bound as Bound, Case as Case, NotSolved as NotSolved, Problem as Problem, Solution as Solution,
     Starts as Starts, load as load,
 )
-from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose
+from .analysis import Diagnosis as Diagnosis, diagnose as diagnose
 from .display import save_report as save_report
 from .errors import Fault as Fault, InputError as InputError
-from .explanation import (
+from .analysis import (
     Explanation as Explanation, Optimality as Optimality, explain as explain, optimality as optimality,
 )
-from .formulation import Options as Options
+from .program import Options as Options
 from .fronts import Front as Front, pareto as pareto
 from .guide import Description as Description, convert as convert, describe as describe, schema as schema
-from .margins import Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness
+from .boundaries import Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness
 from .models import Bicycle as Bicycle, read_bicycle as read_bicycle, write_bicycle as write_bicycle
-from .motion import Simulation as Simulation, simulate as simulate
+from .dynamics import Simulation as Simulation, simulate as simulate
 from .paper import Comparison as Comparison, Ledger as Ledger, compare as compare, verify as verify
 from .progress import Progress as Progress
 from .proofs import Proof as Proof, prove as prove
-from .solver import Every as Every, solve as solve, solve_all as solve_all
+from .search import Every as Every, solve as solve, solve_all as solve_all
 from .studies import (
     Results as Results, Row as Row, Sampling as Sampling, Span as Span, Study as Study,
     latin_hypercube as latin_hypercube, load_study as load_study, monte_carlo as monte_carlo, over_grid as over_grid,

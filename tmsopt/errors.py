@@ -189,7 +189,7 @@ def _text(value: Any, room: int) -> str:
     return repr(value)
 
 
-def needed(module: str, otherwise: str = "") -> Any:
+def import_optional(module: str, otherwise: str = "") -> Any:
     """A module that the extra ``data`` brings.
 
     Args:

@@ -105,7 +105,7 @@ def begin(steps: Steps | None, what: str, unit: str = "") -> None:
         steps.begin(what, unit)
 
 
-def heard(told: Listener | None) -> Steps | None:
+def steps_for(told: Listener | None) -> Steps | None:
     """The counts of a verb, for whoever listens to it.
 
     Raises:
@@ -116,8 +116,8 @@ def heard(told: Listener | None) -> Steps | None:
     return None if told is None else Steps(told)
 
 
-def counted(told: Listener | None, what: str, unit: str = "") -> Steps | None:
+def start_steps(told: Listener | None, what: str, unit: str = "") -> Steps | None:
     """The same for one piece of work, which begins."""
-    steps = heard(told)
+    steps = steps_for(told)
     begin(steps, what, unit)
     return steps

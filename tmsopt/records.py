@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.errors import needed
+from tmsopt.errors import import_optional
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ Complex = NDArray[np.complex128]
 Truth = NDArray[np.bool_]
 
 
-class Shown(Protocol):
+class Printable(Protocol):
     """What every result shows of itself. Who writes it stands floors above, and is found when first asked."""
 
     def report(self, full: bool = False) -> str:
@@ -48,7 +48,7 @@ class Shown(Protocol):
         return str(_display().page(self))
 
 
-class Tabular(Shown, Protocol):
+class Tabular(Printable, Protocol):
     """A result that is a table as well."""
 
     def records(self) -> Iterable[Mapping[str, Any]]:
@@ -75,7 +75,7 @@ def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
     Raises:
         InputError: where pandas is not installed.
     """
-    made: DataFrame = needed("pandas").DataFrame(rows if isinstance(rows, Mapping) else list(rows))
+    made: DataFrame = import_optional("pandas").DataFrame(rows if isinstance(rows, Mapping) else list(rows))
     return made
 
 

@@ -1,6 +1,6 @@
 """An independent judge of designs: numeric eigenvalues on dense grids of scenarios and tolerances.
 
-It shares the model with `tmsopt.design` and nothing else: expressions are Python's own, roots are those of companion
+It shares the model with `tmsopt.problem` and nothing else: expressions are Python's own, roots are those of companion
 matrices, the worst case is the worst of a grid. Beside a multiple root eigenvalues scatter, by 4e-4 at a 4-fold one;
 what rounding of the coefficients does to them is measured, and granted to whoever claims a value.
 """
@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.judges.eigenvalues import worst_roots
 from benchmarks.judges.text import NOWHERE, evaluated, excess, sides
 from tmsopt import Problem
-from tmsopt.design import Band
 from tmsopt.models import Values
+from tmsopt.problem import Band
 from tmsopt.records import Array
 
 _ROUNDING = 2e-15  # relative, of a coefficient: a dozen roundings of doubles

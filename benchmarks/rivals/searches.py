@@ -17,7 +17,7 @@ from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, 
 
 from benchmarks.rivals.reduced import Found, Reduced, Watch
 from tmsopt import Problem
-from tmsopt.formulation import designs
+from tmsopt.program import designs
 
 STARTS = 5
 """Designs that the local rivals start from: the first ones of `tmsopt.solve`."""

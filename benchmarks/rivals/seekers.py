@@ -20,7 +20,7 @@ from benchmarks.rivals.nonsmooth import pygranso, rightmost
 from benchmarks.rivals.reduced import Reduced, Watch
 from benchmarks.rivals.searches import LOCAL, differential, local, quiet
 from tmsopt import Problem
-from tmsopt.formulation import designs
+from tmsopt.program import designs
 from tmsopt.records import Array
 
 _MANY = 1_000_000

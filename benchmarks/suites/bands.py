@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from benchmarks.suites.random_designs import Box
 from tmsopt import Problem, models
-from tmsopt.design import Band
+from tmsopt.problem import Band
 
 SPEEDS = Band(1.2, 2.4, 7)
 """Froude numbers that each bicycle must do at; 12 to 24 km/h at a wheelbase of 0.77 m."""

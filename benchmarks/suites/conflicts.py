@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.suites.random_designs import SEED, Box, rounded
 from tmsopt import Problem
-from tmsopt.design import Band
 from tmsopt.models import tms
+from tmsopt.problem import Band
 
 _BOX: Mapping[str, Box] = {
     "Fr": (0.8, 4.0),

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tmsopt import Problem
-from tmsopt.design import parse_value
 from tmsopt.models import tms
+from tmsopt.problem import parse_value
 
 SEED = 2018
 

@@ -9,8 +9,8 @@ import numpy as np
 from benchmarks.judges import Judge
 from benchmarks.suites.random_designs import SEED, Box, drawn_box, drawn_value, rounded
 from tmsopt import Problem
-from tmsopt.design import Band
 from tmsopt.models import tms
+from tmsopt.problem import Band
 
 RANGES: Mapping[str, Box] = {
     "Fr": (0.5, 5.0),

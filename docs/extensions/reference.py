@@ -19,7 +19,7 @@ from sphinx.application import Sphinx
 
 import tmsopt
 from extensions.gallery import EXAMPLES, ROOT
-from tmsopt.records import Shown
+from tmsopt.records import Printable
 
 DOCS = ROOT / "docs"
 GENERATED = DOCS / "generated"
@@ -214,7 +214,7 @@ def _signature(
     _app: Sphinx, what: str, _name: str, found: object, _options: object, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
     """Names without the modules that they are from; results, which nobody makes, without arguments."""
-    if inspect.isclass(found) and Shown in inspect.getmro(found):
+    if inspect.isclass(found) and Printable in inspect.getmro(found):
         return "", None
     short = re.compile(r"~?\b(?:[a-z_]\w*\.)+(?=[A-Za-z_]\w*)")
     return signature and short.sub("", signature).replace("~", ""), returned and short.sub("", returned)

@@ -18,9 +18,9 @@ from helpers.oracles import abscissa_60, certified_roots, polynomial_60
 
 from tmsopt.charts import chart
 from tmsopt.cli import main
-from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.problem import Problem, load
 from tmsopt.report import chart_table
 from tmsopt.roots import CLASSES, classify, find_motion
 

@@ -15,9 +15,9 @@ from helpers.charts import EXTRA, PLANE, SPACE, charted, files
 
 from tmsopt.charts import LAYERS, chart, open_chart
 from tmsopt.cli import main
-from tmsopt.design import load
 from tmsopt.errors import InputError
 from tmsopt.plots import chart_figure
+from tmsopt.problem import load
 
 DATA = Path(__file__).parent / "data"
 

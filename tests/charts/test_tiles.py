@@ -8,9 +8,9 @@ import pytest
 from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 
 from tmsopt.charts import LAYERS, Grid, add_tallies, chart, count_tile, open_chart, survey
-from tmsopt.design import Problem, array_function, load
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
+from tmsopt.problem import Problem, array_function, load
 from tmsopt.roots import CLASSES
 
 

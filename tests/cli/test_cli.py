@@ -280,8 +280,8 @@ def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, capsys):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(import_module("tmsopt.solver.solve"), "explore", stop)
-    monkeypatch.setattr(import_module("tmsopt.solver.solve"), "_so_far", stop)
+    monkeypatch.setattr(import_module("tmsopt.search.solve"), "explore", stop)
+    monkeypatch.setattr(import_module("tmsopt.search.solve"), "_so_far", stop)
     for command in ("solve", "prove", "compare", "speeds"):
         status, out, err = run(capsys, command, "problems/ep4.toml")
         assert (status, out, err) == (130, "", "stopped; what was printed before stands\n")
@@ -303,7 +303,7 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
 
     path = tmp_path / "box.toml"
     path.write_text(UNSTABLE)
-    monkeypatch.setattr(import_module("tmsopt.branch_and_bound.stability"), "any_stable", asked)
+    monkeypatch.setattr(import_module("tmsopt.global_search.stability"), "any_stable", asked)
     monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setattr(sys, "stdout", io.StringIO())
     with pytest.raises(SystemExit) as stop:

@@ -18,8 +18,8 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from tmsopt.branch_and_bound import SCIP
 from tmsopt.cli import main
+from tmsopt.global_search import SCIP
 from tmsopt.killable import Killable
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and shells of POSIX")
@@ -125,7 +125,7 @@ def test_handlers_wait_for_ipopt(number: signal.Signals) -> None:
     heard = []
     before = signal.signal(number, lambda *_: heard.append("handler"))
     try:
-        with import_module("tmsopt.formulation.ipopt")._interruptible():
+        with import_module("tmsopt.program.ipopt")._interruptible():
             press(number)
             time.sleep(0)
             heard.append("solved")
@@ -260,14 +260,14 @@ def test_an_answer_in_hand_is_written_as_a_whole(run: Run, monkeypatch: pytest.M
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), TERM])
 def test_proofs_leave_what_is_proved(run: Run, monkeypatch: pytest.MonkeyPatch, number: int, status: int) -> None:
     """Of all designs; branch and prune is at its first box."""
-    module = import_module("tmsopt.completeness.complete")
+    module = import_module("tmsopt.global_search.complete")
     monkeypatch.setattr(module._Run, "asked", lambda *_: (press(number), time.sleep(LONG)))
     ended, out, _ = run("solve", "problems/ep4_matching.toml", "--all", "--json")
     assert (ended, json.loads(out)["completeness"]["complete"]) == (status, False)
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-@pytest.mark.parametrize("where", ["tmsopt.branch_and_bound.race Crew.race", "tmsopt.certificates.certify doubt"])
+@pytest.mark.parametrize("where", ["tmsopt.global_search.race Crew.race", "tmsopt.proofs.certify doubt"])
 def test_a_proof_that_is_stopped_leaves_the_design(
     run: Run, monkeypatch: pytest.MonkeyPatch, where: str, tmp_path: Path
 ) -> None:
@@ -312,7 +312,7 @@ def test_what_is_said_beside_a_design_may_be_stopped(run: Run, monkeypatch: pyte
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 def test_what_a_global_solver_raises_is_heard(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    race = import_module("tmsopt.branch_and_bound.race")
+    race = import_module("tmsopt.global_search.race")
     process = Killable()
     try:
         failed = process.call(math.sqrt, SimpleNamespace())

@@ -19,7 +19,7 @@ import pytest
 
 import tmsopt
 from tmsopt.cli import main
-from tmsopt.design import unit_of
+from tmsopt.problem import unit_of
 from tmsopt.roots import CLASSES
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

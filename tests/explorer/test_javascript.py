@@ -13,10 +13,10 @@ from helpers.curves import sturm
 from helpers.javascript import page_script, run
 from helpers.oracles import routh_exact
 
-from tmsopt.arithmetic import exact
-from tmsopt.design import Problem, load
+from tmsopt.algebra import exact
 from tmsopt.explorer import kernel_script, model_script
 from tmsopt.models import Values, from_coefficients, from_matrices
+from tmsopt.problem import Problem, load
 from tmsopt.roots import backward_error, classify, find_motion, quartic_classes, roots
 
 FOLDER = Path(__file__).parents[2] / "problems"

@@ -14,7 +14,7 @@ import pytest
 from helpers.browser import chromium, drawn, opened
 
 import tmsopt
-from tmsopt.design import array_function
+from tmsopt.problem import array_function
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 PAGE = Path(tmsopt.__file__).parent / "explorer" / "page"

@@ -20,14 +20,14 @@ import tmsopt
 from tmsopt import InputError, NotSolved, Problem
 from tmsopt.cli import every as main
 from tmsopt.models import from_coefficients, tms
-from tmsopt.solver import solved
+from tmsopt.search import solve_any_status
 
-cases = import_module("tmsopt.design.cases")
+cases = import_module("tmsopt.problem.cases")
 front_data = import_module("tmsopt.fronts.front")
-options = import_module("tmsopt.formulation.options")
-sample = import_module("tmsopt.solver.sample")
-solve = import_module("tmsopt.solver.solve")
-worst_case = import_module("tmsopt.checks.worst_case")
+options = import_module("tmsopt.program.options")
+sample = import_module("tmsopt.search.sample")
+solve = import_module("tmsopt.search.solve")
+worst_case = import_module("tmsopt.evaluation.worst_case")
 subproblems = import_module("tmsopt.fronts.subproblems")
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -222,11 +222,11 @@ def test_what_is_not_solved_is_reported_as_a_gap(monkeypatch):
     """Sub-problems with a limit between 1.5 and 2.5 are made to fail; the front is the whole box, 0 to 4."""
 
     def failing(asked, options, *more):
-        found = solved(asked, options, *more)
+        found = solve_any_status(asked, options, *more)
         values = (abs(float(text.split("<=")[1])) for text in asked.constraints.values())
         return replace(found, status="not_converged") if any(1.5 < v < 2.5 for v in values) else found
 
-    monkeypatch.setattr(subproblems, "solved", failing)
+    monkeypatch.setattr(subproblems, "solve_any_status", failing)
     found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "-chi_B"]), 6)
     assert [g.failed for g in found.gaps] == [True]
     assert "try more starts" in found.gaps[0].reason
@@ -291,7 +291,9 @@ def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(ha
 def test_a_half_that_is_left_out_is_not_searched(monkeypatch):
     searched, explore, asked = [], solve.explore, problem(free=TILTED, pareto=[], minimize="abscissa")
     monkeypatch.setattr(solve, "explore", lambda work, insist: searched.append(work.name) or explore(work, insist))
-    found = solved(asked, beside=[{"Fr": 2.2, "chi_B": 1.4, "lambda_s": 0.7}], blind=True, without=["reversed rake"])
+    found = solve_any_status(
+        asked, extra_starts=[{"Fr": 2.2, "chi_B": 1.4, "lambda_s": 0.7}], without_sample=True, without=["reversed rake"]
+    )
     assert searched == ["normal rake"]
     assert found.value == pytest.approx(EP4[0], abs=1e-8)
 

@@ -15,9 +15,9 @@ from tmsopt.executor import EngineError
 from tmsopt.models import tms
 
 curve = import_module("tmsopt.fronts.curve")
-options = import_module("tmsopt.formulation.options")
+options = import_module("tmsopt.program.options")
 pareto = import_module("tmsopt.fronts.pareto")
-sample = import_module("tmsopt.solver.sample")
+sample = import_module("tmsopt.search.sample")
 subproblems = import_module("tmsopt.fronts.subproblems")
 team = import_module("tmsopt.fronts.team")
 

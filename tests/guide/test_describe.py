@@ -10,7 +10,7 @@ import casadi as ca
 import pytest
 
 import tmsopt
-from tmsopt.design import parse_value
+from tmsopt.problem import parse_value
 
 PROBLEMS = sorted(Path("problems").glob("*.toml"))
 BUILT_IN = ("tms", "whipple")

@@ -3,8 +3,8 @@
 import math
 
 from tmsopt.charts import LAYERS, chart
-from tmsopt.design import Problem
 from tmsopt.models import tms
+from tmsopt.problem import Problem
 
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 PLANE = Problem(

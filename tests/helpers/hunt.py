@@ -1,7 +1,7 @@
 """Global searches that share nothing with the solver: differential evolution on eigenvalues, in shrinking boxes.
 
 The model is `laws.copo`, the roots are eigenvalues of companion matrices, and the numbers of a problem file are read
-here by `tomllib`. Nothing of `tmsopt.design` is used. A search is no proof, but one that agrees with a
+here by `tomllib`. Nothing of `tmsopt.problem` is used. A search is no proof, but one that agrees with a
 solver of another kind, from another start, on another formulation, leaves little room.
 """
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tmsopt.design import load
+from tmsopt.problem import load
 from tmsopt.studies import Row, Study
 
 STUDY = Study(

@@ -1,6 +1,6 @@
 """A second global solver, in a module of its own: its process imports nothing else, so that it soon starts."""
 
-from tmsopt.branch_and_bound import UNDECIDED, Decision, Task
+from tmsopt.global_search import UNDECIDED, Decision, Task
 
 
 def prepare() -> None:

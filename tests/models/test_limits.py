@@ -16,8 +16,8 @@ from tmsopt import models
 
 degree = import_module("tmsopt.models.stated.degree")
 expression = import_module("tmsopt.models.expression")
-elementary = import_module("tmsopt.arithmetic.elementary")
-text = import_module("tmsopt.units.text")
+elementary = import_module("tmsopt.algebra.elementary")
+text = import_module("tmsopt.problem.units.text")
 
 EP4 = Path("problems/ep4.toml").read_text(encoding="utf-8")
 SI = {"v": 3, "lambda_s": 0.3, "m_B": 1, "x_B": 0.5, "z_B": -1, "m_H": 0.1, "x_H": 0.9, "z_H": -0.5}

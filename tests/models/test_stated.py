@@ -16,8 +16,8 @@ from scipy.optimize import differential_evolution
 
 import tmsopt
 from tmsopt.cli import every as main
-from tmsopt.design import ROOT_NAMES
 from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
+from tmsopt.problem import ROOT_NAMES
 from tmsopt.studies import definition
 
 PENDULUMS = """

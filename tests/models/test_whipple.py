@@ -17,7 +17,7 @@ from mpmath import mp
 import tmsopt
 from tmsopt import laws
 from tmsopt.cli import every as main
-from tmsopt.critical_speeds import crossings
+from tmsopt.dynamics import crossings
 from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, tms, to_si, whipple
 from tmsopt.roots import exact_roots, quadratic_pencil
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.critical_speeds import growth
+from tmsopt.dynamics import growth
 from tmsopt.plots import draw_frequencies, draw_growth, growth_figure, save
 
 

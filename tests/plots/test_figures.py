@@ -18,7 +18,6 @@ from matplotlib.figure import Figure
 
 from tmsopt import laws
 from tmsopt.cli import every as main
-from tmsopt.design import load
 from tmsopt.models import Model, Parameter, ParameterSet, tms
 from tmsopt.paper import (
     benchmark,
@@ -49,6 +48,7 @@ from tmsopt.plots.paper import (
     find,
     full_window,
 )
+from tmsopt.problem import load
 from tmsopt.records import Table
 from tmsopt.tracing import trace
 

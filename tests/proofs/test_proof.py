@@ -19,10 +19,10 @@ from click.testing import CliRunner
 from mpmath import mp
 
 import tmsopt
-from tmsopt.arithmetic import Number, Refused, enclosed, number, refined
+from tmsopt.algebra import Number, Refused, enclosed, number, refined
 from tmsopt.cli import every as main
-from tmsopt.design import Case
 from tmsopt.models import decimal
+from tmsopt.problem import Case
 from tmsopt.proofs import Factored, Proof, prove_design
 from tmsopt.report import proof_text
 from tmsopt.roots import exact_roots, product

@@ -19,10 +19,10 @@ from helpers.oracles import polynomial_60, roots_60
 from mpmath import mp
 
 import tmsopt
-from tmsopt.arithmetic import positive_part
+from tmsopt.algebra import positive_part
 from tmsopt.models import Values, matrices, tms, to_si
+from tmsopt.problem.units import decay_time, frequencies, growth_time, reading, with_unit
 from tmsopt.roots import Root
-from tmsopt.units import decay_time, frequencies, growth_time, reading, with_unit
 
 NATIVE, SI = tms.sets
 EPS = np.finfo(float).eps

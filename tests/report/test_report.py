@@ -13,8 +13,8 @@ import pytest
 from helpers.designs import ROBOT
 
 import tmsopt
-from tmsopt.design import Relaxation, Solution
 from tmsopt.models import tms
+from tmsopt.problem import Relaxation, Solution
 from tmsopt.records import Table
 from tmsopt.report import design_report, si_parameters
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import tmsopt
-from tmsopt.design import Solution, unit_of
+from tmsopt.problem import Solution, unit_of
 from tmsopt.report import design_report
 
 NUMBER = r"-?\d[\d.]*(?:e[+-]?\d+)?"

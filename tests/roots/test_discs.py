@@ -1,11 +1,15 @@
 """Discs about numeric roots: the true roots, isolated in ball arithmetic, lie in them, beside multiple roots too."""
 
+from importlib import import_module
+
 import flint
 import numpy as np
 import pytest
 
-from tmsopt.arithmetic import Bounded
-from tmsopt.roots import enclose_motions, exact_roots
+from tmsopt.algebra import Bounded
+from tmsopt.roots import exact_roots
+
+enclose_motions = import_module("tmsopt.roots.discs").enclose_motions
 
 
 def polynomials(degree: int) -> np.ndarray:

@@ -16,11 +16,11 @@ import pytest
 from helpers.rows import assert_same
 
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
-from tmsopt.checks import LAWS, law_rows, verdicts
 from tmsopt.errors import InputError
+from tmsopt.evaluation import LAWS, law_rows, verdicts
 from tmsopt.plots import draw_histogram
 from tmsopt.report import design_report, row_lines, study_table
-from tmsopt.studies import Row, RowTable, Solver, alone, columns, open_store, read_store, summary
+from tmsopt.studies import Row, RowTable, Solver, columns, open_store, read_store, solve_row, summary
 
 judge = import_module("tmsopt.studies.solving")
 SOLVES = import_module("tmsopt.studies.monte_carlo")
@@ -91,7 +91,7 @@ def test_rows_do_not_depend_on_others() -> None:
             numbers = np.arange(first, min(first + size, 300))
             some = RowTable(study, list(judge.judged(study, numbers)))
             assert_same(some, [whole[row.number] for row in some])
-    assert_same([alone(study, 17).row], [whole[17]])
+    assert_same([solve_row(study, 17).row], [whole[17]])
 
 
 def test_what_is_searched_or_listed_is_not_judged_at_once() -> None:
@@ -198,7 +198,7 @@ def test_seeds_are_those_of_numpy() -> None:
 @pytest.mark.parametrize("study", [own(), built(12)], ids=["own", "drawn"])
 def test_what_is_judged_is_called_feasible_and_not_optimal(study: Study) -> None:
     """Also where it is not stable: it is as given, and nobody looked for a better one."""
-    results, row = run_study(study), alone(study, 9)
+    results, row = run_study(study), solve_row(study, 9)
     assert row.row.status == "optimal"
     assert row.solution is not None
     told = [

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from helpers.rows import assert_same
 
-from tmsopt.studies import alone, load_study, planned, read_store, stored
+from tmsopt.studies import load_study, planned, read_store, solve_row, stored
 
 ROWS, KILLS, SAMPLE = 20_000, 30, 25
 PAUSE = (0.3, 2.0)
@@ -88,6 +88,6 @@ def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
     assert added == ROWS
     assert {row.status for row in rows} == {"optimal"}
     numbers = rng.sample(range(ROWS), SAMPLE)
-    assert_same([alone(study, number).row for number in numbers], [rows[number] for number in numbers])
+    assert_same([solve_row(study, number).row for number in numbers], [rows[number] for number in numbers])
     time.sleep(2 * GRACE)
     assert not {pid for pid in workers if Path(f"/proc/{pid}").exists()}

@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.stats import binomtest
 
 import tmsopt
-from tmsopt.design import ExpressionError, limit_of, with_limit
+from tmsopt.problem import ExpressionError, limit_of, with_limit
 from tmsopt.records import Column, Table
 from tmsopt.studies import (
     Row,

@@ -20,9 +20,9 @@ import pytest
 from helpers.rows import STUDY, row
 
 from tmsopt import models
-from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.problem import Problem, load
 from tmsopt.records import Table
 from tmsopt.studies import Row, RowTable, Study, open_store, read_store, run_study, stored
 

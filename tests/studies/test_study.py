@@ -21,26 +21,26 @@ from helpers.rows import assert_same
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import Progress, laws
-from tmsopt.checks import law_rows
 from tmsopt.cli import every as main
-from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
+from tmsopt.evaluation import law_rows
 from tmsopt.executor import Crash
 from tmsopt.models import tms
+from tmsopt.problem import Problem, load
 from tmsopt.records import Table
 from tmsopt.report import study_table
-from tmsopt.solver import solve
+from tmsopt.search import solve
 from tmsopt.studies import (
     Row,
     Solver,
     Study,
-    alone,
     load_study,
     monte_carlo,
     open_store,
     over_grid,
     read_store,
     run_study,
+    solve_row,
     stored,
     summary,
 )  # fmt: skip
@@ -104,7 +104,7 @@ def test_every_row_obeys_the_laws_of_ep4() -> None:
 def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -> None:
     here, backwards = run_study(GRID, workers=1).rows, Solver(GRID)
     assert_same([backwards((k,))[0] for k in reversed(range(6))], here)
-    assert_same([alone(GRID, k).row for k in range(6)], here)
+    assert_same([solve_row(GRID, k).row for k in range(6)], here)
     assert_same(run_study(GRID, tmp_path / "s.sqlite", workers=2).rows, here)
 
 
@@ -265,7 +265,7 @@ def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 24).tolist()}, warm=True)
     here = run_study(study, workers=1).rows
     assert_same(run_study(study, workers=2).rows, here)
-    assert_same([alone(study, k).row for k in (0, 11, 23)], [here[k] for k in (0, 11, 23)])
+    assert_same([solve_row(study, k).row for k in (0, 11, 23)], [here[k] for k in (0, 11, 23)])
 
 
 @pytest.mark.slow
@@ -389,7 +389,7 @@ def test_a_summary_by_hand() -> None:
 
 def test_a_row_tells_how_far_its_design_is_from_the_laws() -> None:
     """The residuals are those that `tmsopt compare` shows, each under a label of its own."""
-    answer = alone(GRID, 4)
+    answer = solve_row(GRID, 4)
     assert answer.solution is not None
     applying = [law for law in law_rows(answer.solution) if law.applies]
     assert sorted(answer.row.laws.values()) == sorted(law.relative for law in applying)

@@ -13,8 +13,8 @@ from helpers import curves
 from helpers.curves import certified, changes, damped, distance, equations, exact_polynomial, stable, sturm
 
 import tmsopt
-from tmsopt.design import Problem
 from tmsopt.models import Model, Parameter, ParameterSet, tms
+from tmsopt.problem import Problem
 from tmsopt.tracing import domain
 
 pytestmark = pytest.mark.slow

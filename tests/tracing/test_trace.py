@@ -18,9 +18,9 @@ from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
 from tmsopt import laws
-from tmsopt.design import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.problem import Problem
 from tmsopt.tracing import trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -192,7 +192,7 @@ def test_ep_set_points_match_coefficients_and_tangents(ep_set):
 
 
 def test_the_file_of_the_ep_set_is_the_same_curve():
-    from tmsopt.design import load
+    from tmsopt.problem import load
 
     found = trace(load("problems/ep_set.toml"))
     (branch,) = found.branches

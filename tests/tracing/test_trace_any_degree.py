@@ -12,16 +12,16 @@ import pytest
 from click.testing import CliRunner
 from flint import fmpq, fmpq_poly
 
+from tmsopt.analysis import optimality
 from tmsopt.cli import every as main
-from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
-from tmsopt.explanation import optimality
 from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.plots import trace_figure
+from tmsopt.problem import Problem, load
 from tmsopt.report import trace_table
 from tmsopt.roots import pattern, product, shift
 from tmsopt.roots.patterns import in_words
-from tmsopt.solver import solve
+from tmsopt.search import solve
 from tmsopt.tracing import domain, swallowtail, trace
 
 pytestmark = pytest.mark.slow

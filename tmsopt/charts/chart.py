@@ -16,13 +16,13 @@ from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_fold
 from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, survey
 from tmsopt.charts.tally import Tally, add_tallies
 from tmsopt.deprecated import ignore_option
-from tmsopt.design.files import Given
-from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError, call_faults, count_faults
 from tmsopt.executor import Crash, here, processes
 from tmsopt.files import path_of
-from tmsopt.progress import Listener, counted
-from tmsopt.records import Array, Shown
+from tmsopt.problem.files import Given
+from tmsopt.problem.problem import Problem
+from tmsopt.progress import Listener, start_steps
+from tmsopt.records import Array, Printable
 from tmsopt.roots import CLASSES
 from tmsopt.tracing.domain import Domain, domain
 
@@ -43,7 +43,7 @@ def _layer(name: str, meaning: str) -> Any:
 
 
 @dataclass(frozen=True, repr=False)
-class Chart(Shown):
+class Chart(Printable):
     """Classes, roots and quantities over a grid of two or three parameters.
 
     Attributes:
@@ -213,7 +213,7 @@ def chart(
     faults = [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1)]
     if faults := faults + call_faults("progress", progress):
         raise InputError(faults)
-    steps = counted(progress, "charting", "design")
+    steps = start_steps(progress, "charting", "design")
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = survey(problem, axes, points, wanted, quantities, single)
     path, grid = None if folder is None else path_of(folder, "a folder"), work.grid

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.charts.survey import Grid
-from tmsopt.design.problem import Problem
-from tmsopt.errors import Fault, InputError, needed
+from tmsopt.errors import Fault, InputError, import_optional
 from tmsopt.files import netcdf_errors, write_atomic
+from tmsopt.problem.problem import Problem
 from tmsopt.roots import CLASSES
 
 Layers = Mapping[str, NDArray[Any]]
@@ -58,7 +58,7 @@ def make_dataset(problem: Problem, grid: Grid, layers: Layers) -> Any:
     Raises:
         InputError: where xarray is not installed.
     """
-    xarray, axes, of = needed("xarray"), _axes(grid, layers), problem.parameter_set
+    xarray, axes, of = import_optional("xarray"), _axes(grid, layers), problem.parameter_set
     # Names as the climate and forecast conventions want them, blanks between words only.
     words = " ".join(n.replace(" ", "_") for n in CLASSES)
     classes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": words}

@@ -29,10 +29,10 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid
 from tmsopt.charts.tally import Tally
-from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.files import differences, from_json, move_aside, read_lines, read_text, write_text
 from tmsopt.models import MODELS
+from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 

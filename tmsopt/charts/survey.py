@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.tally import Tally, count_tile
-from tmsopt.design.advice.names import example_of
-from tmsopt.design.array_function import ArrayFunction, array_function, parse_all
-from tmsopt.design.files import Given, problem_of
-from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS, ROOT_NAMES
 from tmsopt.errors import Fault, InputError, list_faults, short, suggest, table_faults
+from tmsopt.problem.advice.names import example_of
+from tmsopt.problem.array_function import ArrayFunction, array_function, parse_all
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
 from tmsopt.records import Array
 from tmsopt.roots import classify, find_motion
 
@@ -171,7 +171,7 @@ def survey(
         InputError: unless two or three parameters are free and the axes name them; for other numbers of points,
             unknown layers, bad expressions.
     """
-    problem = problem_of(problem)
+    problem = as_problem(problem)
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
     extra = {} if quantities is None else quantities

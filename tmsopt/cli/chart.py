@@ -30,7 +30,7 @@ from tmsopt.deprecated import no_longer_needed
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
-    from tmsopt.design import Problem
+    from tmsopt.problem import Problem
 
 _EXAMPLES = """
 \b
@@ -237,7 +237,7 @@ def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: 
 def _held(problem: "Problem", cut: dict[str, str]) -> dict[str, float]:
     """The parameter that a figure holds, as a number in its box."""
     from tmsopt.errors import Fault, InputError, suggest
-    from tmsopt.units import with_unit
+    from tmsopt.problem.units import with_unit
 
     held = {}
     for name, text in cut.items():

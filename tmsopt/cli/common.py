@@ -215,14 +215,14 @@ def write_json_rows(data: dict[str, Any], key: str, rows: Sequence[Any]) -> None
         data: with an empty list there.
         rows: that have `to_json`.
     """
-    from tmsopt.progress import counted
+    from tmsopt.progress import start_steps
 
     head = f'\n  "{key}": ['
     before, _, after = _json_text(data).partition(f"{head}]")
     if not rows:
         write_json(data)
         return
-    steps = counted(None if sys.stdout.isatty() else shown(), "writing the answer", "row")
+    steps = start_steps(None if sys.stdout.isatty() else shown(), "writing the answer", "row")
     for first in range(0, len(rows), _BLOCK):
         some = [row.to_json() for row in rows[first : first + _BLOCK]]
         text = _json_text(some)[1:-2].replace("\n", "\n  ")  # without brackets, further in

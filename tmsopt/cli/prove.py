@@ -55,10 +55,10 @@ def prove(
     file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int, report: Path | None
 ) -> None:
     """Prove that the design which FILE asks for exists, and whether it is stable and heavily damped."""
-    from tmsopt.design import question_of
+    from tmsopt.problem import as_solvable
 
     given = named("--exact", exact, "zeta_B=-1/3")
-    problem = question_of(file)
+    problem = as_solvable(file)
     asked = options(starts=starts, seed=seed)
     solution = tmsopt.solve(problem, throw=False, interruptible=False, progress=shown(), **asked)
     proof = tmsopt.prove(solution, digits, exact=given, progress=shown())

@@ -170,13 +170,13 @@ def solve(
     **search: Any,
 ) -> None:
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
-    from tmsopt.design import question_of
+    from tmsopt.problem import as_solvable
 
     w, m_B = _scale("--wheelbase", wheelbase or "1", "m"), _scale("--rear-mass", rear_mass or "1", "kg")
-    problem = question_of(file, front=True)
+    problem = as_solvable(file, front=True)
     _check_options(problem, _given(context), every)
     if certify:
-        from tmsopt.certificates import check_installed
+        from tmsopt.proofs import check_installed
 
         check_installed()
     asked, seed = options(**search), search["seed"]
@@ -266,9 +266,9 @@ def _as_json(solution: "tmsopt.Solution", found: "Findings", full: bool) -> dict
 @_common
 def compare(file: Path, as_json: bool, **search: Any) -> None:
     """Set the optimum of FILE beside the closed-form laws, and one formulation beside the other."""
-    from tmsopt.design import question_of
+    from tmsopt.problem import as_solvable
 
-    problem = nominal_of(question_of(file))
+    problem = nominal_of(as_solvable(file))
     comparison = tmsopt.compare(problem, progress=shown(), **options(**search))
     answer(as_json, comparison.to_json, lambda: tmsopt.report.comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
@@ -283,7 +283,7 @@ def _given(context: click.Context) -> list[str]:
 
 def _scale(option: str, text: str, unit: str) -> float:
     """A positive length or mass of the command line."""
-    from tmsopt.units import with_unit
+    from tmsopt.problem.units import with_unit
 
     try:
         try:

@@ -203,10 +203,10 @@ def _show(results: "Results", path: Path, stopped: bool, as_json: bool) -> None:
 
 def _show_row(asked: "Study", number: int, as_json: bool) -> None:
     """One row, solved alone."""
-    from tmsopt.studies import alone
+    from tmsopt.studies import solve_row
 
     doing("solving the row")
-    solved = alone(asked, number)
+    solved = solve_row(asked, number)
     if as_json:
         solution = {} if solved.solution is None else {"solution": solved.solution.to_json()}
         write_json({"schema": 1, **solved.row.to_json(), **solution})

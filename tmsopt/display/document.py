@@ -15,11 +15,11 @@ from tmsopt.display.page import badges
 from tmsopt.display.writers import WRITERS, report, title_of
 from tmsopt.errors import Fault, InputError, short
 from tmsopt.files import path_of, write_text
-from tmsopt.progress import Counts, Listener, counted
+from tmsopt.progress import Counts, Listener, start_steps
 from tmsopt.versions import installed
 
 if TYPE_CHECKING:
-    from tmsopt.design import Solution
+    from tmsopt.problem import Solution
 
 ENDINGS = ("html", "htm")
 """Of the name of a document."""
@@ -67,7 +67,7 @@ def save_report(
     place = path_of(path, "the file to write")
     if place.suffix.lstrip(".").lower() not in ENDINGS:
         raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
-    steps = counted(progress, "writing the page", "part")
+    steps = start_steps(progress, "writing the page", "part")
     write_text(place, _document(result, command, files or {}, seed, full, design, steps))
 
 

@@ -5,14 +5,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.design import Problem, Solution, unit_at
 from tmsopt.models import in_words_of
+from tmsopt.problem import Problem, Solution, unit_at
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
     from tmsopt.fronts import Front
     from tmsopt.proofs import Proof
-    from tmsopt.solver import Every
+    from tmsopt.search import Every
     from tmsopt.studies import Results
     from tmsopt.tracing import Trace
 

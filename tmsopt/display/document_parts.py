@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from tmsopt import plots, report as texts
-from tmsopt.design import Problem, unit_of
 from tmsopt.display.document_rows import (
     chart_rows,
     limit_rows,
@@ -20,11 +19,12 @@ from tmsopt.display.pictures import picture, untitled
 from tmsopt.display.writers import drawn, report
 from tmsopt.guide import describe
 from tmsopt.models import in_words_of, tms
+from tmsopt.problem import Problem, unit_of
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
-    from tmsopt.design import Solution
     from tmsopt.fronts import Front
+    from tmsopt.problem import Solution
     from tmsopt.proofs import Proof
     from tmsopt.studies import Results
     from tmsopt.tracing import Trace
@@ -170,7 +170,7 @@ def _looks(solution: "Solution") -> Chapters:
 
 def _growth(solution: "Solution") -> Chapters:
     """Growth rates and frequencies over the speed, or the first parameter."""
-    from tmsopt.critical_speeds import growth
+    from tmsopt.dynamics import growth
 
     try:
         found = growth(untitled(solution))

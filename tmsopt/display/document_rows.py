@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from tmsopt.design import NO_RADIUS, Case, Problem, Unit, unit_of
-from tmsopt.design.unit_system import limit_text
 from tmsopt.display.markup import Rows, paragraphs
 from tmsopt.guide import describe
 from tmsopt.models import in_words_of
+from tmsopt.problem import NO_RADIUS, Case, Problem, Unit, unit_of
+from tmsopt.problem.unit_system import limit_text
 from tmsopt.roots import CLASSES
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
-    from tmsopt.design import Solution
+    from tmsopt.problem import Solution
     from tmsopt.tracing import Trace
 
 T = TypeVar("T")

@@ -4,23 +4,21 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from tmsopt.checks import abscissa_as_stored
-from tmsopt.design import Unit, amounts_text, ended, show_at, unit_of
-from tmsopt.design.verdict.stability import ROUNDED
+from tmsopt.evaluation import abscissa_as_stored
+from tmsopt.problem import Unit, amounts_text, show_at, status_text, unit_of
+from tmsopt.problem.verdict.stability import ROUNDED
 
 if TYPE_CHECKING:
+    from tmsopt.analysis import Diagnosis, Explanation, Optimality
+    from tmsopt.boundaries import Nearest, Robustness
     from tmsopt.charts import Chart
-    from tmsopt.critical_speeds import Growth, Speeds
-    from tmsopt.design import Solution
-    from tmsopt.diagnosis import Diagnosis
-    from tmsopt.explanation import Explanation, Optimality
+    from tmsopt.dynamics import Growth, Simulation, Speeds
     from tmsopt.fronts import Front
     from tmsopt.guide import Description
-    from tmsopt.margins import Nearest, Robustness
-    from tmsopt.motion import Simulation
     from tmsopt.paper import Comparison, Ledger
+    from tmsopt.problem import Solution
     from tmsopt.proofs import Proof
-    from tmsopt.solver import Every
+    from tmsopt.search import Every
     from tmsopt.studies import Results
     from tmsopt.tracing import Branch, Domain, Swallowtail, Trace
 
@@ -30,7 +28,7 @@ Words = Iterator[str]
 def of_solution(solution: "Solution") -> Words:
     """Status, objective, structure, proof, stability."""
     problem = solution.problem
-    yield ended(problem, solution.status)
+    yield status_text(problem, solution.status)
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
     yield f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}"
@@ -110,7 +108,7 @@ def of_results(results: "Results") -> Words:
     """Rows and how they ended."""
     yield _count(len(results.rows), "row")
     for status, count in results.summary.counts.items():
-        yield f"{count} {ended(results.study.problem, status)}"
+        yield f"{count} {status_text(results.study.problem, status)}"
 
 
 def of_proof(proof: "Proof") -> Words:

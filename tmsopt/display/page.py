@@ -11,9 +11,9 @@ from html import escape
 from itertools import islice
 from typing import Any
 
-from tmsopt.design import Problem, unit_of
 from tmsopt.display.writers import WRITERS, drawn, report, title_of
 from tmsopt.models import Parameter
+from tmsopt.problem import Problem, unit_of
 
 _ROWS, _COLUMNS = 12, 12  # of a table shown
 _BADGE = "border:1px solid currentColor;border-radius:.7em;padding:0 .6em;margin-right:.4em;white-space:nowrap"

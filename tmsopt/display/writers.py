@@ -125,7 +125,7 @@ def plotted(result: Any, ax: "Axes | None" = None) -> "Axes":
 
 def response(solution: Any, **asked: Any) -> Any:
     """The motion of a solution, for its method of that name."""
-    from tmsopt.motion import simulate  # and SciPy, which to show a result takes not
+    from tmsopt.dynamics import simulate  # and SciPy, which to show a result takes not
 
     return simulate(solution, **asked)
 

@@ -6,15 +6,15 @@ from html import escape
 from os import PathLike
 from typing import Any, Unpack
 
-from tmsopt.design import Given, Problem, Solution, problem_of
-from tmsopt.design.toml import read_page
 from tmsopt.errors import Fault, InputError
 from tmsopt.explorer.known import known_designs
 from tmsopt.explorer.page import html_of
 from tmsopt.files import path_of, write_text
-from tmsopt.formulation.options import Asked
-from tmsopt.progress import Listener, counted
-from tmsopt.solver import solve
+from tmsopt.problem import Given, Problem, Solution, as_problem
+from tmsopt.problem.toml import read_page
+from tmsopt.program.options import Asked
+from tmsopt.progress import Listener, start_steps
+from tmsopt.search import solve
 
 _HEIGHT = 900  # pixels of the frame in a notebook: header and the first row of pictures
 _ENDINGS = (".html", ".htm")
@@ -83,7 +83,7 @@ def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
     if isinstance(problem, Solution):
         return _explorer(problem.problem, problem, {}, told)
     typed = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
-    posed = problem_of(problem)
+    posed = as_problem(problem)
     if posed.pareto:
         posed = replace(posed, pareto=(), minimize=posed.pareto[0])
     asked = posed.sense != "evaluate" or not posed.free
@@ -113,7 +113,7 @@ def frame(html: str, title: str) -> str:
 
 
 def _explorer(problem: Problem, solution: Solution | None, model: Mapping[str, Any], told: Listener | None) -> Explorer:
-    counted(told, "looking for designs worth going to")
+    start_steps(told, "looking for designs worth going to")
     designs = known_designs(problem, solution, search=True)
-    counted(told, "writing the page")
+    start_steps(told, "writing the page")
     return Explorer(problem, solution, html_of(problem, designs, model, trace_curves=True))

@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tmsopt.design import Problem
 from tmsopt.guide import toml_key, toml_text
+from tmsopt.problem import Problem
 
 _SHARED = re.compile(r"\[(\d+)\]")
 

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from tmsopt.arithmetic import NotAccepted, Program, operation_name, program
-from tmsopt.design import array_function
-from tmsopt.design.expression import Expression
-from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS, ROOT_QUANTITIES
+from tmsopt.algebra import NotAccepted, Program, operation_name, program
 from tmsopt.models.bicycles.bicycle import contact_path
+from tmsopt.problem import array_function
+from tmsopt.problem.expression import Expression
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import RADIUS, ROOT_QUANTITIES
 
 
 class Spelling(NamedTuple):
@@ -133,7 +133,7 @@ _POWERS = {
     2.0: Spelling("{0}*{0}", 7, (8,)), 3.0: Spelling("{0}*{0}*{0}", 7, (8,)),
     4.0: Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
 }  # fmt: skip
-"""Small powers, as `tmsopt.arithmetic.arrays` has them."""
+"""Small powers, as `tmsopt.algebra.arrays` has them."""
 
 _OPERATIONS: Mapping[int, Spelling] = {
     ca.OP_ASSIGN: _POWERS[1.0], ca.OP_ADD: ADD, ca.OP_SUB: SUBTRACT, ca.OP_MUL: MULTIPLY, ca.OP_DIV: DIVIDE,

@@ -5,17 +5,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tmsopt.design import Problem, Solution, freedom
-from tmsopt.design.files import posed
-from tmsopt.design.verdict.meetings import meetings
-from tmsopt.design.verdict.stability import MultipleRoot
-from tmsopt.design.verdict.status import status_in_words, verdict_in_words
 from tmsopt.errors import InputError
 from tmsopt.guide import example
-from tmsopt.models.told import told
+from tmsopt.models.user_spectrum import user_structure
+from tmsopt.problem import Problem, Solution, degrees_of_freedom
+from tmsopt.problem.files import problem_from_tables
+from tmsopt.problem.verdict.meetings import meetings
+from tmsopt.problem.verdict.stability import MultipleRoot
+from tmsopt.problem.verdict.status import status_in_words, verdict_in_words
 from tmsopt.report.solution.limits import proof_line
 from tmsopt.roots import Structure
-from tmsopt.solver import solve
+from tmsopt.search import solve
 
 _BENCHMARKS = {"tms": "benchmark", "whipple": "whipple_benchmark"}
 """Models → the example with the published bicycle."""
@@ -95,7 +95,7 @@ def _benchmark(problem: Problem) -> Known | None:
     if problem.model.name not in _BENCHMARKS:
         return None
     try:
-        faults, found = posed(tomllib.loads(example(_BENCHMARKS[problem.model.name])), "")
+        faults, found = problem_from_tables(tomllib.loads(example(_BENCHMARKS[problem.model.name])), "")
     except InputError:  # an installation without the examples
         return None
     if faults or found is None:
@@ -117,7 +117,7 @@ def _exceptional(problem: Problem) -> Known | None:
     asked = replace(
         problem.nominal, locate=f"EP{order}", constraints={}, minimize=None, maximize=None, pareto=(), start={}
     )
-    if freedom(asked).count < 0:
+    if degrees_of_freedom(asked).count < 0:
         return None
     found = solve(asked, throw=False, starts=_STARTS, stability=0.0, alone=False)
     if found.status != "optimal" or "EP" not in found.structure:
@@ -127,4 +127,4 @@ def _exceptional(problem: Problem) -> Known | None:
 
 
 def _structure(problem: Problem, parameters: Mapping[str, float]) -> Structure:
-    return told(problem.model, problem.nominal.values(parameters)["structure"])
+    return user_structure(problem.model, problem.nominal.values(parameters)["structure"])

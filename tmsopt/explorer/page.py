@@ -9,11 +9,11 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-from tmsopt.design import Problem
 from tmsopt.explorer.javascript import model_script
 from tmsopt.explorer.kernel import kernel_script
 from tmsopt.explorer.known import Known
 from tmsopt.explorer.subject import subject
+from tmsopt.problem import Problem
 
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
 _BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style

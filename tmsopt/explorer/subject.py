@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.checks.recheck import FEASIBLE
-from tmsopt.design import Problem, freedom, limit_of, unit_of
-from tmsopt.design.validate import SMALLEST
+from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.explorer.file_text import around
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
 from tmsopt.guide import exact_value
 from tmsopt.models import Parameter, words_of
-from tmsopt.models.told import ON_AXIS, eigenfrequencies
+from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
+from tmsopt.problem import Problem, degrees_of_freedom, limit_of, unit_of
+from tmsopt.problem.validate import SMALLEST
 from tmsopt.records import Array
 from tmsopt.report.solution.rows import structure_line
 from tmsopt.roots import Structure
@@ -154,7 +154,7 @@ def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) 
     """Traced curves in the plane of the chart: the boundaries of both domains, and the set that the problem locates."""
     names = problem.parameter_set.names
     axes = [names.index(n) for n in plane]
-    if problem.locate and freedom(problem.nominal).count == 1 and set(plane) <= set(problem.free):
+    if problem.locate and degrees_of_freedom(problem.nominal).count == 1 and set(plane) <= set(problem.free):
         along = [names.index(n) for n in problem.free if n not in plane]
         for branch in trace(problem.nominal, starts=_STARTS).branches:
             yield {"kind": problem.locate, "set": "EP set", "axes": axes, "along": along} | _points(

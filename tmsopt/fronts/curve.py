@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 
-from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
-from tmsopt.fronts.subproblems import Asker, least, point
+from tmsopt.fronts.subproblems import FrontSolver, least, point
 from tmsopt.fronts.team import AT_ONCE, Team
+from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps, begin
-from tmsopt.solver.solve import covered
+from tmsopt.search.solve import covered
 
 Objectives = tuple[float, ...]
 
@@ -28,7 +28,7 @@ _ROOM = 1.5  # of the mean spacing: a longer stretch has room for a point
 _CLOSE = 0.3  # of the mean spacing: unlabelled points closer than this to another are left out
 
 
-def curve(team: Team, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> Front:
+def curve(team: Team, ask: FrontSolver, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> Front:
     """The front between its two ends, with kinks and gaps.
 
     Each new limit is set where neighbours are farthest apart, on the objective that changes more there; sweeps both
@@ -97,7 +97,9 @@ class _Stretch:
 class _Search:
     """The probes made so far; the front is always read from them afresh."""
 
-    def __init__(self, team: Team, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> None:
+    def __init__(
+        self, team: Team, ask: FrontSolver, ends: Sequence[FrontPoint], points: int, progress: Steps | None
+    ) -> None:
         self.team, self.ask, self.ends, self.points, self.progress = team, ask, tuple(ends), points, progress
         self.probes: list[_Probe] = []
         self.done, self.most = 0, points  # of what is counted
@@ -273,7 +275,7 @@ class _Asked:
     count: int
 
 
-def _probed(ask: Asker, asked: _Asked) -> _Probe | None:
+def _probed(ask: FrontSolver, asked: _Asked) -> _Probe | None:
     """What comes of a probe."""
     found, ask = None, ask.later(asked.count)
     for near, few in asked.ways:
@@ -324,11 +326,11 @@ def _thinned(search: _Search) -> Front:
     )
 
 
-def _covered(_: Asker, solution: Solution) -> Solution:
+def _covered(_: FrontSolver, solution: Solution) -> Solution:
     return covered(solution)
 
 
-def _missing(ask: Asker, s: _Stretch) -> str:
+def _missing(ask: FrontSolver, s: _Stretch) -> str:
     low, high = sorted((s.left.objectives[s.axis], s.right.objectives[s.axis]))
     where = f"{ask.texts[s.axis]} from {low:.6g} to {high:.6g}"
     return f"not solved for {where}; try more starts" if s.failed else f"no efficient design was found with {where}"

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import units_of
 from tmsopt.files import write_csv
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import units_of
 from tmsopt.records import Tabular, plain
 
 

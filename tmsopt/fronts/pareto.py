@@ -5,17 +5,17 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import Unpack
 
-from tmsopt.design.files import Given, problem_of
-from tmsopt.design.solution import Solution
-from tmsopt.design.verdict.status import NotSolved
 from tmsopt.errors import MOST_POINTS, Fault, InputError, count_faults
 from tmsopt.executor import cores
-from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
-from tmsopt.fronts.subproblems import Asker, alone, best_first, point
+from tmsopt.fronts.subproblems import FrontSolver, alone, best_first, point
 from tmsopt.fronts.surface import surface
 from tmsopt.fronts.team import AT_ONCE, Team, can_send
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.verdict.status import NotSolved
+from tmsopt.program.options import Asked, Options, documents_options, options_of
 from tmsopt.progress import Steps, begin
 
 POINTS = 25
@@ -26,7 +26,7 @@ _DEFAULTS = Options(starts=STARTS)
 _ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of optima that count as the same
 
 
-@taking(Asked, _DEFAULTS)
+@documents_options(Asked, _DEFAULTS)
 def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, **options: Unpack[Asked]) -> Front:
     """The front of two or three objectives, each minimised, with its ends, kinks and gaps.
 
@@ -58,7 +58,7 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
 
     More: docs/how_to/fronts.md
     """
-    problem = problem_of(problem)
+    problem = as_problem(problem)
     if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise InputError([Fault(message, ("objective",))])
@@ -67,7 +67,7 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)
     began = time.perf_counter()
-    ask = Asker(problem, replace(how, progress=None))
+    ask = FrontSolver(problem, replace(how, progress=None))
     with Team(min(workers or cores(), AT_ONCE) if can_send(ask) else 1) as team:
         front = _front(team, ask, points, how.progress)
     if front.interrupted:
@@ -76,7 +76,7 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     return replace(front, seconds=time.perf_counter() - began)
 
 
-def _front(team: Team, ask: Asker, points: int, progress: Steps | None) -> Front:
+def _front(team: Team, ask: FrontSolver, points: int, progress: Steps | None) -> Front:
     n, ends = len(ask.texts), dict[int, FrontPoint]()
     begin(progress, "looking for the ends of the front", "sub-problem")
     if progress:

@@ -5,16 +5,16 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from tmsopt.checks.recheck import recheck
-from tmsopt.design.limit import limit_of
-from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Solution
-from tmsopt.formulation.formulate import LIMIT
-from tmsopt.formulation.options import STARTS, Options
+from tmsopt.evaluation.recheck import recheck
 from tmsopt.fronts.front import FrontPoint
-from tmsopt.solver.sample import Met
-from tmsopt.solver.solve import solved
-from tmsopt.solver.workspace import Family
+from tmsopt.problem.limit import limit_of
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.program.formulate import LIMIT
+from tmsopt.program.options import STARTS, Options
+from tmsopt.search.sample import SampleCache
+from tmsopt.search.solve import solve_any_status
+from tmsopt.search.workspace import Family
 
 _RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
 _SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
@@ -31,12 +31,12 @@ class Workshop:
     """
 
     def __init__(self) -> None:
-        self.known, self._families = Met(), dict[Hashable, Family]()
+        self.known, self._families = SampleCache(), dict[Hashable, Family]()
 
     def __reduce__(self) -> tuple[type["Workshop"], tuple[()]]:
         return Workshop, ()
 
-    def know(self, known: Met) -> None:
+    def know(self, known: SampleCache) -> None:
         """Know what another does, and nothing else."""
         self.known.refined = dict(known.refined)
         self.known.leads = {box: dict(leads) for box, leads in known.leads.items()}
@@ -48,7 +48,7 @@ class Workshop:
 
 
 @dataclass(frozen=True)
-class Asker:
+class FrontSolver:
     """What all sub-problems of one front share.
 
     Attributes:
@@ -67,13 +67,15 @@ class Asker:
     easier: Mapping[int, Solution] = field(default_factory=dict)
     shop: Workshop = field(default_factory=Workshop, compare=False)
 
-    def solve(self, problem: Problem, starts: int, near: Sequence[Solution] = (), blind: bool = False) -> Solution:
+    def solve(
+        self, problem: Problem, starts: int, near: Sequence[Solution] = (), without_sample: bool = False
+    ) -> Solution:
         """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
         limits = [n for n in eps_names(self) if n in problem.constraints]
         family = self.shop.family(problem, limits)
         beside = [_inside(problem, n) for n in near]
         options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
-        return solved(problem, options, family, beside, blind, self._hopeless(problem, near))
+        return solve_any_status(problem, options, family, beside, without_sample, self._hopeless(problem, near))
 
     def _hopeless(self, problem: Problem, near: Sequence[Solution]) -> frozenset[str]:
         """Parts of the box whose best in an objective, without any limit, is worse than what is asked or had of it."""
@@ -92,7 +94,7 @@ class Asker:
             hopeless |= {n for n, value in best.sides.items() if value > worse + _BEYOND * (1 + abs(worse))}
         return frozenset(hopeless if hopeless < {n for best in self.easier.values() for n in best.sides} else ())
 
-    def later(self, count: int) -> "Asker":
+    def later(self, count: int) -> "FrontSolver":
         """The same with other starts."""
         return replace(self, options=replace(self.options, seed=self.options.seed + count))
 
@@ -102,12 +104,12 @@ class Asker:
         return tuple(self.problem.pareto)
 
 
-def alone(ask: Asker, k: int) -> Solution:
+def alone(ask: FrontSolver, k: int) -> Solution:
     """Objective `k` minimised alone, whatever the others are; of any status."""
     return ask.solve(subproblem(ask, k, {}), STARTS)
 
 
-def best_first(ask: Asker, first: int) -> Solution:
+def best_first(ask: FrontSolver, first: int) -> Solution:
     """An end of the front: the least of the first objective, held there while the others are minimised in turn."""
     count = len(ask.texts)
     found, held = ask.easier[first], dict[int, float]()
@@ -125,7 +127,12 @@ def best_first(ask: Asker, first: int) -> Solution:
 
 
 def least(
-    ask: Asker, k: int, limits: Mapping[int, float], near: Sequence[Solution], few: bool = False, pin: int | None = None
+    ask: FrontSolver,
+    k: int,
+    limits: Mapping[int, float],
+    near: Sequence[Solution],
+    few: bool = False,
+    pin: int | None = None,
 ) -> Solution | None:
     """Objective `k` minimised with others limited, from designs near by and, unless `few`, from new starts.
 
@@ -137,19 +144,19 @@ def least(
     asked = subproblem(ask, k, limits)
     if pin is not None and near:
         asked = _pinned(ask, asked, pin, near[0])
-    ended = [ask.solve(asked, (0 if few else ask.options.starts) if near else _RETRY, near, blind=few)]
+    ended = [ask.solve(asked, (0 if few else ask.options.starts) if near else _RETRY, near, without_sample=few)]
     if not few and all(s.status != "optimal" for s in ended):
         ended.append(ask.later(1).solve(asked, _RETRY))
     found = min((s for s in ended if s.status == "optimal"), key=lambda s: s.value, default=None)
     return found if found is None or not ask.ranges else _tightened(ask, k, limits, found)
 
 
-def solvable(ask: Asker, k: int, limits: Mapping[int, float]) -> bool:
+def solvable(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> bool:
     """Whether a sub-problem without an optimum may have one: False when no start satisfied its limits."""
     return ask.solve(subproblem(ask, k, limits), _RETRY).status != "infeasible"
 
 
-def subproblem(ask: Asker, k: int, limits: Mapping[int, float]) -> Problem:
+def subproblem(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> Problem:
     """The problem that minimises objective `k`, with a limit on the value of others."""
     names = eps_names(ask)
     eps = {names[j]: f"({ask.texts[j]}) <= {float(value)!r}" for j, value in limits.items()}
@@ -157,7 +164,7 @@ def subproblem(ask: Asker, k: int, limits: Mapping[int, float]) -> Problem:
     return replace(ask.problem, pareto=(), minimize=ask.texts[k], constraints=constraints)
 
 
-def eps_names(ask: Asker) -> tuple[str, ...]:
+def eps_names(ask: FrontSolver) -> tuple[str, ...]:
     """A constraint name per objective that is none of the user's."""
     names = []
     for text in ask.texts:
@@ -168,7 +175,7 @@ def eps_names(ask: Asker) -> tuple[str, ...]:
     return tuple(names)
 
 
-def objectives(ask: Asker, solution: Solution) -> tuple[float, ...]:
+def objectives(ask: FrontSolver, solution: Solution) -> tuple[float, ...]:
     """Values of all objectives, from the parameters alone; the worst over the cases that the design was made for."""
     problem = ask.problem
     if not (problem.variations or problem.tolerances or solution.problem.asks_radius):
@@ -186,7 +193,7 @@ def objectives(ask: Asker, solution: Solution) -> tuple[float, ...]:
     return tuple(known[text] for text in ask.texts)
 
 
-def point(ask: Asker, solution: Solution) -> FrontPoint:
+def point(ask: FrontSolver, solution: Solution) -> FrontPoint:
     """A design as a point of the front."""
     active = [n for n in solution.active if n in ask.problem.constraints]
     for name, (low, high) in ask.problem.free.items():
@@ -195,7 +202,7 @@ def point(ask: Asker, solution: Solution) -> FrontPoint:
     return FrontPoint(objectives(ask, solution), solution, tuple(active))
 
 
-def _tightened(ask: Asker, k: int, limits: Mapping[int, float], found: Solution) -> Solution:
+def _tightened(ask: FrontSolver, k: int, limits: Mapping[int, float], found: Solution) -> Solution:
     """A design as good in objective `k` and better in the others, if a limit that does not bind leaves one."""
     names = eps_names(ask)
     loose = [j for j in limits if names[j] not in found.active and ask.ranges[j] > 0]
@@ -214,7 +221,7 @@ def _inside(problem: Problem, near: Solution) -> dict[str, float]:
     return {n: min(max(near.parameters[n], lo), hi) for n, (lo, hi) in problem.free.items()}
 
 
-def _pinned(ask: Asker, asked: Problem, k: int, best: Solution) -> Problem:
+def _pinned(ask: FrontSolver, asked: Problem, k: int, best: Solution) -> Problem:
     """The problem without slack where objective `k` is a parameter, or minus one, that ended at its bound."""
     name = ask.texts[k].strip().removeprefix("-").strip()
     if name not in asked.free or best.parameters[name] not in asked.free[name]:

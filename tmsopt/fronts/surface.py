@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import FrontPoint, Gap, efficient
-from tmsopt.fronts.subproblems import Asker, least, point, solvable
+from tmsopt.fronts.subproblems import FrontSolver, least, point, solvable
 from tmsopt.fronts.team import Team
+from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps, begin
 
 MOST = 12
@@ -25,7 +25,7 @@ class _Cell:
 
 
 def surface(
-    team: Team, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None
+    team: Team, ask: FrontSolver, ends: Sequence[FrontPoint], points: int, progress: Steps | None
 ) -> tuple[tuple[FrontPoint, ...], tuple[Gap, ...], int, bool]:
     """Efficient points, sub-problems that failed, the number of those solved, and whether the user ended it.
 
@@ -80,7 +80,7 @@ def surface(
     return tuple(kept), gaps, count + 3, interrupted
 
 
-def _solved(ask: Asker, cell: _Cell) -> tuple[Solution | None, bool]:
+def _solved(ask: FrontSolver, cell: _Cell) -> tuple[Solution | None, bool]:
     """The best of a cell, None where no optimum was found, and whether there may be one."""
     found = least(ask.later(cell.number), 0, cell.limits, cell.near)
     return found, found is not None or solvable(ask, 0, cell.limits)

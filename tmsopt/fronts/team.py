@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from tmsopt.executor import Crash, EngineError, Executor, here, processes
-from tmsopt.fronts.subproblems import Asker, Workshop
-from tmsopt.solver.sample import REMEMBERED, Met
+from tmsopt.fronts.subproblems import FrontSolver, Workshop
+from tmsopt.search.sample import REMEMBERED, SampleCache
 
 AT_ONCE = 4
 """Sub-problems set at a time, at most, however many processes there are: what is asked next depends on them all."""
@@ -27,7 +27,7 @@ class Team:
 
     def __init__(self, workers: int) -> None:
         self._executor: Executor = processes(workers) if workers > 1 else here()
-        self._carry, self._known = _Carrier(), Met()
+        self._carry, self._known = _Carrier(), SampleCache()
 
     def __enter__(self) -> "Team":
         return self
@@ -35,13 +35,15 @@ class Team:
     def __exit__(self, *error: object) -> None:
         self._executor.__exit__(*error)
 
-    def each(self, function: Callable[[Asker, T], R], ask: Asker, items: Sequence[T]) -> Iterator[tuple[int, R]]:
+    def each(
+        self, function: Callable[[FrontSolver, T], R], ask: FrontSolver, items: Sequence[T]
+    ) -> Iterator[tuple[int, R]]:
         """Places of the items with what the function makes of each, as they come.
 
         Raises:
             EngineError: an item ends every process that tries it.
         """
-        met = dict[int, Met]()
+        met = dict[int, SampleCache]()
         tasks = [(function, ask, self._known, item) for item in items]
         with closing(self._executor.map(self._carry, tasks)) as answers:
             for place, answer in answers:
@@ -58,12 +60,14 @@ class _Carrier:
 
     shop: Workshop = field(default_factory=Workshop)
 
-    def __call__(self, task: tuple[Callable[[Asker, T], R], Asker, Met, T]) -> tuple[R, Met]:
+    def __call__(
+        self, task: tuple[Callable[[FrontSolver, T], R], FrontSolver, SampleCache, T]
+    ) -> tuple[R, SampleCache]:
         """What comes of an item, and what was met on the way."""
         function, ask, known, item = task
         self.shop.know(known)
         result = function(replace(ask, shop=self.shop), item)
-        return result, Met(self.shop.known.refined, self.shop.known.leads)
+        return result, SampleCache(self.shop.known.refined, self.shop.known.leads)
 
 
 def can_send(thing: Any) -> bool:
@@ -77,7 +81,7 @@ def can_send(thing: Any) -> bool:
     return True
 
 
-def _joined(before: Met, after: Sequence[Met]) -> Met:
+def _joined(before: SampleCache, after: Sequence[SampleCache]) -> SampleCache:
     """What was met before a round and in it: new designs first; of new leads those that were found first."""
     refined = dict(before.refined)
     for place in dict.fromkeys(place for met in after for place in met.refined):
@@ -88,4 +92,4 @@ def _joined(before: Met, after: Sequence[Met]) -> Met:
     for box, pattern in ((box, pattern) for met in after for box, found in met.leads.items() for pattern in found):
         every_lead = (met.leads.get(box, {}).get(pattern, []) for met in (before, *after))
         leads.setdefault(box, {})[pattern] = max(every_lead, key=len)
-    return Met(refined, leads)
+    return SampleCache(refined, leads)

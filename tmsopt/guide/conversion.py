@@ -3,12 +3,12 @@
 import re
 from collections.abc import Iterator, Mapping
 
-from tmsopt.design import Problem
-from tmsopt.design.files import Given, problem_of
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.guide.problem_text import toml_problem
 from tmsopt.models import CONSTANTS, FUNCTIONS, controlled, whipple
-from tmsopt.units import with_unit
+from tmsopt.problem import Problem
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.units import with_unit
 
 INERTIAS = ("boxes", "none")
 """What a body becomes: a solid box about its centre of mass, or the point mass that it was."""
@@ -60,7 +60,7 @@ def convert(
 
     More: docs/how_to/inertia.md
     """
-    problem = problem_of(given)
+    problem = as_problem(given)
     if faults := [*_not_taken(problem, to, inertia)]:
         raise InputError(faults)
     sizes = _sizes(problem, {"B": body, "H": front}) if inertia == "boxes" else {}
@@ -92,7 +92,7 @@ def converted_file(
     front: str | Size | None = None,
 ) -> str:  # fmt: skip
     """The text of a converted problem file, with what was assumed in comments; arguments as of `convert`."""
-    problem = problem_of(given)
+    problem = as_problem(given)
     converted = convert(problem, to, inertia, body, front)
     lines = ["The two masses of the model tms in the model whipple, without wheels and trail."]
     for which, size in _sizes(problem, {"B": body, "H": front}).items() if inertia == "boxes" else ():

@@ -6,14 +6,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from tmsopt.design import Band, Problem, Solution, Unit, load, unit_of
-from tmsopt.design.advice.names import vocabulary
-from tmsopt.design.toml import read_page
 from tmsopt.errors import Fault, InputError, short
 from tmsopt.guide.description import Description, Word, Words
 from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
 from tmsopt.models.built_in import controlled, gain_names
-from tmsopt.models.told import pattern_of, patterns_of
+from tmsopt.models.user_spectrum import pattern_of, patterns_of
+from tmsopt.problem import Band, Problem, Solution, Unit, load, unit_of
+from tmsopt.problem.advice.names import vocabulary
+from tmsopt.problem.toml import read_page
 from tmsopt.records import Table
 from tmsopt.studies import load_study
 

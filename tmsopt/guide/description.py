@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from tmsopt.guide.text import matrix, table, wrapped
-from tmsopt.records import Shown, Table
+from tmsopt.records import Printable, Table
 from tmsopt.versions import SCHEMA
 
 
@@ -46,7 +46,7 @@ class Words:
 
 
 @dataclass(frozen=True, repr=False)
-class Description(Shown):
+class Description(Printable):
     """What a model is made of, or a problem.
 
     Attributes:

@@ -8,11 +8,11 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any
 
-from tmsopt.design import Band, Problem
-from tmsopt.design.cases import middle_of
 from tmsopt.models import Parameter, gain_names
-from tmsopt.units import factor, with_unit
-from tmsopt.units.text import read
+from tmsopt.problem import Band, Problem
+from tmsopt.problem.cases import middle_of
+from tmsopt.problem.units import factor, with_unit
+from tmsopt.problem.units.text import read
 
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
 _PLACES = 22  # of a decimal that only one double is nearest to, in any unit

@@ -8,9 +8,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from tmsopt.design.files import SHAPE as PROBLEM
-from tmsopt.design.model_table import KEYS
 from tmsopt.models import MODELS, Parameter, ParameterSet, controlled, gain_names
+from tmsopt.problem.files import SHAPE as PROBLEM
+from tmsopt.problem.model_table import KEYS
 from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.studies.files import SHAPE as STUDY
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS

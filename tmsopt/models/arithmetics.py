@@ -12,7 +12,7 @@ import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.arithmetic import elementary
+from tmsopt.algebra import elementary
 from tmsopt.models.names import CONSTANTS, FUNCTIONS
 from tmsopt.models.stated.degree import Degree, alone, applied, constant, same
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from tmsopt.arithmetic.formulas import Formulas
+from tmsopt.algebra.formulas import Formulas
 from tmsopt.models.exact import constant
 from tmsopt.models.expression import parse_value
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import DIGITS, rational
+from tmsopt.algebra.elementary import DIGITS, rational
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.expression import Expression, parse_value
 from tmsopt.models.model import Model, ParameterSet

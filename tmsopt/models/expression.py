@@ -19,7 +19,7 @@ from tmsopt.models import arithmetics
 from tmsopt.models.advice import advice, call_advice
 from tmsopt.models.arithmetics import BALLS, BINARY, DEGREES, NUMERIC, SYMBOLIC, Arithmetic
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, OUTSIDE
-from tmsopt.models.stated.degree import Beyond, Degree
+from tmsopt.models.stated.degree import Degree, DegreeTooHigh
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 _STRICT = {ast.Lt: "<=", ast.Gt: ">="}
@@ -237,7 +237,7 @@ def _checked(node: ast.expr, text: str, accepted: list[str] | None) -> tuple[str
     names = _checked_names(node, text, accepted)
     try:
         DEGREES.number(_value(node, dict.fromkeys(names, Degree()), DEGREES))
-    except Beyond as error:
+    except DegreeTooHigh as error:
         part = _source(error.part, text) if error.part else text
         whole = "" if part == text.strip() else f"{_quoted(text)}: "
         raise ExpressionError(f"{whole}{_quoted(part)} {error}") from None
@@ -317,10 +317,10 @@ def _check_number(node: ast.Constant, text: str) -> None:
 
 
 def _value(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
-    """Value of a checked tree; what is `Beyond` knows the innermost part that is."""
+    """Value of a checked tree; what is `DegreeTooHigh` knows the innermost part that is."""
     try:
         return _computed(node, values, arithmetic)
-    except Beyond as error:
+    except DegreeTooHigh as error:
         error.part = error.part or node
         raise
 

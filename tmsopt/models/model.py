@@ -9,7 +9,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_ball, exact
+from tmsopt.algebra.elementary import as_ball, exact
 
 _BITS = 106  # the parameters' own roundings are all that widens a ball
 _EPSILON = 2.0**-53

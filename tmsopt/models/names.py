@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from tmsopt.arithmetic.walk import operation_name, steps
+from tmsopt.algebra.walk import operation_name, steps
 
 FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
 CONSTANTS = ("pi",)

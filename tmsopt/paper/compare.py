@@ -4,15 +4,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
-from tmsopt.checks.law_rows import LawRow, law_rows
-from tmsopt.design.files import Given, question_of
-from tmsopt.design.solution import Solution
-from tmsopt.formulation.options import Asked, Options, options_of, taking
+from tmsopt.evaluation.law_rows import LawRow, law_rows
 from tmsopt.models import tms
+from tmsopt.problem.files import Given, as_solvable
+from tmsopt.problem.solution import Solution
+from tmsopt.program.options import Asked, Options, documents_options, options_of
 from tmsopt.progress import begin
 from tmsopt.records import Tabular, plain
 from tmsopt.roots import PATTERNS
-from tmsopt.solver.solve import solved
+from tmsopt.search.solve import solve_any_status
 from tmsopt.versions import SCHEMA
 
 
@@ -58,7 +58,7 @@ class Comparison(Tabular):
         return {"schema": SCHEMA} | plain(self, "design laws") | {"formulations": formulations}
 
 
-@taking(Asked)
+@documents_options(Asked)
 def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
     """Set a design beside the laws of the paper, which are of skates alone, and solve it by the other formulation.
 
@@ -76,9 +76,9 @@ def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
     More: docs/explanation/paper.md
     """
     how = options_of(options)
-    problem = question_of(design)
+    problem = as_solvable(design)
     one = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
-    found = solved(design if one else problem.nominal, how)
+    found = solve_any_status(design if one else problem.nominal, how)
     other, reason = _other_formulation(found, how)
     begin(how.progress, "comparing")
     return Comparison(found, tuple(law_rows(found)) if found.problem.model is tms else (), other, reason)
@@ -99,7 +99,7 @@ def _other_formulation(design: Solution, options: Options) -> tuple[Solution | N
         restated = replace(problem, locate=design.structure, start={})
         if square:  # there may be several such designs: the one near this
             restated = replace(restated, minimize=None, maximize=None, start=_near(design))
-    other = solved(restated, options)
+    other = solve_any_status(restated, options)
     if other.status != "optimal":
         return None, f"the {other.formulation} formulation ended {other.status}"
     return other, ""

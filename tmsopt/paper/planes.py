@@ -7,9 +7,9 @@ import numpy as np
 
 from tmsopt import laws
 from tmsopt.charts.chart import Chart, chart
-from tmsopt.design.problem import Problem
 from tmsopt.models import tms
 from tmsopt.paper.reference import MU, ZETA_B, ZETA_H
+from tmsopt.problem.problem import Problem
 from tmsopt.records import Array, Table
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.swallowtail import Swallowtail, swallowtail

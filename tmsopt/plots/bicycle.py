@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon
 
-from tmsopt.design.solution import Solution
 from tmsopt.paper.sketch import Sketch, sketch
 from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, REAL, new_figure, on_axes
+from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
 
 REAR_FRAME, FRONT_FRAME = CRITICAL, MARK

@@ -17,16 +17,16 @@ from matplotlib.typing import LineStyleType
 from numpy.typing import NDArray
 
 from tmsopt.charts.chart import Chart
-from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import Unit
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Model, in_words_of
 from tmsopt.plots.labels import AxisScale, Name, abscissa_label, events_of, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import Unit
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES
-from tmsopt.solver.solve import solve
+from tmsopt.search.solve import solve
 from tmsopt.tracing.domain import Domain
 
 Plane = tuple[AxisScale, AxisScale]

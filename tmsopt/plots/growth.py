@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
 
-from tmsopt.critical_speeds.growth import SPEEDS, Growth, growth
-from tmsopt.critical_speeds.modes import Mode
-from tmsopt.design.solution import Solution
+from tmsopt.dynamics.growth import SPEEDS, Growth, growth
+from tmsopt.dynamics.modes import Mode
 from tmsopt.plots.labels import OF_H, AxisScale, Name, events_of, finished, place_all, scale_over
 from tmsopt.plots.style import (
     CAPSIZE,
@@ -25,6 +24,7 @@ from tmsopt.plots.style import (
     new_figure,
     on_axes,
 )  # fmt: skip
+from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
 
 _DASHED, _DOTTED = (0, (6, 2)), (0, (4, 2, 1, 2))

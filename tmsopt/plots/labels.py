@@ -14,10 +14,10 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
-from tmsopt.design.problem import Problem
-from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.models import Model, Parameter, words_of
 from tmsopt.plots.style import figure_of, legend_below
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.unit_system import Unit, unit_of
 from tmsopt.records import Array
 
 _SIZE = 8

@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
 
-from tmsopt.checks.law_rows import SAME_LAW
-from tmsopt.explanation import Explanation
-from tmsopt.margins import Nearest, Robustness
+from tmsopt.analysis import Explanation
+from tmsopt.boundaries import Nearest, Robustness
+from tmsopt.evaluation.law_rows import SAME_LAW
 from tmsopt.models import words_of
 from tmsopt.paper import Comparison, Ledger
 from tmsopt.plots.labels import Name, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CRITICAL, STABLE, on_axes
-from tmsopt.solver import Every
+from tmsopt.search import Every
 
 _LEAST = 1e-17  # of differences on a logarithmic axis: those of no double
 _SEEN = 1e-3  # of the longest bar

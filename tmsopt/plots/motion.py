@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tmsopt.motion import Simulation
+from tmsopt.dynamics import Simulation
 from tmsopt.plots.labels import finished
 from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, new_figure, on_axes
 

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from tmsopt.design.solution import Solution
-from tmsopt.diagnosis import Diagnosis
-from tmsopt.explanation import Optimality
+from tmsopt.analysis import Diagnosis, Optimality
 from tmsopt.plots.labels import OF_H, finished
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, on_axes
+from tmsopt.problem.solution import Solution
 from tmsopt.proofs import Proof
 
 _COLOURS = (CRITICAL, MARK, REAL, COMPLEX, CAPSIZE)

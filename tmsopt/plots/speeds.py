@@ -4,7 +4,7 @@ import math
 
 from matplotlib.axes import Axes
 
-from tmsopt.critical_speeds.speeds import Speeds
+from tmsopt.dynamics.speeds import Speeds
 from tmsopt.plots.labels import events_of, finished, scale_over
 from tmsopt.plots.style import CAPSIZE, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, on_axes
 

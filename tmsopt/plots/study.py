@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from tmsopt.design import Unit, ended
 from tmsopt.plots.labels import AxisScale, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
+from tmsopt.problem import Unit, status_text
 from tmsopt.records import Array, Truth
-from tmsopt.solver.solve import solve
+from tmsopt.search.solve import solve
 from tmsopt.studies import Results, columns, header
 
 _BINS = 25
@@ -115,4 +115,4 @@ def _over_what_varies(ax: Axes, data: Results) -> str:
         figure_of(ax).colorbar(drawn, ax=ax, label=aside.label)
     ax.set(xlabel=across.label if across else "row", ylabel=scale.label)
     ax.xaxis.set_major_locator(MaxNLocator(6))
-    return f"{np.count_nonzero(found)} of {len(found)} rows {ended(study.problem, 'optimal')}"
+    return f"{np.count_nonzero(found)} of {len(found)} rows {status_text(study.problem, 'optimal')}"

@@ -1,7 +1,7 @@
-"""Prove: the exceptional point exists, by interval Newton in ball arithmetic.
+"""Proofs: an exceptional point exists (interval Newton in balls), no better design does (branch and bound).
 
-In: a solution. Out: a `Proof`: every number with its radius, or the reason why not. Open `proof` first, then
-`existence`.
+In: a solution. Out: a `Proof`, every number with its radius, or the solution with a proved bound. Open `proof` first,
+then `certify`.
 """
 
 import lazy_loader

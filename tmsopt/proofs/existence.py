@@ -6,11 +6,11 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.balls import GUARD, largest_radius, upper
-from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
-from tmsopt.design.problem import Problem
-from tmsopt.formulation.nlp import Scale
+from tmsopt.algebra.balls import GUARD, largest_radius, upper
+from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.models.exact import Written
+from tmsopt.problem.problem import Problem
+from tmsopt.program.nlp import Scale
 from tmsopt.proofs.factored import Factored, factored, has_pattern, of_pattern
 from tmsopt.proofs.system import ROUNDINGS, Chosen, Equations, choose, equations
 from tmsopt.roots import Pattern

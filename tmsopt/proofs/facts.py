@@ -5,12 +5,12 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.balls import largest_radius
-from tmsopt.arithmetic.elementary import rational
-from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.algebra.balls import largest_radius
+from tmsopt.algebra.elementary import rational
 from tmsopt.models import Values
 from tmsopt.models.exact import Written
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.proofs.existence import EXACT, Existing
 from tmsopt.proofs.factored import Factored, factored, roots_of
 from tmsopt.roots import exact_nullity, has_one_eigenvector

@@ -8,28 +8,28 @@ from typing import Any, Unpack
 
 import flint
 
-from tmsopt.arithmetic.balls import Number, ProvedRoot, fraction, number
-from tmsopt.arithmetic.krawczyk import Refused
-from tmsopt.design.cases import Case
-from tmsopt.design.files import Given
-from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import units_of
-from tmsopt.design.verdict.stability import CROSSING, crossing_in_words
+from tmsopt.algebra.balls import Number, ProvedRoot, fraction, number
+from tmsopt.algebra.krawczyk import Refused
 from tmsopt.errors import Fault, InputError, count_faults
-from tmsopt.formulation.options import AskedOfSolve, options_of, taking
 from tmsopt.models.exact import Written, written
-from tmsopt.models.told import name_told, pattern_of, roots_told
+from tmsopt.models.user_spectrum import pattern_of, user_roots, user_structure_name
+from tmsopt.problem.cases import Case
+from tmsopt.problem.files import Given
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import units_of
+from tmsopt.problem.verdict.stability import CROSSING, crossing_in_words
+from tmsopt.program.options import AskedOfSolve, documents_options, options_of
 from tmsopt.progress import begin
 from tmsopt.proofs.existence import Existing, beside, exactly
 from tmsopt.proofs.factored import multiple_roots
 from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, eigenvectors, heavy_damping, inside, limits, stability
-from tmsopt.records import Shown, Table, plain
+from tmsopt.records import Printable, Table, plain
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots.patterns.doubled import complex_shown
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 from tmsopt.roots.patterns.pattern import LINES
-from tmsopt.solver.solve import solved
+from tmsopt.search.solve import solve_any_status
 
 DIGITS = 30
 """Digits by default."""
@@ -49,7 +49,7 @@ _SIMPLE = {
 
 
 @dataclass(frozen=True, repr=False)
-class Proof(Shown):
+class Proof(Printable):
     """What is proved about a design in ball arithmetic; plain data, decimals as text.
 
     Attributes:
@@ -135,7 +135,7 @@ class Proof(Shown):
         }
 
 
-@taking(AskedOfSolve)
+@documents_options(AskedOfSolve)
 def prove(
     design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[AskedOfSolve]
 ) -> Proof:
@@ -167,7 +167,7 @@ def prove(
         message = f"found {', '.join(wrong)}; options are for solving, and this is solved: give the problem instead"
         raise InputError([Fault(message, ("options",))])
     how = options_of(options, AskedOfSolve)
-    found = solved(design, how)
+    found = solve_any_status(design, how)
     problem = found.problem
     if found.status != "optimal":
         crossings = [crossing_in_words(m) for m in found.meetings if not m.exceptional]
@@ -233,7 +233,7 @@ def _proved(
             reasons.append(str(refusal))
         else:
             return _assembled(problem, design, pattern.name, pattern, found, digits)
-    name = problem.locate or name_told(problem.model, structure)
+    name = problem.locate or user_structure_name(problem.model, structure)
     meant = next((p for p in patterns if p.name == name), None)
     stored = as_stored(problem, design)
     if stored is None:
@@ -262,13 +262,13 @@ def _decided(problem: Problem, design: Written) -> list[Pattern]:
     """The pattern of all multiple roots of a design that is exact."""
     a = design.coefficients(problem.model, problem.parameter_set)
     name = multiple_roots(a) if a else ""
-    return [pattern_of(problem.model, name_told(problem.model, name))] if name else []
+    return [pattern_of(problem.model, user_structure_name(problem.model, name))] if name else []
 
 
 def _of_simple(problem: Problem, structure: str, found: Existing) -> list[str]:
     """Why the structure of a design without multiple roots is not proved; nothing if it is."""
     if structure not in _SIMPLE:
-        name = name_told(problem.model, structure)
+        name = user_structure_name(problem.model, structure)
         return [f"the structure is {name}: double precision cannot tell it; locate the pattern that is meant"]
     roots = found.factored.roots
     if roots is None:
@@ -276,7 +276,9 @@ def _of_simple(problem: Problem, structure: str, found: Existing) -> list[str]:
     rest = roots[1:] if roots[0].real else roots[2:]
     if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in rest):
         return []
-    return [f"the rightmost root of the design as stored is not certainly a {name_told(problem.model, structure)}"]
+    return [
+        f"the rightmost root of the design as stored is not certainly a {user_structure_name(problem.model, structure)}"
+    ]
 
 
 def _assembled(
@@ -293,7 +295,7 @@ def _assembled(
     real = problem.model.carrier is None
     hidden = () if real or pattern is None else pattern.unknowns  # of the double with its carrier
     hidden = (*hidden, *(f"{pattern.name}.{n}" for n in hidden)) if pattern else ()
-    roots = roots_told(problem.model, found.factored.roots or ())
+    roots = user_roots(problem.model, found.factored.roots or ())
     geometric, defective = eigenvectors(problem, design, found)
     if not reasons and geometric is not None and geometric > 1 and "EP" in name:
         reasons = [f"{'not an EP' if defective.holds else CROSSING}: {defective.words}"]

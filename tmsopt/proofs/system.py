@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.arithmetic.krawczyk import Refused, slopes
-from tmsopt.design.expression import Expression
-from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
-from tmsopt.formulation.nlp import ordinary, reaches_of, scale_of
+from tmsopt.algebra.krawczyk import Refused, slopes
 from tmsopt.models import Quantity, Values
+from tmsopt.problem.expression import Expression
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
+from tmsopt.program.nlp import ordinary, reaches_of, scale_of
 from tmsopt.proofs.factored import abscissa_formula
 from tmsopt.records import Array
 from tmsopt.roots import Pattern

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from tmsopt.charts.chart import Chart
-from tmsopt.checks import missed_note
-from tmsopt.design.problem import Problem
-from tmsopt.design.unit_system import Unit, unit_at, unit_of, unit_of_all
+from tmsopt.evaluation import missed_note
 from tmsopt.fronts.front import Front
 from tmsopt.models import Model, in_words_of
-from tmsopt.models.told import pattern_of
+from tmsopt.models.user_spectrum import pattern_of
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.unit_system import Unit, unit_at, unit_of, unit_of_all
 from tmsopt.report.text import HEIGHT, columns, screen, yes_no
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain

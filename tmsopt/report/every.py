@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
-from tmsopt.completeness import Completeness
-from tmsopt.design import unit_at
-from tmsopt.design.verdict.stability import CROSSING
+from tmsopt.global_search import Completeness
+from tmsopt.problem import unit_at
+from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.report.text import columns, number
-from tmsopt.solver.all_designs import Coverage, Every
+from tmsopt.search.all_designs import Coverage, Every
 
 
 def every_table(every: Every) -> str:

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from tmsopt.critical_speeds.speeds import speed_of
-from tmsopt.design import unit_of
-from tmsopt.design.verdict.stability import MARGINAL, UNSTABLE, power_of_t
+from tmsopt.dynamics.speeds import speed_of
+from tmsopt.problem import unit_of
+from tmsopt.problem.verdict.stability import MARGINAL, UNSTABLE, power_of_t
 from tmsopt.report.text import columns, model_lines
 
 if TYPE_CHECKING:
-    from tmsopt.motion import ModeShape, Simulation
+    from tmsopt.dynamics import ModeShape, Simulation
 
 _WORDS = {"phi": "lean phi", "delta": "steer delta", "T_phi": "lean torque", "T_delta": "steer torque"}
 _COUNTS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}

@@ -3,10 +3,10 @@
 import re
 from fractions import Fraction
 
-from tmsopt.arithmetic.balls import Number, fraction
-from tmsopt.design.problem import Problem
-from tmsopt.design.unit_system import units_of
-from tmsopt.models.told import pattern_of
+from tmsopt.algebra.balls import Number, fraction
+from tmsopt.models.user_spectrum import pattern_of
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.unit_system import units_of
 from tmsopt.proofs.facts import NOTHING, Verdict
 from tmsopt.proofs.proof import Proof
 from tmsopt.report.text import columns

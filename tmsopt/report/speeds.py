@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from tmsopt.critical_speeds.crossings import Crossing, Stretch
-from tmsopt.critical_speeds.growth import Growth
-from tmsopt.critical_speeds.speeds import Speeds, speed_of
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import Unit, unit_of, unit_of_all
+from tmsopt.dynamics.crossings import Crossing, Stretch
+from tmsopt.dynamics.growth import Growth
+from tmsopt.dynamics.speeds import Speeds, speed_of
 from tmsopt.models import in_words_of
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import Unit, unit_of, unit_of_all
 from tmsopt.report.solution.rows import frequency_of
 from tmsopt.report.text import columns, model_lines
 

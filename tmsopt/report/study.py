@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
-from tmsopt.design import ended, show_at, unit_at, unit_of
+from tmsopt.problem import show_at, status_text, unit_at, unit_of
 from tmsopt.report.text import HEIGHT, WIDTH, columns, number, screen, yes_no
 from tmsopt.studies.rows import Row
 from tmsopt.studies.study import Study
@@ -57,7 +57,7 @@ def row_lines(study: Study, row: Row) -> str:
     More: docs/tutorials/study.md
     """
     given = ", ".join(f"{name} = {number(value)}" for name, value in row.varied.items())
-    parts = [f"row {row.number}: {given}", f"seed {row.seed}", ended(study.problem, row.status), row.cause]
+    parts = [f"row {row.number}: {given}", f"seed {row.seed}", status_text(study.problem, row.status), row.cause]
     return "; ".join(part for part in parts if part)
 
 
@@ -67,7 +67,7 @@ def _headline(study: Study, found: Summary) -> str:
     if study.grid_shape is not None:
         names = " × ".join(f"{name} ({size})" for name, size in study.grid_shape.items())
     made = f"{study.method.replace('_', ' ')} over {names}: {found.rows} rows"
-    counts = ", ".join(f"{count} {ended(study.problem, status)}" for status, count in found.counts.items())
+    counts = ", ".join(f"{count} {status_text(study.problem, status)}" for status, count in found.counts.items())
     missing = found.rows - sum(found.counts.values())
     return f"{made}; {counts or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
 
@@ -106,7 +106,7 @@ def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) ->
     found = (row.parameters, row.reports) if known else ({}, {})
     return (
         str(row.number), yes_no(row.stable) if known else "", *(shown(n, row.varied) for n in study.columns),
-        ended(problem, row.status),
+        status_text(problem, row.status),
         *(shown(n, {n: row.objective} if known else {}) for n in asked),
         shown("abscissa", {"abscissa": row.abscissa} if known else {}),
         row.structure if known else "",

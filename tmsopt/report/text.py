@@ -2,8 +2,8 @@
 
 from collections.abc import Collection, Sequence
 
-from tmsopt.design.unit_system import Unit
 from tmsopt.models import Model
+from tmsopt.problem.unit_system import Unit
 
 WIDTH, HEIGHT = 100, 30
 """Columns of every line; lines of a report, if not full."""

@@ -5,7 +5,6 @@ first; `patterns` says which roots meet, `quartics` takes millions at once.
 """
 
 from tmsopt.roots.count import may_be_real, real_roots
-from tmsopt.roots.discs import enclose_motions
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
 from tmsopt.roots.many import classify, find_motion
@@ -35,7 +34,6 @@ __all__ = [
     "composition",
     "determinant",
     "discriminant",
-    "enclose_motions",
     "evaluate",
     "exact_abscissa",
     "exact_longest",

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.arithmetic.rounding import Bounded, beside, rounded
+from tmsopt.algebra.rounding import Bounded, beside, rounded
 from tmsopt.records import Array
 from tmsopt.roots.exact import exact_roots
 from tmsopt.roots.numeric import roots

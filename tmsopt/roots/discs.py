@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tmsopt.arithmetic.rounding import Bounded
+from tmsopt.algebra.rounding import Bounded
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics.quartic import quartic_factors

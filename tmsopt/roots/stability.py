@@ -7,7 +7,7 @@ import flint
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.arithmetic.rounding import Bounded
+from tmsopt.algebra.rounding import Bounded
 from tmsopt.records import Array
 from tmsopt.roots.polynomial import Coefficients, determinant
 

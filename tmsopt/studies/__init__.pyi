@@ -9,7 +9,7 @@ from .run import Results as Results, fill as fill, run_study as run_study, store
 from .sampling import (
     Span as Span, grid as grid, latin_hypercube as latin_hypercube, sobol as sobol, sobol_note as sobol_note,
 )
-from .solving import Solver as Solver, alone as alone
+from .solving import Solver as Solver, solve_row as solve_row
 from .store import Store as Store, open_store as open_store, read_store as read_store
 from .study import Study as Study, definition as definition, over_grid as over_grid
 from .summary import Share as Share, summary as summary, wilson as wilson, yield_of as yield_of

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.errors import Fault, InputError, needed
+from tmsopt.errors import Fault, InputError, import_optional
 from tmsopt.files import cell, headed, netcdf_errors, write_atomic
-from tmsopt.progress import Listener, Steps, counted
+from tmsopt.progress import Listener, Steps, start_steps
 from tmsopt.records import Array
 from tmsopt.studies.rows import PREFIXES, Names, PartialColumn, Row, columns
 
@@ -61,7 +61,7 @@ def export(
     check_export(path)
     try:
         with write_atomic(path) as temporary:
-            steps = counted(progress, f"writing {path.name}", "row")
+            steps = start_steps(progress, f"writing {path.name}", "row")
             FORMATS[_ending(path)].write(columns(rows, names), temporary, json.dumps(metadata or {}), steps)
     except OSError as error:
         raise InputError([Fault(f"cannot be written: {error.strerror or error}", file=str(path))]) from error
@@ -80,7 +80,7 @@ def check_export(path: Path) -> None:
         problem = "is no regular file" if path.exists() else "is in a folder that does not exist"
         raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", ("export",))])
     for module in FORMATS[_ending(path)].needs:
-        needed(module, "export to a .csv file")
+        import_optional(module, "export to a .csv file")
 
 
 def _ending(path: Path) -> str:
@@ -129,7 +129,7 @@ def _texts(values: NDArray[Any], present: NDArray[np.bool_], known: dict[bytes, 
 
 
 def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str, steps: Steps | None) -> None:
-    pa, parquet = needed("pyarrow"), needed("pyarrow.parquet")
+    pa, parquet = import_optional("pyarrow"), import_optional("pyarrow.parquet")
     arrays = {name: pa.array(c.values, _kind(pa, c), mask=~c.present, from_pandas=False) for name, c in table.items()}
     whole = pa.table(arrays).replace_schema_metadata({"tmsopt": metadata})
     with parquet.ParquetWriter(path, whole.schema) as writer:
@@ -142,7 +142,7 @@ def _kind(pa: Any, column: PartialColumn) -> Any:
 
 
 def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str, _: Steps | None) -> None:
-    xarray = needed("xarray")
+    xarray = import_optional("xarray")
     names = _names(table)
     over_rows = {names[n]: ("row", c.numbers, {"long_name": n}) for n, c in table.items()}
     made = xarray.Dataset(over_rows, {"row": table["number"].values}, {"tmsopt": metadata})
@@ -159,7 +159,7 @@ def gridded(table: Mapping[str, PartialColumn]) -> Any:
     Raises:
         InputError: where xarray is not installed.
     """
-    xarray, names, axes = needed("xarray"), _names(table), levels(table)
+    xarray, names, axes = import_optional("xarray"), _names(table), levels(table)
     if not axes:
         return None
     order = np.argsort(places(table, axes))

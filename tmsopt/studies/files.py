@@ -11,14 +11,15 @@ from typing import Any
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr
 
-from tmsopt.design.expression import written_sides
-from tmsopt.design.files import posed, question_of
-from tmsopt.design.limit import limit_of
-from tmsopt.design.problem import Problem, unasked
-from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, within
 from tmsopt.errors import LISTED, Fault, InputError, count_faults, is_number, short, suggest, visible
 from tmsopt.files import read_lines
-from tmsopt.formulation.options import STARTS
+from tmsopt.problem.expression import written_sides
+from tmsopt.problem.files import as_solvable, problem_from_tables
+from tmsopt.problem.limit import limit_of
+from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.toml import Key, Number, Page, Section, read_page, validate_tables, within
+from tmsopt.problem.units import with_unit
+from tmsopt.program.options import STARTS
 from tmsopt.records import Column
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
 from tmsopt.studies.sampling import (
@@ -33,7 +34,6 @@ from tmsopt.studies.sampling import (
     span_faults,
 )
 from tmsopt.studies.study import METHODS, Study, common_faults, name_faults
-from tmsopt.units import with_unit
 
 LARGEST = 1_000_000_000
 """Bytes of a CSV file."""
@@ -403,7 +403,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
             f'or write a study file with problem = "{Path(page.file).name}" and what varies under [vary]'
         )
         raise InputError([Fault(message, file=page.file)])
-    faults, written = fitted(page.data, _StudyFile, _shape_fault)
+    faults, written = validate_tables(page.data, _StudyFile, _shape_fault)
     problem_faults, problem = _problem(page)
     faults += problem_faults
     if written is None or problem is None:
@@ -439,19 +439,21 @@ def _problem(page: Page) -> tuple[list[Fault], Problem | None]:
     """The problem that a study is of, and what is wrong with it."""
     stated = page.data.get("problem")
     if isinstance(stated, dict):
-        faults, problem = posed(stated, str(page.data.get("title", "")).strip() or visible(Path(page.file).stem))
+        faults, problem = problem_from_tables(
+            stated, str(page.data.get("title", "")).strip() or visible(Path(page.file).stem)
+        )
         if problem is not None and not problem.pareto:
-            faults += unasked(problem)
+            faults += question_faults(problem)
         faults = within("problem", faults)
     elif isinstance(stated, str):
         try:
-            faults, problem = [], question_of(Path(page.file).parent / stated, front=True)
+            faults, problem = [], as_solvable(Path(page.file).parent / stated, front=True)
         except InputError as error:
             faults, problem = [f if f.line else _of_problem_file(stated, f) for f in error.faults], None
     else:
         return [], None  # reported as a fault of shape
     if problem is not None and problem.pareto:
-        faults += [Fault(f.message, ("problem",)) for f in unasked(problem)]
+        faults += [Fault(f.message, ("problem",)) for f in question_faults(problem)]
     return faults, problem
 
 

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.files import Given, problem_of
-from tmsopt.design.problem import Problem, unasked
-from tmsopt.design.verdict.status import NotSolved
 from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
 from tmsopt.files import path_of
-from tmsopt.formulation.options import STARTS
-from tmsopt.progress import Listener, counted
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.verdict.status import NotSolved
+from tmsopt.program.options import STARTS
+from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Column, Table
-from tmsopt.solver.solve import solve, solved_first
+from tmsopt.search.solve import solve, solved_first
 from tmsopt.studies.sampling import MOST_ROWS
 from tmsopt.studies.store import check_same, read_store
 from tmsopt.studies.study import Study, common_faults
@@ -61,9 +61,9 @@ class Sampling:
     report: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        problem = problem_of(self.problem)
+        problem = as_problem(self.problem)
         object.__setattr__(self, "problem", problem)
-        found = [*unasked(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
+        found = [*question_faults(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
         found += [
             *common_faults(problem, self.seed, self.starts, self.report), *_draw_faults(self.rows, self.distribution),
         ]  # fmt: skip
@@ -119,7 +119,7 @@ def monte_carlo(
     More: docs/tutorials/study.md
     """
     solution = solved_first(design, progress)
-    counted(progress, "drawing designs")
+    start_steps(progress, "drawing designs")
     if solution.status != "optimal":
         raise NotSolved(solution)
     stated = solution.problem.tolerances if tolerances is None else tolerances

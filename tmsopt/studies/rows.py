@@ -10,10 +10,10 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.unit_system import unit_of
 from tmsopt.errors import short
+from tmsopt.problem.unit_system import unit_of
 from tmsopt.records import Table, Truth
-from tmsopt.solver.solve import UNSTABLE
+from tmsopt.search.solve import UNSTABLE
 from tmsopt.studies.study import Study, names_of
 
 STATUSES = ("optimal", "infeasible", "not_converged", "failed", "quarantined")

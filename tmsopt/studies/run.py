@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.unit_system import units_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
 from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, processes, silent
 from tmsopt.files import path_of
-from tmsopt.progress import Listener, counted
-from tmsopt.records import Shown, frame
+from tmsopt.problem.unit_system import units_of
+from tmsopt.progress import Listener, start_steps
+from tmsopt.records import Printable, frame
 from tmsopt.studies.export import export, gridded
 from tmsopt.studies.files import load_study
 from tmsopt.studies.monte_carlo import Sampling, check_unchanged, planned
@@ -42,7 +42,7 @@ _FEW = 32  # rows for which no workers are started unless asked for: they take s
 
 
 @dataclass(frozen=True, repr=False)
-class Results(Shown):
+class Results(Printable):
     """A study with its rows.
 
     Attributes:
@@ -164,11 +164,11 @@ def run_study(
         made, seconds, engine = _carried_out(asked, [], workers, scheduler, note, progress)
         rows = RowTable(asked, made)
         return Results(asked, rows, len(rows), seconds, engine)
-    counted(progress, "waiting for the store")
+    start_steps(progress, "waiting for the store")
     with open_store(path_of(store, "an SQLite file"), asked, fresh=fresh) as opened:
         for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
             note(line)
-        counted(progress, "reading the store")
+        start_steps(progress, "reading the store")
         there = _held(asked, opened)  # damage is said before any work
         found = _count(there)
         if found:
@@ -231,7 +231,7 @@ def _carried_out(
     progress: Listener | None, store: Store | None = None,
 ) -> tuple[list[Part], float, str]:  # fmt: skip
     """The rows that are not there, in how many seconds, and by which engine; kept in a store as they come."""
-    began, made, engine, steps = time.perf_counter(), list[Part](), "", counted(progress, _WHAT, "row")
+    began, made, engine, steps = time.perf_counter(), list[Part](), "", start_steps(progress, _WHAT, "row")
     lacks = np.ones(len(study), dtype=bool)
     for part in there:
         lacks[part["number"].values] = False

@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from tmsopt.checks.judge import BLOCK, Verdicts, judgeable, verdicts
-from tmsopt.checks.law_rows import law_rows
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import amounts_text
 from tmsopt.errors import InputError
+from tmsopt.evaluation.columns import BLOCK, Verdicts, judgeable, verdicts
+from tmsopt.evaluation.law_rows import law_rows
 from tmsopt.models import tms
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import amounts_text
 from tmsopt.records import Table
-from tmsopt.solver.multistart import same
-from tmsopt.solver.solve import solve
-from tmsopt.solver.workspace import Family
+from tmsopt.search.multistart import same_objective
+from tmsopt.search.solve import solve
+from tmsopt.search.workspace import Family
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.rows import Part, PartialColumn, Row, RowTable, full, header
 from tmsopt.studies.study import Study
@@ -39,7 +39,7 @@ class SolvedRow:
     solution: Solution | None = None
 
 
-def alone(study: Study, number: int) -> SolvedRow:
+def solve_row(study: Study, number: int) -> SolvedRow:
     """One row solved without the others, as in the study; with warm starts, with the other rows of its block.
 
     Raises:
@@ -110,7 +110,7 @@ class Solver:
         if one.status != "optimal" or other.status != "optimal":
             return one.status == "optimal" and other.status != "optimal"
         sign = self.study.problem.sign
-        return sign * one.objective < sign * other.objective and not same(one.objective, other.objective)
+        return sign * one.objective < sign * other.objective and not same_objective(one.objective, other.objective)
 
     def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> SolvedRow:
         """One row, near a neighbour's optimum and from so many starts afar if that leads to an optimum."""

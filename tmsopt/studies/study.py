@@ -7,12 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.checks.law_rows import LAWS
-from tmsopt.design.cases import Band
-from tmsopt.design.expression import ExpressionError
-from tmsopt.design.files import Given, problem_of
-from tmsopt.design.limit import limit_of, with_limit
-from tmsopt.design.problem import Problem, unasked
 from tmsopt.errors import (
     MOST_STARTS,
     Fault,
@@ -25,8 +19,14 @@ from tmsopt.errors import (
     table_faults,
     text_faults,
 )
-from tmsopt.formulation.options import STARTS
+from tmsopt.evaluation.law_rows import LAWS
 from tmsopt.models import tms
+from tmsopt.problem.cases import Band
+from tmsopt.problem.expression import ExpressionError
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.limit import limit_of, with_limit
+from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.program.options import STARTS
 from tmsopt.records import Array, Column, Table
 from tmsopt.studies.sampling import MOST_ROWS, grid
 
@@ -152,7 +152,7 @@ def over_grid(
     if wrong := table_faults("axes", axes, "{'mu': [0.1, 0.2]}"):
         raise InputError(wrong)
     return Study(
-        problem=problem_of(problem), columns=grid(axes), title=title, seed=seed, starts=starts, warm=warm,
+        problem=as_problem(problem), columns=grid(axes), title=title, seed=seed, starts=starts, warm=warm,
         report=report, grid_shape={name: len(values) for name, values in axes.items()}, method="grid",
     )  # fmt: skip
 
@@ -235,7 +235,7 @@ def faults(study: Stated) -> Iterator[Fault]:
         message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
         yield Fault(message, ("problem",))
         return
-    yield from (Fault(f.message, ("problem", *f.key)) for f in unasked(study.problem))
+    yield from (Fault(f.message, ("problem", *f.key)) for f in question_faults(study.problem))
     if isinstance(study.columns, Mapping):
         yield from _column_faults(study)
     else:

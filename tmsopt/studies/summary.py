@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design import rate_of
+from tmsopt.problem import rate_of
 from tmsopt.records import Array, Table, Truth, plain
 from tmsopt.studies.rows import PREFIXES, STATUSES, PartialColumn, Row, RowTable, columns
 from tmsopt.studies.study import Study

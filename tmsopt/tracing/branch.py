@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.problem import Problem
-from tmsopt.design.unit_system import units_of
 from tmsopt.files import write_csv
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.unit_system import units_of
 from tmsopt.records import Array, Table, Tabular, plain
 
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.files import Given, problem_of
-from tmsopt.design.problem import Problem
-from tmsopt.models.told import pattern_of
-from tmsopt.progress import Listener, counted
-from tmsopt.records import Array, Shown, Truth, plain
+from tmsopt.models.user_spectrum import pattern_of
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.problem import Problem
+from tmsopt.progress import Listener, start_steps
+from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.branch import Branch, Event
@@ -58,7 +58,7 @@ class Corner:
 
 
 @dataclass(frozen=True, repr=False)
-class Domain(Shown):
+class Domain(Printable):
     """Boundaries inside a box; where a domain leaves the box, its boundary ends at the edge. A boundary that
     lies in an edge, such as that of designs without damping, is that edge and is left out.
 
@@ -103,13 +103,13 @@ def domain(
 
     More: docs/how_to/charts.md
     """
-    plane = replace(problem_of(problem), constraints={}, minimize=None, maximize=None, locate=None)
+    plane = replace(as_problem(problem), constraints={}, minimize=None, maximize=None, locate=None)
     how: dict[str, Any] = {"step": step, "starts": starts, "seed": seed, "progress": progress}
     bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
     found: dict[str, list[Branch]] = {"capsize": [], "EP2": []}
     found |= {name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)] for name in bounding}
     unstable_beyond = [b for name in ("weave", "capsize") for b in found[name]]
-    counted(progress, "looking for corners")
+    start_steps(progress, "looking for corners")
     infinite = list(through_infinity(plane, step, starts, seed))
     at_infinity = [c for curve in infinite for c in _changes(curve)]
     stability = [arc for b in unstable_beyond for arc in _pieces(b, _bounds(b, plane), plane, at_infinity)]

@@ -8,12 +8,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
-from tmsopt.formulation.formulate import matching, variables_of
-from tmsopt.formulation.nlp import NLP
-from tmsopt.formulation.starts import spread
-from tmsopt.models.told import pattern_of
+from tmsopt.models.user_spectrum import pattern_of
+from tmsopt.problem.problem import Problem
+from tmsopt.program.formulate import matching, variables_of
+from tmsopt.program.nlp import NLP
+from tmsopt.program.starts import spread
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern, roots
 from tmsopt.tracing.continuation import Curve, curve

@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.problem import Problem
 from tmsopt.models import Values
+from tmsopt.problem.problem import Problem
 from tmsopt.records import Array, Table
 from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.roots.patterns.pattern import mean_size

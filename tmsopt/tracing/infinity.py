@@ -11,9 +11,9 @@ from itertools import chain, islice
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.problem import Problem
-from tmsopt.formulation.starts import spread
 from tmsopt.models import Values
+from tmsopt.problem.problem import Problem
+from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.models import Values
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern, is_stable, lienard_chipart, roots
 from tmsopt.roots.meetings import CLOSED, balance, nearest_two

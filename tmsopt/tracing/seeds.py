@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.problem import Problem
-from tmsopt.formulation.starts import spread
+from tmsopt.problem.problem import Problem
+from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
 from tmsopt.tracing.continuation import INFINITE, Walk

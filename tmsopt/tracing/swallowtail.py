@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from tmsopt.design.files import Given, problem_of
-from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
-from tmsopt.progress import Listener, counted
-from tmsopt.records import Array, Shown, plain
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.problem import Problem
+from tmsopt.progress import Listener, start_steps
+from tmsopt.records import Array, Printable, plain
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.equations import Traced, prepare
@@ -50,7 +50,7 @@ class Patch:
 
 
 @dataclass(frozen=True, repr=False)
-class Swallowtail(Shown):
+class Swallowtail(Printable):
     """The surface with its edges.
 
     Attributes:
@@ -100,7 +100,7 @@ def swallowtail(
 
     More: docs/how_to/tracing.md
     """
-    problem = problem_of(problem)
+    problem = as_problem(problem)
     if problem.model.degree < _LEAST:
         message = (
             f"model '{problem.model.name}' has degree {problem.model.degree}; accepted: {_LEAST} or more, for a "
@@ -124,7 +124,7 @@ def swallowtail(
         np.concatenate([np.linspace(low, high, rows), *(e.parameters[axes[0]] + _AROUND for e in changes)])
     )
     grid = grid[(grid >= low) & (grid <= high)]
-    ready, cuts, steps = prepare(crossing.problem), [], counted(progress, "cutting the surface", "row")
+    ready, cuts, steps = prepare(crossing.problem), [], start_steps(progress, "cutting the surface", "row")
     for done, value in enumerate(grid, 1):
         cuts.append(_cuts(affine, float(value), crossing, ready))
         if steps:

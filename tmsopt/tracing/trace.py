@@ -8,10 +8,6 @@ from itertools import chain
 
 import numpy as np
 
-from tmsopt.design.files import Given, problem_of
-from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.verdict.meetings import is_crossing
-from tmsopt.design.verdict.stability import CROSSING
 from tmsopt.errors import (
     MOST_STARTS,
     Fault,
@@ -24,8 +20,12 @@ from tmsopt.errors import (
     suggest,
     table_faults,
 )
-from tmsopt.models.told import pattern_of, patterns_of
-from tmsopt.progress import Listener, counted
+from tmsopt.models.user_spectrum import pattern_of, patterns_of
+from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.problem import Problem, degrees_of_freedom
+from tmsopt.problem.verdict.meetings import is_crossing
+from tmsopt.problem.verdict.stability import CROSSING
+from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
 from tmsopt.tracing.branch import Branch, Event, Trace
 from tmsopt.tracing.continuation import SINGULAR, Walk, both_ways, contains, same
@@ -66,9 +66,9 @@ def trace(
     More: docs/how_to/tracing.md
     """
     began = time.perf_counter()
-    problem = _asked(problem_of(problem), pattern)
+    problem = _asked(as_problem(problem), pattern)
     _check(problem, step, starts, seed, most, through, progress)
-    steps = counted(progress, f"tracing {problem.locate}", "start")
+    steps = start_steps(progress, f"tracing {problem.locate}", "start")
     ready = prepare(problem)
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
@@ -135,7 +135,7 @@ def _asked(problem: Problem, name: str | None) -> Problem:
         message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
         raise InputError([Fault(message, ("objective", "locate"))]) from error
     asked = replace(problem, locate=name, minimize=None, maximize=None)
-    count = freedom(asked)
+    count = degrees_of_freedom(asked)
     if count.count != 1:
         free, needed = ", ".join(problem.free) or "none", count.conditions + 1
         advice = (

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.problem import Problem
+from tmsopt.problem.problem import Problem
 from tmsopt.records import Array
 from tmsopt.roots import Pattern
 from tmsopt.tracing.continuation import Curve, Walk, between

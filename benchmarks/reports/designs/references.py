@@ -22,7 +22,7 @@ from benchmarks.rivals import differential, least_violation
 from benchmarks.suites import REFERENCES, SEED, Reference, random_problem, read, references, write
 from benchmarks.timing import over_processes
 from tmsopt import Problem
-from tmsopt.checks import realised_abscissa
+from tmsopt.evaluation import realised_abscissa
 
 FEW = 64
 """Starts where the default solve says that nothing is feasible: the evolutions check that claim better than starts."""

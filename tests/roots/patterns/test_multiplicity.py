@@ -17,7 +17,7 @@ import sympy
 from mpmath import mp
 
 import tmsopt
-from tmsopt.arithmetic import exact
+from tmsopt.algebra import exact
 from tmsopt.models import from_matrices
 from tmsopt.roots import (
     backward_error,

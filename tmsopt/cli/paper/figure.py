@@ -8,7 +8,7 @@ import click
 
 from tmsopt.cli.common import FIGURES, PATH, check_output, refusal, saving, write_json
 from tmsopt.cli.terminal import shown
-from tmsopt.progress import counted
+from tmsopt.progress import start_steps
 
 if TYPE_CHECKING:
     from tmsopt.plots.paper import Item
@@ -86,7 +86,7 @@ def _draw(wanted: "list[Item]", files: list[Path]) -> None:
     from tmsopt.files import write_atomic
     from tmsopt.plots.paper import pictures
 
-    steps = counted(shown(), "drawing", "figure")
+    steps = start_steps(shown(), "drawing", "figure")
     with closing(pictures(wanted, [path.suffix[1:].lower() for path in files])) as drawn:
         for done, (k, picture) in enumerate(drawn, start=1):
             with saving("--output", files[k]), write_atomic(files[k]) as temporary:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.arithmetic.elementary import quotient, sqrt, tan
+from tmsopt.algebra.elementary import quotient, sqrt, tan
 from tmsopt.models.model import Formula, Quantity, Range
 
 WORDS = "weave", "capsize"

@@ -11,7 +11,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import is_ball, magnitude, quotient, sqrt
+from tmsopt.algebra.elementary import is_ball, magnitude, quotient, sqrt
 from tmsopt.models.model import Feedback, Formula, Matrix, Model, Parameter, ParameterSet, Quantity, Range
 from tmsopt.roots.polynomial import determinant
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.arithmetic.elementary import chosen, is_ball, is_symbolic, positive_part, quotient, sqrt, tan
+from tmsopt.algebra.elementary import chosen, is_ball, is_symbolic, positive_part, quotient, sqrt, tan
 from tmsopt.models.bicycles.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed
 from tmsopt.models.model import Quantity, Range

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.arithmetic.walk import Instruction, operation_name, steps
+from tmsopt.algebra.walk import Instruction, operation_name, steps
 
 LARGEST_EXPONENT = 1023
 """Of a power: 2**1024 is no double any more."""
@@ -18,7 +18,7 @@ LARGEST_DEGREE = 10_000
 """Of an expression multiplied out. At a design of doubles it is then a fraction of some million bits at most."""
 
 
-class Beyond(ValueError):
+class DegreeTooHigh(ValueError):
     """An expression that is not computed, with the reason.
 
     Attributes:
@@ -46,11 +46,11 @@ class Degree:
 
     def __post_init__(self) -> None:
         if self.number is not None and not math.isfinite(self.number):
-            raise Beyond(f"is {self.number:g}; accepted: parts with a finite value")
+            raise DegreeTooHigh(f"is {self.number:g}; accepted: parts with a finite value")
         if max(self.over, self.under) > LARGEST_DEGREE:
             found = max(self.over, self.under)
             size = f"{found}" if found < 10**18 else f"about 1e{len(str(found)) - 1}"
-            raise Beyond(f"has the degree {size} when it is multiplied out; accepted: up to {LARGEST_DEGREE}")
+            raise DegreeTooHigh(f"has the degree {size} when it is multiplied out; accepted: up to {LARGEST_DEGREE}")
 
     def __add__(self, other: "Degree") -> "Degree":
         return Degree(max(self.over + other.under, other.over + self.under), self.under + other.under)
@@ -60,7 +60,7 @@ class Degree:
 
     def __truediv__(self, other: "Degree") -> "Degree":
         if other.number == 0:
-            raise Beyond("divides by 0; accepted: parts with a finite value")
+            raise DegreeTooHigh("divides by 0; accepted: parts with a finite value")
         return Degree(self.over + other.under, self.under + other.over)
 
     def __pow__(self, other: "Degree") -> "Degree":
@@ -69,7 +69,7 @@ class Degree:
             return Degree()  # by logarithms, in numbers of one size
         if abs(n) > LARGEST_EXPONENT:
             accepted = f"from -{LARGEST_EXPONENT} to {LARGEST_EXPONENT}, for 2**{LARGEST_EXPONENT + 1} is no double"
-            raise Beyond(f"has the exponent {n:.17g}; accepted: {accepted}")
+            raise DegreeTooHigh(f"has the exponent {n:.17g}; accepted: {accepted}")
         over, under = (self.over, self.under) if n >= 0 else (self.under, self.over)
         return Degree(math.ceil(abs(n) * over), math.ceil(abs(n) * under))
 
@@ -149,5 +149,5 @@ def _stepped(step: Instruction, operands: Sequence[Any]) -> Degree | str:
             return f"uses {operation_name(operation)}; accepted: + - * / ** and {known}"
     try:
         return OPERATIONS[step.operation](*operands)
-    except Beyond as error:
+    except DegreeTooHigh as error:
         return str(error)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from tmsopt.arithmetic.elementary import exact, is_ball
+from tmsopt.algebra.elementary import exact, is_ball
 from tmsopt.models.model import Matrix
 from tmsopt.models.stated.pairs import Pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil

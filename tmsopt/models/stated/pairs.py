@@ -11,7 +11,7 @@ import casadi as ca
 from tmsopt.models.arithmetics import BINARY, SYMBOLIC, Arithmetic
 from tmsopt.models.constants import number_of, number_symbol, number_texts
 from tmsopt.models.names import FUNCTIONS
-from tmsopt.models.stated.degree import LARGEST_EXPONENT, Beyond
+from tmsopt.models.stated.degree import LARGEST_EXPONENT, DegreeTooHigh
 
 UNIT = "_1j"
 """Stands for 1j in texts that are parsed; no parameter may have such a name."""
@@ -58,7 +58,7 @@ class Pair:
             return Pair(self.re**n.re)
         exponent = _whole(n)
         if exponent is None:
-            raise Beyond("is a complex number to a power; accepted: whole numbers as exponents, and exp(1j*phi)")
+            raise DegreeTooHigh("is a complex number to a power; accepted: whole numbers as exponents, and exp(1j*phi)")
         found, power = Pair(1.0), self
         for bit in bin(abs(exponent))[:1:-1]:
             found, power = (found * power if bit == "1" else found), power * power
@@ -101,7 +101,7 @@ def _whole(n: Pair) -> int | None:
 def _real(name: str, function: Callable[..., Any]) -> Callable[..., Pair]:
     def applied(*operands: Any) -> Pair:
         if not all(is_real(pair(x)) for x in operands):
-            raise Beyond(f"takes {name} of a complex number; accepted: + - * / ** and exp of these")
+            raise DegreeTooHigh(f"takes {name} of a complex number; accepted: + - * / ** and exp of these")
         return Pair(function(*(pair(x).re for x in operands)))
 
     return applied

@@ -13,7 +13,7 @@ from tmsopt.models.constants import number_symbol
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
-from tmsopt.models.stated.degree import Beyond, Degree
+from tmsopt.models.stated.degree import Degree, DegreeTooHigh
 
 MOST_QUANTITIES = 500
 """More take seconds to read."""
@@ -120,12 +120,12 @@ class Texts:
             values[name] = self.quantity(name) if derived else self.symbols.setdefault(name, ca.SX.sym(name))
         try:
             degree = expression.evaluate({n: self._degrees.get(n, Degree()) for n in values}, DEGREES)
-        except Beyond as error:
+        except DegreeTooHigh as error:
             self.fault(f"{where}{error}", *key)
             return 0, Degree()
         try:
             return expression.evaluate(values, arithmetic), degree
-        except Beyond as error:
+        except DegreeTooHigh as error:
             self.fault(f"{where}'{expression.text}' {error}", *key)
             return 0, Degree()
 

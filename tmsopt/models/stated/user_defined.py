@@ -11,12 +11,12 @@ import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import exact, is_ball
-from tmsopt.arithmetic.formal import Formal
-from tmsopt.arithmetic.formulas import Formulas
-from tmsopt.arithmetic.identity import Field
-from tmsopt.arithmetic.rounding import Bounded
-from tmsopt.arithmetic.walk import NotAccepted, steps, walk
+from tmsopt.algebra.elementary import exact, is_ball
+from tmsopt.algebra.formal import Formal
+from tmsopt.algebra.formulas import Formulas
+from tmsopt.algebra.identity import Field
+from tmsopt.algebra.rounding import Bounded
+from tmsopt.algebra.walk import NotAccepted, steps, walk
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.constants import formulas, number_symbol, number_texts, rebuilt
@@ -24,9 +24,9 @@ from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
 from tmsopt.models.stated.closed_loop import check_loop, closed
 from tmsopt.models.stated.degree import faulty
-from tmsopt.models.stated.doubles import carriers, complex_model
 from tmsopt.models.stated.equations import IMAGINARY, in_order, pencil, polynomial, whole
 from tmsopt.models.stated.pairs import complex_text
+from tmsopt.models.stated.real_form import carriers, complex_model
 from tmsopt.models.stated.texts import Unfit, untexted
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"

@@ -14,7 +14,7 @@ from tmsopt.paper.ledger.algebra import PRECISION
 from tmsopt.paper.ledger.claims import compute_entry, list_claims
 from tmsopt.paper.ledger.entry import VERDICTS, Entry, Ledger, judge_decimal, judge_identity, judge_statement
 from tmsopt.paper.ledger.language import Table, compute, list_definitions, read_tables
-from tmsopt.progress import Listener, counted
+from tmsopt.progress import Listener, start_steps
 
 __all__ = [
     "VERDICTS",
@@ -60,7 +60,7 @@ def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger
     for pattern in map(str, only):
         if not select_claims([pattern]):
             raise InputError([Fault(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", ("--only",))])
-    chosen, steps = select_claims(only), counted(progress, "recomputing claims", "claim")
+    chosen, steps = select_claims(only), start_steps(progress, "recomputing claims", "claim")
     entries = []
     for done, claim in enumerate(chosen, 1):
         with flint.ctx.workdps(PRECISION):

@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 
 import flint
 
-from tmsopt.arithmetic.elementary import rational
-from tmsopt.arithmetic.identity import Quotient
-from tmsopt.arithmetic.krawczyk import enclosed, refined
+from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.identity import Quotient
+from tmsopt.algebra.krawczyk import enclosed, refined
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import determinant, product
 from tmsopt.roots.stability import lienard_chipart

@@ -21,7 +21,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.identity import Quotient
+from tmsopt.algebra.identity import Quotient
 from tmsopt.paper.ledger.entry import EXACT, Entry, format_digits, judge_decimal, judge_identity, judge_statement
 from tmsopt.paper.ledger.language import Table, are_true, compute, open_scope, read_tables
 

@@ -27,7 +27,7 @@ _OFF_RELATIVE = 1e-6  # and the number is the same for every practical purpose
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Judgement:
     """What computing a claim gave."""
 
     verdict: str
@@ -91,7 +91,7 @@ def format_digits(value: Any) -> str:
     return text
 
 
-def judge_decimal(printed: str, value: Any, remark: str = "") -> Outcome:
+def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
     """Judge a printed decimal against a ball, or a fraction, that contains the true value.
 
     Exact if they are one number; the printed digits hold if the true value is within half a unit of the last;
@@ -104,7 +104,7 @@ def judge_decimal(printed: str, value: Any, remark: str = "") -> Outcome:
     claimed = flint.fmpq(fraction.numerator, fraction.denominator)
     shown = format_digits(value)
     if isinstance(value, flint.fmpq) and value == claimed:
-        return Outcome(EXACT, printed, shown, remark)
+        return Judgement(EXACT, printed, shown, remark)
     unit = flint.fmpq(1, 10 ** len(printed.partition(".")[2]))
     ball = flint.arb(value) if isinstance(value, flint.fmpq) else value
     distance = abs(ball - claimed) / unit
@@ -118,16 +118,16 @@ def judge_decimal(printed: str, value: Any, remark: str = "") -> Outcome:
         verdict = DIGITS_OFF if distance < few and close else FAILS
     size = f"{float(distance.mid()):.2g}" if verdict != FAILS else f"{float(distance.mid()):.3g}"
     words = f"The true value is {size} units of the last printed digit away."
-    return Outcome(verdict, printed, shown, f"{words} {remark}".strip())
+    return Judgement(verdict, printed, shown, f"{words} {remark}".strip())
 
 
 def judge_identity(
     holds: bool, remark: str = "", otherwise: str = "", printed: str = "", computed: str = ""
-) -> Outcome:
+) -> Judgement:
     """Exact where a proof runs through; otherwise it does not hold, for the reason given."""
     if holds:
-        return Outcome(EXACT, printed, computed, remark)
-    return Outcome(FAILS, printed, computed, otherwise or "The proof does not run through.")
+        return Judgement(EXACT, printed, computed, remark)
+    return Judgement(FAILS, printed, computed, otherwise or "The proof does not run through.")
 
 
 def judge_statement(
@@ -138,7 +138,7 @@ def judge_statement(
     printed: str = "",
     computed: str = "",
     remark: str = "",
-) -> Outcome:
+) -> Judgement:
     """Judge a general statement: proved under a condition and refuted outside it, or refuted.
 
     Args:
@@ -154,4 +154,4 @@ def judge_statement(
         raise ArithmeticError(f"neither proved nor refuted: {condition}")
     parts = [f"Condition: {condition}."] if under else []
     parts += [f"Counterexample: {against}.", remark]
-    return Outcome(CONDITIONAL if under else FAILS, printed, computed, " ".join(p for p in parts if p))
+    return Judgement(CONDITIONAL if under else FAILS, printed, computed, " ".join(p for p in parts if p))

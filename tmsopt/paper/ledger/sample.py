@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from tmsopt import laws
-from tmsopt.arithmetic.elementary import rational
+from tmsopt.algebra.elementary import rational
 from tmsopt.models import copo
 from tmsopt.models.exact import Tilt
 from tmsopt.paper.ledger.algebra import is_stable

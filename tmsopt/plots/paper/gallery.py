@@ -61,13 +61,13 @@ def _bicycle() -> "Figure":
 
 
 def _growth() -> "Figure":
-    from tmsopt.critical_speeds.growth import growth
-    from tmsopt.design.problem import Problem
+    from tmsopt.dynamics.growth import growth
     from tmsopt.models import tms
     from tmsopt.paper.reference import benchmark, optimised
     from tmsopt.plots.paper.growth import draw_growth_rates
     from tmsopt.plots.style import REAL, new_figure
-    from tmsopt.solver.solve import solve
+    from tmsopt.problem.problem import Problem
+    from tmsopt.search.solve import solve
 
     others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
     fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False)

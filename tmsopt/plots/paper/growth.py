@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from tmsopt.critical_speeds.growth import Growth
+from tmsopt.dynamics.growth import Growth
 from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, STABLE
 
 

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Iterator, Mapping
 
-from tmsopt.checks import abscissa_as_stored
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import limit_text, show_at, unit_at, unit_of
-from tmsopt.design.verdict.stability import ROUNDED
-from tmsopt.design.verdict.status import status_in_words, verdict_in_words
-from tmsopt.explanation import Lever
+from tmsopt.analysis import Lever
+from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.models import GRAVITY, tms, to_si
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import limit_text, show_at, unit_at, unit_of
+from tmsopt.problem.verdict.stability import ROUNDED
+from tmsopt.problem.verdict.status import status_in_words, verdict_in_words
 from tmsopt.report.solution.explanation import diagnosis_lines, optimality_lines, rounding_line, rounding_rows
 from tmsopt.report.solution.findings import Findings
 from tmsopt.report.solution.infeasible import infeasible_lines

@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 from itertools import takewhile
 
-from tmsopt.diagnosis.diagnosis import Diagnosis
-from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
-from tmsopt.explanation.explain import Explanation
-from tmsopt.explanation.optimality import NOT_COVERED, OnLine, Optimality
-from tmsopt.explanation.rounding import ALONE, Rounded
+from tmsopt.analysis.diagnosis import Diagnosis
+from tmsopt.analysis.explain import Explanation
+from tmsopt.analysis.optimality import NOT_COVERED, OnLine, Optimality
+from tmsopt.analysis.rounding import ALONE, Rounded
+from tmsopt.analysis.splitting import DEVIATION, Law, Response
 from tmsopt.report.solution.rows import frequency_of
 from tmsopt.report.text import columns, number
 

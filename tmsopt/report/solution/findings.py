@@ -5,13 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from tmsopt.critical_speeds import stable_speeds
-from tmsopt.design.solution import Solution
-from tmsopt.diagnosis import Diagnosis, diagnose
+from tmsopt.analysis import Diagnosis, Explanation, diagnose, explain
+from tmsopt.boundaries import Robustness, robustness, robustness_at
+from tmsopt.dynamics import stable_speeds
 from tmsopt.errors import InputError
-from tmsopt.explanation import Explanation, explain
-from tmsopt.margins import Robustness, robustness, robustness_at
-from tmsopt.progress import Listener, counted
+from tmsopt.problem.solution import Solution
+from tmsopt.progress import Listener, start_steps
 
 T = TypeVar("T")
 
@@ -66,7 +65,7 @@ def _around(solution: Solution, full: bool, progress: Listener | None) -> Robust
     """The nearest boundaries; that of heavy damping, which a screen has no line for, where all is wanted."""
     if full:
         return robustness(solution, progress=progress)
-    counted(progress, "looking for the nearest boundaries")
+    start_steps(progress, "looking for the nearest boundaries")
     return robustness_at(solution.problem, solution.parameters)
 
 

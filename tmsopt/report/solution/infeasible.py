@@ -5,12 +5,12 @@ import re
 from collections.abc import Collection
 from dataclasses import replace
 
-from tmsopt.checks.exclusion import known_bound
-from tmsopt.design import limit_of, unit_of
-from tmsopt.design.advice.remedies import Need, Relaxation
-from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import dimension_of, limit_text
+from tmsopt.evaluation.exclusion import known_bound
+from tmsopt.problem import limit_of, unit_of
+from tmsopt.problem.advice.remedies import Need, Relaxation
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import dimension_of, limit_text
 from tmsopt.records import Table
 
 _SIGN = re.compile(r"<=|>=|==")

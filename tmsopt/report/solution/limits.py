@@ -2,12 +2,12 @@
 
 import math
 
-from tmsopt.design.cases import Case
-from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
-from tmsopt.design.solution import Bound, Solution
-from tmsopt.design.unit_system import unit_of, unit_of_all
-from tmsopt.explanation import faster_than, none_of
+from tmsopt.analysis import faster_than, none_of
+from tmsopt.problem.cases import Case
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.problem.solution import Bound, Solution
+from tmsopt.problem.unit_system import unit_of, unit_of_all
 from tmsopt.report.text import number
 
 

@@ -2,9 +2,9 @@
 
 import math
 
-from tmsopt.design.unit_system import unit_of
-from tmsopt.margins.nearest import Nearest, Robustness
+from tmsopt.boundaries.nearest import Nearest, Robustness
 from tmsopt.models import Model, in_words_of, words_of
+from tmsopt.problem.unit_system import unit_of
 from tmsopt.report.text import columns
 
 _MAIN = 0.5

@@ -7,17 +7,17 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tmsopt.checks.recheck import FEASIBLE
-from tmsopt.critical_speeds.speeds import speed_of
-from tmsopt.design.cases import Case
-from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import Unit, unit_at, unit_of
-from tmsopt.design.verdict.stability import ROUNDED, MultipleRoot, crossing_in_words
+from tmsopt.dynamics.speeds import speed_of
+from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import INERTIAS, Model, Parameter, ParameterSet, Quantity, Values
-from tmsopt.models.told import eigenfrequencies, on_axis, structure_in_words
+from tmsopt.models.user_spectrum import eigenfrequencies, on_axis, structure_in_words
+from tmsopt.problem.cases import Case
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import Unit, unit_at, unit_of
+from tmsopt.problem.units import frequencies
+from tmsopt.problem.verdict.stability import ROUNDED, MultipleRoot, crossing_in_words
 from tmsopt.roots import Root
-from tmsopt.units import frequencies
 
 TableRow = Sequence[str]
 

@@ -12,7 +12,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_ball, rational
+from tmsopt.algebra.elementary import as_ball, rational
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.composed import PATTERNS
 from tmsopt.roots.patterns.fitting import Form

@@ -1,0 +1,164 @@
+"""Formulas over balls: the same value as at 60 digits, certain enclosures, and nan where nothing exists."""
+
+import math
+import re
+from fractions import Fraction
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+from helpers.designs import designs
+from mpmath import mp
+
+from tmsopt.algebra import exact, greater, lesser, magnitude, positive_part, power, quotient, sqrt, tan
+from tmsopt.models import FUNCTIONS, Values, tms, to_si
+from tmsopt.problem import parse_comparison, parse_value
+
+HALF = flint.fmpq(1, 2)
+
+
+def middle(ball: Any) -> Fraction:
+    if isinstance(ball, flint.fmpq):
+        return Fraction(int(ball.p), int(ball.q))
+    mantissa, exponent = ball.mid().man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+def series(x: float) -> flint.arb_series:
+    return flint.arb_series([flint.arb(x), 1], prec=2)
+
+
+@pytest.mark.parametrize("of", tms.sets, ids=lambda s: s.name)
+def test_every_quantity_of_balls_encloses_what_doubles_give(of: Any) -> None:
+    """To the conditioning of doubles; where doubles give nan, the balls do, and exact fractions serve like balls."""
+    seen = 0
+    for native in designs(60):
+        p = to_si(native, w=1.7, m_B=11.0) if of.name == "SI" else native
+        names = [q.name for q in (*tms.quantities, *of.quantities)]
+        plain = Values(tms, of, p)
+        with flint.ctx.workdps(60):
+            for convert in (exact, flint.arb):
+                balls = Values(tms, of, {n: convert(v) for n, v in p.items()})
+                for name in names:
+                    ball = flint.arb(balls[name])
+                    if math.isnan(plain[name]):
+                        assert not ball.is_finite()
+                    else:
+                        assert float(ball) == pytest.approx(float(plain[name]), rel=1e-9, abs=1e-13)
+                        assert ball.rad() <= abs(ball) * 1e-45 + 1e-45
+                        seen += 1
+    assert seen > 500
+
+
+def test_slopes_of_quantities_are_those_of_exact_differences() -> None:
+    """Series of first order against central differences at 60 digits with a step of 1e-20: right to 1e-35."""
+    p = {"Fr": 1.3, "mu": 0.3, "chi_B": 1.4, "chi_H": 1.1, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.4}
+    with flint.ctx.workdps(60):
+        step = flint.arb("1e-20")
+        for moving in p:
+            at = {n: flint.arb(v) for n, v in p.items()}
+            tangent = Values(tms, tms.sets[0], {**at, moving: flint.arb_series([at[moving], 1], prec=2)})
+            up = Values(tms, tms.sets[0], {**at, moving: at[moving] + step})
+            down = Values(tms, tms.sets[0], {**at, moving: at[moving] - step})
+            for q in tms.quantities:
+                slope = tangent[q.name]
+                slope = slope[1] if isinstance(slope, flint.arb_series) else flint.arb(0)
+                assert abs(slope - (up[q.name] - down[q.name]) / (2 * step)) < 1e-30
+
+
+def test_quantities_that_do_not_exist_are_nan() -> None:
+    p = {"Fr": 1.0, "mu": 0.3, "chi_B": 1.2, "chi_H": 1.2, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.4}
+    level = Values(tms, tms.sets[0], {n: exact(v) for n, v in p.items()})
+    assert not flint.arb(level["Fr_c"]).is_finite()
+    assert flint.arb(level["omega0"]).is_finite()
+    flat = Values(tms, tms.sets[0], {n: exact(v) for n, v in {**p, "chi_H": 1.0, "zeta_H": 0.0}.items()})
+    assert not flint.arb(flat["omega0"]).is_finite()
+
+
+def test_a_weave_speed_of_0_is_exactly_0() -> None:
+    """ζ_B = ζ_H and χ_H = 1 in SI: fractions know x_H/w − 1 = 0 and z_B/w − z_H/w = 0, doubles and balls may not."""
+    p = {
+        "w": 0.7, "v": 3.0, "g": 9.81, "lambda_s": 0.2, "m_B": 9.0, "x_B": 0.9, "z_B": -0.3, "m_H": 1.0, "x_H": 0.7,
+        "z_H": -0.3,
+    }  # fmt: skip
+    assert Values(tms, tms.sets[1], {n: exact(v) for n, v in p.items()})["Fr_c"] == 0
+
+
+ORACLE = {
+    **{name: getattr(mp, name) for name in FUNCTIONS[:9]},
+    "abs": abs,
+    "min": min,
+    "max": max,
+    "pi": mp.pi,
+}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(f"{name}(x)" for name in FUNCTIONS[:10]),
+        "min(x, y)",
+        "max(x, y, 0.3)",
+        "min(y, x, 2)",
+        "x**2 - y**-3",
+        "(-y)**3",
+        "y**0.5",
+        "2**x",
+        "y**x",
+        "x/3 + one/7",
+        "-pi*x",
+        "abs(x - y) - 0.1",
+        "3",
+    ],
+)
+def test_expressions_over_balls_enclose_the_60_digit_value(text: str) -> None:
+    x, y = 0.7, 1.9
+    tree = parse_value(text.replace("one", "1"), ["x", "y"])
+    with mp.workdps(60), flint.ctx.workdps(50):
+        names = {**ORACLE, "x": mp.mpf(x), "y": mp.mpf(y), "one": mp.mpf(1), "mpf": mp.mpf, "__builtins__": {}}
+        exactly = re.sub(r"\d+\.\d+", lambda number: f"(mpf({number[0]!r}))", text)  # as written, not as doubles
+        wanted = mp.mpf(eval(exactly, names))
+        for convert in (exact, flint.arb):
+            got = tree.enclosure({"x": convert(x), "y": convert(y)})
+            assert abs(mp.mpf(middle(got).numerator) / middle(got).denominator - wanted) < mp.mpf(10) ** -45
+        got = tree.enclosure({"x": series(x), "y": flint.arb(y)})
+        slope = got[1] if isinstance(got, flint.arb_series) else flint.arb(0)
+        step = mp.mpf(10) ** -15
+        up, down = (mp.mpf(eval(exactly, {**names, "x": mp.mpf(x) + s})) for s in (step, -step))
+        assert float(slope) == pytest.approx(float((up - down) / (2 * step)), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("text", ["log(-x)", "sqrt(-x)", "asin(2*x)", "x/(y - y)", "(-x)**0.5", "(y - y)**-1"])
+def test_expressions_without_a_value_are_nan(text: str) -> None:
+    got = parse_value(text, ["x", "y"]).enclosure({"x": exact(0.7), "y": exact(1.9)})
+    assert not flint.arb(got).is_finite()
+
+
+def test_a_comparison_over_balls_is_left_minus_right() -> None:
+    """A number is what its digits say, however many, and a quotient of numbers is a fraction."""
+    for text in ("0.1", "1/10", "0.1000", "1e-1", "0.30000000000000004444 - 0.20000000000000004444"):
+        got = parse_comparison(f"x >= {text}", ["x"]).enclosure({"x": exact(0.5)})
+        assert middle(got) == Fraction(1, 2) - Fraction(1, 10)
+
+
+def test_choices_and_magnitudes_of_balls() -> None:
+    """Certain ones are exact; of a ball about 0 nothing is lost; floats and arrays stay what they were."""
+    wide = flint.arb(0, 0.5)
+    assert greater(exact(2), exact(1)) == 2
+    assert lesser(exact(2), flint.arb(3)) == 2
+    assert greater(wide, flint.arb(0)).contains(flint.arb(0.5))
+    assert magnitude(flint.arb_series([wide, 3], prec=2))[1].contains(flint.arb(-3))
+    assert magnitude(flint.arb_series([wide, 3], prec=2))[1].contains(flint.arb(3))
+    assert magnitude(series(-2.0))[1] == -1
+    assert positive_part(exact(-2)) == 0
+    assert positive_part(series(2.0))[1] == 1
+    assert greater(series(-2.0), flint.arb(1)) == 1
+    assert lesser(flint.arb_series([wide, 1], prec=2), flint.arb(0))[1].contains(flint.arb(1))
+    assert magnitude(-3.0) == 3
+    assert sqrt(exact(0.25)) == HALF
+    assert sqrt(exact(2)).contains(flint.arb(2).sqrt())
+    assert tan(exact(0)) == 0
+    assert power(exact(4), HALF) == 2
+    assert not flint.arb(quotient(exact(1), exact(0))).is_finite()
+    np.testing.assert_array_equal(quotient(np.array([1.0, 1.0]), np.array([2.0, 0.0])), [0.5, np.nan])

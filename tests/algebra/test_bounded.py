@@ -1,0 +1,71 @@
+"""Numbers with bounds of their errors: the bounds hold, by ball arithmetic at 300 bits, and are not far too wide."""
+
+from collections.abc import Callable
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+
+from tmsopt.algebra import Bounded, as_bounded, greater, lesser, power, quotient
+
+FORMULAS: dict[str, Callable[[Any, Any], Any]] = {
+    "mixed": lambda a, b: (a * b + a) * (b / a) - 1 / b, "root": lambda a, b: abs(a * a + b).sqrt(),
+    "cancels": lambda a, b: (a + b) * (a - b) - (a * a - b * b) + a, "power": lambda a, b: a**5 - b**-2,
+    "sin": lambda a, b: a.sin(), "cos": lambda a, b: (30 * b).cos(), "tan": lambda a, b: (a / 2).tan(),
+    "exp": lambda a, b: a.exp() * b.atan(), "log": lambda a, b: (a * a).log() - (3 + b), "asin": lambda a, b: (a / 4).asin(),
+    "acos": lambda a, b: (b / 4).acos(), "fraction": lambda a, b: flint.fmpq(1, 3) * a - b * flint.fmpq(2, 7),
+    "irrational": lambda a, b: power(abs(a), flint.fmpq(2, 3)), "greater": lambda a, b: greater(a * b, quotient(a, b)),
+    "lesser": lesser,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+@pytest.mark.parametrize("share", [0.0, 1e-12])
+def test_no_number_is_farther_off_than_it_says(name: str, share: float) -> None:
+    rng = np.random.default_rng(0)
+    a, b = rng.uniform(-3, 3, (2, 400))
+    found = FORMULAS[name](Bounded(a, share * np.abs(a)), Bounded(b, share * np.abs(b)))
+    with flint.ctx.workprec(300):
+        for k in range(len(a)):
+            ends = [
+                flint.arb(float(x[k])) * (1 + share * flint.arb(move))
+                for x, move in zip((a, b), rng.uniform(-1, 1, 2), strict=True)
+            ]
+            true = FORMULAS[name](*ends)
+            assert abs(flint.arb(float(found.value[k])) - true) <= flint.arb(float(found.error[k]))
+    typical = np.median(found.error / (1 + np.abs(found.value)))
+    assert typical <= 100 * (share + 2.0**-50)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 7])
+def test_roots_of_a_degree(degree: int) -> None:
+    x = np.random.default_rng(1).uniform(-3, 3, 200)
+    found = Bounded(x, 1e-13 * np.abs(x)).root(degree)
+    with flint.ctx.workprec(300):
+        for k, value in enumerate(x.tolist()):
+            for moved in (value * (1 - 1e-13), value, value * (1 + 1e-13)):
+                size = flint.arb(abs(moved)).root(degree)
+                true = size if value > 0 else -size if degree % 2 else flint.arb(0)
+                assert abs(flint.arb(float(found.value[k])) - true) <= flint.arb(float(found.error[k]))
+
+
+def test_what_does_not_exist_is_never_known() -> None:
+    zero, one = Bounded(np.zeros(1), np.zeros(1)), Bounded(np.ones(1), np.zeros(1))
+    near = Bounded(np.ones(1), 2 * np.ones(1))
+    with np.errstate(all="ignore"):
+        lost = (
+            one / zero, (zero - one).sqrt(), (one - one) / (one - one), Bounded(np.array([1e300]), np.zeros(1)) * 1e300,
+            1.0 / near, near.log(), near.sqrt(), near.asin(), (1.5707963 * near).tan(),
+        )  # fmt: skip
+        for number in lost:
+            assert not number.holds(1.0).any()
+            for choice in (greater(number, 1.0), greater(1.0, number), lesser(number, 1.0), lesser(1.0, number)):
+                assert not choice.holds(1.0).any()
+
+
+def test_exact_fractions_and_balls_keep_their_digits() -> None:
+    for number, value in ((flint.fmpq(1, 3), 1 / 3), (flint.arb.pi(), np.pi), (flint.fmpq(2**70 + 1), 2.0**70)):
+        found = as_bounded(number)
+        assert found.value == value
+        assert found.holds(1e-15)

@@ -1,0 +1,427 @@
+"""Diagnosis of multiple roots: matrices with a known Jordan form, and roots that split as closed forms say.
+
+The leading coefficient of a k-fold root that does not lose its derivative is c = −k! ∂p/∂θ / p⁽ᵏ⁾(s0), derived by hand
+for each system here; where a law is said to hold, the roots themselves are found at 60 digits by mpmath.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from math import factorial, sqrt
+from typing import Any
+
+import casadi as ca
+import flint
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from helpers.oracles import polynomial_60, roots_60
+from mpmath import mp
+
+import tmsopt
+from tmsopt.analysis import Diagnosis, Response, branches, diagnosed
+from tmsopt.cli import every as main
+from tmsopt.models import Model, from_coefficients, from_hamiltonian, from_matrices, tms
+from tmsopt.report import diagnosis_lines
+from tmsopt.roots import is_regular, jordan, structure
+
+# Jordan chains
+
+
+def conjugated(blocks: Sequence[tuple[int, int]], rng: np.random.Generator) -> list[list[int]]:
+    """S J S⁻¹ of whole numbers, J of Jordan blocks given as (eigenvalue, size), S with determinant 1."""
+    n = sum(size for _, size in blocks)
+    J = np.zeros((n, n), dtype=int)
+    at = 0
+    for value, size in blocks:
+        J[at : at + size, at : at + size] = value * np.eye(size, dtype=int) + np.eye(size, k=1, dtype=int)
+        at += size
+    for _ in range(2 * n):
+        i, j = rng.choice(n, 2, replace=False)
+        sign = int(rng.choice([-1, 1]))
+        J[i] += sign * J[j]  # and its inverse from the right
+        J[:, j] -= sign * J[:, i]
+    return J.tolist()
+
+
+@pytest.mark.parametrize(
+    ("chains", "others"),
+    [
+        ((1,), (1, 2)),
+        ((3,), (1, 1)),
+        ((1, 1), (2,)),
+        ((2, 1), ()),
+        ((2, 1), (1, 1, 2)),
+        ((2, 2), (1,)),
+        ((3, 2), (1,)),
+        ((3, 1, 1), (2,)),
+        ((4, 2), ()),
+        ((1, 1, 1, 1), (2,)),
+        ((6,), (3,)),
+    ],
+)
+def test_chains_of_matrices_with_a_known_jordan_form(chains: tuple[int, ...], others: tuple[int, ...]) -> None:
+    """In any units of the states and of time, which scale rows, columns and the eigenvalue."""
+    rng = np.random.default_rng(len(chains))
+    for unit in (1.0, 2.0**-20):
+        A = conjugated([(-2, c) for c in chains] + [(1 + k, c) for k, c in enumerate(others)], rng)
+        states = 2.0 ** rng.integers(-12, 13, len(A))
+        scaled = [[-unit * A[i][j] * states[i] / states[j] for j in range(len(A))] for i in range(len(A))]
+        pencil = [[[float(i == j) for j in range(len(A))] for i in range(len(A))], scaled]
+        found = jordan(
+            [[[flint.arb(x) for x in row] for row in P] for P in pencil], flint.acb(-2 * unit), sum(chains), 1e-7
+        )
+        assert (found.geometric, found.partial) == (len(chains), chains)
+        assert found.zero <= 1e-14
+        assert found.nonzero >= 1e-9  # of transformations that may be this ill-conditioned
+
+
+def test_chains_of_a_quadratic_pencil() -> None:
+    """(s + 1)² I + N with nilpotent N: det = (s + 1)⁶; N of rank 1 gives the chains 4 and 2 (one, and two uncoupled)."""
+    M = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    D = [[2 * x for x in row] for row in M]
+    for coupled, partial in (((0, 0), (2, 2, 2)), ((1, 0), (4, 2)), ((1, 1), (6,))):
+        K = [[1, coupled[0], 0], [0, 1, coupled[1]], [0, 0, 1]]
+        balls = [[[flint.arb(x) for x in row] for row in P] for P in (M, D, K)]
+        found = jordan(balls, flint.acb(-1), 6, 1e-7)
+        assert (found.geometric, found.partial) == (len(partial), partial)
+        assert is_regular(balls, flint.acb(-1), 1e-7)
+
+
+def test_matrices_that_are_singular_everywhere_are_seen() -> None:
+    singular = [[[flint.arb(1), flint.arb(1)], [flint.arb(1), flint.arb(1)]]] * 2
+    assert not is_regular(singular, flint.acb(-1), 1e-7)
+
+
+# Newton's polygon
+
+
+def test_branches_of_known_curves() -> None:
+    """t³ − ε t − ε³ = 0: t² = ε twice and t = −ε² once. t² (t − ε) = 0: two stay. (t² − ε)² + ε⁴ = 0: t⁴ cycles meet."""
+    found, unmoved = branches([[0, 0, 0, 1], [0, -1, 0, 0], [0, 0, 0, 0], [-1, 0, 0, 0]])
+    assert [(b.roots, str(b.exponent), b.constants) for b in found] == [(2, "1/2", (1,)), (1, "2", (-1,))]
+    assert unmoved == 0
+    found, unmoved = branches([[0, 0, 0, 1], [0, 0, -1, 0]])
+    assert [(b.roots, str(b.exponent), b.constants) for b in found] == [(1, "1", (1,))]
+    assert unmoved == 2
+    found, unmoved = branches([[0, 0, 0, 0, 1], [0, 0, -2, 0, 0], [1, 0, 0, 0, 0]])
+    assert [(b.roots, b.numerator, b.denominator, len(b.constants)) for b in found] == [(4, 1, 2, 2)]
+    assert branches([[0, 0, 1], [0, 0, 0]]) == ((), 2)
+
+
+# Systems
+
+
+def diagnosis_of(model: Model, **design: float) -> Diagnosis:
+    """The one multiple root of a design of a model's first parameter set."""
+    of = model.sets[0]
+    found = structure([float(c) for c in model.coefficients(design, of)], 1e-11)
+    (diagnosis,) = diagnosed(model, of, design, found)
+    return diagnosis
+
+
+def response(diagnosis: Diagnosis, name: str) -> Response:
+    return next(r for r in diagnosis.responses if r.parameter == name)
+
+
+def symbols(names: str) -> Any:
+    return [ca.SX.sym(n) for n in names.split()]
+
+
+def test_two_equal_oscillators_are_semisimple() -> None:
+    """m s² + c s + k twice: two eigenvectors; k₁ moves one root by −k₁ ε/(2 m s + c), and leaves the other."""
+    m, c, k1, k2, kappa = symbols("m c k1 k2 kappa")
+    model = from_matrices([[m, 0], [0, m]], [[c, 0], [0, c]], [[k1 + kappa, -kappa], [-kappa, k2 + kappa]])
+    found = diagnosis_of(model, m=2.0, c=0.6, k1=7.0, k2=7.0, kappa=0.0)
+    s0 = complex(found.re, found.im)
+    assert s0 == pytest.approx((-0.6 + sqrt(56 - 0.36) * 1j) / 4, rel=1e-14)
+    assert (found.kind, found.algebraic, found.geometric, found.partial) == ("semisimple", 2, 2, (1, 1))
+    own = response(found, "k1")
+    assert own.unmoved == 1
+    assert str(own.laws[0].branches.exponent) == "1"
+    assert own.laws[0].branches.constants[0] == pytest.approx(-7 / (4 * s0 + 0.6), rel=1e-12)
+    coupled = response(found, "kappa")
+    assert not coupled.relative
+    assert coupled.unmoved == 1  # both masses together do not feel the spring between them
+    assert coupled.laws[0].branches.constants[0] == pytest.approx(-2 / (4 * s0 + 0.6), rel=1e-12)
+    both = response(found, "m").laws[0].branches
+    assert (both.roots, both.constants) == (2, pytest.approx([-2 * s0**2 / (4 * s0 + 0.6)] * 2, rel=1e-12))
+
+
+def test_oscillators_equal_but_for_a_millionth_have_two_eigenvectors() -> None:
+    """Their polynomial is 1e-13 from a double pair; the matrix there is the root of that from rank 0."""
+    k1, k2 = symbols("k1 k2")
+    model = from_matrices([[1, 0], [0, 1]], [[0.6, 0], [0, 0.6]], [[k1, 0], [0, k2]])
+    found = diagnosis_of(model, k1=7.0, k2=7.0 * (1 + 1e-6))
+    assert (found.kind, found.geometric, found.partial) == ("semisimple", 2, (1, 1))
+
+
+def test_a_slope_that_is_rounding_moves_nothing() -> None:
+    """(s + 1)² = x (2y² − 1): at y = √½ in doubles the slope is 2e-16, and at y = √½ none."""
+    x, y = symbols("x y")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - x * (2 * y * y - 1)]), x=0.0, y=sqrt(0.5))
+    assert 2 * sqrt(0.5) ** 2 != 1
+    assert response(found, "x") == Response("x", False, (), 2)
+
+
+def test_six_uncoupled_oscillators_with_critical_damping() -> None:
+    """(s² + c s + 1)⁶ at c = 2: six chains of two, each moved by t² = 2 ε for c (1 + ε)."""
+    c, k = symbols("c k")
+    eye = np.eye(6, dtype=int).tolist()
+    model = from_matrices(eye, [[c * x for x in row] for row in eye], [[k * x for x in row] for row in eye])
+    found = diagnosis_of(model, c=2.0, k=1.0)
+    assert (found.kind, found.algebraic, found.partial) == ("partly defective", 12, (2,) * 6)
+    law = response(found, "c").laws[0].branches
+    assert (law.roots, str(law.exponent)) == (12, "1/2")
+    assert law.constants == pytest.approx([2] * 6, rel=1e-10)
+
+
+def test_the_sixfold_root_of_two_masses_and_a_controller() -> None:
+    """(s⁴ + 2s²)(x0 + x1 s + s²) + y0 + y1 s + y2 s² = (s + r)⁶ with r = √15/5; y0 (1 + ε): t⁶ = −r⁶ ε exactly."""
+    x0, x1, y0, y1, y2 = symbols("x0 x1 y0 y1 y2")
+    model = from_coefficients([1, x1, x0 + 2, 2 * x1, 2 * x0 + y2, y1, y0])
+    r = sqrt(15) / 5
+    free = {"x0": 15 * r**2 - 2, "x1": 6 * r, "y0": r**6, "y1": 6 * r**5, "y2": 15 * r**4 - 2 * (15 * r**2 - 2)}
+    found = diagnosis_of(model, **free)
+    assert (found.algebraic, found.re) == (6, pytest.approx(-r, rel=1e-14))
+    (law,) = response(found, "y0").laws
+    assert str(law.branches.exponent) == "1/6"
+    assert law.branches.constants[0] == pytest.approx(-(r**6), rel=1e-12)
+    assert (law.below, law.above) == (1.0, 1.0)
+
+
+def test_a_defective_pair_of_first_order() -> None:
+    """[[−1, 1], [d, −1]] at d = 0: (s + 1)² = d exactly, so the law holds as far as it was sampled."""
+    d, rate = symbols("d rate")
+    found = diagnosis_of(from_matrices(A=[[-rate, 1], [d, -rate]]), d=0.0, rate=1.0)
+    assert (found.kind, found.partial, found.re, found.im) == ("defective", (2,), -1.0, 0.0)
+    law = response(found, "d").laws[0]
+    assert (str(law.branches.exponent), law.branches.constants[0]) == ("1/2", pytest.approx(1, rel=1e-14))
+    assert (law.below, law.above) == (1.0, 1.0)
+
+
+def test_chains_two_and_one_of_a_threefold_root() -> None:
+    d, f = symbols("d f")
+    found = diagnosis_of(from_matrices(A=[[-1, 1, 0], [d, -1, 0], [0, 0, -1 + f]]), d=0.0, f=0.0)
+    assert (found.kind, found.algebraic, found.geometric, found.partial) == ("partly defective", 3, 2, (2, 1))
+    assert [(r.parameter, r.unmoved, str(r.laws[0].branches.exponent)) for r in found.responses] == [
+        ("d", 1, "1/2"),
+        ("f", 2, "1"),
+    ]
+
+
+def test_a_bare_polynomial_has_one_chain_and_may_move_linearly() -> None:
+    """(s + 1)² = x²: one chain of a companion matrix, and yet two roots ± x, for ∂p/∂x = 0."""
+    (x,) = symbols("x")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - x * x]), x=0.0)
+    assert (found.geometric, found.jordan, found.kind) == (1, None, "defective")
+    law = found.responses[0].laws[0]
+    assert str(law.branches.exponent) == "1"
+    assert sorted(c.real for c in law.branches.constants) == pytest.approx([-1, 1], rel=1e-12)
+    assert "no matrices" in diagnosis_lines([found])[0]
+
+
+def test_the_exceptional_point_of_a_pair_with_balanced_gain_and_loss() -> None:
+    """s⁴ + (2 − γ²) s² + 1 − κ²: a double pair where 2 − γ² = 2 √(1 − κ²), and t² = γ² ε/2 for γ (1 + ε)."""
+    gamma, kappa = symbols("gamma kappa")
+    model = from_matrices([[1, 0], [0, 1]], [[gamma, 0], [0, -gamma]], [[1, kappa], [kappa, 1]])
+    at = sqrt(2 - 2 * sqrt(1 - 0.36))
+    found = diagnosis_of(model, gamma=at, kappa=0.6)
+    assert (found.algebraic, found.geometric, found.kind) == (2, 1, "defective")
+    assert complex(found.re, found.im) == pytest.approx(1j * 0.8**0.5, rel=1e-14)
+    law = response(found, "gamma").laws[0].branches
+    assert (str(law.exponent), law.constants[0]) == ("1/2", pytest.approx(at**2 / 2, rel=1e-12))
+
+
+def test_flutter_of_the_undamped_ziegler_pendulum() -> None:
+    """2 s⁴ + (7 − 2P) s² + 1 with P = 7/2 − √2: s0⁴ = 1/2 and t² = P ε/4 (masses 2 and 1, springs and length 1)."""
+    (P,) = symbols("P")
+    model = from_matrices(M=[[3, 1], [1, 1]], K=[[2 - P, P - 1], [-1, 1]])
+    critical = 3.5 - sqrt(2)
+    found = diagnosis_of(model, P=critical)
+    assert (found.algebraic, found.geometric, found.kind) == (2, 1, "defective")
+    assert complex(found.re, found.im) == pytest.approx(1j * 0.5**0.25, rel=1e-14)
+    law = found.responses[0].laws[0].branches
+    assert (str(law.exponent), law.constants[0]) == ("1/2", pytest.approx(critical / 4, rel=1e-12))
+
+
+def test_the_law_holds_farther_on_one_side() -> None:
+    """(s + 1)² = x + 2x²: t is off √x by √(1 + 2x) − 1, so by a tenth at x = 0.105 and at −0.095.
+
+    Sampled are 0.1, which is between them, and 0.1^(5/4).
+    """
+    (x,) = symbols("x")
+    (law,) = diagnosis_of(from_coefficients([1, 2, 1 - x - 2 * x * x]), x=0.0).responses[0].laws
+    assert (law.below, law.above) == (pytest.approx(10**-1.25), pytest.approx(0.1))
+
+
+def test_parameters_are_ordered_by_how_far_they_move_the_root() -> None:
+    """(s + 1)² = a + 4b + c²: t² = 4ε moves farther than t² = ε, and t = ±ε least."""
+    a, b, c = symbols("a b c")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
+    assert [r.parameter for r in found.responses] == ["b", "a", "c"]
+
+
+# Points that are met to rounding, or less
+
+
+def test_a_crossing_that_is_met_to_less_than_its_digits_moves_linearly() -> None:
+    """[[d, k], [k, −d]] has ω = ±√(d² + k²): a double root at d = k = 0 alone, which coefficients meet to their root."""
+    model = from_hamiltonian([["d", "k"], ["k", "-d"]]).within({"d": (-1, 1), "k": (-1, 1)})
+    at = {"d": -6.5e-10, "k": -3.1e-10}
+    found = structure([float(c) for c in model.coefficients(at)], 1e-12)
+    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"d": (-1, 1), "k": (-1, 1)})
+    assert (diagnosis.kind, diagnosis.eigenfrequency) == ("semisimple", 0)
+    for answer in diagnosis.responses:
+        (law,) = answer.laws
+        assert (answer.relative, str(law.branches.exponent), law.branches.roots) == (False, "1", 2)
+        assert law.branches.size == pytest.approx(1, rel=1e-12)
+
+
+def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly() -> None:
+    """As above: k₂ moves one root by k ε/(2 √(k − c²/4)), and the other stays."""
+    m, c, k1, k2 = symbols("m c k1 k2")
+    model = from_matrices([[m, 0], [0, 1]], [[c, 0], [0, c]], [[k1, 0], [0, k2]])
+    at = {"m": 1.0, "c": 0.1, "k1": 2.0, "k2": 2.0000009}
+    found = structure([float(x) for x in model.coefficients(at)], 1e-12)
+    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"k2": (1, 3)})
+    assert diagnosis.im == pytest.approx(sqrt(2 - 0.0025), rel=1e-14)
+    (law,) = response(diagnosis, "k2").laws
+    assert (str(law.branches.exponent), law.branches.roots, response(diagnosis, "k2").unmoved) == ("1", 1, 1)
+    assert law.branches.size == pytest.approx(1 / sqrt(2 - 0.0025), rel=1e-9)
+
+
+def test_a_singular_exceptional_point_moves_linearly() -> None:
+    """[[a + ib, 1], [0, 0]] has ω = a + ib and 0, one Jordan block at a = b = 0."""
+    model = from_hamiltonian([["a + 1j*b", 1], [0, 0]]).within({"a": (-1, 1), "b": (-1, 1)})
+    at = {"a": 5.2e-8, "b": 6e-30}
+    found = structure([float(c) for c in model.coefficients(at)], 1e-12)
+    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"a": (-1, 1), "b": (-1, 1)})
+    assert (diagnosis.geometric, diagnosis.eigenfrequency) == (1, 0)
+    for answer in diagnosis.responses:
+        (law,) = answer.laws
+        assert (answer.relative, str(law.branches.exponent), law.branches.size) == (False, "1", pytest.approx(1))
+        assert (answer.unmoved, answer.unresolved) == (1, 0)
+
+
+def test_what_has_no_power_series_is_not_resolved() -> None:
+    """(s + 1)² = √x + y: at x = 0 the slope in x is infinite."""
+    x, y = symbols("x y")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - ca.sqrt(x) - y]), x=0.0, y=0.0)
+    assert response(found, "x") == Response("x", False, (), 0, 2)
+    assert str(response(found, "y").laws[0].branches.exponent) == "1/2"
+    assert "not resolved for x" in diagnosis_lines([found])[1]
+
+
+def test_orders_beyond_ten_count() -> None:
+    """(s + 1)¹² + x¹¹ − y: by x the roots move as ε^(11/12), by y as ε^(1/12)."""
+    x, y = symbols("x y")
+    binomials = [1, 12, 66, 220, 495, 792, 924, 792, 495, 220, 66, 12]
+    found = diagnosis_of(from_coefficients([*binomials, 1 + x**11 - y]), x=0.0, y=0.0)
+    assert [str(response(found, n).laws[0].branches.exponent) for n in "xy"] == ["11/12", "1/12"]
+
+
+def test_every_parameter_is_listed_with_its_law() -> None:
+    a, b, c = symbols("a b c")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
+    (_, line) = diagnosis_lines([found])
+    assert "of b moves it by 2 ε^(1/2)" in line
+    assert "a (absolute) by 1 ε^(1/2)" in line
+    assert "c (absolute) by 1 ε" in line
+
+
+# The EP4 of the two-mass-skate bicycle
+
+
+def ep4() -> dict[str, float]:
+    """Compact closed form for χ_H = 1, with r = √(ζ_B/ζ_H) and h = √(ζ_B ζ_H), rounded to doubles."""
+    with mp.workdps(40):
+        r, h = mp.sqrt(2), mp.sqrt(mp.mpf("0.08"))
+        T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
+        Fr = (r**2 + 6 * r + 1) / (4 * mp.sqrt(h) * (r + 1))
+        return {
+            "Fr": float(Fr), "mu": 0.1, "chi_B": float(r), "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2,
+            "lambda_s": float(mp.atan(T)),
+        }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def bicycle() -> Diagnosis:
+    return diagnosis_of(tms, **ep4())
+
+
+def changed(design: Mapping[str, float], name: str, eps: float) -> dict[str, Any]:
+    with mp.workdps(80):
+        return {**{n: mp.mpf(x) for n, x in design.items()}, name: mp.mpf(design[name]) * (1 + mp.mpf(eps))}
+
+
+def test_the_bicycle_has_one_chain_of_four(bicycle: Diagnosis) -> None:
+    assert (bicycle.kind, bicycle.algebraic, bicycle.geometric, bicycle.partial) == ("defective", 4, 1, (4,))
+    assert bicycle.re == pytest.approx(-(0.08 ** (-0.25)), rel=1e-15)
+    assert bicycle.jordan is not None
+    assert bicycle.jordan.zero < 1e-15
+    assert bicycle.jordan.nonzero > 1e-2
+
+
+@pytest.mark.parametrize("name", ["Fr", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s"])
+def test_the_leading_coefficient_is_that_of_the_closed_form(bicycle: Diagnosis, name: str) -> None:
+    """−4! θ ∂p/∂θ / p⁗ by differences of the 60-digit polynomial: the rounded design costs 1e-15, so 1e-13."""
+    with mp.workdps(60):
+        ahead, back = (polynomial_60(**changed(ep4(), name, eps)) for eps in (1e-12, -1e-12))
+        slope = [(a - b) / mp.mpf(2e-12) for a, b in zip(ahead, back, strict=True)]
+        p = polynomial_60(**changed(ep4(), name, 0))
+        expected = -factorial(4) * mp.polyval(slope, mp.mpf(bicycle.re)) / (factorial(4) * p[0])
+    (law,) = response(bicycle, name).laws
+    assert str(law.branches.exponent) == "1/4"
+    # but for the factor ν_H of the matrices, which vanishes from ratios only where p does: s0 is off by 1e-16
+    assert law.branches.constants[0] == pytest.approx(float(expected), rel=1e-10)
+
+
+@pytest.mark.parametrize("name", ["Fr", "zeta_H"])
+def test_the_law_holds_as_far_as_said_and_no_further(bicycle: Diagnosis, name: str) -> None:
+    """Roots at 60 digits of the design that is stored, whose own rounding splits them far less than the change."""
+    (law,) = response(bicycle, name).laws
+    for sign, end in ((-1, law.below), (1, law.above)):
+        assert off(bicycle, name, sign * end) <= 0.1
+        assert off(bicycle, name, sign * end * 10**0.25) > 0.1
+        assert off(bicycle, name, sign * end * 1e-3) < 0.05
+
+
+def off(bicycle: Diagnosis, name: str, eps: float) -> float:
+    """The largest relative deviation of a root's shift from the law."""
+    shifts = [complex(z) - bicycle.re for z in roots_60(polynomial_60(**changed(ep4(), name, eps)))]
+    law = response(bicycle, name).laws[0].branches
+    return max(min(abs(t - z) for z in shifts) / abs(t) for t in law.shifts(eps))
+
+
+def test_the_mass_ratio_does_not_move_it(bicycle: Diagnosis) -> None:
+    """At χ_H = 1 the polynomial does not depend on μ."""
+    assert response(bicycle, "mu") == Response("mu", True, (), 4)
+    assert bicycle.responses[-1].parameter == "mu"
+
+
+# From a solution
+
+
+def test_a_solution_says_what_its_multiple_root_is() -> None:
+    solution = tmsopt.solve(tmsopt.load("problems/ep4.toml"))
+    (found,) = tmsopt.diagnose(solution)
+    assert (found.kind, found.partial) == ("defective", (4,))
+    assert json.loads(json.dumps(found.to_json(), allow_nan=False))["responses"][0]["laws"][0]["exponent"] == "1/4"
+    text, splitting = diagnosis_lines([found])
+    assert text.startswith("4-fold root -1.8803015: defective, Jordan chain of length 4 (1 independent eigenvector")
+    assert "ε^(1/4)" in splitting
+
+
+@pytest.mark.slow
+def test_the_command_shows_it() -> None:
+    printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--full"]).output
+    assert "4-fold root -1.8803015: defective" in printed
+    assert "holds for ε > 0" in printed
+    data = json.loads(CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--json", "--full"]).output)
+    assert [(d["algebraic"], d["geometric"], d["partial"]) for d in data["diagnosis"]] == [(4, 1, [4])]
+
+
+def test_all_designs_take_no_diagnosis() -> None:
+    ended = CliRunner().invoke(main, ["solve", "problems/coupled_pair.toml", "--all", "--full"])
+    assert ended.exit_code == 2
+    assert "--full" in ended.output

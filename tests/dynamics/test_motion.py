@@ -1,0 +1,387 @@
+"""Motion against integrators, closed forms at 50 digits and invariants: none of them knows a matrix exponential."""
+
+import math
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp
+from scipy.integrate import solve_ivp
+
+import tmsopt
+from tmsopt.dynamics import system_of
+from tmsopt.models import canonical, from_matrices, matrices, tms, whipple
+from tmsopt.records import Array
+
+Feedback = import_module("tmsopt.models.model").Feedback
+PROBLEMS = Path(__file__).parents[2] / "problems"
+BENCHMARK, EP4 = PROBLEMS / "whipple_benchmark.toml", PROBLEMS / "ep4.toml"
+STATES = ("phi", "delta", "phidot", "deltadot")
+
+
+def table(motion: tmsopt.Simulation, names: Sequence[str]) -> Array:
+    return np.array([motion[name] for name in names])
+
+
+def integrated(right: Callable[[Array], Array], start: Array, times: Array) -> Array:
+    """By an explicit Runge–Kutta method of order 8, to 1e-13."""
+    found = solve_ivp(
+        lambda t, x: right(x), (0, times[-1]), start, "DOP853", t_eval=times, rtol=1e-13, atol=1e-14, max_step=0.01
+    )
+    return np.asarray(found.y)
+
+
+def rolling(p: Mapping[str, float]) -> Callable[[Array], Array]:
+    """x′ of a Whipple bicycle: lean, steer, rates, yaw, rear contact aside; equations 5.3 and B of Meijaard et al."""
+    M, C1, K0, K2 = (np.array(m, dtype=float) for m in canonical(p))
+    v, g, c, w, cosine = p["v"], p["g"], p["c"], p["w"], math.cos(p["lambda_s"])
+
+    def right(x: Array) -> Array:
+        q, r = x[:2], x[2:4]
+        turn = (v * q[1] + c * r[1]) * cosine / w
+        return np.r_[r, -np.linalg.solve(M, v * C1 @ r + (g * K0 + v**2 * K2) @ q), turn, v * x[4]]
+
+    return right
+
+
+# The motion
+
+
+def test_the_benchmark_moves_as_an_integrator_says() -> None:
+    """Whole: angles, rates, yaw and both contacts, after a lean, a steer and both pushes."""
+    motion = tmsopt.simulate(BENCHMARK, lean=5, steer="-2 deg", push=0.3, lean_push=4.0, seconds=6, points=301)
+    p = motion.parameters
+    M = np.array(canonical(p)[0], dtype=float)
+    start = np.r_[math.radians(5), -math.radians(2), np.linalg.solve(M, [4.0, 0.3]), 0, 0]
+    found = integrated(rolling(p), start, np.array(motion["t"]))
+    assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found, abs=1e-10)
+    front = found[5] + p["w"] * found[4] - p["c"] * math.cos(p["lambda_s"]) * found[1]
+    assert np.array(motion["y_front"]) == pytest.approx(front, abs=1e-10)
+    assert np.array(motion["x"]) == pytest.approx(p["v"] * np.array(motion["t"]), rel=1e-15)
+
+
+def test_a_dimensionless_bicycle_moves_as_an_integrator_says() -> None:
+    p = {"Fr": 1.1, "mu": 0.3, "chi_B": 1.3, "chi_H": 1.02, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.2}
+    motion = tmsopt.simulate(tmsopt.Problem(tms, fixed=p), lean=3, push=0.001, seconds=8, points=201)
+    dimensions = {n: x for n, x in p.items() if n != "lambda_s"}
+    M, V, P = map(np.array, matrices(**dimensions, sine=math.sin(0.2), cosine=math.cos(0.2)))
+
+    def right(x: Array) -> Array:
+        turn = p["Fr"] * math.cos(0.2) * x[1]
+        return np.r_[x[2:4], -np.linalg.solve(M, V @ x[2:4] + P @ x[:2]), turn, p["Fr"] * x[4]]
+
+    start = np.r_[math.radians(3), 0, np.linalg.solve(M, [0, 0.001]), 0, 0]
+    found = integrated(right, start, np.array(motion["t"]))
+    assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found, abs=1e-10)
+
+
+def as_whipple(p: Mapping[str, float]) -> dict[str, float]:
+    """Two masses on skates as a Whipple bicycle without wheels and trail."""
+    return {n: p[n] for n in ("w", "v", "g", "lambda_s", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")}
+
+
+def test_two_masses_in_si_move_as_whipple_without_wheels() -> None:
+    """Every unit at once: the one is computed without dimensions, the other in SI."""
+    skates = tmsopt.simulate(PROBLEMS / "benchmark.toml", lean=2, push=0.1, lean_push=-0.2, seconds=5, points=50)
+    wheels = tmsopt.Problem(whipple, fixed=as_whipple(skates.parameters))
+    same = tmsopt.simulate(wheels, lean=2, push=0.1, lean_push=-0.2, seconds=5, points=50)
+    assert list(skates.columns) == list(same.columns)
+    scale = np.abs(table(same, list(same.columns))).max(axis=1, keepdims=True)
+    assert table(skates, list(same.columns)) / scale == pytest.approx(
+        table(same, list(same.columns)) / scale, abs=1e-12
+    )
+    assert skates.units == same.units
+    for a, b in zip(skates.modes, same.modes, strict=True):
+        assert (a.re, a.im, a.steer_per_lean) == pytest.approx((b.re, b.im, b.steer_per_lean), rel=1e-9)
+
+
+def ideal_ep4() -> tuple[Any, Any]:
+    """A and the fourfold root of EP4 at χ_H = 1, ζ_B = −0.4, ζ_H = −0.2 from the closed form, at the digits of mp."""
+    zeta_B, zeta_H = mp.mpf("-0.4"), mp.mpf("-0.2")
+    r, h = mp.sqrt(zeta_B / zeta_H), mp.sqrt(zeta_B * zeta_H)
+    T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
+    Fr = (r**2 + 6 * r + 1) / (4 * mp.sqrt(h) * (r + 1))
+    cosine = 1 / mp.sqrt(1 + T**2)
+    M, V, P = (mp.matrix(m) for m in matrices(Fr, mp.mpf("0.1"), r, 1, zeta_B, zeta_H, T * cosine, cosine))
+    A = mp.zeros(4)
+    for i in range(2):
+        A[i, i + 2] = 1
+    A[2:4, 0:2], A[2:4, 2:4] = -mp.inverse(M) * P, -mp.inverse(M) * V
+    return A, -1 / mp.sqrt(h)
+
+
+def test_the_closed_form_of_the_ep4_is_that_of_the_paper() -> None:
+    design = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2)
+    with mp.workdps(50):
+        A, root = ideal_ep4()
+        assert float(root) == pytest.approx(design.omega0, rel=1e-14)
+        N = A - root * mp.eye(4)
+        assert mp.mnorm(N**4) < mp.mpf(10) ** -45
+        assert mp.mnorm(N**3) > mp.mpf("0.1")
+
+
+@pytest.mark.parametrize("start", [(1.0, 0.0, 0.0, 0.0), (0.0, 0.1, 0.0, -0.5)])
+def test_at_an_ep4_it_moves_with_the_third_power_of_time(start: tuple[float, ...]) -> None:
+    """x(t) = e^(rt) Σ t^k N^k x(0)/k!, N = A − r, at 50 digits for the ideal design; the motion is that of the rounded one.
+
+    Rounding moves the roots by 4e-4 and e^(At) by about 1e-15 times the growth of its derivative.
+    """
+    motion = tmsopt.simulate(EP4, start=dict(zip(STATES, start, strict=True)), seconds=8, points=81)
+    with mp.workdps(50):
+        A, root = ideal_ep4()
+        N, x = A - root * mp.eye(4), mp.matrix(list(start))
+        terms = [N**k * x / mp.factorial(k) for k in range(4)]
+        assert max(abs(e) for e in terms[3]) > 0.01  # t³ is there
+        for k, t in enumerate(motion["t"]):
+            ideal = mp.exp(root * t) * sum((mp.mpf(t) ** j * terms[j] for j in range(1, 4)), terms[0])
+            assert [motion[name][k] for name in STATES] == pytest.approx([float(e) for e in ideal], abs=1e-10)
+
+
+@pytest.mark.parametrize("file", ["whipple_benchmark.toml", "ep4.toml", "benchmark.toml"])
+def test_an_impulse_changes_the_momentum_alone(file: str) -> None:
+    """M (φ̇, δ̇) jumps by (0, J), φ and δ do not; dimensionless M of skates is in m_B w²."""
+    motion = tmsopt.simulate(PROBLEMS / file, push=0.7, seconds=1)
+    p = dict(motion.parameters)
+    wheels = {**dict.fromkeys(whipple.sets[0].names, 0.0), **p}
+    M = tms.pencil(p)[0] if "Fr" in p else canonical(wheels)[0]  # type: ignore[misc]
+    jump = np.array(M, dtype=float) @ [motion["phidot"][0], motion["deltadot"][0]]
+    assert jump == pytest.approx([0, 0.7], abs=1e-13)
+    assert (motion["phi"][0], motion["delta"][0]) == (0, 0)
+
+
+def test_a_system_without_dampers_keeps_its_energy() -> None:
+    chain = from_matrices(M=[["m", 0, 0], [0, 2, 0.5], [0, 0.5, 1]], K=[[3, -1, 0], [-1, 2, -1], [0, -1, 4]])
+    motion = tmsopt.simulate(tmsopt.Problem(chain, fixed={"m": 1.5}), start={"q1": 1, "q3dot": -2}, seconds=400)
+    q, r = table(motion, ("q1", "q2", "q3")), table(motion, ("q1dot", "q2dot", "q3dot"))
+    M, K = np.array([[1.5, 0, 0], [0, 2, 0.5], [0, 0.5, 1]]), np.array([[3, -1, 0], [-1, 2, -1], [0, -1, 4]])
+    energy = np.einsum("it,ij,jt->t", r, M, r) + np.einsum("it,ij,jt->t", q, K, q)
+    assert energy == pytest.approx(3 + 4, rel=1e-12)
+    assert (motion.stable, [math.isnan(m.settling) for m in motion.measures]) == (False, [True] * 3)
+
+
+def test_at_the_capsize_speed_it_rides_a_circle() -> None:
+    """A root 0: lean and steer stay, so the yaw rate is v δ cos λ_s / w, and the path the parabola of a circle of that."""
+    (_, fast), *_ = tmsopt.speeds(BENCHMARK).stable
+    p = {**tmsopt.load(BENCHMARK).fixed, "v": fast}
+    _, _, K0, K2 = (np.array(m, dtype=float) for m in canonical(p))
+    K = p["g"] * K0 + fast**2 * K2
+    lean, steer = -K[0, 1] / K[0, 0], 1.0
+    start = {"phi": 0.01 * lean, "delta": 0.01 * steer}
+    motion = tmsopt.simulate(tmsopt.Problem(whipple, fixed=p), start=start, seconds=4)
+    t, turn = np.array(motion["t"]), fast * 0.01 * math.cos(p["lambda_s"]) / p["w"]
+    assert np.array(motion["delta"]) == pytest.approx(0.01, rel=1e-9)  # the speed is rounded
+    assert np.array(motion["psi"]) == pytest.approx(turn * t, abs=1e-9)
+    assert np.array(motion["y_rear"]) == pytest.approx(fast * turn * t**2 / 2, abs=1e-8)
+    apart = p["w"] * turn * t - p["c"] * math.cos(p["lambda_s"]) * 0.01
+    assert np.array(motion["y_front"]) - np.array(motion["y_rear"]) == pytest.approx(apart, abs=1e-8)
+    speeds = [m for m in motion.modes if abs(m.re) < 1e-6 and m.im == 0]
+    assert [m.steer_per_lean for m in speeds] == pytest.approx([steer / lean], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_response_is_a_simulation_and_is_pickled() -> None:
+    design = tmsopt.solve(EP4)
+    one, other = design.response(lean=5, seconds=3), tmsopt.simulate(design, lean=5, seconds=3)
+    assert one.columns == other.columns == tmsopt.simulate(EP4, lean=5, seconds=3).columns
+    assert pickle.loads(pickle.dumps(one)).columns == one.columns
+
+
+# Controllers
+
+
+GAINS = np.array([[0.0, 0, 0, 0], [-60.0, 18.0, -9.0, 2.5]])
+LAG = 0.05
+
+
+def steered(lag: float | None) -> tmsopt.models.Model:
+    """The Whipple bicycle with steer torque −(60…) x, at once or by a motor with a lag: τ T′ = −T − G x."""
+
+    def pencil(p: Mapping[str, Any]) -> tuple[Any, ...]:
+        M, D, K = whipple.pencil(p)  # type: ignore[misc]
+        if lag is None:
+            return M, added(D, GAINS[:, 2:]), added(K, GAINS[:, :2])
+        determinant = M[0][0] * M[1][1] - M[0][1] * M[1][0]
+        inverse = [[M[1][1], -M[0][1]], [-M[1][0], M[0][0]]]
+        zero, one = 0 * determinant, 1 + 0 * determinant
+        A = [[zero, zero, one, zero, zero], [zero, zero, zero, one, zero]]
+        for row in inverse:
+            force = [-sum(a * F[i][j] for i, a in enumerate(row)) / determinant for F in (K, D) for j in range(2)]
+            A.append([*force, row[1] / determinant])
+        A.append([*(-float(g) / lag * one for g in GAINS[1]), -one / lag])
+        return [[int(i == j) for j in range(5)] for i in range(5)], [[-x for x in row] for row in A]
+
+    def polynomial(**p: Any) -> list[Any]:
+        if lag is None:
+            return list(tmsopt.roots.quadratic_pencil(*pencil(p)))
+        M, D, K = whipple.pencil(p)  # type: ignore[misc]
+        L = [[[M[i][j], D[i][j], K[i][j]] for j in range(2)] for i in range(2)]
+        late = [
+            sums(convolved([lag, 1], L[1][j]), [0, 0, float(GAINS[1, 2 + j]), float(GAINS[1, j])]) for j in range(2)
+        ]
+        return sums(convolved(L[0][0], late[1]), [-x for x in convolved(L[0][1], late[0])])
+
+    return replace(
+        whipple, pencil=pencil, algebraic=dict, polynomial=polynomial, compact=None, degree=4 if lag is None else 5,
+        feedback=lambda p: Feedback(whipple.pencil(p)[0], GAINS.tolist(), lag),  # type: ignore[misc]
+    )  # fmt: skip
+
+
+def convolved(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    """Coefficients of a product of polynomials, numbers of any kind."""
+    found = [0 * b[0]] * (len(a) + len(b) - 1)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            found[i + j] = found[i + j] + x * y
+    return found
+
+
+def sums(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    return [x + y for x, y in zip(a, b, strict=True)]
+
+
+def added(F: Sequence[Sequence[Any]], G: Array) -> list[list[Any]]:
+    return [[a + float(b) for a, b in zip(*rows, strict=True)] for rows in zip(F, G, strict=True)]
+
+
+@pytest.mark.parametrize("lag", [None, LAG])
+def test_a_controller_steers_and_its_torque_is_told(lag: float | None) -> None:
+    """Against an integrator in which the torque acts on the passive bicycle; its peak against 100 000 points."""
+    p = {**tmsopt.load(BENCHMARK).fixed, "v": 3.0}
+    motion = tmsopt.simulate(tmsopt.Problem(steered(lag), fixed=p), lean=4, push=0.2, seconds=2, points=101)
+    passive, M = rolling(p), np.array(canonical(p)[0], dtype=float)
+
+    def right(x: Array) -> Array:
+        torque = -GAINS[1] @ x[:4] if lag is None else x[6]
+        moved = passive(x[:6])
+        moved[2:4] += np.linalg.solve(M, [0, torque])
+        return np.r_[moved, [] if lag is None else [(-x[6] - GAINS[1] @ x[:4]) / lag]]
+
+    start = np.r_[math.radians(4), 0, np.linalg.solve(M, [0, 0.2]), 0, 0, [] if lag is None else [0.0]]
+    found = integrated(right, start, np.array(motion["t"]))
+    assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found[:6], abs=1e-10)
+    torque = -GAINS[1] @ found[:4] if lag is None else found[6]
+    assert np.array(motion["T_delta"]) == pytest.approx(torque, abs=1e-9)
+    assert "T_phi" not in motion.columns
+    assert motion.names == ("t", *STATES)
+    (peak,) = (m for m in motion.measures if m.name == "T_delta")
+    dense = tmsopt.simulate(motion.problem, lean=4, push=0.2, seconds=12, points=100_001)
+    assert abs(peak.peak) == pytest.approx(np.abs(dense["T_delta"]).max(), rel=1e-6)
+    assert "steer torque" in str(motion)
+    assert len(tmsopt.plots.motion_figure(motion).axes) == 3
+
+
+@pytest.mark.parametrize("lag", [None, LAG])
+def test_a_motor_of_skates_has_its_torque_in_newton_metres(lag: float | None) -> None:
+    """Of tms in SI, whose matrices have no units: beside the same bicycle as Whipple's, whose have."""
+    own = tmsopt.load(PROBLEMS / "benchmark.toml")
+    p = {**own.fixed, "v": 3.5}
+    wheels = tmsopt.Problem(steered(lag), fixed=as_whipple(p))
+    native = tms.parameter_set("SI").native(p)
+    unit = p["m_B"] * p["g"] * p["w"]
+    rate = math.sqrt(p["g"] / p["w"])
+    gains = GAINS * [1, 1, rate, rate] / unit
+    M, D, K = (np.array(m, dtype=float) for m in tms.pencil(native))  # type: ignore[misc]
+    if lag is None:
+        pencil: tuple[Array, ...] = (M, D + gains[:, 2:], K + gains[:, :2])
+        coefficients = tmsopt.roots.quadratic_pencil(*(m.tolist() for m in pencil))
+    else:
+        J = np.linalg.inv(M)
+        top = np.hstack([np.zeros((2, 2)), np.eye(2), np.zeros((2, 1))])
+        A = np.vstack([top, np.hstack([-J @ K, -J @ D, J[:, 1:]]), np.r_[-gains[1], -1] / (lag * rate)])
+        pencil, coefficients = (np.eye(5), -A), np.poly(A).tolist()
+    driven = replace(
+        tms, degree=len(coefficients) - 1, compact=None, pencil=lambda p: tuple(m.tolist() for m in pencil),
+        polynomial=lambda **p: list(coefficients),
+        feedback=lambda p: Feedback(M.tolist(), gains.tolist(), lag and lag * rate),
+    )  # fmt: skip
+    asked: dict[str, Any] = {"lean": 2, "push": 0.05, "seconds": 0.4, "points": 41}
+    skates, same = (tmsopt.simulate(q, **asked) for q in (tmsopt.Problem(driven, fixed=p), wheels))
+    for name in (*STATES, "T_delta", "psi", "y_rear", "y_front"):
+        scale = np.abs(same[name]).max()
+        assert np.array(skates[name]) / scale == pytest.approx(np.array(same[name]) / scale, abs=1e-10), name
+    assert skates.units["T_delta"] == "N m"
+
+
+# What cannot be
+
+
+def test_a_singular_mass_has_no_motion() -> None:
+    stuck = from_matrices(M=[[1, 0], [0, "m"]], K=[[1, 0], [0, 1]])
+    with pytest.raises(tmsopt.InputError, match="mass matrix of this design is singular"):
+        tmsopt.simulate(tmsopt.Problem(stuck, fixed={"m": 0.0}))
+    with pytest.raises(tmsopt.InputError, match=r"given by its coefficients alone.*write its matrices"):
+        tmsopt.simulate(tmsopt.Problem(tmsopt.models.from_coefficients([1, "c", 1]), fixed={"c": 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"lean": "steep"}, "lean: found 'steep'"),
+        ({"push": "10"}, "push: found '10'; accepted: a number"),
+        ({"lean": math.nan}, "lean: found nan"),
+        ({"noise": -1.0}, "noise: found -1; accepted: 0 or more"),
+        ({"start": {"q1": 1.0}}, "unknown state 'q1'; accepted: phi delta phidot deltadot"),
+        ({"start": {"phi": "x"}}, "start.phi: found 'x'; accepted: a number"),
+        ({"start": 3}, "start: found 3; accepted: names with their values"),
+        ({"lean": 1, "start": {"phi": 0.1}}, "start.phi: is given twice"),
+        ({"seconds": 0}, "seconds: found 0; accepted: a number above 0"),
+        ({"points": 1}, "points: found 1; accepted: a whole number from 2"),
+        ({"seed": -1}, "seed: found -1; accepted: a whole number, 0 or more"),
+    ],
+)
+def test_what_cannot_be_asked_is_said(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(tmsopt.InputError) as raised:
+        tmsopt.simulate(BENCHMARK, **asked)
+    assert said in str(raised.value)
+
+
+def test_a_stated_system_starts_by_the_names_of_its_states() -> None:
+    spring = tmsopt.Problem(from_matrices(M=[[1]], D=[["c"]], K=[[1]]), fixed={"c": 0.2})
+    with pytest.raises(tmsopt.InputError, match=r"push: a stated system has no lean and no steer.* q1dot=1"):
+        tmsopt.simulate(spring, push=1)
+    assert list(tmsopt.simulate(spring).columns) == ["t", "q1", "q1dot"]
+    flow = from_matrices(A=[["a", 1], [0, -2]])
+    assert list(tmsopt.simulate(tmsopt.Problem(flow, fixed={"a": -1.0})).columns) == ["t", "x1", "x2"]
+    assert system_of(spring, {"c": 0.2}).A.tolist() == [[0, 1], [-1, -0.2]]
+
+
+def test_growth_beyond_all_numbers_is_refused() -> None:
+    falling = tmsopt.Problem(from_matrices(M=[[1]], K=[["k"]]), fixed={"k": -4.0})
+    with pytest.raises(tmsopt.InputError, match=r"seconds: found 1000 .*accepted: up to 300"):
+        tmsopt.simulate(falling, seconds=1000)
+    motion = tmsopt.simulate(falling)
+    assert (motion.stable, motion.to_json()["measures"]["q1"]["settling"]) == (False, None)
+    assert np.array(motion["q1"]) == pytest.approx(np.cosh(2 * np.array(motion["t"])), rel=1e-12)
+
+
+def test_a_mass_alone_rolls_on() -> None:
+    """Both roots 0, one chain: q = q′(0) t."""
+    alone = tmsopt.Problem(from_matrices(M=[["m"]], K=[[0]]), fixed={"m": 3.0})
+    motion = tmsopt.simulate(alone, start={"q1dot": 2}, seconds=7)
+    assert np.array(motion["q1"]) == pytest.approx(2 * np.array(motion["t"]), rel=1e-14)
+    assert [(m.multiplicity, m.partial) for m in motion.modes] == [(2, (2,))]
+    (found,) = tmsopt.diagnose(alone)
+    assert [(r.parameter, r.unmoved, r.laws) for r in found.responses] == [("m", 2, ())]
+
+
+def test_what_dies_out_too_slowly_to_be_followed_has_no_settling_time() -> None:
+    """x1 = e^(−300 t) cos(900 t) + 0.05 e^(−0.001 t) sin t: within 2 % from 0.01 on, and beyond again at t = 0.41."""
+    A = [[-300, 900, 15 - 0.05 * 0.001, 0.05], [-900, -300, 45, 0], [0, 0, "-p", 1], [0, 0, -1, "-p"]]
+    motion = tmsopt.simulate(tmsopt.Problem(from_matrices(A=A), fixed={"p": 0.001}), start={"x1": 1, "x4": 1})
+    assert motion.stable
+    assert math.isnan(motion.measures[0].settling)
+    at = [float(t) for t in motion["t"]]
+    whole = [math.exp(-300 * t) * math.cos(900 * t) + 0.05 * math.exp(-0.001 * t) * math.sin(t) for t in at]
+    assert np.array(motion["x1"]) == pytest.approx(whole, abs=1e-12)
+
+
+def test_a_root_that_is_rounding_gives_no_settling_time() -> None:
+    """2 × 56.56 = 10.1 × 11.2, but for 1.6e-14 in doubles: what comes to rest elsewhere would settle after 1e14 s."""
+    resting = from_matrices(A=[["p", -56.56], [2, -11.2]])
+    measures = tmsopt.simulate(tmsopt.Problem(resting, fixed={"p": 10.1}), start={"x1": 1}).measures
+    assert all(math.isnan(found.settling) for found in measures)

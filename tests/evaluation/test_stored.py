@@ -1,0 +1,133 @@
+"""Limits on the roots hold for the parameters as they are stored: roots at 60 digits of the doubles."""
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.oracles import roots_60
+from mpmath import mp
+
+import tmsopt
+from tmsopt.evaluation import recheck
+from tmsopt.models import from_coefficients
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+multiple_roots_exist = import_module("tmsopt.evaluation.stored").multiple_roots_exist
+KEPT = 1e-9  # relative to the greater of 1 and the limit
+
+
+def least_sum(n: int, limits: Mapping[str, str], top: float = 30.0, **more: Any) -> tmsopt.Solution:
+    """The polynomial sⁿ + a sⁿ⁻¹ + … with the least sum of coefficients."""
+    names = "abcde"[:n]
+    free = dict.fromkeys(names, (0.0, top))
+    model = from_coefficients([1, *names])
+    return tmsopt.solve(tmsopt.Problem(model, free=free, minimize=" + ".join(names), constraints=limits, **more))
+
+
+def stored_roots(found: tmsopt.Solution, coefficients: Sequence[Any] | None = None) -> list[Any]:
+    return list(roots_60([mp.mpf(1), *(mp.mpf(x) for x in coefficients or found.parameters.values())]))
+
+
+@pytest.mark.parametrize(("n", "decay"), [(2, 1.1), (3, 1.1), (4, 1.1), (4, 0.3), (5, 0.6)])
+def test_a_multiple_root_on_a_limit_is_stored_left_of_it(n: int, decay: float) -> None:
+    """(s + decay)ⁿ has the least coefficients; the nearest doubles have roots right of −decay by up to 1e-3."""
+    found = least_sum(n, {"fast": f"abscissa <= {-decay}"})
+    assert max(z.real for z in stored_roots(found)) <= -decay + KEPT
+    assert found.abscissa_realised <= -decay + KEPT
+    assert found.structure == f"EP{n}"
+    assert not found.missed
+    assert found.value == pytest.approx((1 + decay) ** n - 1, rel=1e-6)  # at s = 1, less the leading 1
+    assert found.abscissa == pytest.approx(-decay, abs=5e-7)
+
+
+def test_a_double_pair_on_a_limit_of_the_damping_ratio() -> None:
+    """(s² + 2 ζ s + 1)² among quartics with one product of the roots; ζ² = 0.36."""
+    free = dict.fromkeys("abc", (0.0, 30.0))
+    limits = {"damped": "damping_ratio >= 0.6", "even": "a == c", "low": "b <= 3.44"}
+    problem = tmsopt.Problem(from_coefficients([1, *"abc", 1]), free=free, minimize="a", constraints=limits)
+    found = tmsopt.solve(problem)
+    roots = stored_roots(found, [*found.parameters.values(), 1])
+    assert min(-z.real / abs(z) for z in roots) >= 0.6 - KEPT
+    assert found.value == pytest.approx(2.4, abs=1e-6)
+
+
+def test_the_limit_holds_in_every_scenario() -> None:
+    """s³ + a s² + b s + c + m is slowest where m is least or greatest."""
+    free = dict.fromkeys("abc", (0.0, 20.0))
+    problem = tmsopt.Problem(
+        from_coefficients([1, "a", "b", "c + m"]), free=free, minimize="a + b + c",
+        constraints={"fast": "abscissa <= -0.7"}, scenarios={"m": (0.25, 0.75)},
+    )  # fmt: skip
+    found = tmsopt.solve(problem)
+    a, b, c = (found.parameters[n] for n in "abc")
+    worst = max(z.real for m in (0.25, 0.75) for z in stored_roots(found, [a, b, mp.mpf(c) + m]))
+    assert worst <= -0.7 + KEPT
+
+
+def test_what_a_given_design_misses_is_told() -> None:
+    """(s + 1.1)³ in decimals: a triple root as far as a structure tells, at −1.0999… as stored."""
+    fixed = {"a": 3.3000000000000003, "b": 3.63, "c": 1.3310000000000002}
+    problem = tmsopt.Problem(
+        from_coefficients([1, *"abc"]), fixed=fixed, minimize="a", constraints={"fast": "abscissa <= -1.1"}
+    )
+    found = tmsopt.solve(problem)
+    miss = float(max(z.real for z in stored_roots(found)) + mp.mpf(1.1))
+    assert miss > 1e-6
+    assert found.missed["fast"] == pytest.approx(miss, rel=1e-6)
+    assert found.to_json()["missed_as_stored"]["fast"] == pytest.approx(miss, rel=1e-5)
+    told = f"fast by {miss:.3g}"
+    assert told in found.report()
+    assert told in repr(found)
+
+
+def test_the_headline_has_the_abscissa_of_the_doubles_too() -> None:
+    """At the EP4 of the benchmark heights rounding alone moves the rightmost root by some 1e-4."""
+    found = tmsopt.solve("problems/ep4.toml")
+    assert abs(found.abscissa_realised - found.abscissa) > 1e-6
+    for text in (repr(found), found.report()):
+        assert f"as stored {found.abscissa_realised:.7g}" in text
+    assert "as stored" not in repr(tmsopt.solve("problems/least_speed.toml"))  # of simple roots
+
+
+def test_roots_near_a_4_fold_one_are_those_of_the_doubles() -> None:
+    """Roots −1 ± 0.005 i and −1.003 ± 0.01 i are no multiple ones to 1e-11; numeric ones are off by 1e-9."""
+    a = np.polymul([1, 2, 1 + 2.5e-5], [1, 2.006, 1.003**2 + 1e-4])
+    fixed = dict(zip("abcd", a[1:].tolist(), strict=True))
+    found = recheck(tmsopt.Problem(from_coefficients([1, *"abcd"]), fixed=fixed), fixed)
+    exact = float(max(z.real for z in roots_60([mp.mpf(1), *map(mp.mpf, fixed.values())])))
+    assert found.structure.abscissa == pytest.approx(exact, abs=1e-14)
+    assert found.realised == pytest.approx(exact, abs=1e-14)
+
+
+LOCATED = (
+    "ep4",
+    "heavily_damped",
+    "two_mass_spring",
+    "chocolate",
+    "ep3_sensor",
+    "loss_only_dimer",
+    "brake_squeal_coupling",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOCATED)
+def test_multiple_roots_of_regular_equations_exist(name: str) -> None:
+    """Each of these is proved to exist elsewhere, by Krawczyk's method or in closed form."""
+    found = tmsopt.solve(PROBLEMS / f"{name}.toml")
+    assert multiple_roots_exist(found.problem, found.parameters)
+
+
+@pytest.mark.parametrize(
+    ("off", "there"), [(0.0, True), (1e-5, False), (3e-5, False), (1.0, True)], ids=["triple", "1e-5", "3e-5", "double"]
+)
+def test_a_triple_root_that_is_there_for_rounding_alone_does_not_exist(off: float, there: bool) -> None:
+    """(s² + 2 z s + 1) (s + c) has a triple root at z = c = 1 alone; with c = 1 + ε, z = 1 − ε²/6 it misses by ε³/27."""
+    model = from_coefficients([1, "2*z + c", "1 + 2*z*c", "c"])
+    problem = tmsopt.Problem(model, free={"z": (0.05, 3.0), "c": (0.1, 3.0)}, minimize="abscissa")
+    design = {"z": 1 - off**2 / 6 if off < 0.1 else 1.0, "c": 1 + off}
+    assert max(r.multiplicity for r in problem.values(design)["structure"].roots) == (2 if off == 1.0 else 3)
+    assert multiple_roots_exist(problem, design) is there

@@ -1,0 +1,88 @@
+"""What branch and prune is made of: formulas multiplied out, and boxes that never lose a zero."""
+
+from fractions import Fraction
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+
+from tmsopt.algebra import variable
+from tmsopt.global_search import Puzzle, available, prune, tree
+from tmsopt.killable import Killable
+
+NAMES = ("x", "y", "z")
+ROUNDS = 60
+
+
+def drawn(rng: np.random.Generator, depth: int) -> tuple[Any, Any]:
+    """A formula in x, y, z, and the same as a function of fractions."""
+    if depth == 0:
+        k = int(rng.integers(5))
+        constant = Fraction(int(rng.integers(-8, 9)), 4)
+        if k > 2:
+            return flint.fmpq(constant.numerator, constant.denominator), lambda at: constant
+        return variable(NAMES[k]), lambda at: at[k]
+    (one, f), (other, g) = drawn(rng, depth - 1), drawn(rng, depth - 1)
+    match int(rng.integers(3)):
+        case 0:
+            return one + other, lambda at: f(at) + g(at)
+        case 1:
+            return one - other, lambda at: f(at) - g(at)
+    return one * other, lambda at: f(at) * g(at)
+
+
+def value(found: Any, at: list[Fraction]) -> Fraction:
+    """A tree of exact numbers at fractions."""
+    match found:
+        case ("x", k):
+            return at[k]
+        case ("c", least, greatest):
+            assert least == greatest
+            return Fraction(least)
+        case ("+", a, b):
+            return value(a, at) + value(b, at)
+        case ("*", a, b):
+            return value(a, at) * value(b, at)
+        case ("^", a, n):
+            return value(a, at) ** int(n)
+    raise AssertionError(found)
+
+
+@pytest.mark.parametrize("seed", range(ROUNDS))
+def test_a_formula_multiplied_out_has_the_same_values(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    formula, function = drawn(rng, 4)
+    at = [Fraction(int(rng.integers(-9, 10)), 2) for _ in NAMES]
+    assert value(tree(formula, NAMES), at) == function(at)
+
+
+@pytest.mark.skipif(not available(), reason="codac is not installed")
+def test_no_box_loses_a_zero() -> None:
+    """Systems with a zero planted at a fraction, mid in the box or on an end of it, singular ones among them."""
+    worker = Killable()
+    rng = np.random.default_rng(0)
+    try:
+        for _ in range(ROUNDS):
+            at = [Fraction(int(rng.integers(-4, 5)), 2) for _ in NAMES]
+            equations = []
+            for formula, function in (drawn(rng, 3) for _ in NAMES):
+                there = function(at)
+                equations.append(tree(formula - flint.fmpq(there.numerator, there.denominator), NAMES))
+            reach = [(float(rng.choice([0, 1, 2.5])), float(rng.choice([0, 0.5, 3]))) for _ in NAMES]
+            box = tuple((float(c) - lo, float(c) + hi) for c, (lo, hi) in zip(at, reach, strict=True))
+            puzzle = Puzzle(tuple(equations), (), (), tuple(hi - lo for lo, hi in box))
+            pruned = worker.call(prune, puzzle, [box], [], 0.2, 50, 1e-7).result(timeout=60)
+            left = [*pruned.left, *pruned.met, *pruned.small]
+            assert any(all(lo <= c <= hi for c, (lo, hi) in zip(at, b, strict=True)) for b in left)
+    finally:
+        worker.end()
+
+
+def test_identities_of_angles() -> None:
+    t = variable("x")
+    assert t.atan().tan() == t
+    sine, cosine = t.atan().sin(), t.atan().cos()
+    assert sine == t * cosine
+    assert flint.fmpq(1, 2) + t - t == flint.fmpq(1, 2)
+    assert (t / 4) ** 3 * 64 == t * t * t

@@ -1,0 +1,268 @@
+"""Expressions over arrays: against mpmath, against one design at a time, in blocks and whole to the bit."""
+
+import dataclasses
+import math
+from importlib import import_module
+
+import casadi as ca
+import mpmath
+import numpy as np
+import pytest
+
+from benchmarks.suites import TEMPLATES
+from tmsopt.algebra import NotAccepted, program
+from tmsopt.errors import InputError
+from tmsopt.models import Quantity, Values, tms
+from tmsopt.problem import NO_RADIUS, Problem, array_function, parse_comparison
+from tmsopt.roots import roots
+
+arrays = import_module("tmsopt.algebra.arrays")
+
+NATIVE = Problem(
+    model=tms,
+    fixed={"chi_H": 1.02, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 3.0, "chi_B": 1.3},
+    free={"Fr": (0.1, 5.0), "lambda_s": (-1.2, 1.4)},
+)
+SI = Problem(
+    model=tms,
+    fixed={"w": 1.0, "m_B": 10.0, "x_B": 1.2, "z_B": -0.5, "m_H": 1.0, "x_H": 1.0, "z_H": -0.3},
+    free={"v": (0.1, 8.0), "lambda_s": (-1.0, 1.0)},
+)
+
+
+def grid(problem, rows=7, columns=11):
+    """Every parameter: the first free one along the columns, the second along the rows."""
+    (first, ends), (second, others) = problem.free.items()
+    return problem.ordered({first: np.linspace(*ends, columns)[None, :], second: np.linspace(*others, rows)[:, None]})
+
+
+def single(problem, columns, i, j, shape=(7, 11)):
+    """One design of a grid as numbers."""
+    return {n: float(np.broadcast_to(v, shape)[i, j]) for n, v in columns.items()}
+
+
+def ulps(found, wanted):
+    """Difference in units of the last place of what is wanted; 0 where both are nan."""
+    if math.isnan(wanted) or math.isnan(found):
+        return 0.0 if math.isnan(wanted) and math.isnan(found) else math.inf
+    return 0.0 if found == wanted else abs(found - wanted) / math.ulp(wanted)
+
+
+# What an expression is
+
+
+EXACT_VALUES = {
+    "Fr + lambda_s": lambda f, s: f + s,
+    "Fr - lambda_s": lambda f, s: f - s,
+    "Fr * lambda_s": lambda f, s: f * s,
+    "Fr / lambda_s": lambda f, s: f / s,
+    "-Fr": lambda f, s: -f,
+    "Fr ** 2": lambda f, s: f**2,
+    "Fr ** 3": lambda f, s: f**3,
+    "lambda_s ** 4": lambda f, s: s**4,
+    "Fr ** -1": lambda f, s: 1 / f,
+    "Fr ** 0.5": lambda f, s: mpmath.sqrt(f),
+    "Fr ** 1.7": lambda f, s: f ** mpmath.mpf(1.7),
+    "Fr ** lambda_s": lambda f, s: f**s,
+    "2 ** lambda_s": lambda f, s: mpmath.mpf(2) ** s,
+    "sin(Fr)": lambda f, s: mpmath.sin(f),
+    "cos(Fr)": lambda f, s: mpmath.cos(f),
+    "tan(Fr)": lambda f, s: mpmath.tan(f),
+    "asin(lambda_s / 2)": lambda f, s: mpmath.asin(s / 2),
+    "acos(lambda_s / 2)": lambda f, s: mpmath.acos(s / 2),
+    "atan(lambda_s)": lambda f, s: mpmath.atan(s),
+    "sqrt(Fr)": lambda f, s: mpmath.sqrt(f),
+    "exp(lambda_s)": lambda f, s: mpmath.exp(s),
+    "log(Fr)": lambda f, s: mpmath.log(f),
+    "abs(lambda_s)": lambda f, s: abs(s),
+    "min(Fr, lambda_s, 1)": lambda f, s: min(f, s, mpmath.mpf(1)),
+    "max(Fr, lambda_s, 1)": lambda f, s: max(f, s, mpmath.mpf(1)),
+    "pi * Fr": lambda f, s: mpmath.mpf(math.pi) * f,
+}
+"""One operation each, so that an error is that of the operation; division of an angle by 2 is exact."""
+
+
+def test_every_operation_of_the_language_is_right():
+    """A correctly rounded operation is within 1/2 ulp, NumPy's functions within 2, as its own tests demand."""
+    found = array_function(NATIVE, dict(zip(EXACT_VALUES, EXACT_VALUES, strict=True)))
+    assert found.others == {}
+    columns = grid(NATIVE)
+    values = found(columns)
+    with mpmath.workdps(50):
+        for text, exact in EXACT_VALUES.items():
+            array = np.broadcast_to(values[text], (7, 11))
+            for i, j in np.ndindex(7, 11):
+                design = single(NATIVE, columns, i, j)
+                wanted = exact(mpmath.mpf(design["Fr"]), mpmath.mpf(design["lambda_s"]))
+                assert abs(mpmath.mpf(float(array[i, j])) - wanted) <= 2 * math.ulp(float(wanted)), text
+
+
+@pytest.mark.parametrize("problem", [NATIVE, SI], ids=["native", "SI"])
+def test_every_quantity_is_that_of_one_design_at_a_time(problem):
+    """Without a power other than a square NumPy rounds a number alone and in an array alike: equal to the bit."""
+    of_roots = ("abscissa", "damping_ratio", "angular_frequency", "decay_rate", "decay_time", "frequency")
+    names = [n for n in problem.vocabulary if n not in of_roots]
+    found = array_function(problem, dict(zip(names, names, strict=True)))
+    assert found.others == {}  # quotients and choices too are written down
+    columns = grid(problem)
+    values = found(columns)
+    for i, j in np.ndindex(7, 11):
+        one = Values(tms, problem.parameter_set, single(problem, columns, i, j), extra=(NO_RADIUS,))
+        for name in names:
+            assert ulps(float(np.broadcast_to(values[name], (7, 11))[i, j]), float(one[name])) == 0, name
+
+
+def test_constraints_are_those_of_one_design_at_a_time():
+    """Forms of every kind, left minus right; the powers in them cost up to 2 ulp of a side."""
+    texts = {f"{text} {sign} 0.7": sign for text, sign in TEMPLATES}
+    conditions = {t: parse_comparison(t, NATIVE.vocabulary) for t in texts}
+    columns = grid(NATIVE)
+    values = array_function(NATIVE, conditions)(columns)
+    for i, j in np.ndindex(7, 11):
+        one = NATIVE.values(single(NATIVE, columns, i, j))
+        for text, condition in conditions.items():
+            left, right = condition.sides(one)
+            found = float(np.broadcast_to(values[text], (7, 11))[i, j])
+            assert math.isnan(found) == math.isnan(left - right), text
+            assert math.isnan(found) or abs(found - (left - right)) <= 2 * math.ulp(max(abs(left), abs(right))), text
+
+
+@pytest.mark.parametrize(
+    ("text", "exists"),
+    [
+        ("sqrt(lambda_s)", lambda s: s >= 0),
+        ("sqrt(lambda_s)**2", lambda s: s >= 0),  # lambda_s, if it were simplified
+        ("0 * log(lambda_s)", lambda s: s > 0),
+        ("log(lambda_s) - log(lambda_s)", lambda s: s > 0),
+        ("min(Fr, sqrt(lambda_s))", lambda s: s >= 0),  # Fr, in CasADi
+        ("max(asin(2 * lambda_s), 5)", lambda s: abs(s) <= 0.5),
+    ],
+)
+def test_nan_where_a_value_does_not_exist(text, exists):
+    tilts = np.array([-1.1, -0.5, -0.25, 0.25, 0.5, 1.2])[:, None]
+    columns = grid(NATIVE) | {"lambda_s": tilts}
+    found = np.broadcast_to(array_function(NATIVE, {"x": text})(columns)["x"], (6, 11))
+    assert np.array_equal(np.isfinite(found[:, 0]), [exists(s) for s in tilts.ravel()])
+
+
+def test_a_difference_keeps_its_roundings():
+    """(x + y) − y is not x; CasADi would write x."""
+    found = array_function(NATIVE, {"x": "(lambda_s + 1e16) - 1e16"})(grid(NATIVE) | {"lambda_s": 1.5})
+    assert found["x"] == 2.0
+    assert ca.GlobalOptions.getSimplificationOnTheFly()  # as it was
+
+
+# Shapes
+
+
+def test_what_depends_on_one_axis_stays_on_it():
+    found = array_function(NATIVE, {"a3": "a3", "a4": "a4", "a2": "a2", "mass": "mu * zeta_H"})(grid(NATIVE))
+    assert {n: np.shape(v) for n, v in found.items()} == {"a3": (1, 11), "a4": (7, 1), "a2": (7, 11), "mass": ()}
+
+
+def test_root_quantities_are_given_or_computed():
+    found, columns = array_function(NATIVE, {"x": "2 * abscissa", "y": "Fr"}), grid(NATIVE)
+    alpha = np.random.default_rng(0).normal(size=(7, 11))
+    assert np.array_equal(found(columns | {"abscissa": alpha})["x"], 2 * alpha)
+    z = roots(np.stack(np.broadcast_arrays(*tms.coefficients(columns)), axis=-1))
+    assert found(columns)["x"] == pytest.approx(2 * z.real.max(axis=-1), abs=1e-9)  # by another way to the roots
+
+
+def test_a_formula_that_takes_no_symbols_is_evaluated_all_the_same():
+    odd = Quantity("steps", "1", "whole part of Fr", "", lambda v: np.asarray(v["Fr"]).astype(int))
+    model = dataclasses.replace(tms, quantities=(*tms.quantities, odd))
+    problem = dataclasses.replace(NATIVE, model=model)
+    found = array_function(problem, {"x": "steps * lambda_s", "y": "Fr * lambda_s"})
+    assert list(found.others) == ["x"]
+    columns = grid(problem)
+    values = found(columns)
+    assert np.array_equal(values["x"], np.floor(columns["Fr"]) * columns["lambda_s"])
+    assert np.array_equal(values["y"], columns["Fr"] * columns["lambda_s"])
+
+
+# Programs
+
+
+BINARY = (
+    ca.fmin, ca.fmax, ca.atan2, ca.copysign, ca.fmod, ca.hypot, ca.lt, ca.le, ca.eq, ca.ne, ca.logic_and, ca.logic_or,
+    ca.plus, ca.minus, ca.times, ca.rdivide,
+)  # fmt: skip
+UNARY = (
+    ca.sqrt, ca.fabs, ca.sign, ca.floor, ca.ceil, ca.sin, ca.cos, ca.tan, ca.exp, ca.atan, ca.asinh, ca.tanh, ca.log1p,
+    ca.expm1, ca.cosh, ca.sinh, ca.acos, ca.asin, ca.acosh, ca.atanh, ca.log, ca.logic_not, lambda x: x**3,
+    lambda x: x**2, lambda x: x**4, lambda x: x**-1, lambda x: x**0.5, lambda x: x**1.5, lambda x: -x, lambda x: x + x,
+)  # fmt: skip
+
+
+def random_function(rng, size=40):
+    """Forty operations on each other's results, of four inputs."""
+    x = ca.SX.sym("x", 4)
+    made = [*ca.vertsplit(x), ca.SX(0.5), ca.SX(-2.0)]
+    for _ in range(size):
+        a, b, c = (made[k] for k in rng.integers(max(0, len(made) - 12), len(made), 3))
+        match rng.integers(4):
+            case 0:
+                made.append(UNARY[rng.integers(len(UNARY))](a))
+            case 1:
+                made.append(ca.if_else(a < b, b, c))
+            case _:
+                made.append(BINARY[rng.integers(len(BINARY))](a, b))
+    return ca.Function("f", [x], [ca.vertcat(made[-1], made[-2], made[size // 2])])
+
+
+@pytest.mark.parametrize("shape", [(5, 1200), (600, 3), (1, 700), (40, 1), (700,), (), (2, 3, 4), (0, 5)])
+def test_blocks_change_no_bit(shape, monkeypatch):
+    """Whatever the program: blocks are parts of a row, whole rows, or the grid."""
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        found = program(random_function(rng))
+        column, row = (1,) * (len(shape) - 1) + shape[-1:], (*shape[:-1], 1) if shape else ()
+        given = {k: rng.normal(size=s) * 3 for k, s in enumerate((shape, column, row, ()))}
+        whole = found(given)
+        for size in (97, 512):
+            with monkeypatch.context() as patch:
+                patch.setattr(arrays, "BLOCK", size)
+                parts = found(given)
+            for one, other in zip(whole, parts, strict=True):
+                assert np.shape(one) == np.shape(other)
+                assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_a_program_is_the_casadi_function():
+    """Point by point, for every operation alone: exactly rounded ones alike, CasADi's functions within 2 ulp."""
+    rng = np.random.default_rng(6)
+    x = ca.SX.sym("x", 2)
+    operations = [f(x[0]) for f in UNARY] + [f(x[0], x[1]) for f in BINARY] + [ca.if_else(x[0] < x[1], 2 * x[0], x[1])]
+    function = ca.Function("f", [x], [ca.vertcat(*operations)])
+    points = np.concatenate([rng.normal(size=(60, 2)), [[0.0, 1.0], [1.0, 1.0], [-1.0, 0.5]]])
+    found = program(function)({0: points[:, 0], 1: points[:, 1]})
+    for k, point in enumerate(points):
+        for n, wanted in enumerate(function(point).full().ravel()):
+            assert ulps(float(np.broadcast_to(found[n], len(points))[k]), float(wanted)) <= 2, operations[n]
+
+
+def test_inputs_are_left_as_they_are_and_may_be_read_only():
+    problem, columns = NATIVE, grid(NATIVE)
+    for array in (columns["Fr"], columns["lambda_s"]):
+        array.flags.writeable = False
+    alpha = np.broadcast_to(np.linspace(-1, 1, 11), (7, 11))
+    found = array_function(problem, {"x": "abscissa * Fr - lambda_s", "y": "abscissa"})
+    values = found(columns | {"abscissa": alpha})
+    assert np.array_equal(values["x"], alpha * columns["Fr"] - columns["lambda_s"])
+    assert np.array_equal(values["y"], alpha)
+
+
+def test_an_operation_that_arrays_lack_is_refused():
+    x = ca.SX.sym("x")
+    with pytest.raises(NotAccepted, match="erf"):
+        program(ca.Function("f", [x], [ca.erf(x)]))
+
+
+def test_an_empty_output_is_zero():
+    x = ca.SX.sym("x")
+    assert program(ca.Function("f", [x], [ca.densify(ca.vertcat(x, ca.SX(1, 1)))]))({0: 3.0}) == [3.0, 0.0]
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(InputError, match=r"quantities\.x: .*unknown name 'Froude'"):
+        array_function(NATIVE, {"x": "Froude"})

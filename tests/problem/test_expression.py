@@ -1,0 +1,439 @@
+"""The expression language: arithmetic agrees with plain Python, and nothing else gets in."""
+
+import builtins
+import math
+import os
+import string
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings, strategies as st
+
+from tmsopt.problem import Expression, ExpressionError, parse_comparison, parse_value
+
+NAMES = ("Fr", "mu", "zeta_B", "a0", "lambda_s", "abscissa")
+UNIT = np.finfo(float).eps
+
+
+# Random expressions, with their value by Python's own floats and a bound of its rounding
+
+
+@dataclass(frozen=True)
+class Tree:
+    """An expression as text, how tightly it binds, and its value with an error bound for given names."""
+
+    text: str
+    binding: int  # 1 sums, 2 products, 3 signs, 4 powers, 5 atoms
+    value: Callable[[dict[str, float]], tuple[float, float]]
+
+
+def wrapped(tree: Tree, least: int) -> str:
+    return tree.text if tree.binding >= least else f"({tree.text})"
+
+
+def number(text: str) -> Tree:
+    return Tree(text, 5, lambda at: (float(text), 0.0))
+
+
+def name(text: str) -> Tree:
+    return Tree(text, 5, lambda at: (at[text], 0.0))
+
+
+def signed(sign: str, a: Tree) -> Tree:
+    def value(at: dict[str, float]) -> tuple[float, float]:
+        v, e = a.value(at)
+        return (-v if sign == "-" else v), e
+
+    return Tree(sign + wrapped(a, 3), 3, value)
+
+
+def binary(op: str, a: Tree, b: Tree, space: str) -> Tree:
+    least = {"+": (1, 2, 1), "-": (1, 2, 1), "*": (2, 3, 2), "/": (2, 3, 2), "**": (5, 3, 4)}
+    left, right, own = least[op]
+
+    def value(at: dict[str, float]) -> tuple[float, float]:
+        (x, dx), (y, dy) = a.value(at), b.value(at)
+        if op in "+-":
+            v, e = (x + y if op == "+" else x - y), dx + dy
+        elif op == "*":
+            v, e = x * y, abs(x) * dy + abs(y) * dx + dx * dy
+        elif op == "/":
+            v = x / y
+            e = (dx + abs(v) * dy) / max(abs(y) - dy, 1e-300)
+        else:
+            assume(x > 1e-3)
+            v = x**y
+            e = abs(v) * (abs(y) * dx / x + abs(math.log(x)) * dy) * 2
+        return v, e + 4 * UNIT * abs(v)
+
+    return Tree(wrapped(a, left) + space + op + space + wrapped(b, right), own, value)
+
+
+SLOPES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
+    "sin": (math.sin, lambda x: 1),
+    "cos": (math.cos, lambda x: 1),
+    "tan": (math.tan, lambda x: 1 + math.tan(x) ** 2),
+    "asin": (math.asin, lambda x: 1 / math.sqrt(1 - x * x)),
+    "acos": (math.acos, lambda x: 1 / math.sqrt(1 - x * x)),
+    "atan": (math.atan, lambda x: 1),
+    "sqrt": (math.sqrt, lambda x: 0.5 / math.sqrt(x)),
+    "exp": (math.exp, math.exp),
+    "log": (math.log, lambda x: 1 / x),
+    "abs": (abs, lambda x: 1),
+}
+
+
+def call(function: str, a: Tree) -> Tree:
+    f, slope = SLOPES[function]
+
+    def value(at: dict[str, float]) -> tuple[float, float]:
+        x, dx = a.value(at)
+        v = f(x)
+        return v, 2 * slope(x) * dx + 4 * UNIT * abs(v)
+
+    return Tree(f"{function}({a.text})", 5, value)
+
+
+def extreme(function: str, arguments: list[Tree]) -> Tree:
+    def value(at: dict[str, float]) -> tuple[float, float]:
+        found = [a.value(at) for a in arguments]
+        return (min if function == "min" else max)(v for v, _ in found), max(e for _, e in found)
+
+    return Tree(f"{function}({', '.join(a.text for a in arguments)})", 5, value)
+
+
+leaves = st.one_of(
+    st.sampled_from(["0", "1", "2", "7", "0.5", ".25", "3.", "1e-3", "2.5E2", "1e+1"]).map(number),
+    st.floats(0.001, 1000).map(repr).map(number),
+    st.sampled_from(NAMES).map(name),
+    st.just(Tree("pi", 5, lambda at: (math.pi, 0.0))),
+)
+trees = st.recursive(
+    leaves,
+    lambda inner: st.one_of(
+        st.builds(binary, st.sampled_from(["+", "-", "*", "/", "**"]), inner, inner, st.sampled_from(["", " "])),
+        st.builds(signed, st.sampled_from("+-"), inner),
+        st.builds(call, st.sampled_from(sorted(SLOPES)), inner),
+        st.builds(extreme, st.sampled_from(["min", "max"]), st.lists(inner, min_size=2, max_size=4)),
+        inner.map(lambda t: Tree(f"({t.text})", 5, t.value)),
+    ),
+    max_leaves=12,
+)
+
+
+@settings(
+    max_examples=250,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
+)
+@given(trees, st.lists(st.floats(-3, 3), min_size=len(NAMES), max_size=len(NAMES)))
+def test_random_expressions_mean_what_they_mean_in_python(tree: Tree, numbers: list[float]) -> None:
+    """NumPy and CasADi against Python's floats, within the running error bound of the operations."""
+    assume(len(tree.text) <= 2000)
+    at = dict(zip(NAMES, numbers, strict=True))
+    try:
+        value, error = tree.value(at)
+    except (ValueError, ZeroDivisionError, OverflowError):
+        assume(False)
+    assume(math.isfinite(value) and abs(value) < 1e100 and error <= 1e-9 * max(1.0, abs(value)))
+    expression = parse_value(tree.text, NAMES)
+    tolerance = error + 1e-300
+
+    assert abs(expression(at) - value) <= tolerance
+
+    several = expression({n: np.array([v, v]) for n, v in at.items()})
+    assert np.all(np.abs(several - value) <= tolerance)
+
+    symbols = {n: ca.SX.sym(n) for n in NAMES}
+    function = ca.Function("f", list(symbols.values()), [ca.SX(expression.symbolic(symbols))])
+    assert abs(float(function(*numbers)) - value) <= tolerance
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 - 2 - 3", -4),
+        ("2 - 3 + 4", 3),
+        ("8 / 4 / 2", 1),
+        ("2 ** 3 ** 2", 512),
+        ("-2 ** 2", -4),
+        ("2 ** -1", 0.5),
+        ("(-2) ** 2", 4),
+        ("1 + 2 * 3", 7),
+        ("- - 2", 2),
+        ("min(3, 1, 2)", 1),
+        ("max(3, 1, 4, 2)", 4),
+        ("cos(pi)", -1),
+        ("abs(-3.5)", 3.5),
+        ("1/3", 1 / 3),
+        ("7/2", 3.5),
+        ("  2 + 2 ", 4),
+    ],
+)
+def test_the_rules_of_school(text: str, value: float) -> None:
+    expression = parse_value(text, ())
+    assert float(expression({})) == value
+    assert float(ca.evalf(ca.SX(expression.symbolic({})))) == value
+
+
+@pytest.mark.parametrize("text", ["sqrt(Fr)", "log(Fr)", "asin(2 - Fr)", "Fr ** 0.5", "sqrt(Fr) + 1", "0/(Fr + 1)"])
+def test_what_does_not_exist_is_nan_without_a_warning(text: str) -> None:
+    """Warnings are errors in these tests. At Fr = −1; CasADi itself takes 0/x for 0."""
+    expression = parse_value(text, NAMES)
+    assert math.isnan(expression({"Fr": -1.0}))
+    symbol = ca.SX.sym("Fr")
+    value = float(ca.Function("f", [symbol], [expression.symbolic({"Fr": symbol})])(-1.0))
+    assert math.isnan(value) or text.startswith("0/")
+
+
+@pytest.mark.parametrize("text", ["1/(Fr + 1)", "exp(-1000*Fr)", "(Fr + 1) ** -1", "10 ** (-400*Fr)", "-log(Fr + 1)"])
+def test_what_overflows_is_infinite_without_a_warning(text: str) -> None:
+    assert parse_value(text, NAMES)({"Fr": -1.0}) == math.inf
+
+
+def test_names_in_order_of_appearance() -> None:
+    assert parse_value("mu*Fr + mu/a0 - pi", NAMES).names == ("mu", "Fr", "a0")
+    assert parse_comparison("a0 >= mu + Fr*mu", NAMES).names == ("a0", "mu", "Fr")
+
+
+# Comparisons
+
+
+@pytest.mark.parametrize(
+    ("text", "comparison", "difference", "violation"),
+    [
+        ("Fr <= 1", "<=", 0.5, 0.5 / 1.5),
+        ("Fr >= 1", ">=", 0.5, 0.0),
+        ("Fr == 1", "==", 0.5, 0.5 / 1.5),
+        ("Fr + 1 <= 4", "<=", -1.5, 0.0),
+        ("4 <= Fr + 1", "<=", 1.5, 1.5 / 4),
+        ("mu/4 >= Fr/4", ">=", -0.125, 0.125),
+        ("100*Fr == 148", "==", 2.0, 2 / 150),
+        ("(Fr <= 1)", "<=", 0.5, 0.5 / 1.5),
+    ],
+)
+def test_comparisons(text: str, comparison: str, difference: float, violation: float) -> None:
+    """Value: left minus right. Violation: relative to the larger side, or to 1 if both are smaller."""
+    expression = parse_comparison(text, NAMES)
+    at = {"Fr": 1.5, "mu": 1.0}
+    assert expression.comparison == comparison
+    assert float(expression(at)) == difference
+    assert expression.violation(at) == violation
+    symbols = {n: ca.SX.sym(n) for n in at}
+    assert float(ca.Function("f", [*symbols.values()], [expression.symbolic(symbols)])(1.5, 1.0)) == difference
+
+
+def test_a_comparison_of_what_does_not_exist_is_violated_by_nan() -> None:
+    assert math.isnan(parse_comparison("sqrt(Fr) >= 0", NAMES).violation({"Fr": -1.0}))
+    assert math.isnan(parse_comparison("1/Fr >= 0", NAMES).violation({"Fr": 0.0}))
+
+
+def test_values_and_comparisons_are_told_apart() -> None:
+    assert parse_value("abscissa", NAMES).comparison == ""
+    with pytest.raises(ExpressionError, match="is a comparison"):
+        parse_value("abscissa <= 0", NAMES)
+    with pytest.raises(ExpressionError, match="not a comparison"):
+        parse_comparison("abscissa", NAMES)
+    with pytest.raises(ExpressionError, match="no parameter or quantity"):
+        parse_comparison("1 <= 2", NAMES)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Fr < 1", "Fr > 1", "Fr != 1", "Fr is mu", "Fr is not mu", "Fr in mu", "Fr not in mu", "Fr = 1", "Fr =< 1",
+        "Fr => 1", "Fr <> 1", "Fr ≤ 1", "Fr ≥ 1", "Fr <= 1 <= mu", "Fr == mu == a0", "Fr <= (mu <= 1)",
+        "(Fr <= 1) <= mu", "Fr <= 1, mu <= 1", "Fr <= 1 and mu <= 1", "not Fr <= 1", "Fr <= 1; mu <= 1",
+        "Fr <= 1 if mu else 0", "Fr <=", "<= 1", "-(Fr <= 1)", "min(Fr <= 1, 2) <= 3", "Fr <= True", "Fr <= 1e999",
+        "Fr <= inf", "Fr <= x", "Fr <= 'a'", "(Fr := 1) <= 1", "Fr <= print(1)",
+    ],
+)  # fmt: skip
+def test_other_comparisons_are_refused(text: str) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        parse_comparison(text, NAMES)
+    assert text in str(caught.value)
+
+
+# What is refused
+
+
+FORBIDDEN = {
+    "call": [
+        "print(1)", "__import__('os')", "eval('1')", "open('x')", "Fr()", "pi()", "Fr(1)", "sin(1)(2)", "(sin)(1)(1)",
+    ],
+    "attribute": [
+        "Fr.real", "Fr.__class__", "sin.__globals__", "().__class__.__bases__", "math.pi", "(1).real", "np.sin(Fr)",
+    ],
+    "subscript": ["Fr[0]", "[Fr][0]", "(1, 2)[0]", "Fr[1:2]"],
+    "lambda": ["lambda: 1", "(lambda x: x)(1)"],
+    "comprehension": ["[x for x in (1, 2)]", "{x for x in (1, 2)}", "{1: x for x in ()}", "min(x for x in (1, 2))"],
+    "container": ["[Fr]", "(Fr,)", "Fr, mu", "{Fr}", "{1: 2}", "()"],
+    "string": ["'Fr'", '"Fr"', "b'Fr'", "'a' * 3", "'''x'''"],
+    "walrus": ["(Fr := 1)", "min(x := 1, 2)"],
+    "f-string": ["f'{Fr}'", "f'{print(1)}'"],
+    "keyword argument": ["sin(x=1)", "min(1, key=2)", "max(1, 2, key=abs)", "sin(**Fr)", "min(*Fr, 1)", "max(*Fr)"],
+    "condition": ["1 if Fr else 2", "Fr and mu", "Fr or mu", "not Fr", "Fr == mu", "sin(Fr == mu)"],
+    "operator": [
+        "Fr ^ 2", "Fr // 2", "Fr % 2", "Fr @ mu", "Fr << 1", "Fr >> 1", "Fr | 1", "Fr & 1", "~Fr", "Fr <- mu",
+    ],
+    "constant": ["True", "False", "None", "...", "1j", "2 + 3j", "inf", "nan", "Infinity", "e"],
+    "overflow": ["1e999", "-1e999", "1e400 * 0", "9" * 400, "1" + "0" * 309],
+    "statement": [
+        "Fr = 1", "Fr; mu", "import os", "del Fr", "return 1", "yield", "await Fr", "pass", "assert Fr", "x: int",
+    ],
+    "wrong number of arguments": ["sin()", "sin(1, 2)", "min()", "min(1)", "max(Fr)", "sqrt(1, 2)", "abs()"],
+    "function without argument": ["sin", "min + 1", "sin(cos)", "abs"],
+    "unknown name": ["x", "fr", "FR", "chi", "_", "__builtins__", "a5", "tmsopt", "Pi"],
+    "not parsed": [
+        "", " ", "\t", "(", ")", "1 +", "* 1", "1 2", "Fr mu", "2 Fr", "2Fr", "1..2", "1e", "sin 1", "(1", "1)", "$",
+        "Fr!", "?", "@Fr", "1,000.5", "0777", "Fr''",
+    ],
+    "line break": ["Fr\nmu", "Fr\n+ 1", "(Fr\n+ 1)", "(Fr +\r\n1)", "Fr \\\n+ 1", "sin(\nFr)"],
+    "control character": ["Fr\x00", "\x00", "Fr + \x001", "Fr\x1b", "Fr\x07+1", "Fr\x7f"],
+    "comment": ["Fr # mu", "Fr #"],
+    "unicode": [
+        "ｓｉｎ(Fr)", "𝐅𝐫", "Ｆｒ", "ℱr", "F\u0280", "Fr − 1", "Fr × 2", "Fr ÷ 2", "２", "Fr\u00a0+ 1", "Fr\u200b",
+        "\ufeffFr", "π", "µ", "μ", "а0", "Fr²", "√Fr", "\u202eFr", "m\u1d58", "\ud800",
+    ],
+}  # fmt: skip
+"""Looks like a name or an operator, or is one in another language; the grammar of the problem file has none of it."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"), [(kind, text) for kind, texts in FORBIDDEN.items() for text in texts], ids=ascii
+)
+def test_everything_else_is_refused(kind: str, text: str) -> None:
+    with pytest.raises(ExpressionError):
+        parse_value(text, NAMES)
+    with pytest.raises(ExpressionError):
+        parse_comparison(f"{text} <= 1", NAMES)
+
+
+def test_nothing_is_ever_executed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The classic escapes, with every door that they lead to alarmed."""
+
+    def alarm(*args: object, **keywords: object) -> None:
+        raise AssertionError("code of an expression was executed")
+
+    attacks = [
+        f"__import__('os').system('touch {tmp_path}/x')",
+        f"open('{tmp_path}/x', 'w')",
+        f"eval(\"open('{tmp_path}/x', 'w')\")",
+        "exec('raise SystemExit')",
+        "().__class__.__bases__[0].__subclasses__()",
+        "(lambda: print(1))()",
+        "[print(1) for _ in (1,)]",
+        "f'{print(1)}'",
+        "sin.__call__(print(1))",
+        "sin(print(1))",
+        "print(1) + Fr",
+        "(x := print(1))",
+        "min(print(1), 2)",
+    ]
+    for name_ in ("eval", "exec", "print", "open"):
+        monkeypatch.setattr(builtins, name_, alarm)
+    monkeypatch.setattr(os, "system", alarm)
+    monkeypatch.setattr(subprocess, "Popen", alarm)
+    for attack in attacks:
+        for parse, text in ((parse_value, attack), (parse_comparison, f"{attack} <= 1")):
+            try:
+                parse(text, (*NAMES, "print", "open", "__import__", "x"))
+            except ExpressionError:
+                continue
+            raise AssertionError(attack)
+    assert not list(tmp_path.iterdir())
+
+
+DEEP = {
+    "parentheses": "(" * 900 + "Fr" + ")" * 900,
+    "minus": "-" * 1990 + "Fr",
+    "not": "not " * 400 + "Fr",
+    "invert": "~" * 1900 + "Fr",
+    "attributes": "Fr" + ".b" * 900,
+    "subscripts": "Fr" + "[0]" * 600,
+    "calls": "Fr" + "()" * 900,
+    "calls of a function": "sin" + "(1)" * 600,
+    "functions": "sin(" * 300 + "Fr" + ")" * 300,
+    "powers": "2**" * 600 + "Fr",
+    "lambdas": "lambda:" * 250 + "Fr",
+    "conditions": "1 if Fr else " * 140 + "2",
+    "lists": "[" * 900 + "]" * 900,
+    "braces": "{" * 900 + "}" * 900,
+    "brackets unclosed": "(" * 1990,
+}
+
+
+@pytest.mark.parametrize("kind", DEEP)
+def test_deep_nesting_is_refused(kind: str) -> None:
+    text = DEEP[kind]
+    assert len(text) <= 2000, "the length alone would refuse it"
+    with pytest.raises(ExpressionError):
+        parse_value(text, NAMES)
+    with pytest.raises(ExpressionError):
+        parse_comparison(f"{text} <= 1"[:2000], NAMES)
+
+
+@pytest.mark.parametrize("text", ["Fr+" * 33_000 + "Fr", "(" * 100_000, "9" * 100_000, "F" * 100_000, " " * 100_000])
+def test_100_kB_of_text_are_refused_briefly(text: str) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        parse_value(text, NAMES)
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
+    with pytest.raises(ExpressionError, match="unknown name 'zeta_b'; did you mean 'zeta_B'") as caught:
+        parse_value("2*zeta_b", NAMES)
+    assert all(known in str(caught.value) for known in NAMES)
+    with pytest.raises(ExpressionError, match="did you mean 'abscissa'"):
+        parse_comparison("abcissa <= 0", NAMES)
+
+
+def test_a_caret_is_answered_with_the_power() -> None:
+    with pytest.raises(ExpressionError, match=r"write 'Fr\*\*2'"):
+        parse_value("Fr^2", NAMES)
+
+
+ALLOWED = set(string.ascii_letters + string.digits + "_.+-*/(), <>=")
+tokens = st.lists(
+    st.sampled_from(
+        [
+            *NAMES, "sin", "min", "max", "abs", "pi", "1", "2.5", "1e3", ".5", "+", "-", "*", "/", "**", "(", ")",
+            ",", "<=", ">=", "==", "<", "!=", "=", ".", "[", "]", "{", "}", ":", ";", "'", '"', "lambda", "if",
+            "else", "for", "in", "not", "and", "True", "None", "~", "^", "%", "@", "#", "\\", "\n", "\x00", "é",
+            "f''", ":=", "...", "await", "yield", "0x", "_",
+        ]
+    ),
+    max_size=12,
+)  # fmt: skip
+
+
+@settings(max_examples=800, deadline=None, derandomize=True)
+@given(tokens, st.sampled_from(["", " "]), st.sampled_from([parse_value, parse_comparison]))
+def test_random_tokens_are_refused_or_can_be_evaluated(
+    parts: list[str], space: str, parse: Callable[..., Expression]
+) -> None:
+    text = space.join(parts)
+    try:
+        expression = parse(text, NAMES)
+    except ExpressionError:
+        return
+    assert set(text.strip()) <= ALLOWED, text
+    assert isinstance(float(expression(dict.fromkeys(NAMES, 0.7))), float)
+    expression.symbolic({n: ca.SX.sym(n) for n in NAMES})
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.text(max_size=30))
+def test_random_text_never_raises_anything_else(text: str) -> None:
+    for parse in (parse_value, parse_comparison):
+        try:
+            parse(text, NAMES)
+        except ExpressionError:
+            continue
+        assert set(text.strip()) <= ALLOWED, text

@@ -1,0 +1,203 @@
+"""Problem files: the contract's example loads, and every kind of bad input is refused with its place."""
+
+import math
+import pickle
+from pathlib import Path
+
+import pytest
+
+import tmsopt
+from tmsopt.files import LARGEST
+from tmsopt.problem import as_solvable
+
+STUDIES = set(Path("problems").glob("study_*.toml"))
+
+GOOD = """\
+title = "EP4 of the chi_H = 1 bicycle"
+model = "tms"
+
+[parameters]                  # a number fixes; a table frees
+chi_H = 1.0
+zeta_H = -0.2
+zeta_B = -0.4
+mu = 0.1
+chi_B = { min = 1.01, max = 5 }
+Fr = { min = 0.01, max = 10, start = 2 }
+lambda_s = { min = "1 deg", max = "80 deg" }
+
+[objective]
+minimize = "abscissa"
+
+[constraints]
+trail = "nu_H >= 0.02"
+layout = "chi_B - chi_H >= 0.1"
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text):
+        path = tmp_path / "problem.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_the_example_of_the_contract(write):
+    problem = tmsopt.load(write(GOOD))
+    assert problem.title == "EP4 of the chi_H = 1 bicycle"
+    assert problem.fixed == {"chi_H": 1.0, "zeta_H": -0.2, "zeta_B": -0.4, "mu": 0.1}
+    assert problem.free["lambda_s"] == pytest.approx((math.radians(1), math.radians(80)), rel=1e-15)
+    assert problem.start == {"Fr": 2.0}
+    assert problem.constraints == {"trail": "nu_H >= 0.02", "layout": "chi_B - chi_H >= 0.1"}
+    assert (problem.minimize, problem.maximize, problem.locate) == ("abscissa", None, None)
+    assert pickle.loads(pickle.dumps(problem)) == problem
+
+
+def test_si_units_and_the_default_gravity(write):
+    text = """
+[parameters]
+w = "110 cm"
+v = { min = "5 km/h", max = "15 km/h" }
+lambda_s = "5 deg"
+m_B = "10 kg"
+x_B = 1.2
+z_B = "-400 mm"
+m_H = "500 g"
+x_H = "1.02 m"
+z_H = -0.2
+[objective]
+maximize = "v - v_c"
+"""
+    problem = tmsopt.load(write(text))
+    assert problem.fixed["g"] == 9.81
+    assert problem.fixed["w"] == pytest.approx(1.1, rel=1e-15)
+    assert problem.fixed["m_H"] == pytest.approx(0.5, rel=1e-15)
+    assert problem.free["v"] == pytest.approx((5 / 3.6, 15 / 3.6), rel=1e-15)
+    assert problem.parameter_set.name == "SI"
+
+
+def replaced(old, new):
+    assert old in GOOD
+    return GOOD.replace(old, new)
+
+
+# text of the file, line at fault, words that the message must contain
+BAD = {
+    "unknown section": ("[paramters]\nx = 1\n" + GOOD, 1, ["paramters", "did you mean 'parameters'"]),
+    "unknown key of a parameter": (replaced("start = 2", "strat = 2"), 10, ["strat", "did you mean 'start'"]),
+    "misspelt parameter": (replaced("chi_H = 1.0", "chi_h = 1.0"), 5, ["chi_h", "did you mean 'chi_H'"]),
+    "missing parameter": (replaced("mu = 0.1\n", ""), 4, ["missing parameter mu"]),
+    "min above max": (replaced("min = 1.01", "min = 7"), 9, ["7", "5", "swap"]),
+    "missing max": (replaced("{ min = 1.01, max = 5 }", "{ min = 1.01 }"), 9, ["missing max"]),
+    "start outside": (replaced("start = 2", "start = 20"), 10, ["start", "20", "0.01", "10"]),
+    "wrong unit": (replaced('"1 deg"', '"1 kg"'), 11, ["kg", "deg"]),
+    "unit on a dimensionless number": (replaced("mu = 0.1", 'mu = "0.1 kg"'), 8, ["0.1 kg", "dimensionless"]),
+    "malformed unit": (replaced('"1 deg"', '"1 d*/g"'), 11, ["d*/g"]),
+    "not physical": (replaced("zeta_B = -0.4", "zeta_B = 0.4"), 7, ["zeta_B", "0.4", "<= 0"]),
+    "tilt beyond 90 degrees": (replaced('"80 deg"', '"95 deg"'), 11, ["lambda_s", "1.5708"]),
+    "nan": (replaced("mu = 0.1", "mu = nan"), 8, ["nan", "finite"]),
+    "infinity": (replaced("max = 5", "max = inf"), 9, ["inf", "finite"]),
+    "boolean": (replaced("mu = 0.1", "mu = true"), 8, ["True", "number"]),
+    "list": (replaced("mu = 0.1", "mu = [1]"), 8, ["[1]", "number"]),
+    "mixed sets": (replaced("mu = 0.1", "mu = 0.1\nm_B = 10"), 9, ["m_B", "SI", "not mixed"]),
+    "both objectives": (replaced('"abscissa"', '"abscissa"\nmaximize = "Fr"'), 13, ["minimize and maximize"]),
+    "no objective": (replaced('minimize = "abscissa"\n', ""), 13, ["minimize, maximize or locate"]),
+    "unknown pattern": (replaced('minimize = "abscissa"', 'locate = "EP5"'), 14, ["EP5", "EP4"]),
+    "misspelt objective": (replaced("minimize", "minimise"), 14, ["minimise", "did you mean 'minimize'"]),
+    "unknown model": (replaced('"tms"', '"tsm"'), 2, ["tsm", "tms"]),
+    "objective does not parse": (replaced('"abscissa"', '"abscissa +"'), 14, ["abscissa +", "does not parse"]),
+    "unknown name": (replaced("nu_H >=", "nuh >="), 17, ["nuh", "did you mean 'nu_H'"]),
+    "call": (replaced("nu_H >= 0.02", "__import__('os') >= 0"), 17, ["__import__"]),
+    "attribute": (replaced("nu_H >= 0.02", "nu_H.real >= 0"), 17, ["attribute"]),
+    "not a comparison": (replaced("nu_H >= 0.02", "nu_H"), 17, ["not a comparison", ">="]),
+    "strict comparison": (replaced("nu_H >= 0.02", "nu_H > 0.02"), 17, [">="]),
+    "constraint is a number": (replaced('"nu_H >= 0.02"', "3"), 17, ["3", "quotes"]),
+    "title is a number": (replaced('"EP4 of the chi_H = 1 bicycle"', "4"), 1, ["title", "4"]),
+    "parameters is a number": ("parameters = 3\n", 1, ["parameters", "3"]),
+    "no parameters": ('title = "x"\n', 1, ["parameters", "missing"]),
+    "not TOML": (replaced("mu = 0.1", "mu = = 0.1"), 8, ["not TOML"]),
+    "duplicate key": (replaced("mu = 0.1", "mu = 0.1\nmu = 0.2"), 9, ["not TOML"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_input_is_placed_and_explained(write, kind):
+    text, line, words = BAD[kind]
+    path = write(text)
+    with pytest.raises(tmsopt.InputError) as caught:
+        as_solvable(path)
+    at_line = [f for f in caught.value.faults if f.line == line]
+    assert at_line, str(caught.value)
+    message = "\n".join(map(str, at_line))
+    assert all(word in message for word in words), message
+    assert str(path) in message
+
+
+def test_all_faults_of_a_file_at_once(write):
+    text = GOOD.replace("mu = 0.1", "mu = nan").replace("zeta_B = -0.4", "zeta_B = 4").replace("nu_H >=", "nuh >=")
+    with pytest.raises(tmsopt.InputError) as caught:
+        tmsopt.load(write(text))
+    assert [f.line for f in caught.value.faults] == [7, 8, 17]
+
+
+def test_same_faults_from_python():
+    with pytest.raises(tmsopt.InputError, match="did you mean 'chi_B'"):
+        tmsopt.Problem(tmsopt.models.tms, fixed={"chi_b": 1.0}, minimize="abscissa")
+    with pytest.raises(tmsopt.InputError, match="swap"):
+        tmsopt.Problem(tmsopt.models.tms, free={"Fr": (2, 1)}, minimize="abscissa")
+
+
+def unreadable(tmp_path, name):
+    path = tmp_path / "x.toml"
+    if name == "directory":
+        return tmp_path
+    if name == "missing":
+        return path
+    contents = {
+        "huge": b"# " + b"x" * (10 * LARGEST),
+        "not text": b'title = "\xff\xfe"\n',
+        "nul": b"title = \x00\n",
+        "empty": b"",
+        "nested": b"x = " + b"[" * 5000,
+    }
+    path.write_bytes(contents[name])
+    return path
+
+
+@pytest.mark.parametrize("name", ["directory", "missing", "huge", "not text", "nul", "empty", "nested"])
+def test_files_that_cannot_be_problems(tmp_path, name):
+    path = unreadable(tmp_path, name)
+    with pytest.raises(tmsopt.InputError) as caught:
+        tmsopt.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_missing_file_suggests_a_neighbour(write):
+    path = write(GOOD)
+    with pytest.raises(tmsopt.InputError, match=r"did you mean 'problem\.toml'"):
+        tmsopt.load(path.with_name("problm.toml"))
+
+
+def test_minimum_equal_to_maximum_fixes(write):
+    problem = tmsopt.load(write(replaced("max = 5", "max = 1.01")))
+    assert problem.fixed["chi_B"] == 1.01
+    assert "chi_B" not in problem.free
+
+
+@pytest.mark.parametrize("path", sorted(set(Path("problems").glob("*.toml")) - STUDIES), ids=lambda p: p.stem)
+def test_every_problem_in_the_repository_loads(path):
+    assert tmsopt.load(path).title
+
+
+def test_a_study_is_told_from_a_problem():
+    assert len(STUDIES) >= 4
+    for path in STUDIES:
+        with pytest.raises(tmsopt.InputError, match="tmsopt study"):
+            tmsopt.load(path)
+
+
+def test_a_problem_with_a_table_of_studies_has_an_unknown_key(write):
+    with pytest.raises(tmsopt.InputError, match="unknown key 'vary'"):
+        tmsopt.load(write(GOOD + "[vary]\nmu = [0.1]\n"))

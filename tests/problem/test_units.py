@@ -1,0 +1,298 @@
+"""Numbers with units, against their definitions; nothing but a ValueError, and that at once, for the rest."""
+
+import math
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from fractions import Fraction
+from itertools import permutations
+from pathlib import Path
+
+import flint
+import pytest
+from hypothesis import given, settings, strategies as st
+from mpmath import mp
+
+import tmsopt
+from tmsopt.problem.units import USUAL, Dimension, by_pint, dimensions, factor, read, with_unit
+
+AT_ONCE = 1.0
+"""Seconds; pint needs a third of one to start."""
+
+
+class _TooSlowError(BaseException):
+    """Not an Exception, so that no handler in between takes it for bad input."""
+
+
+@contextmanager
+def at_once() -> Iterator[None]:
+    def ring(*_: object) -> None:
+        raise _TooSlowError
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, AT_ONCE)
+    started = time.perf_counter()
+    try:
+        yield
+    except _TooSlowError:
+        pytest.fail(f"took longer than {AT_ONCE} s")
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert time.perf_counter() - started < AT_ONCE
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _pint_is_warm() -> None:
+    by_pint("m", "m")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("5 deg", "rad", math.radians(5)),
+        ("80 deg", "rad", math.radians(80)),
+        ("-12.5 degree", "rad", math.radians(-12.5)),
+        ("5°", "rad", math.radians(5)),
+        ("0.25 rad", "rad", 0.25),
+        ("100 mrad", "rad", 0.1),
+        ("1.2 m", "m", 1.2),
+        ("40 cm", "m", 0.4),
+        ("40cm", "m", 0.4),
+        ("  40   cm  ", "m", 0.4),
+        ("-900 mm", "m", -0.9),
+        ("1e3 mm", "m", 1.0),
+        (".5 m", "m", 0.5),
+        ("5. m", "m", 5.0),
+        ("+5E-1 m", "m", 0.5),
+        ("1 inch", "m", 0.0254),
+        ("10 kg", "kg", 10.0),
+        ("500 g", "kg", 0.5),
+        ("1 lb", "kg", 0.45359237),
+        ("15 km/h", "m/s", 15 / 3.6),
+        ("36 km / h", "m/s", 10.0),
+        ("4 m/s", "m/s", 4.0),
+        ("10 mph", "m/s", 10 * 1609.344 / 3600),
+        ("9.81 m/s^2", "m/s^2", 9.81),
+        ("9.81 m/s²", "m/s^2", 9.81),
+        ("9.81 m/s**2", "m/s^2", 9.81),
+        ("981 cm/s^2", "m/s^2", 9.81),
+    ],
+)
+def test_units_by_their_definitions(text: str, unit: str, value: float) -> None:
+    """A factor and a product: two roundings, and two more in the factor of a quotient."""
+    assert with_unit(text, unit) == pytest.approx(value, rel=4 * sys.float_info.epsilon)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300))
+def test_the_parameters_own_unit_changes_nothing(number: float) -> None:
+    for unit in ("m", "kg", "m/s", "m/s^2", "rad"):
+        assert with_unit(f"{number!r} {unit}", unit) == number
+
+
+@pytest.mark.parametrize(("written", "unit"), [(written, unit) for unit, table in USUAL.items() for written in table])
+def test_usual_units_are_as_pint_has_them(written: str, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit of what is read and shown, for every one of the table that spares loading pint."""
+    texts = [f"{number} {written}" for number in ("1", "-0.7", "3.1e5", "12.345678", "1e-9", "0")]
+    own = [read(text, unit) for text in texts], factor(written, unit)
+    monkeypatch.setattr("tmsopt.problem.units.text._factor", by_pint)
+    assert own == ([read(text, unit) for text in texts], factor(written, unit))
+
+
+CONSTANTS = {
+    ("8/3", "1"): lambda: mp.mpf(8) / 3,
+    ("-sqrt(2)/2", "1"): lambda: -1 / mp.sqrt(2),
+    ("0.1234567890123456789012345", "1"): lambda: mp.mpf("0.1234567890123456789012345"),
+    ("2*pi/3 rad", "rad"): lambda: 2 * mp.pi / 3,
+    ("20/3 deg", "rad"): lambda: mp.pi / 27,
+    ("1/3 m", "m"): lambda: mp.mpf(1) / 3,
+    ("10 km/h", "m/s"): lambda: mp.mpf(25) / 9,
+    ("sqrt(2) in", "m"): lambda: mp.sqrt(2) * mp.mpf("0.0254"),
+    ("7 ft", "m"): lambda: mp.mpf("2.1336"),
+    ("exp(1)/3 kg", "kg"): lambda: mp.e / 3,
+}
+
+
+@pytest.mark.parametrize(("text", "unit"), CONSTANTS)
+def test_a_constant_is_kept_as_it_is_written(text: str, unit: str) -> None:
+    """The double is near, and the exact number is the true one, to 50 digits by mpmath."""
+    with mp.workdps(60), flint.ctx.workdps(70):
+        truth = CONSTANTS[text, unit]()
+        number, _, exact = read(text, unit)
+        assert exact is not None
+        assert number == pytest.approx(float(truth), rel=3e-16)
+        assert abs(mp.mpf(exact.ball().str(60, radius=False)) - truth) < 1e-50
+
+
+def test_a_problem_keeps_the_constants_that_it_was_given() -> None:
+    system = tmsopt.models.from_coefficients([1, "c", "k"])
+    problem = tmsopt.Problem(system, fixed={"k": "8/3"}, free={"c": ("1/10", "sqrt(50)")}, locate="EP2")
+    assert problem.fixed["k"] == 8 / 3
+    assert problem.typed({"k": 8 / 3, "c": 50**0.5}) == {"k": "8/3", "c": "sqrt(50)"}
+    assert "c" not in problem.typed({"c": 0.1})  # whose own decimal is exact
+    assert replace(problem, fixed={"k": 2.5}).typed({"k": 2.5}) == {}
+    assert tmsopt.Problem(system, fixed={"k": Fraction(8, 3)}, free={"c": (0, 9)}).typed({"k": 8 / 3}) == {"k": "8/3"}
+
+
+REFUSED = {
+    "wrong dimension": [
+        ("5 m", "rad"), ("5 deg", "m"), ("5 kg", "m"), ("5 s", "m"), ("5 m", "kg"), ("5 m/s", "m"), ("5 m", "m/s"),
+        ("5 m/s", "m/s^2"), ("5 N", "kg"), ("5 m^2", "m"), ("5 rad/s", "rad"), ("5 deg^2", "rad"),
+        ("5 percent", "rad"), ("5 Hz", "rad"), ("5 1/s", "m/s"), ("5 m*deg", "m"), ("5 kg rad", "kg"),
+    ],
+    "a unit on a dimensionless number": [
+        ("5 m", "1"), ("5 deg", "1"), ("5 %", "1"), ("5 rad", "1"), ("5 percent", "1"),
+    ],
+    "no unit": [("5", "m"), ("5.0", "rad"), ("1e3", "kg"), (" 5 ", "m"), ("pi/6", "rad"), ("8/3", "m")],
+    "no constant": [("1/0", "1"), ("sqrt(-1)", "1"), ("8/3*c", "1"), ("2*(3", "1"), ("9^2", "1"), ("1e999", "1")],
+    "malformed": [
+        ("", "m"), (" ", "m"), ("m", "m"), ("deg", "rad"), ("five m", "m"), ("5 5 m", "m"), ("5,5 m", "m"),
+        ("1.2.3 m", "m"), ("+-5 m", "m"), ("--5 m", "m"), ("5 m 5", "m"), ("5 *m", "m"), ("5 m*", "m"), ("5 m/", "m"),
+        ("5 (m", "m"), ("5 m)", "m"), ("5 m**", "m"), ("5 m^", "m"), ("5 m^m", "m"), ("5 m m m/", "m"),
+        ("5 m; 3", "m"), ("5 m # x", "m"), ("5 m\x00", "m"), ("5 m/0", "m"), ("5 m/(m-m)", "m"), ("5 m^(1/0)", "m"),
+        ("5 m - 3 m", "m"), ("5 m + 1", "m"), ("0x10 m", "m"), ("1_0 m", "m"), ("5e m", "m"), ("5 'm'", "m"),
+        ("5 []", "m"), ("5 {m}", "m"), ("5 m == m", "m"), ("5 lambda", "m"), ("5 import", "m"), ("5 __class__", "m"),
+        ("5 m.__class__", "m"), ("5 ()", "m"), ("5 \ud800", "m"), ("5 ｍ", "m"), ("٣ m", "m"),
+    ],
+    "unknown": [
+        ("5 furlongz", "m"), ("5 Deg", "rad"), ("5 metre_", "m"), ("5 xyz", "kg"), ("5 kmh", "m/s"),
+        ("5 kph2", "m/s"),
+    ],
+    "not finite": [
+        ("nan m", "m"), ("inf m", "m"), ("-inf m", "m"), ("1e999 m", "m"), ("-1e400 m", "m"), ("1e308 km", "m"),
+        ("9" * 400 + " m", "m"),
+    ],
+    "offset": [("5 degC", "K"), ("5 degF", "K"), ("5 celsius", "K")],
+    "logarithmic": [("5 dBm", "W"), ("5 dB", "m"), ("5 Np", "rad"), ("5 pH", "m")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "unit"),
+    [(kind, *case) for kind, cases in REFUSED.items() for case in cases],
+    ids=lambda x: ascii(x)[:40],
+)
+def test_everything_else_is_refused(kind: str, text: str, unit: str) -> None:
+    with at_once(), pytest.raises(ValueError, match="found"):
+        with_unit(text, unit)
+
+
+HOSTILE = {
+    "power": "5 m^99",
+    "large power": "5 m**999999999",
+    "negative power": "5 m**-999999999",
+    "power tower": "5 m**9**9**9**9",
+    "power tower by carets": "5 m^9^9^9^9",
+    "spaced tower": "5 m ^ 9 ^ 9 ^ 9 ^ 9",
+    "bracketed tower": "5 m*(9**9)**9**9**9",
+    "tower in brackets": "5 m**(9**(9**(9**9)))",
+    "tower of superscripts": "5 m²²²²²²²",
+    "factors": "5 9**9**9**9 m",
+    "long number": "1" * 100_000 + " m",
+    "long number without end": "1" * 100_000 + "+",
+    "long decimal without end": "1." + "1" * 100_000 + "+",
+    "long exponent": "1e" + "1" * 100_000 + " m",
+    "long blank": "5 " + " " * 100_000 + "+",
+    "long blank before a unit": "5" + " " * 100_000 + "m" + " " * 100_000 + "?",
+    "long unit": "5 " + "m" * 100_000,
+    "long product": "5 " + "m*" * 50_000 + "m",
+    "brackets": "5 " + "(" * 100_000,
+    "brackets that close": "5 " + "(" * 20 + "m" + ")" * 20,
+    "blanks in a unit": "5 m" + " " * 70 + "?",
+    "many blanks in a unit": "5 m" + "  m" * 20 + "?",
+    "division": "5 m" + "/m" * 19,
+    "signs": "5 m**" + "-" * 35 + "1",
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_text_is_refused_at_once(kind: str) -> None:
+    with at_once(), pytest.raises(ValueError, match="found"):
+        with_unit(HOSTILE[kind], "m")
+
+
+def test_products_and_powers_are_read() -> None:
+    for text in ("5 m*m/m", "5 m^2/m", "5 m**2 / m", "5 m² m^-1", "5 m s / s"):
+        with at_once():
+            assert with_unit(text, "m") == 5
+
+
+def test_a_sum_of_unlike_units_has_none_whatever_is_added() -> None:
+    """In any order: metres and kilograms added are neither, and no third summand gives its unit to all."""
+    metre, kilogram, none = Dimension.of("m"), Dimension.of("kg"), Dimension()
+    for parts in permutations((metre, kilogram, kilogram, none)):
+        assert sum(parts, 1.0).unit == "1"
+        assert dimensions.power(sum(parts, none), 0.5).unit == (sum(parts, none) * metre / 2.0).unit == "1"
+    assert (metre + none + metre).unit == "m"
+
+
+@settings(max_examples=250, deadline=None, derandomize=True)
+@given(
+    st.lists(
+        st.sampled_from(
+            [*"0123456789.+-*/^() _%°²³µ", "m", "kg", "deg", "rad", "s", "km", "h", "**", "e", "degC", "x", "\n"]
+        ),
+        max_size=14,
+    ).map("".join),
+    st.sampled_from(["m", "rad", "kg", "m/s", "m/s^2", "1"]),
+)
+def test_random_text_gives_a_finite_number_or_a_value_error(text: str, unit: str) -> None:
+    try:
+        with at_once():
+            value = with_unit(text, unit)
+    except ValueError:
+        return
+    assert math.isfinite(value)
+
+
+PROBLEM = """
+model = "tms"
+[parameters]
+Fr = 1.0
+mu = 0.1
+chi_B = 1.2
+chi_H = 1.02
+zeta_B = -0.4
+zeta_H = -0.2
+lambda_s = {tilt}
+"""
+
+
+@pytest.mark.parametrize(
+    ("tilt", "needed"), [("0.0872664625997165", False), ('"5 deg"', False), ('"300 arcmin"', True)]
+)
+def test_pint_is_imported_only_when_an_unusual_unit_is_written(tmp_path: Path, tilt: str, needed: bool) -> None:
+    file = tmp_path / "problem.toml"
+    file.write_text(PROBLEM.format(tilt=tilt), encoding="utf-8")
+    script = "import sys, tmsopt; p = tmsopt.load(sys.argv[1]); print('pint' in sys.modules, p.fixed['lambda_s'])"
+    root = Path(__file__).parents[2]
+    ended = subprocess.run(
+        [sys.executable, "-c", script, str(file)], capture_output=True, text=True, cwd=root, check=True
+    )
+    imported, value = ended.stdout.split()
+    assert imported == str(needed)
+    assert float(value) == pytest.approx(math.radians(5), rel=1e-15)
+
+
+def test_no_problem_that_comes_along_needs_pint() -> None:
+    root = Path(__file__).parents[2]
+    files = [f for f in sorted((root / "problems").glob("*.toml")) if not f.name.startswith("study_")]
+    script = "import sys, tmsopt; [tmsopt.load(f) for f in sys.argv[1:]]; print('pint' in sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", script, *files], capture_output=True, text=True, cwd=root, check=True)
+    assert ended.stdout.split() == ["False"]
+
+
+@pytest.mark.slow
+def test_json_names_seconds_only_where_there_are_seconds() -> None:
+    """A system of one's own, as a dimensionless bicycle, is in no unit of time."""
+    own = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])
+    assert tmsopt.solve(tmsopt.Problem(own, fixed={"c": 1.0})).to_json()["units"] == {}
+    problems = Path(__file__).parents[2] / "problems"
+    free, robot = (tmsopt.solve(problems / f"{n}.toml").to_json()["units"] for n in ("ep4", "point_mass_robot"))
+    assert not {"decay_rate", "decay_time", "frequency", "abscissa"} & set(free)
+    assert (robot["decay_rate"], robot["decay_time"], robot["frequency"]) == ("1/s", "s", "Hz")

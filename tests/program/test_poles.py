@@ -1,0 +1,165 @@
+"""Quotients and tangents with a pole in the box: optima in closed form beside poles, and what becomes a variable."""
+
+import math
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.models import from_coefficients
+from tmsopt.program import abscissa as plain_nlp, formulate
+from tmsopt.search import Family, solve
+
+x, y = ca.SX.sym("x"), ca.SX.sym("y")
+SQUARE = {"x": (0.0, 1.0), "y": (0.0, 1.0)}
+KINK = ".kink"
+MET = 1e-8  # what is asked of every value
+
+
+def near(u: float, v: float) -> Any:
+    """s + 4 − (x − u)² − (y − v)²: the abscissa is least at (u, v), or as near to it as limits allow."""
+    return from_coefficients([1, 4 - (x - u) ** 2 - (y - v) ** 2])
+
+
+def problem(
+    limits: tuple[str, ...], at: tuple[float, float] = (0.3, 0.7), free: Any = None, **asked: Any
+) -> tmsopt.Problem:
+    constraints = {f"limit{k}": text for k, text in enumerate(limits)}
+    asked = asked or {"minimize": "abscissa"}
+    return tmsopt.Problem(near(*at), free=free or SQUARE, constraints=constraints, **asked)
+
+
+# Limits, the point aimed at, and the nearest that they allow
+
+
+def line(u: float, v: float, gap: float) -> tuple[float, float]:
+    """The nearest point with x − y = gap."""
+    step = (gap - (u - v)) / 2
+    return u + step, v - step
+
+
+CASES: tuple[tuple[tuple[str, ...], tuple[float, float], tuple[float, float]], ...] = (
+    (("1/(x - y) >= 30",), (0.7, 0.3), line(0.7, 0.3, 1 / 30)),
+    (("1/(x - y) >= 1000",), (0.7, 0.3), line(0.7, 0.3, 1e-3)),
+    (("1/(x - y) <= -30",), (0.3, 0.7), line(0.3, 0.7, -1 / 30)),
+    (("1/(x - y) >= 30", "x >= 0.6"), (0.4, 0.35), (0.6, 0.6 - 1 / 30)),
+    (("1/(x - y) == 30",), (0.2, 0.1), line(0.2, 0.1, 1 / 30)),
+    (("abs(1/(x - y)) >= 30",), (0.3, 0.7), line(0.3, 0.7, -1 / 30)),
+    (("abs(1/(x - y)) >= 30",), (0.7, 0.3), line(0.7, 0.3, 1 / 30)),
+    (("x/(y - 0.5) <= -10",), (0.5, 0.0), (0.5 + 4.5 / 101, 45 / 101)),  # the foot on the line x + 10 y = 5
+    (("x/(y - 0.5) >= 10",), (0.5, 1.0), (0.5 + 4.5 / 101, 1 - 45 / 101)),  # above the pole, on 10 y − x = 5
+    (("tan(9*y) >= 2000",), (0.3, 0.7), (0.3, (math.atan(2000) + 2 * math.pi) / 9)),
+    (("tan(9*y) >= 2000", "y <= 0.3"), (0.3, 0.1), (0.3, math.atan(2000) / 9)),
+)
+
+
+@pytest.mark.parametrize(("limits", "aim", "best"), CASES)
+def test_optimum_beside_a_pole(limits: tuple[str, ...], aim: tuple[float, float], best: tuple[float, float]) -> None:
+    design = tmsopt.solve(problem(limits, aim))
+    assert design.status == "optimal"
+    assert design.value == pytest.approx(-4 + math.dist(aim, best) ** 2, abs=MET)
+    assert (design.parameters["x"], design.parameters["y"]) == pytest.approx(best, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("limits", "aim", "edge"),
+    [
+        (("(x + 1)/(x + y - 1)**2 >= 400",), (0.0, 0.0), lambda u: 1 - u - np.sqrt((u + 1) / 400)),
+        (
+            ("1/(x - 0.5) + 1/(y - 0.5) >= 50", "x >= 0.55", "y >= 0.5"), (0.9, 0.9),
+            lambda u: np.where(u < 0.55, np.nan, 0.5 + 1 / (50 - 1 / (np.maximum(u, 0.55) - 0.5))),
+        ),
+    ],
+)  # fmt: skip
+def test_edges_that_are_curved(limits: tuple[str, ...], aim: tuple[float, float], edge: Any) -> None:
+    """The nearest point by a scan of the edge, 1e-6 from the next: its distance is right to 1e-12."""
+    across = np.linspace(0, 1, 1_000_001)
+    squared = (across - aim[0]) ** 2 + (edge(across) - aim[1]) ** 2
+    assert tmsopt.solve(problem(limits, aim)).value == pytest.approx(-4 + float(np.nanmin(squared)), abs=MET)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("limit", "aim", "gap"), [("1/(x - y) >= 1000", (0.9, 0.1), 1e-3), ("1/(y - x) >= 300", (0.2, 0.9), -1 / 300)]
+)
+def test_the_side_of_a_pole_does_not_depend_on_the_seed(
+    limit: str, aim: tuple[float, float], gap: float, seed: int
+) -> None:
+    design = tmsopt.solve(problem((limit,), aim), seed=seed)
+    assert design.value == pytest.approx(-4 + math.dist(aim, line(*aim, gap)) ** 2, abs=MET)
+
+
+@pytest.mark.parametrize(
+    ("asked", "best"),
+    [
+        ({"minimize": "abs(1/(x - y) - 20) + 1e-3*x"}, 0.05e-3),  # x − y = 1/20 with the least x
+        ({"maximize": "min(1/(x - 0.4), 7) - x"}, 7 - 0.4),  # not attained: 1/(x − 0.4) has no value at 0.4
+        ({"minimize": "max(tan(3*x), -2) + y"}, -2.0),
+    ],
+)
+def test_objectives_with_poles(asked: dict[str, str], best: float) -> None:
+    design = tmsopt.solve(problem((), **asked))
+    assert design.value == pytest.approx(best, abs=MET)
+
+
+def test_what_no_side_of_a_pole_allows() -> None:
+    """x − y ≤ 1/30 and ≥ 1/20."""
+    design = tmsopt.solve(problem(("1/(x - y) >= 30", "x - y >= 0.05")), throw=False)
+    assert design.status == "infeasible"
+
+
+# What becomes a variable
+
+
+def kinks(*limits: str, free: Any = None, **asked: Any) -> int:
+    return formulate(problem(limits, free=free, **asked)).variables.count(KINK)
+
+
+@pytest.mark.parametrize(
+    ("limits", "count"),
+    [
+        (("1/(x - y) >= 30",), 1),
+        (("x/(y - 0.5) <= -10",), 1),
+        (("tan(9*y) >= 2000",), 1),
+        (("1/(x - y) >= 30", "tan(9*x) + 1/(x + y - 1) >= 3"), 3),
+        (("abs(1/(x - y)) >= 30",), 2),
+        (("1/(x + y) <= 30",), 1),  # 0 at one corner
+        (("1/(x + y + 0.01) <= 30",), 0),
+        (("x/(2 - y) <= 0.7", "1/(1 + x*x) >= 0.6", "y/3 <= 0.2"), 0),
+        (("tan(x) + tan(y - 1) <= 1",), 0),
+        (("x/cos(y) <= 0.5",), 0),
+    ],
+)
+def test_only_what_may_vanish_in_the_box_becomes_a_variable(limits: tuple[str, ...], count: int) -> None:
+    assert kinks(*limits) == count
+
+
+def test_without_a_pole_in_the_box_the_nlp_is_the_same() -> None:
+    stated = problem(("1/(x - y) >= 0.3", "tan(x) <= 1"), free={"x": (0.6, 1.0), "y": (0.0, 0.5)})
+    one, other = formulate(stated), plain_nlp(stated)
+    assert (one.variables, one.rows, one.kinks) == (other.variables, other.rows, ())
+    assert str(one.functions.serialize()) == str(other.functions.serialize())
+
+
+def test_the_variable_is_the_quotient() -> None:
+    """t (x − y) = 1 at a design, held as an equation; the NLP's rows are those of the problem there."""
+    nlp = formulate(problem(("1/(x - y) >= 30",)))
+    (kink,) = nlp.kinks
+    assert kink.quotient
+    assert [(nlp.row_lower[k], nlp.row_upper[k]) for k in kink.rows] == [(0.0, 0.0)]
+    at = np.zeros(len(nlp.variables))
+    at[:2], at[kink.variable] = (0.52, 0.5), 50.0
+    rows = np.array(nlp.at(at)[1]).ravel()
+    assert rows[list(kink.rows)] == pytest.approx([0.0], abs=1e-12)
+    limit = nlp.rows.index("limit0")
+    assert rows[limit] - nlp.row_lower[limit] == pytest.approx(20.0, abs=1e-9)
+
+
+def test_members_of_a_family_with_poles() -> None:
+    family = Family(["limit0.limit"])
+    for least in (30.0, 100.0, 1000.0):
+        stated = problem((f"1/(x - y) >= {least}",), (0.7, 0.3))
+        best = -4 + math.dist((0.7, 0.3), line(0.7, 0.3, 1 / least)) ** 2
+        assert solve(stated, family=family).value == pytest.approx(best, abs=MET)

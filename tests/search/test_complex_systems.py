@@ -1,0 +1,301 @@
+"""Exceptional points of complex matrices beside closed forms: located, proved, traced, counted, split."""
+
+import math
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import tmsopt
+from tmsopt.cli import every as main
+from tmsopt.models import from_hamiltonian
+
+EXACT = 1e-12
+"""What print and closed forms are met to: some hundred roundings."""
+
+TWO = complex(1 + math.cos(math.pi - 2), -math.sin(2))
+PUBLISHED: dict[str, tuple[dict[str, float], complex, int]] = {
+    "loss_only_dimer": ({"k": 0.4, "d": 0}, -0.6j, 2),
+    "pt_trimer": ({"gain": math.sqrt(2), "loss": math.sqrt(2), "d1": 0, "d3": 0}, 0j, 3),
+    "ep3_sensor": ({"gain": math.sqrt(2), "loss": math.sqrt(2), "d1": 0, "d3": 0}, 0j, 3),
+    "ring_backscattering": ({"r": -math.cos(2), "s": math.sin(2)}, TWO, 2),
+    "bose_hubbard": ({"e1": 0, "e2": 0, "e3": 0, "g1": 3, "g2": 1, "g3": -1}, 0j, 4),
+}
+"""Problem → parameters of its exceptional point, eigenfrequency and order; the sources are in the files."""
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_published_exceptional_points_are_located_and_proved(name: str) -> None:
+    where, omega, order = PUBLISHED[name]
+    found = tmsopt.solve(f"problems/{name}.toml")
+    assert max(abs(found.parameters[n] - x) for n, x in where.items()) < EXACT
+    assert (found.structure, found.status) == (f"EP{order}", "optimal")
+    (root,), (frequency,) = found.roots, found.eigenfrequencies
+    assert abs(complex(frequency.re, frequency.im) - omega) < EXACT
+    assert complex(frequency.re, frequency.im) == 1j * complex(root.re, root.im)
+    assert root.multiplicity == frequency.multiplicity == order
+    proof = tmsopt.prove(found)
+    assert (proof.proved, proof.pattern) == (True, f"EP{order}")
+    assert [z.multiplicity for z in proof.eigenfrequencies] == [order]
+    (diagnosis,) = tmsopt.diagnose(found)
+    assert (diagnosis.algebraic, diagnosis.geometric, diagnosis.kind) == (order, 1, "defective")
+
+
+def test_the_matrix_itself_has_them() -> None:
+    """By another route, at 60 digits: H − ω to the power of the order vanishes, and to one less does not."""
+    with mpmath.workdps(60):
+        v, g = mpmath.mpf(1), mpmath.mpf(1)
+        three = mpmath.sqrt(3)
+        bosons = mpmath.matrix([[-3j * g, three * v, 0, 0], [three * v, -1j * g, 2 * v, 0],
+                                [0, 2 * v, 1j * g, three * v], [0, 0, three * v, 3j * g]])  # fmt: skip
+        root = mpmath.sqrt(2)
+        trimer = mpmath.matrix([[1j * root, 1, 0], [1, 0, 1], [0, 1, -1j * root]])
+        for matrix in (bosons, trimer):
+            n = matrix.rows
+            assert mpmath.mnorm(matrix**n) < mpmath.mpf(10) ** -55
+            assert mpmath.mnorm(matrix ** (n - 1)) > 1
+
+
+@pytest.mark.parametrize(
+    ("name", "exponent", "size"), [("loss_only_dimer", "1/2", math.sqrt(0.4)), ("ep3_sensor", "1/3", 1.0)]
+)
+def test_a_sensor_responds_by_the_root_of_its_order(name: str, exponent: str, size: float) -> None:
+    """(k eps)^(1/2) of a dimer and (k² eps)^(1/3) of a trimer, by the characteristic equation to leading order."""
+    (diagnosis,) = tmsopt.diagnose(f"problems/{name}.toml")
+    (law,) = next(r for r in diagnosis.responses if r.parameter == "eps").laws
+    assert (str(law.branches.exponent), law.branches.roots) == (exponent, diagnosis.algebraic)
+    assert law.branches.size == pytest.approx(size, rel=1e-9)
+
+
+def test_the_curve_of_a_dimer_is_half_the_difference_of_losses() -> None:
+    model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
+    free = {"g2": (0.1, 3.0), "d": (-1.0, 1.0), "k": (0.01, 2.0)}
+    traced = tmsopt.trace(tmsopt.Problem(model, fixed={"g1": 1.0}, free=free, locate="EP2"))
+    assert traced.pattern == "EP2"
+    assert set(np.unique(np.concatenate([b.kinds for b in traced.branches]))) == {"EP2"}
+    assert len(traced.branches) == 2  # g2 < g1 and g2 > g1; between them k = 0
+    for branch in traced.branches:
+        at = branch.parameters
+        assert np.abs(at["k"] - np.abs(1 - at["g2"]) / 2).max() < EXACT
+        assert np.abs(at["d"]).max() < EXACT
+        assert np.allclose(branch.abscissa, -(1 + at["g2"]) / 2, rtol=0, atol=EXACT)
+        row = next(iter(branch.records()))
+        assert (row["omega_re"], row["omega_im"]) == pytest.approx((0, -(1 + row["g2"]) / 2), abs=EXACT)
+        assert "c" not in row
+
+
+def test_all_exceptional_points_of_a_dimer_are_counted() -> None:
+    """d = 0 and k = ±(g1 − g2)/2, no others: those of the double alone are none."""
+    model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
+    fixed = {"g1": 1.0, "g2": 0.2}
+    every = tmsopt.solve_all(tmsopt.Problem(model, fixed=fixed, free={"d": (-1, 1), "k": (-2, 2)}, locate="EP2"))
+    assert every.complete
+    assert sorted(s.parameters["k"] for s in every.solutions) == pytest.approx([-0.4, 0.4], abs=EXACT)
+    assert {s.structure for s in every.solutions} == {"EP2"}
+
+
+def test_meetings_along_a_parameter_are_those_of_the_matrix() -> None:
+    """±a pass each other at no k: only k = 0.4 is a meeting, and none is a root 0."""
+    model = from_hamiltonian([["-1j*g1", "k"], ["k", "-1j*g2"]])
+    found = tmsopt.speeds(
+        tmsopt.Problem(model, fixed={"g1": 1.0, "g2": 0.2}, free={"k": (0.01, 2)}), parameter="k"
+    ).found
+    assert [(c.kind, c.root.multiplicity) for c in found] == [("EP2", 2)]
+    assert found[0].at == pytest.approx(0.4, abs=1e-14)
+    assert (found[0].root.re, found[0].root.im) == pytest.approx((-0.6, 0.0), abs=1e-14)
+
+
+def test_the_threshold_of_a_pt_dimer() -> None:
+    """Gain g and loss g, coupled by k: balanced up to g = k; with more loss l the threshold is g = l or g l = k²."""
+    model = from_hamiltonian([["1j*g", "k"], ["k", "-1j*l"]])
+    asked = tmsopt.Problem(model, fixed={"k": 1.0, "l": 2.0}, free={"g": (0.1, 1.5)}, locate="weave")
+    found = tmsopt.solve(asked)
+    assert found.parameters["g"] == pytest.approx(0.5, abs=EXACT)
+    assert max(z.im for z in found.eigenfrequencies) == pytest.approx(0, abs=EXACT)
+    margins = tmsopt.robustness(tmsopt.Problem(model, fixed={"k": 1.0, "l": 2.0, "g": 0.25}), weights={"g": 1.0})
+    assert (margins.limit.kind, margins.capsize.found) == ("weave", False)
+    assert margins.radius == pytest.approx(0.25, abs=1e-9)
+
+
+def test_a_carrier_of_a_million_couplings() -> None:
+    """No false exceptional point is found: it is where it is without the carrier, to the roundings of that."""
+    model = from_hamiltonian([["w1 - 1j*g1", "k"], ["k", "w - 1j*g2"]])
+    free = {"w1": (1e6 - 1, 1e6 + 1), "k": (0.01, 1)}
+    found = tmsopt.solve(tmsopt.Problem(model, fixed={"w": 1e6, "g1": 0.3, "g2": 0.1}, free=free, locate="EP2"))
+    assert found.parameters["k"] == pytest.approx(0.1, abs=EXACT)
+    assert found.parameters["w1"] == pytest.approx(1e6, abs=1.2e-10)
+    assert tmsopt.prove(found).proved
+
+
+def test_the_optimum_of_a_lossy_dimer_is_its_trace() -> None:
+    """No eigenfrequency decays faster than the mean loss, which all reach beyond the exceptional point."""
+    model = from_hamiltonian([["-1j*g1", "k"], ["k", "-1j*g2"]])
+    asked = tmsopt.Problem(model, fixed={"g1": 1.0, "g2": 0.2}, free={"k": (0.1, 2)}, minimize="abscissa")
+    found = tmsopt.solve(asked)
+    assert found.abscissa == pytest.approx(-0.6, abs=EXACT)
+    assert found.bound.proven
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_the_optimum_where_nothing_is_stable_is_the_mean_gain(size: int) -> None:
+    """No greatest gain is below the mean one, which symmetric chains reach; a search for EPs of full order leads on."""
+    rows: list[list[str]] = [
+        ["k" if abs(i - j) == 1 else f"1j*{size - i} + d" if i == j == 0 else f"1j*{size - i}" if i == j else "0"
+         for j in range(size)]
+        for i in range(size)
+    ]  # fmt: skip
+    free = {"d": (-1.0, 1.0), "k": (0.1, 2.0)} if size > 1 else {"d": (-1.0, 1.0)}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(rows), free=free, minimize="abscissa"))
+    assert found.abscissa == pytest.approx((1 + size) / 2, abs=1e-9)
+
+
+@pytest.mark.parametrize("command", ["solve", "prove", "describe"])
+def test_no_words_of_the_double_are_shown(command: str) -> None:
+    text = (
+        CliRunner()
+        .invoke(main, [command, "problems/pt_trimer.toml", *(["--full"] if command == "solve" else [])])
+        .output
+    )
+    assert not [w for w in ("CEP", "pair", "damping", "heavily", "capsize", "divergence") if w in text]
+    assert "eigenfrequenc" in text
+
+
+def test_json_has_eigenfrequencies_beside_roots() -> None:
+    found: dict[str, Any] = tmsopt.solve("problems/loss_only_dimer.toml").to_json()
+    (root,) = found["roots"]
+    of_block = {"multiplicity": 2, "defective": True, "geometric_multiplicity": 1}  # an EP2: one eigenvector
+    assert found["eigenfrequencies"] == [{"re": -root["im"], "im": root["re"], **of_block}]
+    assert "eigenfrequencies" not in tmsopt.solve("problems/coupled_pair.toml").to_json()
+
+
+def test_studies_keep_to_the_matrix() -> None:
+    """A row for each g2; the exceptional point follows it."""
+    problem = tmsopt.load("problems/loss_only_dimer.toml")
+    rows = tmsopt.run_study(tmsopt.Study(problem, {"g2": [0.2, 0.4, 0.6]})).rows
+    assert [row.structure for row in rows] == ["EP2"] * 3
+    assert [row.parameters["k"] for row in rows] == pytest.approx([0.4, 0.3, 0.2], abs=EXACT)
+
+
+def test_charts_and_pages_take_a_complex_system() -> None:
+    """Stable beside unstable where the gain passes the loss; roots of the page are told as eigenfrequencies."""
+    model = from_hamiltonian([["1j*g", "k"], ["k", "-1j*l"]])
+    plane = tmsopt.Problem(model, fixed={"k": 1.0}, free={"g": (0.1, 1.5), "l": (0.1, 1.5)})
+    chart = tmsopt.chart(plane, ("g", "l"), points=(40, 40), boundaries=False)
+    gain, loss = np.meshgrid(*chart.grid)
+    names = np.array(tmsopt.roots.CLASSES)[np.asarray(chart.kind)]
+    assert set(np.unique(names)) == {"stable", "weave"}
+    off = np.minimum(np.abs(gain - loss), np.abs(gain * loss - 1)) > 1e-9
+    assert np.array_equal((names == "stable")[off], ((gain < loss) & (gain * loss < 1))[off])
+    page = tmsopt.explore("problems/loss_only_dimer.toml").html
+    assert "both eigenfrequencies meet in one (EP2)" in page
+
+
+LASER = [["d + 1j*g", "k"], ["k", "-1j*l"]]
+"""Characteristic equation (ω − d − i g)(ω + i l) = k²; a real ω asks for (ω − d) ω + g l = k² and ω (l − g) = d l."""
+
+
+def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real() -> None:
+    """ω = d l / (l − g) by the imaginary part of the characteristic equation; the other is the trace less this."""
+    fixed = {"l": 0.5, "d": 0.2, "k": 0.3}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(LASER), fixed=fixed, free={"g": (-1, 1.5)}, locate="weave"))
+    real = 0.2 * 0.5 / (0.5 - found.parameters["g"])
+    assert found.stable is False
+    assert found.beyond_axis == 0
+    assert found.to_json()["stable"] is False
+    assert found.notes == ()
+    report = tmsopt.report.design_report(found)
+    assert "found: marginally stable\n" in report
+    assert f"neither loss nor gain; {real:.5g} is real" in report
+
+
+def test_a_threshold_of_a_lossier_mode_is_not_the_edge() -> None:
+    """The other eigenfrequency has the imaginary part of the trace, g − l."""
+    fixed = {"l": 0.1, "d": 0.3, "k": 0.5}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(LASER), fixed=fixed, free={"g": (-2, 2)}, locate="weave"))
+    gain = found.parameters["g"] - 0.1
+    assert gain > 0.01
+    assert found.beyond_axis == pytest.approx(gain, abs=EXACT)
+    assert found.notes == (f"not the edge of stability: another eigenfrequency has gain {gain:.2g}",)
+    report = tmsopt.report.design_report(found)
+    assert "one eigenfrequency has the most gain" in report
+    assert "least damped" not in report
+
+
+@pytest.mark.parametrize(("rest", "beyond"), [("s + 1", 0.0), ("s - 1", 1.0)])
+def test_a_weave_of_a_real_system_says_whether_it_is_the_edge(rest: str, beyond: float) -> None:
+    """(s² + c s + 1.3) times s ± 1, whose weave is c = 0."""
+    r = 1 if rest == "s + 1" else -1
+    model = tmsopt.models.from_coefficients([1, f"c + {r}", f"1.3 + {r}*c", f"1.3*{r}"])
+    found = tmsopt.solve(tmsopt.Problem(model, free={"c": (-0.5, 0.7)}, locate="weave"))
+    assert found.parameters["c"] == pytest.approx(0, abs=EXACT)
+    assert found.stable is False
+    assert found.beyond_axis == pytest.approx(beyond, abs=EXACT)
+    assert found.notes == (("not the edge of stability: another root has real part 1",) if beyond else ())
+    assert ("marginally stable\n" in tmsopt.report.design_report(found)) is not bool(beyond)
+
+
+def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold() -> None:
+    """A detuning ε of an EP2 moves it by (k ε)^(1/2) beside ε/2, which is within 10 % up to some 1e-2; a common one by ε.
+
+    Of −i (g1 + g2)/2 ± (k² − (g1 − g2)²/4 + …)^(1/2) the EP2 is at k = (g1 − g2)/2 = 0.6.
+    """
+    model = from_hamiltonian([["w + d - 1j*g1", "k"], ["k", "w - 1j*g2"]])
+    free = {"d": (-1, 1), "k": (0.05, 2)}
+    asked = tmsopt.Problem(model, fixed={"w": 0.0, "g1": 1.3, "g2": 0.1}, free=free, locate="EP2")
+    (found,) = tmsopt.diagnose(tmsopt.solve(asked))
+    by = {r.parameter: r for r in found.responses}
+    assert not by["d"].relative
+    (law,) = by["d"].laws
+    assert str(law.branches.exponent) == "1/2"
+    assert law.branches.size == pytest.approx(math.sqrt(0.6), rel=1e-9)
+    (common,) = by["w"].laws
+    assert str(common.branches.exponent) == "1"
+    assert common.branches.size == pytest.approx(1, rel=1e-9)
+    assert (common.below, common.above) == (1, 1)  # it is exact
+    text = "\n".join(tmsopt.report.diagnosis_lines([found], details=True))
+    assert "not move it" not in text
+    assert "nowhere sampled" not in text
+
+
+def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met() -> None:
+    """The EP3 of the trimer at g = l = √2, d = 0: what is printed near it is right to half a unit of its last digit."""
+    model = from_hamiltonian([["d + 1j*g", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j*l"]])
+    free = {"g": (0.1, 2.5), "l": (0.1, 2.5), "d": (-1.0, 1.0)}
+    traced = tmsopt.trace(tmsopt.Problem(model, fixed={"k": 1.0}, free=free, locate="EP2"))
+    near = [e for e in traced.events if abs(e.parameters["g"] - math.sqrt(2)) < 1e-3 and abs(e.parameters["d"]) < 1e-3]
+    assert near
+    for branch in traced.branches:
+        for row in tmsopt.report.event_rows(branch, {"g": tmsopt.problem.Unit()}, model)[1:]:
+            value = float(row[1])
+            if abs(value - math.sqrt(2)) < 1e-3 and "g" in row[-1].split(", "):
+                assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(row[1].split(".")[1])
+    branch, event = next((b, e) for b in traced.branches for e in b.events if e in near)
+    met = replace(event, parameters={**event.parameters, "g": math.sqrt(2) + 3.8e-10}, residual=6e-11)
+    cells = tmsopt.report.event_rows(replace(branch, events=(met,)), {"g": tmsopt.problem.Unit()}, model)[1]
+    assert cells[1] == "1.4142136"  # two digits fewer than met
+
+
+@pytest.mark.slow
+def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix() -> None:
+    model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
+    asked = tmsopt.Problem(
+        model, fixed={"g2": 0.1}, free={"g1": (0, 3), "d": (-1, 1), "k": (0.05, 1)}, minimize="abscissa",
+        constraints={"c": "k <= 0.6"}, tolerances={"g1": 0.05, "k": 0.02},
+    )  # fmt: skip
+    report = tmsopt.report.design_report(tmsopt.solve(asked))
+    assert "worst case" in report
+    assert "damping ratio" not in report
+
+
+def test_words_of_a_matrix_with_gain() -> None:
+    model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
+    told, chart = import_module("tmsopt.models.user_spectrum"), import_module("tmsopt.plots.chart")
+    lossy, gaining = (told.structure_in_words(model, "EP2", gain) for gain in (False, True))
+    assert lossy == "the two least damped eigenfrequencies meet in one (EP2)"
+    assert gaining == "the two eigenfrequencies of most gain meet in one (EP2)"
+    (patch,) = chart.class_handles(np.array([chart.CLASSES.index("weave")], dtype=np.int8), model)
+    assert patch.get_label() == "gain, beyond threshold"

@@ -1,0 +1,185 @@
+"""Limits said to exclude each other do, and those said to be out of reach alone are: what thin needles hide as well."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from importlib import import_module
+from math import comb
+
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.records import Table
+from tmsopt.report import infeasible_lines
+from tmsopt.search import workspace
+
+FOLD = 8
+NAMES = [f"x{k}" for k in range(1, FOLD + 1)]
+BOX = dict.fromkeys(NAMES, (-1.0, 1.3))
+"""(s + 1)⁸ is in it, and little else that decays nearly as fast: moved by 4e-4 of the box, it is 0.38 off."""
+
+FAST = tmsopt.Problem(
+    tmsopt.models.from_coefficients(["1", *(f"{comb(FOLD, k)} + x{k}" for k in range(1, FOLD + 1))]),
+    free=BOX, minimize="x3", constraints={"far": "abscissa <= -0.99", "x": "x1 >= 0.5"},
+)  # fmt: skip
+DAMPED = tmsopt.Problem(
+    tmsopt.models.tms,
+    fixed={"Fr": 4.829142389714604, "mu": 1.4039653950756779, "chi_H": 1.5255656081856155, "lambda_s": -0.848691680576},
+    free={"zeta_B": (-1.5, -0.2), "chi_B": (0.3, 3.0), "zeta_H": (-1.2, -0.1)},
+    minimize="chi_B", constraints={"damped": "damping_ratio >= 0.97", "low": "zeta_H <= -1.0023476412008954"},
+)  # fmt: skip
+"""A heavily damped design is at chi_B = 1.33, zeta_B = -0.403, zeta_H = -0.463, and few are near it."""
+
+
+def test_by_the_sum_of_the_roots_one_excludes_the_other() -> None:
+    """Roots left of -0.99 with a sum of -8.5 or less: the sum of their products by two is least where all but one are
+    there, and more than the box allows."""
+    rest = 8.5 - (FOLD - 1) * 0.99
+    least = comb(FOLD - 1, 2) * 0.99**2 + (FOLD - 1) * 0.99 * rest
+    assert least > comb(FOLD, 2) + BOX["x2"][1]
+    for left_out in FAST.constraints:
+        kept = {n: text for n, text in FAST.constraints.items() if n != left_out}
+        assert tmsopt.solve(replace(FAST, constraints=kept)).status == "optimal"
+
+
+@pytest.mark.slow
+def test_a_limit_that_a_needle_meets_is_not_out_of_reach() -> None:
+    relaxation = tmsopt.solve(FAST, throw=False, alone=False, stability=0.0).relaxation
+    limits = {n for n in relaxation.conflict if n in FAST.constraints}
+    assert (limits, relaxation.irreducible) == (set(FAST.constraints), True)
+
+
+def routh(coefficients: list[Fraction]) -> bool:
+    """Whether all roots are left of the axis, exactly."""
+    above, row = coefficients[0::2], coefficients[1::2]
+    while row:
+        if row[0] <= 0:
+            return False
+        ratio = above[0] / row[0]
+        above, row = row, [x - ratio * y for x, y in zip(above[1:], [*row[1:], Fraction(0)], strict=False)]
+    return coefficients[0] > 0
+
+
+def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish() -> None:
+    """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
+    search = import_module("tmsopt.search.search")
+    found, told = search._reached(workspace(FAST), ["far"])
+    assert told
+    shifted = [Fraction(float(c)) for c in FAST.values(found).coefficients]
+    for end in range(len(shifted), 1, -1):
+        for k in range(1, end):
+            shifted[k] -= Fraction(98, 100) * shifted[k - 1]
+    assert routh(shifted)
+    assert search._reached(workspace(DAMPED), ["damped"]) == (None, False)
+
+
+def test_where_a0_may_vanish_a_search_is_not_said_to_tell() -> None:
+    design = tmsopt.solve(DAMPED, throw=False, alone=False, stability=0.0)
+    first = " ".join(infeasible_lines(design)[:1])
+    assert set(design.relaxation.conflict) >= {*DAMPED.constraints} or not design.relaxation.irreducible
+    assert "no design was found" in first
+    assert "cannot" not in first
+
+
+@pytest.mark.slow
+def test_a_heavily_damped_design_meets_that_limit_alone() -> None:
+    kept = {"damped": DAMPED.constraints["damped"]}
+    design = tmsopt.solve(replace(DAMPED, constraints=kept), stability=0.0)
+    p = DAMPED.values(design.parameters)
+    z = np.roots([float(a) for a in p.coefficients])
+    assert np.min(-z.real / np.abs(z)) >= 0.97 - 1e-3  # as near as roots in doubles tell
+
+
+BOUNDS = tmsopt.Problem(
+    tmsopt.models.from_coefficients(["1", "3 + x", "3 + y", "1"]), free={"x": (0.0, 1.0), "y": (0.0, 1.0)},
+    constraints={"a": "x >= 0.8", "b": "x <= 0.2", "c": "y >= 0.5"},
+)  # fmt: skip
+
+
+def named(problem: tmsopt.Problem, reached):
+    """What `irreducible` makes of it; the nearest design moves b."""
+    near = {**problem.fixed, "x": 0.8, "y": 0.5}
+    relaxation = tmsopt.solve(replace(problem, minimize="x"), throw=False).relaxation
+    relaxation = replace(relaxation, parameters=Table(near), amounts=Table({"b": 0.6}), conflict=(), irreducible=False)
+    options = import_module("tmsopt.program.options").DEFAULTS
+    irreducible = import_module("tmsopt.search.remedies.needs").irreducible
+    return irreducible(problem, relaxation, ("b",), problem, options, reached)
+
+
+@pytest.fixture
+def blind(monkeypatch):
+    """A few starts meet nothing but what designs at hand meet."""
+    monkeypatch.setattr("tmsopt.search.remedies.needs._met", lambda *_, **__: False)
+
+
+@pytest.mark.usefixtures("blind")
+def test_what_a_whole_search_meets_is_decided_anew() -> None:
+    """Without a design of its own each set seems to be out of reach; the searches show what excludes what."""
+    points = [{"x": x, "y": y} for x, y in ((0.1, 0.1), (0.1, 0.6), (0.9, 0.1))]
+    asked = []
+
+    def reached(names):
+        asked.append(tuple(names))
+        return next((p for p in points if {n for n in names if not meets(n, p)} == set()), None), True
+
+    def meets(name, p):
+        return {"a": p["x"] >= 0.8, "b": p["x"] <= 0.2, "c": p["y"] >= 0.5}[name]
+
+    found = named(BOUNDS, reached)
+    assert (found.conflict, found.irreducible) == (("a", "b"), True)
+    assert asked[-1] == ("a", "b")
+    assert not any(all(meets(n, p) for n in ("a", "b")) for p in points)
+
+
+@pytest.mark.usefixtures("blind")
+def test_of_what_searches_go_on_to_meet_no_fewer_limits_are_claimed() -> None:
+    endless = iter({"x": 0.5, "y": k / 1000} for k in range(1000))  # that meet none of the limits, whatever is said
+    found = named(BOUNDS, lambda names: (next(endless), True))
+    assert (found.conflict, found.irreducible) == (("a", "b", "c"), False)
+
+
+@pytest.mark.usefixtures("blind")
+def test_where_no_search_can_tell_that_is_said() -> None:
+    assert not named(BOUNDS, lambda names: (None, False)).irreducible
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fold", [7, 9, 10])
+def test_a_root_of_any_multiplicity_is_within_reach_alone(fold: int) -> None:
+    """(s + 1)ⁿ is at 0; x1 >= 0.5 excludes it, as at eight."""
+    coefficients = ["1", *(f"{comb(fold, k)} + x{k}" for k in range(1, fold + 1))]
+    free = {f"x{k}": (-1.0, 1.3) for k in range(1, fold + 1)}
+    asked = replace(FAST, model=tmsopt.models.from_coefficients(coefficients), free=free)
+    relaxation = tmsopt.solve(asked, throw=False, alone=False, stability=0.0).relaxation
+    assert {"far", "x"} <= set(relaxation.conflict)
+
+
+def test_what_a_sample_misses_a_multiple_root_by_depends_on_its_multiplicity() -> None:
+    """A coefficient that is 4e-4 off moves an n-fold root by the n-th root of that."""
+    sample = import_module("tmsopt.search.sample")
+    for fold in (4, 6, 8, 12):
+        moved = np.abs(np.roots([comb(fold, k) for k in range(fold)] + [1 + 4e-4]) + 1).min()
+        assert moved == pytest.approx(4e-4 ** (1 / fold), rel=1e-3)
+        seen = [sample.Looked(np.zeros((1, 1)), np.zeros(1), np.array([off])) for off in (1.5 * moved, 3 * moved)]
+        assert [one.out_of_reach(fold) for one in seen] == [False, True]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["2EP2", "EP2+EP2"])
+def test_the_least_speed_of_a_pattern_is_told_by_whichever_name(name: str) -> None:
+    """By the law epset: its Froude number falls as the tilt grows to 0.405, so at 0.38 at most it is that at 0.38."""
+    fixed = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1, "chi_B": math.sqrt(2), "Fr": 1.0}
+    problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free={"lambda_s": (0.01, 0.38)}, locate=name)
+    need = tmsopt.solve(problem, throw=False).need
+    assert need is not None
+    assert need.parameter == "Fr"
+    assert need.value == pytest.approx(float(tmsopt.laws.epset(zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.38)), rel=1e-6)
+
+
+def test_a_limit_that_is_moved_by_its_seventh_digit_is_shown_as_it_is() -> None:
+    """s² + 2xs + 1 comes to −1 and no further."""
+    oscillator = tmsopt.models.from_coefficients([1, "2*x", 1])
+    asked = tmsopt.Problem(oscillator, free={"x": (0, 5)}, minimize="x", constraints={"c": "abscissa <= -1.000001"})
+    lines = infeasible_lines(tmsopt.solve(asked, throw=False))
+    assert "smallest change found: abscissa <= -1 instead of -1.000001 (c)" in lines

@@ -1,0 +1,92 @@
+"""Limits that are flat where they bind: met to 1e-9 they leave 1e-4 of a parameter, and are judged in that."""
+
+import pytest
+
+import tmsopt
+from tmsopt.evaluation import recheck
+from tmsopt.models import tms
+
+FIXED = {"chi_H": 1.0, "zeta_H": -0.2, "zeta_B": -0.4, "mu": 0.1}
+FREE = {"chi_B": (1.01, 5.0), "Fr": (0.01, 10.0), "lambda_s": (0.02, 1.4)}
+DESIGN = {"chi_B": 1.5, "lambda_s": 0.4}
+
+
+def bicycle(*limits, **asked):
+    constraints = {f"limit{k}": text for k, text in enumerate(limits)}
+    return tmsopt.Problem(model=tms, fixed=FIXED, free=FREE, constraints=constraints, **asked)
+
+
+def violated(limit, **parameters):
+    problem = bicycle(limit, minimize="abscissa")
+    return set(recheck(problem, problem.ordered({**DESIGN, **parameters})).violations)
+
+
+@pytest.mark.parametrize(
+    "limit", ["(Fr - 1.7)**4 <= 0", "0 >= 3 * (Fr - 1.7)**2", "(Fr - 1.7)**4 == 0", "(Fr - 1.7)**4 * chi_B <= 0",
+              "Fr**2 - 3.4 * Fr + 2.89 <= 0"],
+)  # fmt: skip
+def test_a_limit_that_one_speed_meets(limit):
+    """The excess is 1e-16 or 1e-8 at 1e-4 from it, where nothing within 1e-9 of the box, which is 10 wide, meets it."""
+    assert violated(limit, Fr=1.7) == set()
+    assert violated(limit, Fr=1.7 + 4e-16) == set()
+    assert violated(limit, Fr=1.6999) == {"limit0"}
+    assert violated(limit, Fr=1.7001) == {"limit0"}
+
+
+@pytest.mark.parametrize(
+    ("limit", "speed"),
+    [
+        ("Fr <= 1.7", 1.7 + 5e-10),  # off by less than 1e-9 of the range
+        ("1000 * Fr <= 1700", 1.7 + 1e-12),
+        ("(Fr - 1.7)**3 <= 0", 1.7 + 5e-10),
+        ("chi_H - 0.1 * 10 * Fr / Fr <= 0", 1.3),  # rounding alone, whatever the design
+        ("abscissa <= abscissa + 0 * Fr", 1.3),
+    ],
+)
+def test_what_rounding_leaves_is_no_violation(limit, speed):
+    assert violated(limit, Fr=speed) == set()
+
+
+def test_a_flat_limit_on_a_root_quantity():
+    problem = bicycle("(abscissa + 0.3)**4 <= 0", minimize="abscissa")
+    design = tmsopt.solve(problem)
+    assert design.abscissa == pytest.approx(-0.3, abs=1e-9)
+    off = {**design.parameters, "Fr": design.parameters["Fr"] + 1e-4}
+    assert set(recheck(problem, off).violations) == {"limit0"}
+
+
+@pytest.mark.parametrize(
+    ("limits", "optimum"),
+    [
+        (("(Fr - 1.7)**4 <= 0",), 1.7),
+        (("0 >= 3 * abs(Fr - 1.7)",), 1.7),
+        (("(Fr - 1.7)**5 == 0",), 1.7),
+        (("(Fr - 1.7)**3 <= 0",), 1.7),
+        (("(1.7 - Fr)**5 >= 0",), 1.7),
+        (("(Fr - chi_B)**2 + (chi_B - 1.2)**6 / 7 <= 0",), 1.2),
+        (("(Fr - 1.7)**2 <= 1e-4",), 1.71),
+    ],
+)
+def test_the_speed_that_such_a_limit_leaves(limits, optimum):
+    assert tmsopt.solve(bicycle(*limits, maximize="Fr")).value == pytest.approx(optimum, abs=1e-9)
+
+
+def test_no_wrong_optimum_where_the_limit_cannot_be_taken_apart():
+    """1.7 is all that it allows: what is not within 1e-8 of that is not said to be optimal."""
+    design = tmsopt.solve(bicycle("(Fr - 1.7)**4 * (1 + chi_B**2) <= 0", maximize="Fr"), throw=False, starts=12)
+    assert design.status != "optimal" or design.value == pytest.approx(1.7, abs=2e-8)
+
+
+def test_other_limits_keep_their_price():
+    """Of x² ≤ 1e-4 the price is that of x over 2 x: 50; a limit without one, as of x⁴ ≤ 0, has no entry."""
+    assert tmsopt.solve(bicycle("(Fr - 1.7)**2 <= 1e-4", maximize="Fr")).active["limit0"] == pytest.approx(50)
+    assert "limit0" not in tmsopt.solve(bicycle("(Fr - 1.7)**4 <= 0", maximize="Fr")).active
+
+
+def test_a_flat_stretch_at_the_bound_is_optimal() -> None:
+    """Two modes beyond their EP at k = 0.4 share the loss (g1 + g2)/2 whatever k is, and no design does better."""
+    pair = tmsopt.models.from_hamiltonian([["-1j", "k"], ["k", "-0.2j"]])
+    design = tmsopt.solve(tmsopt.Problem(pair, free={"k": (0.1, 0.5)}, minimize="abscissa"))
+    assert design.status == "optimal"
+    assert design.bound.proven
+    assert design.abscissa == pytest.approx(-0.6, abs=1e-12)

@@ -1,0 +1,193 @@
+"""The suite of random systems and its judges, and what its failures taught the solver."""
+
+import math
+from collections import Counter
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from benchmarks.command import SECTIONS
+from benchmarks.judges import System, confirmed_system, exact_polynomial, ideals, started_at, values_of
+from benchmarks.reports import Asked
+from benchmarks.rivals import evolve_system
+from benchmarks.suites import known, random_system, random_systems
+from tmsopt import Problem, models, solve
+from tmsopt.program import opposite, start_objective as start_worth
+
+SUITE = list(random_systems())
+KNOWN = known()
+SOME = (0, 9, 23, 37, 49, 72, 86, 93)
+
+DAMPED = System(
+    index=0,
+    kind="one mass",
+    matrices={"M": [["m"]], "D": [["d"]], "K": [["k"]]},
+    fixed={"m": 1.0, "k": 2.0},
+    free={"d": (0.0, 9.0)},
+    goal={"minimize": "abscissa"},
+)
+"""Critically damped at d = 2 √2, with a double root at −√2."""
+
+
+def middle(system: System) -> dict[str, float]:
+    return {n: 0.4 * lo + 0.6 * hi for n, (lo, hi) in system.free.items()}
+
+
+# The suite
+
+
+def test_the_suite_is_what_was_promised() -> None:
+    """100 systems of 2 to 6 degrees of freedom with 3 to 8 free parameters, even and odd degrees, the same every time."""
+    assert len(SUITE) == 100
+    assert {s.degree for s in SUITE} == set(range(3, 13))
+    assert {len(s.free) for s in SUITE} == set(range(3, 9))
+    assert Counter(next(iter(s.goal)) for s in SUITE) == {"minimize": 80, "maximize": 15, "locate": 5}
+    assert sum(bool(s.constraints) for s in SUITE) > 30
+    assert SUITE[37] == random_system(37)
+
+
+@pytest.mark.parametrize("index", SOME)
+def test_judges_and_model_agree_on_the_polynomial(index: int) -> None:
+    """Eigenvalues of the state matrix, the exact polynomial of the text, and the model's own coefficients."""
+    system = SUITE[index]
+    design = middle(system)
+    of = system.problem.parameter_set
+    coefficients = np.array([float(c) for c in system.model.coefficients({**system.fixed, **design}, of)])
+    polynomial = exact_polynomial(system, design)
+    leading = polynomial[polynomial.degree()]
+    exact = [polynomial[k] / leading for k in range(system.degree, -1, -1)]
+    size = np.abs(np.poly(-np.abs(np.roots(coefficients))))
+    assert np.abs(coefficients / coefficients[0] - [int(c.p) / int(c.q) for c in exact]) == pytest.approx(
+        0, abs=1e-11 * size.max()
+    )
+    found, _ = system.judged({n: np.array([x]) for n, x in design.items()})
+    assert found["abscissa"][0] == pytest.approx(values_of(next(ideals(system, design)))["abscissa"], abs=1e-9)
+
+
+@pytest.mark.parametrize("index", range(70, 75))
+def test_an_unfolding_has_its_exceptional_point_where_it_was_put(index: int) -> None:
+    system = SUITE[index]
+    cost = eval(system.goal["minimize"], {}, dict(system.known))
+    assert confirmed_system(system, system.known, cost)
+    assert KNOWN[index].value <= cost  # the cheapest one costs no more than the one that is known
+    moved = {**system.known, "x1": system.known["x1"] + 0.01}
+    assert not confirmed_system(system, moved, eval(system.goal["minimize"], {}, moved))
+
+
+def test_only_the_value_of_the_multiple_root_is_confirmed_system() -> None:
+    d = 2 * math.sqrt(2)
+    assert confirmed_system(DAMPED, {"d": d}, -math.sqrt(2))
+    assert not confirmed_system(DAMPED, {"d": d}, -math.sqrt(2) - 1e-6)
+    assert not confirmed_system(DAMPED, {"d": d * (1 + 1e-6)}, -math.sqrt(2))
+    assert confirmed_system(DAMPED, {"d": 2.0}, -1.0)
+
+
+def test_evolution_finds_the_critical_damping() -> None:
+    """To the square root of the rounding unit, as eigenvalues of a double root do."""
+    found = evolve_system(DAMPED)
+    assert found.parameters["d"] == pytest.approx(2 * math.sqrt(2), rel=1e-6)
+    assert found.reached(-math.sqrt(2) * (1 - 1e-3)) <= found.seconds
+    assert found.reached(-2.0) == math.inf
+
+
+@pytest.mark.parametrize("index", SOME)
+def test_a_kept_value_is_that_of_its_design(index: int) -> None:
+    system, one = SUITE[index], KNOWN[index]
+    assert confirmed_system(system, one.parameters, one.value)
+    assert all(lo <= one.parameters[n] <= hi for n, (lo, hi) in system.free.items())
+
+
+def test_every_system_has_a_kept_value() -> None:
+    assert sorted(KNOWN) == list(range(100))
+    assert all(math.isfinite(one.value) for one in KNOWN.values())
+
+
+def test_the_section_runs() -> None:
+    report = next(s for s in SECTIONS if s.name == "random").report()(Asked("random", quick=True))
+    assert "| systems | 3 |" in report
+    assert "### By degree" in report
+    assert "of 3 (100.0 %)" in report
+
+
+# Rounding and structures
+
+
+def steep(slope: float) -> Problem:
+    """s² + 2 d s + 1e-4 with d = slope · x − slope/3 + 0.01: a double root at −0.01, and a coefficient that cancels."""
+    x, k = ca.SX.sym("x"), ca.SX.sym("k")
+    model = models.from_coefficients([1, 2 * (slope * x - (slope / 3 - 0.01)), k], name="steep")
+    return Problem(model, fixed={"k": 1e-4}, free={"x": (0.3, 0.4)}, minimize="abscissa")
+
+
+def test_a_structure_holds_within_the_last_places_of_the_parameters() -> None:
+    """One unit in the last place of x moves d by 5e-17 · 1e6, 5e-9 of it: no double of x gives the double root."""
+    found = solve(steep(1e6))
+    assert found.structure == "EP2"
+    assert found.abscissa == pytest.approx(-0.01, rel=1e-8)
+    off = found.problem.values(found.parameters).roundings()
+    assert off[1] == pytest.approx(2e6 * 2**-53 / 3, rel=0.2)  # of 2 d, x being near 1/3: 5e-9 of it
+
+
+def test_without_cancellation_rounding_explains_nothing() -> None:
+    """s² + 2 s + 1 + 1e-9: as far from a double root as it says, whatever the parameters round."""
+    d = ca.SX.sym("d")
+    problem = Problem(models.from_coefficients([1, d, 1 + 1e-9], name="plain"), fixed={"d": 2.0}, free={})
+    values = problem.values(problem.fixed)
+    assert values.roundings() == pytest.approx([0.0, 2 * 2**-53, 0.0], abs=1e-20)
+    assert values["structure"].name == "pair"
+
+
+# Starts
+
+
+def test_a_start_better_than_its_basin_is_not_lost() -> None:
+    """A lightly damped chain whose best design is in a corner that IPOPT leaves from afar.
+
+    Differential evolution on the eigenvalues finds it too.
+    """
+    system, one = SUITE[4], KNOWN[4]
+    found = solve(started_at(system.problem, one.parameters), starts=1)
+    assert found.value == pytest.approx(one.known["evolution"], rel=1e-7)
+    assert start_worth(system.problem, one.parameters) == pytest.approx(one.value, rel=1e-9)
+
+
+def test_worth_of_a_start() -> None:
+    """s² + 2 s + 2: abscissa −1, damping ratio 1/√2; infinite where a limit is violated."""
+    d, k = ca.SX.sym("d"), ca.SX.sym("k")
+    model = models.from_coefficients([1, d, k], name="plain")
+    box = {"d": (0.0, 3.0), "k": (1.0, 3.0)}
+    most = Problem(model, fixed={}, free=box, maximize="damping_ratio", constraints={"soft": "k <= 2"})
+    assert start_worth(most, {"d": 2.0, "k": 2.0}) == pytest.approx(-math.sqrt(0.5), rel=1e-14)
+    assert start_worth(most, {"d": 2.0, "k": 2.5}) == math.inf
+
+
+def test_opposite_ends() -> None:
+    d, k = ca.SX.sym("d"), ca.SX.sym("k")
+    model = models.from_coefficients([1, d, k], name="plain")
+    problem = Problem(model, fixed={}, free={"d": (0.0, 3.0), "k": (1.0, 3.0)}, minimize="abscissa")
+    assert opposite(problem, {"d": 1.5, "k": 2.0}) == []
+    assert opposite(problem, {"d": 3.0, "k": 1.0}) == [{"d": 0.0, "k": 1.0}, {"d": 3.0, "k": 3.0}]
+
+
+def test_a_limit_on_the_damping_ratio_below_minus_one_forbids_nothing() -> None:
+    """s² − 2 a s + a² − 0.04 + c, a = 1 + 10 c: the roots a ± √(0.04 − c) are least at c = 0, where they are real.
+
+    No factor s² + p s + w² with p ≥ −2 w has two different positive roots.
+    """
+    c = ca.SX.sym("c")
+    a = 1 + 10 * c
+    model = models.from_coefficients([1, -2 * a, a * a - 0.04 + c], name="unstable")
+    problem = Problem(model, fixed={}, free={"c": (0.0, 1.0)}, minimize="abscissa")
+    assert solve(problem).value == pytest.approx(1.2, rel=1e-12)
+    limited = Problem(model, {}, {"c": (0.0, 1.0)}, constraints={"z": "damping_ratio >= -1.1"}, minimize="abscissa")
+    assert solve(limited).value == pytest.approx(1.2, rel=1e-12)
+
+
+def test_limits_of_the_suite_are_met_by_some_design() -> None:
+    for index, one in KNOWN.items():
+        system = SUITE[index]
+        plain = {n: np.array([x]) for n, x in one.parameters.items()}
+        roots = {"abscissa": np.array([-math.inf]), "damping_ratio": np.array([1.0])}  # those are judged elsewhere
+        if "roots" not in system.constraints:
+            assert system.violation({**plain, **roots})[0] <= 1e-9

@@ -1,0 +1,286 @@
+"""The sample as referee: no claim stands that a design contradicts which was looked at; optima that no design has."""
+
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.models import from_coefficients
+from tmsopt.roots import product
+
+multistart = import_module("tmsopt.search.multistart")
+outcome = import_module("tmsopt.search.outcome")
+referee = import_module("tmsopt.search.referee")
+sampling = import_module("tmsopt.search.sample")
+searching = import_module("tmsopt.search.search")
+workspaces = import_module("tmsopt.search.workspace")
+
+x, y = ca.SX.sym("x"), ca.SX.sym("y")
+MET = 1e-8  # what is asked of every value
+
+
+def problem(coefficients: Any, free: Any = None, limits: tuple[str, ...] = (), **asked: Any) -> tmsopt.Problem:
+    constraints = {f"limit{k}": text for k, text in enumerate(limits)}
+    asked = asked or {"minimize": "abscissa"}
+    return tmsopt.Problem(
+        from_coefficients(list(coefficients)), free=free or {"x": (0.0, 1.0)}, constraints=constraints, **asked
+    )
+
+
+def own_roots(design: tmsopt.Solution, coefficients: Any) -> Any:
+    """By NumPy, of the design's parameters."""
+    at = {"x": design.parameters["x"], "y": design.parameters.get("y", 0.0)}
+    f = ca.Function("a", [x, y], [ca.vertcat(*map(ca.SX, coefficients))])
+    return np.roots(np.array(f(at["x"], at["y"])).ravel())
+
+
+# Claims that the sample contradicts: s + 1 − x⁴/4 + x²/2 − x/10, wells near −1.05 and 0.95, the left one deeper
+
+WELLS = [1, 1 - (x**4 / 4 - x**2 / 2 + x / 10)]
+WIDE = {"x": (-2.0, 2.0)}
+LEFT, HUMP, RIGHT = sorted(np.roots([1, 0, -1, 0.1]).real.tolist())
+
+
+def depth(at: float) -> float:
+    return at**4 / 4 - at**2 / 2 + at / 10 - 1
+
+
+def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> None:
+    """Whatever a start is, its end is that of another one."""
+    real = multistart.Runner.ended
+
+    def ended(self: Any, design: Any, near: bool = False, hopeful: bool = True) -> Any:
+        found = real(self, {"x": at}, near, hopeful)
+        return found if feasible else replace(found, feasible=False)
+
+    monkeypatch.setattr(multistart.Runner, "ended", ended)
+
+
+@pytest.mark.parametrize("objective", ["abscissa", "x**4/4 - x**2/2 + x/10 - 1"])
+def test_a_search_in_the_wrong_basin_is_taken_up_again(objective: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(multistart, "starting", lambda work, ended=(), left=None: iter([({"x": 0.9}, True)] * 64))
+    design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective))
+    assert design.value == pytest.approx(depth(LEFT), abs=MET)
+    assert design.status == "optimal"
+
+
+def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where neither the sample nor the starts know of the other basin."""
+    real = sampling.Sampler.sample
+
+    def half(self: Any) -> Any:
+        whole = real(self)
+        kept = (seen.take(np.flatnonzero(seen.u[:, 0] > 0.6)) for seen in (whole.refined, whole.boldest))
+        return replace(whole, **dict(zip(("refined", "boldest"), kept, strict=True)))
+
+    monkeypatch.setattr(sampling.Sampler, "sample", half)
+    monkeypatch.setattr(multistart, "starting", lambda work, ended=(), left=None: iter([({"x": 0.9}, True)] * 64))
+    design = tmsopt.solve(problem(WELLS, WIDE))
+    assert design.value == pytest.approx(depth(LEFT), abs=MET)
+    assert design.status == "optimal"
+
+
+def test_an_end_that_a_design_contradicts_is_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """If no start leaves the basin on the right, what was looked at on the left is said, and that it is no optimum."""
+    stuck(monkeypatch, 0.9)
+    design = tmsopt.solve(problem(WELLS, WIDE), throw=False)
+    assert design.status == "not_converged"
+    assert not design.violations
+    assert any("the best design that was looked at" in note for note in design.notes)
+    assert depth(LEFT) - 1e-12 <= design.value < depth(RIGHT) - 0.1
+    assert design.value == pytest.approx(depth(LEFT), abs=1e-6)
+
+
+def test_the_right_basin_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    stuck(monkeypatch, -1.2)
+    design = tmsopt.solve(problem(WELLS, WIDE), throw=False)
+    assert (design.status, design.notes) == ("optimal", ())
+    assert design.value == pytest.approx(depth(LEFT), abs=MET)
+
+
+@pytest.mark.parametrize(
+    ("found", "between", "status", "value"),
+    [
+        (RIGHT, -2.0, "not_converged", depth(LEFT)),
+        (LEFT, -2.0, "optimal", depth(LEFT)),
+        (RIGHT, 2.0, "optimal", depth(RIGHT)),
+    ],
+)
+def test_no_optimum_stands_that_a_start_ended_better_than(
+    found: float, between: float, status: str, value: float
+) -> None:
+    """On the left designs change between the three values of a band that are looked at first, for better or worse."""
+    worse = between * ca.sin(2 * np.pi * y) ** 2 * (x - RIGHT) ** 2
+    asked = problem([1, WELLS[1] - worse], WIDE, scenarios={"y": tmsopt.Band(0.0, 1.0, 3)}, minimize="abscissa")
+    work = workspaces.workspace(asked)
+    nlp = work.formulate(asked.cases)
+    ends = {at: multistart.Runner(work, nlp).ended({"x": at}, near=True) for at in (LEFT, RIGHT)}
+    trial = outcome.survivor(work, nlp, [ends[found]])
+    own = searching._covered(work, nlp, [ends[found]], trial, outcome.counted([], 0.0))
+    assert own.status == "optimal"
+    left = referee.outdone(work, own)
+    assert left.status == status
+    assert left.checked.objective == pytest.approx(value, abs=MET)
+
+
+@pytest.mark.parametrize("limits", [(), ("x <= -0.5", "abscissa <= -1.3")])
+def test_a_design_that_meets_all_limits_forbids_infeasible(
+    limits: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stuck(monkeypatch, 0.9, feasible=False)
+    design = tmsopt.solve(problem(WELLS, WIDE, limits), throw=False)
+    assert design.status == "not_converged"
+    assert not design.violations
+    assert design.value == pytest.approx(depth(LEFT), abs=1e-6)
+    assert design.starts.converged == 0
+
+
+# A singular mass matrix: the best is where one root is at infinity, and the design is none
+
+
+def slow(*fast: Any) -> list[Any]:
+    """(x s + 1)(s + 2 − x) …: the abscissa is x − 2 for small x, −2 at best where x = 0, and −1/x is far off."""
+    return product([x, 1], [1, 2 - x], *fast)
+
+
+def swaying(*fast: Any) -> list[Any]:
+    """(x s + 1)(s² + 2 z s + 1) …, z = 0.5 − 0.3 x: the damping ratio."""
+    return product([x, 1], [1, 1 - 0.6 * x, 1], *fast)
+
+
+OPEN = [
+    (slow(), {"minimize": "abscissa"}, -2.0),
+    (slow([1, 6, 10]), {"minimize": "abscissa"}, -2.0),  # a pair at −3 ± i beside
+    (slow([1, 6]), {"minimize": "abscissa"}, -2.0),
+    (slow([1, 6], [1, 6, 10]), {"minimize": "abscissa"}, -2.0),
+    (swaying(), {"maximize": "damping_ratio"}, 0.5),
+    (swaying([1, 3]), {"maximize": "damping_ratio"}, 0.5),
+    (swaying([1, 4, 5]), {"maximize": "damping_ratio"}, 0.5),  # 4/√20 is more
+]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("coefficients", "asked", "best"), OPEN)
+@pytest.mark.slow
+def test_there_is_no_best_design_where_a_root_goes_to_infinity(
+    coefficients: Any, asked: Any, best: float, sign: int
+) -> None:
+    design = tmsopt.solve(problem([sign * c for c in coefficients], **asked), throw=False)
+    assert design.status == "not_converged"
+    assert any(note.startswith("no best design: it improves towards a singular mass matrix") for note in design.notes)
+    assert any(f"to {best:g};" in note for note in design.notes)
+    assert design.value == pytest.approx(best, abs=MET)
+    assert not design.violations
+    assert 0 < design.parameters["x"] <= 1e-8
+    z = own_roots(design, coefficients)
+    z = z[np.abs(z) < 1e3]
+    own = z.real.max() if "minimize" in asked else np.min(-z.real / np.abs(z))
+    assert own == pytest.approx(best, abs=1e-6)  # simple roots beside one 1e12 times as large
+
+
+@pytest.mark.parametrize(("coefficients", "asked", "best"), OPEN)
+def test_a_limit_makes_it_an_optimum(coefficients: Any, asked: Any, best: float) -> None:
+    design = tmsopt.solve(problem(coefficients, {"x": (0.1, 1.0)}, **asked))
+    assert (design.status, design.notes) == ("optimal", ())
+    assert design.parameters["x"] == pytest.approx(0.1, abs=MET)
+    assert design.value == pytest.approx(-1.9 if best < 0 else 0.47, abs=MET)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("coefficients", "free"),
+    [
+        ([x, 1], {"x": (-1.0, 1.0)}),
+        ([x, 1], {"x": (0.0, 1.0)}),
+        (product([x, 1], [x, 2]), {"x": (0.0, 1.0)}),
+        ([x, 1 + y], {"x": (-1.0, 1.0), "y": (0.0, 1.0)}),
+    ],
+    ids=["both signs", "one sign", "two roots", "two parameters"],
+)
+def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients: Any, free: Any) -> None:
+    """It is −1/x, or −(1 + y)/x: below anything as x goes to 0 from above."""
+    design = tmsopt.solve(problem(coefficients, free), throw=False)
+    assert design.status == "not_converged"
+    assert any(note.startswith("unbounded") for note in design.notes)
+    assert design.value < -1e6
+    assert not design.violations
+    numerator = 1 + design.parameters.get("y", 0.0)
+    assert design.value == pytest.approx(-numerator / design.parameters["x"], rel=1e-9)
+
+
+def test_a_bound_far_away_is_still_one() -> None:
+    """The same from x = 1e-4 on: −1e4 is the optimum."""
+    design = tmsopt.solve(problem([x, 1], {"x": (1e-4, 1.0)}))
+    assert design.status == "optimal"
+    assert design.value == pytest.approx(-1e4, rel=1e-9)
+
+
+# Ends at which a root has no sign, and values that cannot be beaten
+
+
+@pytest.mark.parametrize("lower", [0.0, -1.0])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower: float, sign: int) -> None:
+    """(s + x)(s² + 0.6 s + 1) has the damping ratio 0.3 for x > 0, 0 at x = 0 and −1 below: no least x, but a limit."""
+    a = [sign * c for c in product([1, x], [1, 0.6, 1])]
+    design = tmsopt.solve(problem(a, {"x": (lower, 1.0)}, ("damping_ratio >= 0.1",), minimize="x"))
+    assert design.status == "optimal"
+    assert 0 < design.value <= 1e-7
+    assert not design.violations
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "free"),
+    [
+        ([1, 2 * x, 1], {"x": (0.1, 3.0)}),
+        (product([1, 2 * x, 1], [1, 3 * y, 2]), {"x": (0.1, 3.0), "y": (0.1, 3.0)}),
+        (product([1, 2 * x, 1], [1, y]), {"x": (0.1, 3.0), "y": (-1.0, 1.0)}),
+    ],
+)
+def test_a_damping_ratio_of_1_is_not_beaten(coefficients: Any, free: Any) -> None:
+    """Where all roots are real and negative; exactly 1, and without a solver."""
+    design = tmsopt.solve(problem(coefficients, free, maximize="damping_ratio"))
+    assert (design.status, design.value) == ("optimal", 1.0)
+    assert design.starts.tried == 0
+    assert design.starts.looked > 1000
+    z = own_roots(design, coefficients)
+    assert np.all(z.imag == 0)
+    assert np.all(z.real < 0)
+
+
+def test_a_damping_ratio_of_1_in_all_cases_and_one_that_is_not_reached() -> None:
+    """s² + 2 x s + k: 1 from x = √k on, √k being 2 at most; and x/2 = 0.75 where x ends at 1.5."""
+    for most, best in ((3.0, 1.0), (1.5, 0.75)):
+        stated = problem([1, 2 * x, y], {"x": (0.1, most)}, scenarios={"y": [1.0, 4.0]}, maximize="damping_ratio")
+        design = tmsopt.solve(stated)
+        assert design.status == "optimal"
+        assert design.value == pytest.approx(best, abs=MET)
+
+
+# Progress
+
+
+def test_long_work_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Starts that an unstable best spends, though others of the box are stable, and those of a relaxation."""
+    monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
+    told: list[tmsopt.Progress] = []
+    asked = problem([1, x, 1], WIDE, ("x <= -1",))
+    found = tmsopt.solve(asked, progress=told.append, stability=0)
+    assert not found.stable
+    assert max(t.done for t in told if t.what == "searching") > 8  # more than the first starts, which agree
+    told.clear()
+    beyond = problem([1, x, 1], WIDE, ("x >= 10",))
+    assert tmsopt.solve(beyond, throw=False, progress=told.append).status == "infeasible"
+    assert any(1 <= t.done <= t.most for t in told if t.what.startswith("searching for the least that limits must"))
+
+
+@pytest.mark.parametrize("coefficients", [[1, "c", 0], ["m", "c", 0]])
+def test_a_root_that_is_0_in_every_design_is_no_reason_to_see_another_run_away(coefficients) -> None:
+    """m s² + c s: roots 0 and −c/m, so that every design of positive c is as good as any."""
+    free = {"c": (0.1, 3)} | ({"m": (0.5, 2)} if "m" in coefficients else {})
+    design = tmsopt.solve(problem(coefficients, free))
+    assert (design.status, design.value, design.without_best) == ("optimal", 0, False)

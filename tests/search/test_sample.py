@@ -1,0 +1,322 @@
+"""The sample of the whole box: what it looks at, how it comes nearer to limits, and basins that starts alone miss."""
+
+import math
+from importlib import import_module
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from helpers.oracles import polynomial_floats
+
+import tmsopt
+from tmsopt.models import from_coefficients
+
+sampling = import_module("tmsopt.search.sample")
+workspaces = import_module("tmsopt.search.workspace")
+Cube, Sampler, Looked = sampling.Cube, sampling.Sampler, sampling.Looked
+
+x, y = ca.SX.sym("x"), ca.SX.sym("y")
+SQUARE = {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}
+LINEAR = from_coefficients([1, 2 + x + y], name="s + 2 + x + y")
+
+
+def problem(limits: tuple[str, ...] = (), free: Any = None, model: Any = LINEAR, **asked: Any) -> tmsopt.Problem:
+    constraints = {f"limit{k}": text for k, text in enumerate(limits)}
+    return tmsopt.Problem(model, free=free or SQUARE, constraints=constraints, **(asked or {"minimize": "abscissa"}))
+
+
+# The box as a cube
+
+
+def cube() -> Any:
+    """A tangent, decades, two ranges that are not, one of them negative."""
+    fixed = {"chi_H": 1.0, "zeta_H": -0.2}
+    free = {
+        "lambda_s": (-1.2, 1.5),
+        "mu": (0.01, 50.0),
+        "Fr": (0.0, 10.0),
+        "chi_B": (1.0, 99.0),
+        "zeta_B": (-9.0, -0.01),
+    }
+    return Cube(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
+
+
+def test_a_design_has_one_point_of_the_cube_and_a_point_one_design() -> None:
+    space = cube()
+    for u in np.random.default_rng(0).random((200, space.size)):
+        design = {n: float(v) for n, v in space.designs(u).items()}
+        assert space.points(design) == pytest.approx(u, abs=1e-13)
+        again = space.designs(space.points(design))
+        assert {n: float(v) for n, v in again.items()} == pytest.approx(design, rel=1e-12, abs=1e-12)
+
+
+def test_ranges_end_exactly_and_are_run_through_in_order() -> None:
+    space = cube()
+    columns = space.designs(np.linspace(0, 1, 1001)[:, None] * np.ones(space.size))
+    for name, (lower, upper) in space.problem.free.items():
+        assert (columns[name][0], columns[name][-1]) == (lower, upper)
+        assert np.all(np.diff(columns[name]) > 0)
+
+
+def test_what_is_even_in_the_cube() -> None:
+    """Tangents; logarithms of positive ranges over more than two decades; all else as it is."""
+    middle = {n: float(v) for n, v in cube().designs(np.full(5, 0.5)).items()}
+    assert math.tan(middle["lambda_s"]) == pytest.approx((math.tan(-1.2) + math.tan(1.5)) / 2, rel=1e-12)
+    assert middle["mu"] == pytest.approx(math.sqrt(0.01 * 50), rel=1e-12)
+    assert (middle["Fr"], middle["chi_B"], middle["zeta_B"]) == pytest.approx((5.0, 50.0, -4.505), rel=1e-12)
+
+
+# What is looked at
+
+
+def test_every_design_that_is_judged_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+    real = sampling.judged
+
+    def counting(stated: Any, columns: Any) -> Any:
+        seen.append(len(columns["x"]))
+        return real(stated, columns)
+
+    monkeypatch.setattr(sampling, "judged", counting)
+    design = tmsopt.solve(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")))
+    starts = design.to_json()["starts"]
+    assert set(starts) == {"tried", "converged", "at_best", "expected_unseen"}
+    assert design.to_json()["looked"] == design.starts.looked == sum(seen) > 2000
+
+
+def test_the_sample_fills_the_box_to_its_faces_and_corners() -> None:
+    """No hole of a tenth of the box, inside or on a face; and all corners."""
+    drawn = Sampler(problem(), 0).draw()
+    assert drawn.u.min() == 0
+    assert drawn.u.max() == 1
+    assert {(0, 0), (0, 1), (1, 0), (1, 1)} <= {tuple(u) for u in drawn.u.tolist()}
+    inside = drawn.u[np.all((drawn.u > 0) & (drawn.u < 1), axis=1)]
+    counts, _, _ = np.histogram2d(*inside.T, bins=20, range=[(0, 1), (0, 1)])
+    assert counts.min() > 0
+    for k in (0, 1):
+        for end in (0.0, 1.0):
+            face = np.sort(drawn.u[drawn.u[:, k] == end][:, 1 - k])
+            assert np.diff(face).max() < 0.1
+
+
+def test_all_corners_of_a_box_of_many_parameters() -> None:
+    names = [f"p{k}" for k in range(8)]
+    model = from_coefficients([1, 9 + sum(ca.SX.sym(n) for n in names)])
+    drawn = Sampler(problem(model=model, free=dict.fromkeys(names, (-1.0, 1.0))), 0).draw()
+    corners = drawn.u[np.all((drawn.u == 0) | (drawn.u == 1), axis=1)]
+    assert len(np.unique(corners, axis=0)) == 2**8
+
+
+def test_limits_come_before_worth() -> None:
+    seen = Looked(np.zeros((4, 1)), np.array([3.0, 1.0, 2.0, -9.0]), np.array([0.0, 0.5, 0.0, np.inf]))
+    assert seen.ranked.tolist() == [2, 0, 1, 3]
+
+
+def test_the_sample_stands_for_its_seed() -> None:
+    first, again, other = (Sampler(problem(("x*y >= 0.1",)), seed).sample() for seed in (5, 5, 6))
+    assert np.array_equal(first.refined.u, again.refined.u)
+    assert not np.array_equal(first.refined.u, other.refined.u)
+
+
+def test_leaders_lie_apart_and_leave_nobody_out() -> None:
+    rng = np.random.default_rng(1)
+    seen = Looked(rng.random((500, 3)), np.zeros(500), np.zeros(500))
+    rows = sampling.apart(seen, 1000, 0.3)
+    distances = np.abs(seen.u[:, None] - seen.u[rows][None]).max(axis=2)
+    chosen = distances[rows]
+    assert rows[0] == 0
+    assert chosen[~np.eye(len(rows), dtype=bool)].min() >= 0.3
+    for k in range(len(seen)):  # whoever is not chosen is too close to one that comes before
+        assert k in rows or np.any((distances[k] < 0.3) & (rows < k))
+    assert sampling.apart(seen, 4, 0.3).tolist() == rows[:4].tolist()
+
+
+# Nearer to limits, and better
+
+
+def sought(stated: tmsopt.Problem, seed: int = 0, count: int = 64) -> tuple[Any, Any, Any]:
+    """A sampler, designs that violate its limits, and what becomes of them."""
+    sampler = Sampler(stated, seed)
+    drawn = sampler.draw()
+    start = drawn.take(np.flatnonzero((drawn.violation > 0) & np.isfinite(drawn.violation))[:count])
+    return sampler, start, sampler.nearer(start)
+
+
+@pytest.mark.parametrize(
+    ("limits", "share"),
+    [
+        (("x**2 + y**2 == 0.5",), 0.95),
+        (("x**2 + y**2 == 0.5", "x == 0.3*y"), 0.9),  # but from the middle, where the circle has no slope
+        (("abs(x - 0.3*y - 0.2) <= 1e-6",), 0.95),
+        (("sin(3*x) + y >= 1.7", "x*y <= 0.4"), 0.5),
+        (("abscissa == -1.5",), 0.85),  # a face in the way is slid along by halves
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_limits_are_met_by_the_way_of_newton(limits: tuple[str, ...], share: float, seed: int) -> None:
+    """Not from everywhere: shares are counted; whoever arrives is judged by formulas of NumPy's own."""
+    sampler, start, ends = sought(problem(limits), seed)
+    arrived = ends.violation == 0
+    assert arrived.mean() >= share
+    assert np.all((ends.u >= 0) & (ends.u <= 1))
+    assert np.all(ends.violation <= start.violation)
+    at: dict[str, Any] = {n: v[arrived] for n, v in sampler.space.designs(ends.u).items()}
+    at |= {"sin": np.sin, "abs": np.abs, "abscissa": -2 - at["x"] - at["y"]}
+    for text in limits:
+        for sense in ("==", "<=", ">="):
+            if sense in text:
+                left, right = (eval(side, {}, at) for side in text.split(sense))
+                off = {"==": abs(left - right), "<=": left - right, ">=": right - left}[sense]
+                assert np.max(off) <= 1e-9  # excess of 1e-10 of what is usual, which is 1 or so
+
+
+def test_what_cannot_be_met_is_not_left_for_worse() -> None:
+    """sin(20 x) is 1 at most; beside its crests Newton's steps lead anywhere."""
+    _, start, ends = sought(problem(("sin(20*x) >= 1.5",)), count=200)
+    assert np.all(ends.violation <= start.violation)
+    assert np.mean(ends.violation < start.violation) > 0.8
+
+
+def test_a_pole_is_approached_from_its_own_side() -> None:
+    """1/(x − y) ≥ 1000 is met for 0 < x − y ≤ 0.001, and from x < y by no small step."""
+    sampler = Sampler(problem(("1/(x - y) >= 1000",)), 0)
+    sampler.draw()
+    gaps = np.geomspace(2e-3, 0.2, 20)
+    points = [sampler.space.points({"x": 0.3 + gap / 2, "y": 0.3 - gap / 2}) for gap in gaps]
+    ends = sampler.nearer(sampler.look(np.array(points)))
+    found = sampler.space.designs(ends.u)
+    assert np.all(found["x"] - found["y"] > 0)
+    assert np.all(found["x"] - found["y"] <= 0.001 * (1 + 1e-9))
+
+
+def test_what_is_refined_is_no_worse_limits_first() -> None:
+    stated = problem(("x**2 + 2*y**2 <= 0.3", "x - y >= 0.5"), minimize="(x - 0.3)**2 - y + 0.1*abscissa")
+    sampler = Sampler(stated, 2)
+    start = sampler.draw().take(np.arange(0, 4000, 40))
+    ends = sampler.refined(start)
+    assert len(ends) == len(start)
+    before, after = zip(start.violation, start.worth, strict=True), zip(ends.violation, ends.worth, strict=True)
+    pairs = list(zip(before, after, strict=True))
+    assert all(new <= old for old, new in pairs)
+    assert sum(new < old for old, new in pairs) > 0.9 * len(pairs)
+    assert np.all((ends.u >= 0) & (ends.u <= 1))
+    again = sampler.look(ends.u)
+    assert np.array_equal(again.worth, ends.worth)
+    assert np.array_equal(again.violation, ends.violation)
+
+
+def test_what_starts_are_made_of_meets_equalities() -> None:
+    """Which no design that is only drawn does."""
+    sampler = Sampler(problem(("x**2 + y**2 == 0.5", "x*y <= 0.1")), 0)
+    seen = sampler.sample()
+    at = sampler.space.designs(seen.refined.u[:8])  # the best; one may be left between the two limits
+    assert seen.met == 0
+    assert len(at["x"]) >= 4
+    assert at["x"] ** 2 + at["y"] ** 2 == pytest.approx(0.5, abs=1e-9)
+    assert np.all(at["x"] * at["y"] <= 0.1 + 1e-9)
+
+
+def test_the_neighbourhood_of_a_design_reaches_from_a_hair_to_the_other_end_of_the_box() -> None:
+    """Best of all is (−1, −1), a corner; or, of a well 2e-4 wide, its bottom."""
+    far = problem(minimize="x + 0.1*abs(y - 0.3)")
+    seen = Sampler(far, 0).around({"x": 1.0, "y": 0.3})
+    assert seen.worth.min() == pytest.approx(-1.0, abs=1e-3)
+    well = problem(minimize="-1/(1 + ((x - 0.2003)**2 + (y - 0.3)**2)/1e-8)")
+    assert Sampler(well, 0).around({"x": 0.2, "y": 0.3}).worth.min() < -0.8
+
+
+# Basins
+
+
+NARROW = ((x - 0.71) ** 2 + (y + 0.37) ** 2, 1 + (x + 0.5) ** 2 + (y - 0.4) ** 2)
+WELLS = from_coefficients([1, 1 - NARROW[0] / (NARROW[0] + 0.004) * NARROW[1]])
+"""s + 1 − d²/(d² + 0.004) q: the abscissa is −1 at d = 0 and nowhere less; all else slopes down to (−0.5, 0.4)."""
+
+
+@pytest.mark.parametrize("asked", [{"seed": seed} for seed in range(6)] + [{"starts": n} for n in (1, 2, 3, 4)])
+def test_the_deep_basin_is_found_though_it_is_narrow(asked: dict[str, int]) -> None:
+    design = tmsopt.solve(problem(model=WELLS), **asked)
+    assert design.value == pytest.approx(-1, abs=1e-12)
+    assert dict(design.parameters) == pytest.approx({"x": 0.71, "y": -0.37}, abs=1e-7)
+
+
+def test_a_dozen_starts_agree_on_the_other_basin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the test before this one asks for something: without a sample, this is where it ends."""
+    monkeypatch.setattr(workspaces.Workspace, "sampler", None)
+    monkeypatch.setattr(workspaces.Workspace, "sample", None)
+    design = tmsopt.solve(problem(model=WELLS))
+    assert design.starts.at_best >= 5
+    assert design.value > -0.01
+
+
+def test_limits_between_wells() -> None:
+    """(x² − 1)² + x/5 has its deeper well at the left, from which the limit keeps all but a sliver of width 2e-5."""
+    model = from_coefficients([1, 2 - (x**2 - 1) ** 2 - 0.2 * x])
+    limit = "(x - 0.95)*(x + 0.9) * (x + 0.90002) >= 0"
+    design = tmsopt.solve(problem((limit,), {"x": (-1.0, 1.0)}, model))
+    sliver = np.array([-0.90002, -0.9])
+    right = np.linspace(0.95, 1, 100001)
+    best = min(float(np.min((v**2 - 1) ** 2 + 0.2 * v - 2)) for v in (sliver, right))
+    assert design.value == pytest.approx(best, abs=1e-9)
+
+
+# A robot, few designs of which are stable
+
+
+ROBOT = {"w": 0.25, "v": 1.9, "m_B": 12.0}
+PARTS = {
+    "m_H": (0.1, 4.0), "x_B": (0.03, 0.4), "z_B": (-0.6, -0.06), "x_H": (0.15, 0.45), "z_H": (-0.4, -0.03),
+    "lambda_s": (0.03, 0.7),
+}  # fmt: skip
+HOLDS = {"front": "N_F >= 20", "rear": "N_R >= 20", "arm": "abs(u_H) >= 0.005"}
+KNOWN = {
+    "m_H": 3.99504145,
+    "x_B": 0.24079365,
+    "z_B": -0.47685,
+    "x_H": 0.15006584,
+    "z_H": -0.2691029,
+    "lambda_s": 0.373013,
+}
+"""By differential evolution on eigenvalues, 20 000 designs for each of 500 rounds; of four runs one found no stable design."""
+
+
+def robot_abscissa(d: dict[str, Any]) -> Any:
+    """Per √(g/w), by NumPy's eigenvalues of the paper's matrices."""
+    w, g = ROBOT["w"], 9.81
+    lengths = (d["x_B"] / w, d["x_H"] / w, d["z_B"] / w, d["z_H"] / w)
+    a = np.stack(polynomial_floats(ROBOT["v"] / math.sqrt(g * w), d["m_H"] / ROBOT["m_B"], *lengths, d["lambda_s"]), -1)
+    companion = np.zeros((*a.shape[:-1], 4, 4))
+    companion[..., 0, :] = -a[..., 1:] / a[..., :1]
+    companion[..., [1, 2, 3], [0, 1, 2]] = 1
+    return np.linalg.eigvals(companion).real.max(axis=-1)
+
+
+def robot_holds(d: dict[str, Any], off: float = 0.0) -> Any:
+    """Whether both wheels stay down and the steer arm is long enough, but for a share."""
+    front = 9.81 * (12 * d["x_B"] + d["m_H"] * d["x_H"]) / 0.25
+    arm = (d["x_H"] - 0.25) * np.cos(d["lambda_s"]) - d["z_H"] * np.sin(d["lambda_s"])
+    down = np.minimum(front, 9.81 * (12 + d["m_H"]) - front) >= 20 * (1 - off)
+    return down & (np.abs(arm) >= 0.005 * (1 - off))
+
+
+def test_a_stable_robot_is_rare() -> None:
+    """At most one in 10 000 random ones is stable and meets all limits, yet one is known."""
+    rng = np.random.default_rng(0)
+    drawn = {n: rng.uniform(lo, hi, 20000) for n, (lo, hi) in PARTS.items()}
+    assert np.sum((robot_abscissa(drawn) < 0) & robot_holds(drawn)) <= 2
+    assert robot_abscissa(KNOWN) < -0.79
+    assert robot_holds(KNOWN, 1e-3)
+    assert all(lo <= KNOWN[n] <= hi for n, (lo, hi) in PARTS.items())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 8))])
+def test_the_stable_robot_is_found(seed: int) -> None:
+    stated = tmsopt.Problem(tmsopt.models.tms, fixed=ROBOT, free=PARTS, constraints=HOLDS, minimize="abscissa")
+    design = tmsopt.solve(stated, seed=seed, stability=0.0)
+    assert design.stable
+    assert design.value <= robot_abscissa(KNOWN)
+    assert robot_holds(dict(design.parameters), 1e-8)
+    # A pair or more may meet on the line, where numeric roots are off by the fourth root of 1e-16 at most.
+    assert robot_abscissa(dict(design.parameters)) == pytest.approx(design.value, abs=2e-3)

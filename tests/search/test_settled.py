@@ -1,0 +1,119 @@
+"""When a search ends: by the optima that are expected still, from how many starts ended in how many different ones."""
+
+from importlib import import_module
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.models import from_coefficients
+from tmsopt.problem import expected_unseen, is_enough
+
+x = ca.SX.sym("x")
+PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x")
+
+
+def settled(ends: list[float | None], share: float, far_off: bool = False, left: int = 0) -> bool:
+    """Of starts that ended at these objectives, None where at nothing feasible; so many refined designs are left."""
+    nlp = SimpleNamespace(size=1.0)
+    candidates: list[Any] = [
+        SimpleNamespace(objective=1.0 if e is None else e, feasible=e is not None, nlp=nlp) for e in ends
+    ]
+    refined = SimpleNamespace(violation=np.zeros(left))
+    sample = SimpleNamespace(met=round(share * 1000), size=1000, far_off=far_off, refined=refined)
+    work = SimpleNamespace(part=PLAIN, sample=sample)
+    return bool(import_module("tmsopt.search.multistart")._settled(work, candidates, range(left)))
+
+
+@pytest.mark.parametrize(
+    ("share", "ends", "enough"),
+    [
+        (0.5, [1.0], 8),  # w/(n − w − 2) is 1/5 where eight starts ended in one optimum
+        (0.5, [1.0, 2.0], 14),
+        (0.5, [1.0, 2.0, 3.0], 20),
+        (0.01, [1.0], 8),
+        (0.5, [None], 8),  # nothing feasible
+        (0.5, [1.0, 2.0, *[None] * 20], 18),  # sixteen failed, beside two others
+    ],
+)
+def test_a_search_ends_with_so_many_starts_and_not_before(share: float, ends: list[float | None], enough: int) -> None:
+    tried = (ends * enough)[:enough]
+    assert settled(tried, share)
+    assert not settled(tried[:-1], share)
+
+
+def test_designs_left_count_as_optima_of_their_own() -> None:
+    """Ten starts in one optimum and three designs left: w = 4, n = 13, and 4/7 are expected."""
+    assert settled([1.0] * 10, 0.5)
+    assert not settled([1.0] * 10, 0.5, left=3)
+    assert settled([1.0] * 23, 0.5, left=3)
+
+
+def test_three_starts_are_enough_where_no_design_of_the_sample_comes_near_the_limits() -> None:
+    assert settled([None] * 3, 0.0, far_off=True)
+    assert not settled([None] * 2, 0.0, far_off=True)
+
+
+def test_the_estimate_is_that_of_boender_and_rinnooy_kan() -> None:
+    """Optima in equal basins: the mean number not met is what is estimated from those that were, within its noise.
+
+    The estimate is w (w + 1)/(n − w − 2), the posterior mean for a uniform prior over numbers and shares of basins.
+    """
+    rng = np.random.default_rng(1)
+    truth, estimate = [], []
+    for _ in range(4000):
+        count = int(rng.integers(1, 30))
+        shares = rng.dirichlet(np.ones(count))
+        seen = len(np.unique(rng.choice(count, 60, p=shares)))
+        truth.append(count - seen)
+        estimate.append(expected_unseen(60, seen))
+    small = np.array(estimate) < 8  # the prior of the estimate has no end, this one ends at 29
+    assert np.mean(np.array(truth)[small]) == pytest.approx(np.mean(np.array(estimate)[small]), rel=0.25)
+
+
+def test_the_words_follow_from_the_numbers() -> None:
+    def words(tried: int, at_best: int, optima: int) -> str:
+        return ", ".join(tmsopt.Starts(tried, tried, at_best, optima=optima).sureness)
+
+    assert words(64, 1, 30) == "found by 1 of 64 starts, a better one is likely"
+    assert words(64, 40, 3) == "found by 40 of 64 starts"
+    assert words(3, 3, 1) == "found by 3 of 3 starts, a better one is possible"
+    assert words(0, 0, 0) == ""
+    assert not is_enough(4, 1)
+    assert tmsopt.Starts(3, 3, 3, optima=1).expected_unseen == float("inf")
+
+
+def led(objective: str, box: tuple[float, float], places: list[tuple[float, ...]], end: tuple[float, ...]) -> list[int]:
+    """Which of these leaders no way leads from to where a start ended."""
+    free = dict.fromkeys(("x", "y")[: len(end)], box)
+    model = from_coefficients([1, 2 + sum(map(ca.SX.sym, free), ca.SX(0))])
+    problem = tmsopt.Problem(model, free=free, minimize=objective)
+    sampler = import_module("tmsopt.search.sample").Sampler(problem, 0)
+    sampler.draw()
+    u = np.array([sampler.space.points(dict(zip(free, place, strict=True))) for place in places])
+    ended = SimpleNamespace(feasible=True, objective=0.0, nlp=SimpleNamespace(size=1.0), run=SimpleNamespace(x=end))
+    work = SimpleNamespace(
+        part=problem, sampler=sampler, sample=SimpleNamespace(leaders=sampler.look(u)),
+        design_at=lambda x: dict(zip(free, x, strict=True)),
+    )  # fmt: skip
+    left = [*range(len(places))]
+    count = import_module("tmsopt.search.basins.leaders").led(work, ended, left)
+    assert count == len(places) - len(left)
+    return left
+
+
+VALLEY = "100*(y - x**2)**2 + (1 - x)**2"  # Rosenbrock's, least at (1, 1)
+
+
+def test_only_a_straight_way_down_counts() -> None:
+    """From the far end of the valley it goes up at first; from beside the end it goes down."""
+    assert led(VALLEY, (-2.0, 2.0), [(-0.9, 0.81), (0.9, 0.81), (1.1, 1.21)], (1.0, 1.0)) == [0]
+
+
+def test_no_way_leads_over_a_ridge_whatever_lies_beyond() -> None:
+    """(x² − 1)² + (x + 1)/10 has its ridge at 0.025: leaders to the right of it are of a basin of their own."""
+    places = [(x,) for x in (-1.4, -0.6, -0.2, 0.2, 0.6, 0.95, 1.4)]
+    assert led("(x**2 - 1)**2 + (x + 1)/10", (-2.0, 2.0), places, (-1.0,)) == [3, 4, 5, 6]

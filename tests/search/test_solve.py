@@ -1,0 +1,428 @@
+"""Solving: closed forms, invariants and honesty about failure. Sources stand beside the numbers."""
+
+import math
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import FrozenInstanceError, fields, replace
+
+import numpy as np
+import pytest
+from helpers.oracles import abscissa_60, polynomial_60
+
+import tmsopt
+from tmsopt import laws
+from tmsopt.evaluation import omega0_bound
+from tmsopt.problem import degrees_of_freedom
+from tmsopt.program import AskedOfSolve, Options, abscissa as abscissa_nlp, matching
+from tmsopt.roots import PATTERNS, backward_error, pattern_distance, roots
+
+TMS = tmsopt.models.tms
+HEIGHTS = {"zeta_B": -0.4, "zeta_H": -0.2}
+BOX = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.02, 1.4)}
+
+
+def ep4_problem(**changes):
+    given = {"fixed": {"chi_H": 1.0, "mu": 0.1, **HEIGHTS}, "free": BOX, "minimize": "abscissa"}
+    return tmsopt.Problem(TMS, **{**given, **changes})
+
+
+def coefficients(solution):
+    return [solution.quantities[f"a{k}"] for k in range(5)]
+
+
+# The paper's closed forms (Table 1; equations chib1, tls, frep4)
+EP4 = {
+    "Fr": 3 * math.sqrt(110 * math.sqrt(2) - 120) / 8,
+    "chi_B": math.sqrt(2),
+    "lambda_s": math.atan(15 / 4 - 75 * math.sqrt(2) / 32),
+}
+
+
+@pytest.mark.parametrize("objective", [{"minimize": "abscissa"}, {"minimize": None, "locate": "EP4"}])
+def test_both_formulations_reach_the_closed_form_ep4(objective):
+    design = tmsopt.solve(ep4_problem(**objective))
+    for name, value in EP4.items():
+        assert design.parameters[name] == pytest.approx(value, abs=1e-12)
+    assert design.structure == "EP4"
+    assert design.abscissa == pytest.approx(-(12.5**0.25), abs=1e-12)  # ω0⁴ = 25/2, Table 1
+    assert [(r.multiplicity, r.im) for r in design.roots] == [(4, 0.0)]
+    # Never by recomputed roots: the coefficients are those of (s − ω0)⁴.
+    assert pattern_distance(PATTERNS["EP4"], coefficients(design)) < 1e-13
+
+
+def test_ep4_is_proven_globally_optimal():
+    bound = tmsopt.solve(ep4_problem()).bound
+    assert bound.proven
+    assert bound.method == "omega0"
+    assert 0 <= bound.gap < 1e-12
+    assert bound.value == pytest.approx(-(12.5**0.25), abs=1e-14)
+
+
+def test_optimised_benchmark_of_the_paper():
+    problem = tmsopt.Problem(
+        TMS,
+        fixed={"chi_H": 1.02, **HEIGHTS},
+        free={**BOX, "mu": (0.001, 100), "chi_B": (1, 3), "lambda_s": (0.02, 1.5)},
+        constraints={"decay": "omega0 == -1"},
+        locate="EP4",
+    )
+    assert degrees_of_freedom(problem).kind == "square"
+    design = tmsopt.solve(problem)
+    first, second = laws.ep4(-1.0, -0.4, -0.2, 1.02)  # closed form for any chi_H
+    expected = {"Fr": 2.337214016650773, "mu": 20.8462670127613, "lambda_s": 0.8514403685251676, "chi_B": 1.19}
+    for name, value in expected.items():
+        assert design.parameters[name] == pytest.approx(value, abs=1e-10)
+    assert design.parameters["mu"] == pytest.approx(float(first.mu), rel=1e-12)
+    other = [b for b in design.branches if b.parameters["mu"] < 0 < b.parameters["Fr"]]
+    assert len(other) == 1
+    assert "mu.min" in other[0].excluded_by
+    assert other[0].parameters["mu"] == pytest.approx(float(second.mu), rel=1e-9)
+    assert other[0].parameters["Fr"] == pytest.approx(float(second.Fr), rel=1e-9)
+
+
+@pytest.mark.parametrize(("zeta_B", "zeta_H"), [(-0.9, -0.3), (-0.5, -0.45), (-1.4, -0.1), (-0.3, -0.6)])
+@pytest.mark.slow
+def test_ep4_for_other_heights_and_both_tilts(zeta_B, zeta_H):
+    law = laws.ep4_chi_H_1(zeta_B, zeta_H)
+    sign = math.copysign(1, float(law.tan_lambda_s))
+    tilt = tuple(sorted((sign * 0.001, sign * 1.5)))
+    design = tmsopt.solve(
+        ep4_problem(
+            fixed={"chi_H": 1.0, "mu": 3.0, "zeta_B": zeta_B, "zeta_H": zeta_H},
+            free={"Fr": (0.01, 20), "chi_B": (0.1, 8), "lambda_s": tilt},
+        )
+    )
+    assert design.structure == "EP4"
+    assert design.parameters["chi_B"] == pytest.approx(float(law.chi_B), abs=1e-11)
+    assert math.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-11)
+    assert design.parameters["Fr"] == pytest.approx(float(law.Fr), abs=1e-11)
+
+
+@pytest.mark.parametrize("pattern", [name for name in PATTERNS if name != "resonance"])
+@pytest.mark.slow
+def test_every_pattern_is_located(pattern):
+    """The 60-digit coefficients of the design are those of the pattern, to what double parameters can hold."""
+    free = {**BOX, "zeta_B": (-1.2, -0.05), "chi_B": (0.1, 5), "chi_H": (0.7, 1.3)}  # both tilts: test_sides.py
+    fixed = {"mu": 2.0, "zeta_H": -0.2}
+    problem = tmsopt.Problem(TMS, fixed=fixed, free=free, locate=pattern, constraints={"offset": "nu_H >= 0.02"})
+    design = tmsopt.solve(problem)
+    exact = [float(c) for c in polynomial_60(**design.parameters)]
+    assert pattern_distance(PATTERNS[pattern], exact) < 1e-13
+    assert design.freedom.count == 5 - PATTERNS[pattern].codimension
+    assert design.quantities["nu_H"] >= 0.02 - 1e-9
+
+
+@pytest.mark.slow
+def test_a_pattern_that_no_bicycle_has_is_infeasible():
+    """A double imaginary pair needs a1 = a3 = 0, so chi_B = chi_H and zeta_B = zeta_H = -0.2. Then with mu = 2 and
+    k = chi_H - 1, a2/a0 > 0 and a4/a0 > 0 ask for T > 10 k and k > 0.4 T and k > -0.2 T (or all reversed): never.
+    """
+    free = {**BOX, "lambda_s": (-1.3, 1.4), "zeta_B": (-1.2, -0.05), "chi_B": (0.1, 5), "chi_H": (0.7, 1.3)}
+    problem = tmsopt.Problem(TMS, fixed={"mu": 2.0, "zeta_H": -0.2}, free=free, locate="resonance")
+    design = tmsopt.solve(problem, throw=False)
+    assert design.status == "infeasible"
+    assert "resonance" in design.violations
+
+
+def test_pattern_with_an_objective_over_its_set():
+    """Least ω0 over the EP4 designs with chi_H = 1: ω0 = −(ζ_B ζ_H)^(−1/4), so both heights end at their least."""
+    problem = ep4_problem(
+        fixed={"chi_H": 1.0, "mu": 1.0},
+        free={**BOX, "lambda_s": (0.02, 1.5), "zeta_B": (-0.8, -0.3), "zeta_H": (-0.25, -0.1)},
+        minimize="omega0",
+        locate="EP4",
+    )
+    design = tmsopt.solve(problem)
+    assert design.freedom.kind == "under-determined"
+    assert design.freedom.count == 2
+    assert design.value == pytest.approx(-((0.3 * 0.1) ** -0.25), rel=1e-10)
+    # By hand: dω0/dζ_H = ω0 / (−4 ζ_H) and likewise for ζ_B.
+    assert design.active["zeta_H.max"] == pytest.approx(abs(design.value) / (4 * 0.1), rel=1e-6)
+    assert design.active["zeta_B.max"] == pytest.approx(abs(design.value) / (4 * 0.3), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_locate_alone_with_freedom_takes_the_design_nearest_the_start():
+    problem = ep4_problem(minimize=None, locate="2EP2", start={"Fr": 2.3, "chi_B": 1.45, "lambda_s": 0.3})
+    design = tmsopt.solve(problem, starts=16)
+    assert design.structure == "2EP2"
+    assert design.freedom.count == 1
+    # On the set chi_B = √2 and Fr = epset(λ_s): the nearest point by a fine independent scan along the curve.
+    tilts = np.linspace(0.02, EP4["lambda_s"], 200_001)
+    speeds = laws.epset(-0.4, -0.2, tilts)
+    distance = ((speeds - 2.3) / 9.99) ** 2 + ((tilts - 0.3) / 1.38) ** 2
+    nearest = int(np.nanargmin(distance))
+    assert design.parameters["lambda_s"] == pytest.approx(tilts[nearest], abs=1e-5)  # spacing of the scan 2e-6
+    assert design.parameters["Fr"] == pytest.approx(laws.epset(-0.4, -0.2, design.parameters["lambda_s"]), abs=1e-11)
+
+
+def test_over_determined_and_inconsistent_pattern_is_infeasible():
+    problem = ep4_problem(
+        fixed={"chi_H": 1.0, "mu": 0.1, "chi_B": 1.3, **HEIGHTS},
+        free={"Fr": (0.01, 10), "lambda_s": (0.02, 1.4)},
+        minimize=None,
+        locate="EP4",
+    )
+    assert degrees_of_freedom(problem).kind == "over-determined"
+    design = tmsopt.solve(problem, throw=False)
+    assert design.status == "infeasible"
+    assert "EP4" in design.violations
+
+
+def test_over_determined_but_consistent_pattern_is_found():
+    problem = ep4_problem(
+        fixed={"chi_H": 1.0, "mu": 0.1, "chi_B": math.sqrt(2), **HEIGHTS},
+        free={"Fr": (0.01, 10), "lambda_s": (0.02, 1.4)},
+        minimize=None,
+        locate="EP4",
+    )
+    design = tmsopt.solve(problem)
+    assert design.parameters["Fr"] == pytest.approx(EP4["Fr"], abs=1e-7)  # least squares: half the digits
+
+
+def test_realised_abscissa_is_that_of_the_stored_parameters():
+    design = tmsopt.solve(ep4_problem())
+    independent = abscissa_60(polynomial_60(**design.parameters))
+    assert design.abscissa_realised == pytest.approx(float(independent), rel=1e-14)
+    # ε^(1/4) of the rounding unit: visibly worse than the ideal, as the theory says.
+    assert 1e-5 < design.abscissa_realised - design.abscissa < 2e-3
+
+
+def test_multipliers_are_gains_found_by_solving_again():
+    problem = tmsopt.Problem(
+        TMS,
+        fixed={"chi_H": 1.0, "mu": 1.0, **HEIGHTS},
+        free={"Fr": (0.01, 1.5), "chi_B": (1.01, 5), "lambda_s": (0.02, 1.4)},
+        constraints={"tilt": "lambda_s <= 0.2", "layout": "chi_B >= 1.35"},
+        minimize="abscissa",
+    )
+    design = tmsopt.solve(problem)
+    step = 1e-5
+    for name, relaxed in (
+        ("Fr.max", replace(problem, free={**problem.free, "Fr": (0.01, 1.5 + step)})),
+        ("tilt", replace(problem, constraints={**problem.constraints, "tilt": f"lambda_s <= {0.2 + step}"})),
+    ):
+        gain = (design.value - tmsopt.solve(relaxed).value) / step
+        assert design.active.get(name, 0.0) == pytest.approx(gain, rel=1e-3, abs=1e-5)
+    assert design.active
+
+
+def test_equality_constraint_multiplier_is_the_slope():
+    def at(value):
+        return tmsopt.solve(
+            tmsopt.Problem(
+                TMS,
+                fixed={"chi_H": 1.0, "mu": 1.0, "zeta_H": -0.2},
+                free={**BOX, "zeta_B": (-0.9, -0.3)},
+                constraints={"height": f"zeta_B == {value}"},
+                minimize="abscissa",
+            )
+        )
+
+    # EP4 at given heights: γ = −(ζ_B ζ_H)^(−1/4), so dγ/dζ_B = γ / (−4 ζ_B).
+    design = at(-0.4)
+    assert design.structure == "EP4"
+    assert design.active["height"] == pytest.approx(design.value / (-4 * -0.4), rel=1e-6)
+
+
+def test_maximize_and_general_expressions():
+    problem = tmsopt.Problem(
+        TMS,
+        fixed={"chi_H": 1.0, "mu": 1.0, **HEIGHTS},
+        free=BOX,
+        constraints={"stable": "abscissa <= -0.5", "speed": "Fr <= 2"},
+        maximize="lambda_s - 0.1*chi_B",
+    )
+    design = tmsopt.solve(problem)
+    p = design.parameters
+    assert design.value == pytest.approx(p["lambda_s"] - 0.1 * p["chi_B"], abs=1e-12)
+    assert float(abscissa_60(polynomial_60(**p))) <= -0.5 + 1e-6
+    # No point of a fine grid over the box that satisfies the constraints is better.
+    Fr, chi_B, tilt = np.meshgrid(np.linspace(0.5, 2, 31), np.linspace(1.05, 3, 40), np.linspace(0.05, 1.2, 60))
+    a = np.moveaxis(laws.copo(Fr, 1.0, chi_B, 1.0, -0.4, -0.2, tilt), 0, -1)
+    good = roots(a).real.max(axis=-1) <= -0.5
+    assert good.any()
+    assert (tilt - 0.1 * chi_B)[good].max() <= design.value + 1e-9
+
+
+def test_damping_ratio_is_maximised_through_factors():
+    """Heavy damping (ratio 1) exists at this speed for some tilt, by the paper's middle row of Fig. root loci."""
+    problem = ep4_problem(
+        fixed={"chi_H": 1.0, "mu": 1.0, "Fr": 2.2, **HEIGHTS},
+        free={"chi_B": (1.01, 3), "lambda_s": (0.02, 1.4)},
+        minimize=None,
+        maximize="damping_ratio",
+    )
+    design = tmsopt.solve(problem)
+    assert design.value == pytest.approx(1.0, abs=1e-9)
+    assert design.quantities["damping_ratio"] == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_infeasible_problem_names_the_violation():
+    problem = ep4_problem(constraints={"low": "chi_B <= 1.2", "high": "chi_B >= 1.5"})
+    with pytest.raises(tmsopt.NotSolved, match="infeasible") as caught:
+        tmsopt.solve(problem)
+    best = caught.value.solution
+    assert best.status == "infeasible"
+    assert set(best.violations) <= {"low", "high"}
+    assert sum(best.violations.values()) == pytest.approx(
+        0.3, rel=0.5
+    )  # least total violation, sides of size 1.2 to 1.5
+    assert set(best.parameters) == set(TMS.sets[0].names)
+    assert pickle.loads(pickle.dumps(caught.value)).solution.status == "infeasible"
+
+
+@pytest.mark.slow
+def test_no_stable_design_is_said():
+    """chi_B < chi_H makes a3 and a1 of opposite sign or unstable for lambda_s > 0 (lscf): no stable design."""
+    problem = ep4_problem(free={**BOX, "chi_B": (0.2, 0.9)})
+    design = tmsopt.solve(problem, throw=False)
+    assert design.abscissa >= 0
+    assert any("no stable design" in note for note in design.notes)
+
+
+@pytest.mark.parametrize("linear_solver", ["mumps", "spral"])
+def test_silence(capfd, linear_solver):
+    tmsopt.solve(
+        ep4_problem(constraints={"odd": "sqrt(chi_B - 1.2) >= 0.1", "log": "log(Fr - 1) >= -2"}),
+        linear_solver=linear_solver,
+        throw=False,
+    )
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    assert captured.err == ""
+
+
+def test_other_linear_solvers_are_refused():
+    with pytest.raises(ValueError, match="mumps spral"):
+        tmsopt.solve(ep4_problem(), linear_solver="ma27")
+
+
+def test_a_misspelt_option_is_refused_with_the_nearest_name():
+    with pytest.raises(TypeError, match="did you mean 'starts'"):
+        tmsopt.solve(ep4_problem(), start=3)
+    with pytest.raises(TypeError, match="unknown option 'near'; accepted: starts seed linear_solver progress"):
+        tmsopt.compare(ep4_problem(), near={})
+    assert list(AskedOfSolve.__annotations__) == [field.name for field in fields(Options)]
+
+
+def test_seeded_runs_are_identical_and_threads_do_not_share_solvers():
+    problem = ep4_problem(constraints={"tilt": "lambda_s <= 0.3"})
+    with ThreadPoolExecutor(3) as pool:
+        designs = list(pool.map(tmsopt.solve, [problem] * 3))
+    assert len({(d.value, *d.parameters.values()) for d in designs}) == 1
+
+
+def test_both_tilts_in_the_box_and_a_singular_mass_matrix_between_them():
+    """At chi_H = 1 and lambda_s = 0 a0 vanishes, where the factor equations hold for any abscissa: not a design."""
+    problem = ep4_problem(free={"Fr": (0.01, 10), "chi_B": (0.1, 5), "lambda_s": (-1.4, 1.4)})
+    design = tmsopt.solve(problem)
+    assert design.structure == "EP4"
+    assert design.parameters["Fr"] == pytest.approx(EP4["Fr"], abs=1e-11)
+
+
+def test_no_mass_matrix_is_said_and_is_no_traceback():
+    design = tmsopt.solve(ep4_problem(fixed={"chi_H": 1.0, "mu": 0.1, "zeta_B": 0.0, "zeta_H": -0.2}), throw=False)
+    assert design.status == "infeasible"
+    assert "a0" in design.violations
+    assert any("mass matrix is singular" in note for note in design.notes)
+    assert design.to_json()["abscissa"] is None
+
+
+def test_solution_is_frozen_and_pickles():
+    design = tmsopt.solve(ep4_problem())
+    with pytest.raises(FrozenInstanceError):
+        design.status = "infeasible"
+    with pytest.raises(TypeError):
+        design.parameters["Fr"] = 1.0
+    again = pickle.loads(pickle.dumps(design))
+    assert again.to_json() == design.to_json()
+
+
+def test_inputs_are_not_mutated():
+    free = dict(BOX)
+    tmsopt.solve(ep4_problem(free=free))
+    assert free == BOX
+
+
+def test_evaluation_of_the_benchmark():
+    design = tmsopt.solve(tmsopt.load("problems/benchmark.toml"))
+    assert design.quantities["Fr_c"] == pytest.approx(0.90706414955081164, rel=1e-14)
+    assert design.quantities["v_c"] == pytest.approx(2.8410083233664, abs=5e-14)
+    assert design.starts.tried == 0
+    assert design.parameters["v"] == 4.0
+    assert design.abscissa == pytest.approx(float(abscissa_60(polynomial_60(**design.dimensionless))), rel=1e-12)
+
+
+def test_si_problem_finds_the_dimensionless_design():
+    w, m_B, g = 1.1, 12.0, 9.81
+    speed = math.sqrt(g * w)
+    problem = tmsopt.Problem(
+        TMS,
+        fixed={"w": w, "m_B": m_B, "m_H": 1.2, "z_B": -0.4 * w, "x_H": w, "z_H": -0.2 * w},
+        free={"v": (0.01 * speed, 10 * speed), "x_B": (1.01 * w, 5 * w), "lambda_s": (0.02, 1.4)},
+        minimize="abscissa",
+    )
+    design = tmsopt.solve(problem)
+    assert design.parameters["v"] == pytest.approx(EP4["Fr"] * speed, rel=1e-12)
+    assert design.parameters["x_B"] == pytest.approx(EP4["chi_B"] * w, rel=1e-12)
+    assert design.parameters["g"] == 9.81
+    assert design.bound.proven
+    assert design.structure == "EP4"
+
+
+def test_bound_holds_on_random_designs():
+    """No random design of the box is below the instant bound (invariant), and the bound is attained by ω0 there."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        free = {}
+        for name, low, high in (
+            ("Fr", 0.1, 5), ("mu", 0.01, 20), ("chi_B", 0.5, 3), ("chi_H", 1.0, 1.3),
+            ("zeta_B", -1.5, -0.1), ("zeta_H", -1, -0.05), ("lambda_s", 0.05, 1.2),
+        ):  # fmt: skip
+            a, b = sorted(rng.uniform(low, high, 2))
+            free[name] = (a, b)
+        problem = tmsopt.Problem(TMS, free=free, minimize="abscissa")
+        bound = omega0_bound(problem, 0.0).value
+        columns = {n: rng.uniform(a, b, 4000) for n, (a, b) in free.items()}
+        a = np.moveaxis(laws.copo(**columns), 0, -1)
+        omega = np.abs(a[:, 4] / a[:, 0]) ** 0.25
+        assert math.isfinite(bound)
+        assert np.all(-omega >= bound)
+        assert np.max(omega) > 0.5 * -bound  # not vacuous: within a factor of two of sampled designs
+
+
+def test_start_satisfies_the_lifted_equations():
+    from tmsopt.program import designs, initial_point
+
+    problem = ep4_problem(constraints={"decay": "omega0 >= -9", "weave": "Fr_c <= 3"})
+    nlp = abscissa_nlp(problem)
+    equalities = np.array(nlp.row_lower) == np.array(nlp.row_upper)
+    exist = [d for d in list(designs(problem, 0, 20)) if math.isfinite(problem.values(problem.ordered(d))["Fr_c"])]
+    assert len(exist) >= 5
+    for design in exist:
+        g = np.array(nlp.functions(initial_point(nlp, problem, design))[1]).ravel()
+        assert np.abs(g[equalities]).max() < 1e-9
+
+
+def test_matching_counts_its_equations():
+    nlp = matching(ep4_problem(minimize=None, locate="EP4"))
+    assert nlp.equations == 4
+    assert nlp.variables == ("Fr", "chi_B", "tan(lambda_s)", "EP4.r")
+    assert backward_error([1.0, 4, 6, 4, 1], np.full(4, -1.0 + 0j)) == 0
+
+
+@pytest.mark.slow
+def test_two_limits_on_the_damping_ratio_both_hold_whichever_comes_first():
+    """The weaker of two limits changes nothing; neither does the order in which they are written."""
+    weak, strong, fast = (
+        {"weak": "damping_ratio >= 0.3"},
+        {"strong": "damping_ratio >= 0.9"},
+        {"fast": "abscissa <= -0.5"},
+    )
+    asked = ({**strong, **fast}, {**weak, **strong, **fast}, {**strong, **weak, **fast})
+    found = [tmsopt.solve(ep4_problem(minimize="Fr", constraints=constraints)) for constraints in asked]
+    for design in found:
+        assert design.quantities["damping_ratio"] == pytest.approx(0.9, abs=1e-9)
+        assert design.value == pytest.approx(found[0].value, rel=1e-10)

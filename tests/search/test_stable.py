@@ -1,0 +1,130 @@
+"""Whether a design is stable, and whether any is, as solutions and reports say it: s² + (x − 2) s + 1 is where x > 2."""
+
+import re
+import time
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import casadi as ca
+import pytest
+
+import tmsopt
+from tmsopt.global_search import SCIP
+from tmsopt.models import from_coefficients
+from tmsopt.report import design_report
+
+solving = import_module("tmsopt.search.solve")
+
+scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+
+X = ca.SX.sym("x")
+NONE = "no design in the box is stable (proved)"
+UNKNOWN = "no stable design found, not proved"
+
+
+def found(most: float, coefficients: Any = (1, X - 2, 1), stability: float = 10.0, **asked: Any) -> tmsopt.Solution:
+    problem = tmsopt.Problem(
+        from_coefficients(list(coefficients)), free={"x": (0, most)}, **{"minimize": "abscissa", **asked}
+    )
+    return tmsopt.solve(problem, throw=False, stability=stability)
+
+
+def headline(design: tmsopt.Solution) -> list[str]:
+    """How it ended, and what is said of stability."""
+    first = re.match(r"[^\n]*\n((?:[^\n]|\n  (?! ))*)", design_report(design))  # wrapped lines go on two columns in
+    assert first
+    return [*" ".join(first[1].split()).split(": "), ""]
+
+
+@pytest.mark.parametrize("x", [1.0, 2.0, 3.0])
+def test_a_given_design(x: float) -> None:
+    design = tmsopt.solve(tmsopt.Problem(from_coefficients([1, X - 2, 1]), fixed={"x": x}))
+    assert design.stable is (x > 2)
+    assert design.to_json()["stable"] is (x > 2)
+
+
+@scip
+def test_that_none_is_stable_is_proved() -> None:
+    design = found(1.0)
+    assert (design.stable, design.any_stable) == (False, False)
+    assert headline(design)[1] == NONE
+    assert design.to_json()["any_stable"] is False
+
+
+@pytest.mark.slow
+@scip
+def test_limits_that_a_proof_rests_on_are_named() -> None:
+    """Without the limit x = 3 would do; one on the roots themselves is none that it rests on."""
+    assert headline(found(3.0, constraints={"most": "x**2 <= 3"}))[1] == f"{NONE} under its constraints"
+    design = found(1.5, constraints={"decay": "abscissa <= -0.1"}, minimize="x")
+    assert design.status == "infeasible"
+    assert headline(design)[1] == NONE
+
+
+@scip
+def test_at_the_edge_nothing_is_proved() -> None:
+    design = found(2.0)
+    assert design.abscissa == pytest.approx(0, abs=1e-9)
+    assert (design.stable, design.any_stable) == (False, None)
+    assert headline(design)[1] == f"marginally stable; {UNKNOWN}"
+
+
+def test_what_is_not_asked_is_not_known() -> None:
+    design = found(1.0, stability=0.0)
+    assert design.any_stable is None
+    assert headline(design)[1] == UNKNOWN
+
+
+def test_a_root_at_0_needs_no_search() -> None:
+    """The product of the roots is 0, so one of them is: the instant bound says so."""
+    design = found(3.0, (1, X, 1, 0), stability=0.0)
+    assert (design.stable, design.any_stable) == (False, False)
+    assert headline(design)[1] == f"marginally stable; {NONE}"
+
+
+def test_a_stable_design_is_one() -> None:
+    design = found(3.0)
+    assert (design.stable, design.any_stable) == (True, True)
+    assert headline(design)[1] == "stable"
+
+
+def test_who_does_not_ask_for_stability_is_told_of_none() -> None:
+    design = found(3.0, minimize="x")
+    assert (design.stable, design.any_stable) == (False, None)
+    assert headline(design)[1] == "not stable"
+
+
+@scip
+def test_a_stable_design_that_the_search_missed_is_found() -> None:
+    """The best design of the box 0 ≤ x ≤ 1, sold as that of 0 ≤ x ≤ 3, where −1/2 is least, at x = 3."""
+    part = found(1.0, stability=0.0)
+    missed = replace(part, problem=replace(part.problem, free={"x": (0.0, 3.0)}))
+    design = solving._with_stability(missed, tmsopt.Options(stability=10.0), None, time.perf_counter())
+    assert (design.status, design.stable, design.any_stable) == ("optimal", True, True)
+    assert design.value == pytest.approx(-0.5, abs=1e-12)
+    assert any("branch and bound found the stable design" in note for note in design.notes)
+
+
+@scip
+def test_a_limit_that_cannot_be_met_though_designs_are_stable() -> None:
+    """The least abscissa is −1/2, at x = 3."""
+    design = found(3.0, constraints={"decay": "abscissa <= -0.6"}, minimize="x")
+    assert design.status == "infeasible"
+    assert design.stable
+
+
+@pytest.mark.parametrize("stability", [-1.0, float("nan"), "soon"])
+def test_seconds_must_be_a_number(stability: Any) -> None:
+    with pytest.raises(tmsopt.InputError, match=r"stability: found .*; accepted: seconds, 0 or more"):
+        found(1.0, stability=stability)
+
+
+@pytest.mark.parametrize(("rest", "some"), [(X - 0.99, True), (X - 1.5, False)])
+def test_designs_left_of_the_axis_are_started_from_where_there_are_any(rest: Any, some: bool) -> None:
+    """s + x − c: stable where x > c, one in a hundred designs or none."""
+    stated = tmsopt.Problem(from_coefficients([1, rest]), free={"x": (0.0, 1.0)}, minimize="abscissa")
+    work = import_module("tmsopt.search.workspace").workspace(stated)
+    ended = import_module("tmsopt.search.search")._left_of_the_axis(work, work.formulate(()), 64)
+    assert bool(ended) is some
+    assert all(c.objective == pytest.approx(-0.01, abs=1e-9) for c in ended if c.feasible)

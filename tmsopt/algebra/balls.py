@@ -1,0 +1,116 @@
+"""Balls as data that lasts: decimals with a radius, and roots made of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import flint
+
+from tmsopt.algebra.elementary import rational
+
+GUARD = 5
+"""Decimal digits written beyond those asked for."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A real number known to lie within a radius of a decimal.
+
+    Attributes:
+        value: the decimal.
+        radius: upper bound of the error, ``0`` where the decimal is exact.
+    """
+
+    value: str
+    radius: str
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def contains(self, x: Any) -> bool:
+        """Whether an exact number (a decimal in text, a Fraction) is within the radius."""
+        return abs(Fraction(x) - Fraction(self.value)) <= Fraction(self.radius)
+
+
+@dataclass(frozen=True)
+class ProvedRoot:
+    """A root with its exact multiplicity; a complex pair is two of these. A real root has the imaginary part 0."""
+
+    re: Number
+    im: Number
+    multiplicity: int
+
+
+def number(ball: Any, digits: int) -> Number:
+    """A ball as a decimal with `digits` digits and a few more, or fewer where its radius says so."""
+    if not ball.is_finite():
+        return Number("nan", "inf")
+    exact = rational(ball) if ball.is_exact() else None
+    if exact is not None and exact == 0:
+        return Number("0", "0")
+    middle, radius, exponent = (int(x) for x in ball.mid_rad_10exp(digits + 2 * GUARD))
+    drop = max(len(str(abs(middle))) - digits - GUARD, len(str(radius)) - 2, 0)
+    unit = 10**drop
+    kept = (middle + unit // 2) // unit
+    radius += abs(middle - kept * unit)
+    return Number(_decimal(kept, exponent + drop), _rounded_up(radius, exponent))
+
+
+def fraction(value: Fraction, digits: int) -> Number:
+    """An exact fraction as a decimal; one that ends is exact."""
+    rest = value.denominator
+    for factor in (2, 5):
+        while rest % factor == 0:
+            rest //= factor
+    if rest == 1:
+        places = 0
+        while (value * 10**places).denominator != 1:
+            places += 1
+        return Number(_decimal(int(value * 10**places), -places), "0")
+    return number(flint.arb(rational(value)), digits)
+
+
+def _decimal(middle: int, exponent: int) -> str:
+    """middle · 10^exponent in plain digits, or with an exponent where these would be many."""
+    sign, figures = "-" if middle < 0 else "", str(abs(middle))
+    if exponent >= 0 and len(figures) + exponent <= 20:
+        return sign + figures + "0" * exponent
+    point = len(figures) + exponent
+    if 0 < point <= len(figures):
+        whole, part = figures[:point], figures[point:]
+        return f"{sign}{whole}.{part}" if part else sign + whole
+    if -6 < point <= 0:
+        return f"{sign}0.{'0' * -point}{figures}"
+    return f"{sign}{figures[0]}.{figures[1:] or '0'}e{point - 1}"
+
+
+def _rounded_up(radius: int, exponent: int) -> str:
+    if radius == 0:
+        return "0"
+    drop = max(len(str(radius)) - 2, 0)
+    head = -(-radius // 10**drop)
+    if head == 100:
+        head, drop = 10, drop + 1
+    if head < 10:
+        return f"{head}e{exponent + drop}"
+    return f"{head // 10}.{head % 10}e{exponent + drop + 1}"
+
+
+def largest_radius(balls: Sequence[Any]) -> float:
+    """Upper bound of the radii of balls."""
+    return max((upper(ball.rad()) for ball in balls), default=0.0)
+
+
+def upper(ball: Any) -> float:
+    """A double that is not below a ball of a size that doubles have."""
+    top = ball.upper()
+    value = float(top)
+    return value if flint.arb(value) >= top else value * (1 + 2**-51) + 5e-324
+
+
+def lower(ball: Any) -> float:
+    """A double that is not above a positive ball."""
+    bottom = ball.lower()
+    value = float(bottom)
+    return value if flint.arb(value) <= bottom else value * (1 - 2**-51)

@@ -1,0 +1,81 @@
+"""Ranges of expressions over a box, by interval arithmetic with outward rounding (balls of Arb)."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+import flint
+
+from tmsopt.algebra.operations import BALLS
+from tmsopt.algebra.walk import Arithmetic, walk
+
+Interval = tuple[float, float]
+
+EVERYTHING = (-math.inf, math.inf)
+_PRECISION = 64  # bits; a few more than a double
+
+
+def ball(ends: Interval) -> Any:
+    """An interval as a ball that holds it; without bounds where an end is infinite."""
+    if not all(map(math.isfinite, ends)):
+        return flint.arb("nan") if math.isnan(ends[0] + ends[1]) else flint.arb(0, math.inf)
+    return flint.arb(ends[0]).union(flint.arb(ends[1]))
+
+
+def interval(x: Any) -> Interval:
+    """Doubles at or beyond the ends of a ball."""
+    if not x.is_finite():
+        return EVERYTHING
+    return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
+
+
+def outwards(lower: float, upper: float) -> Interval:
+    """Doubles that enclose an interval whose ends are decimals; a number alone is itself."""
+    return (lower, upper) if lower == upper else (math.nextafter(lower, -math.inf), math.nextafter(upper, math.inf))
+
+
+def ranges(function: ca.Function, box: Sequence[Interval]) -> list[list[Interval]]:
+    """Ranges of all outputs of a function of one vector over a box; without bounds where it may not exist.
+
+    Raises:
+        NotAccepted: for an operation that has no interval arithmetic here.
+    """
+    return [[interval(x) for x in row] for row in walk(function, [ball(ends) for ends in box], INTERVALS)]
+
+
+def root_bound(coefficients: Sequence[Interval]) -> float:
+    """No root of any polynomial with such coefficients, descending, is larger; inf where the leading one may be 0.
+
+    Fujiwara's 2 max |a_k/a0|^(1/k), the last one halved under the root.
+    """
+    with flint.ctx.workprec(_PRECISION):
+        a = [ball(ends) for ends in coefficients]
+        least = abs(a[0]).lower()
+        if not (a[0].is_finite() and least > 0):
+            return math.inf
+        n = len(a) - 1
+        terms = [(abs(c).upper() / least / (2 if k == n else 1)).root(k) for k, c in enumerate(a[1:], start=1)]
+        return max(interval(2 * t)[1] for t in terms)
+
+
+def square(x: Any) -> Any:
+    """x², not negative."""
+    # abs(x) of a ball around 0 reaches below 0, by as much as the ball has on its lesser side
+    return (x.abs_lower() ** 2).union(x.abs_upper() ** 2) if x.is_finite() else flint.arb(0, math.inf)
+
+
+def _power(x: Any, y: Any) -> Any:
+    """x to the power y; whole powers of any x."""
+    if y.is_integer():
+        exponent = int(float(y))
+        if exponent < 0:
+            return 1 / _power(x, flint.arb(-exponent))
+        if exponent % 2 == 0:
+            return square(x ** (exponent // 2))
+        return x**exponent
+    return x**y
+
+
+INTERVALS: Arithmetic = {**BALLS, ca.OP_CONST: flint.arb, ca.OP_SQ: square, ca.OP_POW: _power, ca.OP_CONSTPOW: _power}
+"""Operations on balls as wide as a box, where an even power must not reach below 0."""

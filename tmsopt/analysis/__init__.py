@@ -1,0 +1,9 @@
+"""What an answer means: is it optimal, what limits cost, what rounding does, how multiple roots split.
+
+In: a solution. Out: an `Explanation` and a `Diagnosis` of each multiple root, as data; `tmsopt.report` has their words.
+Open `explain` first, then `diagnosis`.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

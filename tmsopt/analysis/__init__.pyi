@@ -1,0 +1,13 @@
+from .explain import Explanation as Explanation, explain as explain
+from .again import moved as moved
+from .limits import Lever as Lever
+from .optimality import (
+    NOT_COVERED as NOT_COVERED, NOT_MINIMAL as NOT_MINIMAL, STRICT as STRICT, UNDECIDED as UNDECIDED,
+    Optimality as Optimality, optimality as optimality,
+)
+from .rounding import rounded as rounded, rounded_designs as rounded_designs
+from .summary import faster_than as faster_than, none_of as none_of
+from .steps import natural_step as natural_step, step_within as step_within
+from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose, diagnosed as diagnosed
+from .puiseux import branches as branches
+from .splitting import Response as Response

@@ -1,0 +1,194 @@
+"""What each limit that binds is worth: its multiplier, checked by solving again with the limit moved."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from tmsopt.analysis.again import LimitResolver, moved
+from tmsopt.analysis.steps import natural_step, step_within
+from tmsopt.errors import InputError
+from tmsopt.problem.expression import written_sides
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import Unit, dimension_of, limit_text, unit_of, unit_of_all
+from tmsopt.progress import Counts
+from tmsopt.records import plain
+
+DIFFERS = 0.2
+"""Relative difference of the two gains from which the reader is told why."""
+
+_RETRY = 8  # starts when the optimum as the only start did not lead to one at least as good
+_NOISE = 1e-8  # of the objective: differences below it are no loss
+
+
+@dataclass(frozen=True)
+class Lever:
+    """A limit that binds, and what moving it buys. Gains are positive where the objective gets better.
+
+    Attributes:
+        name: of the constraint, or a bound such as ``Fr.max``.
+        kind: ``bound`` or ``constraint``.
+        limit: the limit, in the unit in which the problem was written.
+        physical: whether the limit is a physical end, such as 0 for a mass, and cannot be moved.
+        move: what is done to the limit, e.g. ``1 deg more lambda_s.max``.
+        step: change of the limit in the unit of the parameter, with its sign; 0 where it cannot be moved.
+        per_unit: gain per unit of that change, to first order (the multiplier).
+        resolved: gain found by solving the moved problem; nan where that was not done or failed.
+        structure: of the moved optimum; empty without one.
+        reason: why the two gains differ, or why there is only one.
+        gained: unit of the gains in words.
+    """
+
+    name: str
+    kind: str
+    limit: str
+    physical: bool
+    move: str
+    step: float
+    per_unit: float
+    resolved: float = math.nan
+    structure: str = ""
+    reason: str = ""
+    gained: Unit = field(default_factory=Unit)
+
+    @property
+    def predicted(self) -> float:
+        """Gain to first order, multiplier times step."""
+        return self.per_unit * abs(self.step)
+
+    @property
+    def relative(self) -> float:
+        """Re-solved minus first-order gain, relative to the latter."""
+        return (self.resolved - self.predicted) / self.predicted if self.predicted else math.nan
+
+    @property
+    def sentence(self) -> str:
+        """The lever in words."""
+        if not self.step:
+            return f"{self.name} = {self.limit} binds and cannot be moved: it is a physical end"
+        solved = math.isfinite(self.resolved)
+        gain = self._gain(self.resolved if solved else self.predicted)
+        verb = "buys" if not gain.startswith("-") else "costs"
+        order = f"first order {self._gain(self.predicted)}" if solved else "first order"
+        return f"{self.move} {verb} {gain.lstrip('-')} ({order})" + (f"; {self.reason}" if self.reason else "")
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return {
+            **plain(self, "name kind limit physical step"),
+            "gain_per_unit": self.per_unit,
+            "gain_first_order": self.predicted,
+            "gain_resolved": self.resolved if math.isfinite(self.resolved) else None,
+            "relative_difference": self.relative if math.isfinite(self.relative) else None,
+            "structure": self.structure or None,
+            **plain(self, "reason sentence"),
+        }
+
+    def _gain(self, value: float) -> str:
+        return self.gained.show(value, 3)
+
+
+def levers(solution: Solution, resolve: bool = True, progress: Counts | None = None) -> tuple[Lever, ...]:
+    """One lever per limit that binds at an optimum, the most valuable step first."""
+    if solution.status != "optimal":
+        return ()
+    found = [_of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name)
+             for name in solution.active]  # fmt: skip
+    again = LimitResolver(solution, {lever.name: lever.step for lever in found if lever.step})
+    checked = []
+    for lever in found:
+        checked.append(_resolved(again, lever) if resolve and lever.step else lever)
+        if progress:
+            progress(len(checked), len(solution.active))
+    return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
+
+
+def is_physical(problem: Problem, bound: str) -> bool:
+    """Whether a bound such as ``mu.min`` is a physical end of its parameter."""
+    name, end = bound.rsplit(".", 1)
+    allowed = problem.parameter_set[name].range
+    return problem.free[name][end == "max"] == (allowed.upper if end == "max" else allowed.lower)
+
+
+def _is_bound(solution: Solution, name: str) -> bool:
+    problem = solution.problem
+    return name not in problem.constraints and name.rsplit(".", 1)[0] in problem.free
+
+
+def _of_bound(solution: Solution, bound: str) -> Lever:
+    problem = solution.problem
+    name, end = bound.rsplit(".", 1)
+    parameter, (lower, upper) = problem.parameter_set[name], problem.free[name]
+    limit, direction = (upper, 1.0) if end == "max" else (lower, -1.0)
+    width = upper - lower
+    # an angle is measured by its box, for 0 is a tilt like any other
+    size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
+    unit = unit_of(problem, name)
+    step = step_within(unit, parameter.unit, size, limit, direction, parameter.range)
+    words = f"{step.text if step else 'nothing'} {'more' if direction > 0 else 'less'} {bound}"
+    change, written = direction * step.size if step else 0.0, unit.show(limit, 10)
+    return _lever(solution, bound, "bound", written, is_physical(problem, bound), words, change)
+
+
+def _of_row(solution: Solution, name: str) -> Lever:
+    problem = solution.problem
+    condition, text, shown = problem.conditions[name], problem.constraints[name], limit_text(problem, name)
+    step = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, text))
+    sign, words = condition.sign, f"relaxing {name} ({shown}) by {step.text}"
+    if condition.equality:  # the right-hand side moves to where the objective is better
+        sign = math.copysign(1.0, -problem.sign * solution.active[name])
+        words = f"moving {name} ({shown}) by {'' if sign > 0 else '-'}{step.text}"
+    return _lever(solution, name, "constraint", shown, False, words, sign * step.size)
+
+
+def _lever(solution: Solution, name: str, kind: str, limit: str, physical: bool, move: str, step: float) -> Lever:
+    text = solution.problem.minimize or solution.problem.maximize
+    gained = unit_of_all(solution.problem, text) if text else Unit()
+    return Lever(name, kind, limit, physical, move, step, abs(solution.active[name]), gained=gained)
+
+
+def _size(solution: Solution, text: str) -> float:
+    """Size of the sides of a constraint at the optimum, where they are equal but for rounding."""
+    problem = solution.problem
+    left, _, right = written_sides(text)
+    values = problem.values(solution.parameters)
+    sides = (abs(float(problem.read(side)(values))) for side in (left, right))
+    return max((size for size in sides if math.isfinite(size)), default=1.0)
+
+
+def _resolved(again: LimitResolver, lever: Lever) -> Lever:
+    """A lever with the gain found by solving again from the optimum."""
+    solution = again.solution
+    try:
+        asked = moved(solution.problem, lever.name, lever.step)
+    except InputError:
+        return replace(lever, reason="the moved problem cannot be written down")
+    gain, found = math.nan, None
+    for starts in (1, _RETRY):
+        ended = again.solved(asked, lever.name, starts)
+        better = -solution.problem.sign * (ended.value - solution.value)
+        if ended.status == "optimal" and not better <= gain:
+            gain, found = better, ended
+        if found and gain >= -_NOISE * (1 + abs(solution.value)):
+            break
+    if found is None:
+        return replace(lever, reason=f"the moved problem is {ended.status.replace('_', ' ')}")
+    checked = replace(lever, resolved=gain, structure=found.structure)
+    if abs(checked.relative) <= DIFFERS:
+        return checked
+    return replace(checked, reason=", ".join(_reasons(solution, lever, found)))
+
+
+def _reasons(solution: Solution, lever: Lever, found: Solution) -> Iterator[str]:
+    """Why the gain is not what the multiplier says."""
+    if found.structure != solution.structure:
+        yield f"the structure changes from {solution.structure} to {found.structure}"
+    for words, names, others in (
+        ("no longer binds", solution.active, found.active),
+        ("binds instead", found.active, solution.active),
+    ):
+        if gone := [n for n in names if n not in others]:
+            yield f"{' and '.join(gone)} {words}"
+    if found.structure == solution.structure and set(found.active) == set(solution.active):
+        yield f"the gain is not linear over this step ({found.structure} before and after)"

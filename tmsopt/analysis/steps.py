@@ -1,0 +1,62 @@
+"""Steps in the unit that a problem was written in: 1 deg of tilt, 1 cm of length, 1 km/h of speed."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from tmsopt.models import Range
+from tmsopt.problem.unit_system import Unit
+
+_PART = 0.01  # of a number without a natural unit
+_SMALLEST = 1e-9  # of the natural step: closer to the physical end a limit has nowhere to go
+_TINY = 1e-9  # a limit so small has no size of its own
+_LARGEST = {"rad": 0.2, "m": 0.05, "m/s": 0.2}
+"""Largest natural step as a part of the size of what is moved."""
+
+_NATURAL = {"rad": math.pi / 180, "m": 1e-2, "m/s": 1 / 3.6}
+"""The natural step of what is in a unit."""
+
+
+@dataclass(frozen=True)
+class LimitStep:
+    """A change of a limit.
+
+    Attributes:
+        size: in the unit of the parameter, positive.
+        text: in the unit that the problem was written in, e.g. ``1 deg``.
+    """
+
+    size: float
+    text: str
+
+
+def natural_step(unit: Unit, kept: str, size: float) -> LimitStep:
+    """The natural step for something of a unit, kept in another, and a size, e.g. the limit or the width of its box."""
+    return next(_steps(unit, kept, size))
+
+
+def step_within(
+    unit: Unit, kept: str, size: float, limit: float, direction: float, allowed: Range
+) -> LimitStep | None:  # fmt: skip
+    """The largest natural step that keeps a moved limit physically possible; None at a physical end."""
+    return next((step for step in _steps(unit, kept, size) if limit + direction * step.size in allowed), None)
+
+
+def _steps(unit: Unit, kept: str, size: float) -> Iterator[LimitStep]:
+    """Ever smaller steps, from the natural one down."""
+    size = abs(size) if abs(size) > _TINY else 1.0
+    largest = _one_two_five(_NATURAL.get(kept, _PART * size) / unit.one)
+    while kept in _NATURAL and largest * unit.one > _LARGEST[kept] * size:
+        largest /= 10
+    step = largest
+    while step >= _SMALLEST * largest:
+        yield LimitStep(step * unit.one, unit.show(step * unit.one, 4))
+        step = _one_two_five(step / 2.2)
+
+
+def _one_two_five(x: float) -> float:
+    """The number 1, 2 or 5 times a power of ten nearest to x by ratio."""
+    decade = math.floor(math.log10(x))
+    choices = [k * 10.0**d for d in (decade, decade + 1) for k in (1, 2, 5)]
+    nearest = min(choices, key=lambda c: abs(math.log(c / x)))
+    return float(f"{nearest:.1g}")

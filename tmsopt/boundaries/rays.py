@@ -1,0 +1,208 @@
+"""Where rays from a design first cross the boundaries: upper bounds of the distances, and starts for an optimiser."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.boundaries.boundaries import heavily_damped, losses
+from tmsopt.records import Array, Truth
+from tmsopt.roots import discriminant, hurwitz_minors, is_stable, roots
+
+_DIRECTIONS = 1000
+_RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
+_COARSE, _FINE = (16, 2), (256, 6)  # parts and times: all crossings, and those that are kept to all digits
+_KEPT = 5
+_ALIKE = 0.9  # cosine between directions that lead to one start
+_ELSEWHERE = 4  # starts; as many as led 11 of 196 random systems of degrees 6 to 8 to nearer points, and 6 to no more
+_POINTS = 400  # looked at on the straight way to a nearest point
+_AROUND = np.array([0.1, 0.3, 1.0])
+_STEP = 1e-6  # of differences, which only choose directions
+
+
+@dataclass(frozen=True)
+class Space:
+    """Designs around one, in units of the weights.
+
+    Attributes:
+        coefficients: displacements of shape (…, n) → coefficients of shape (…, degree + 1), scaled to the size of 1.
+        lower, upper: physical ranges.
+    """
+
+    coefficients: Callable[[Array], Array]
+    lower: Array
+    upper: Array
+
+    def along(self, directions: Array, t: Array) -> Array:
+        """Displacements t · direction, inside the ranges."""
+        return np.clip(t[..., None] * directions, self.lower, self.upper)
+
+
+@dataclass(frozen=True)
+class RayCrossing:
+    """A point just beyond an edge.
+
+    Attributes:
+        edge: name of the edge.
+        sign: sign of a0 on the stable, or heavily damped, side.
+    """
+
+    edge: str
+    sign: float
+    u: Array
+    distance: float
+
+
+def ray_crossings(space: Space, seed: int = 0, damped: bool = True) -> list[RayCrossing]:
+    """The nearest few crossings of each edge in different directions, nearest first.
+
+    Args:
+        damped: whether the edges of heavy damping are looked for too.
+    """
+    rays = directions(space, seed)
+    return along(space, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))), damped)
+
+
+def between(space: Space, u: Array, damped: bool = True) -> list[RayCrossing]:
+    """Crossings on the straight way to u, short of its end."""
+    return along(space, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1], damped)
+
+
+def along(space: Space, rays: Array, t: Array, damped: bool = True) -> list[RayCrossing]:
+    """Crossings between displacements t · ray, t of shape (rays, steps)."""
+    c = space.coefficients(space.along(rays[:, None, :], t))
+    found: list[RayCrossing] = []
+    for heavy, test in ((False, _stable), (True, heavily_damped))[: 1 + damped]:
+        inside = test(c)
+        ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
+        if not ray.size:
+            continue
+        all_of = _Bracket(space, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).narrowed(*_COARSE)
+        names = [losses(c, heavy) for c in all_of.sides()[0]]
+        distance = np.linalg.norm(space.along(all_of.rays, all_of.high), axis=1)
+        unit = all_of.rays / np.linalg.norm(all_of.rays, axis=1, keepdims=True)
+        for name in sorted({n for each in names for n in each}):
+            rows = [k for k in np.argsort(distance, kind="stable") if name in names[k]]
+            found += all_of.rows(_different(unit, rows)).narrowed(*_FINE).crossings(heavy)
+    return sorted(found, key=lambda x: x.distance)
+
+
+def directions(space: Space, seed: int) -> Array:
+    """Unit vectors: the axes, the gradients of the boundaries both ways, and random ones."""
+    axes = np.eye(len(space.lower))
+    random = np.random.default_rng(seed).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
+    near = space.coefficients(_STEP * np.concatenate([axes, -axes]))
+    slopes = (_tests(near[: len(axes)]) - _tests(near[len(axes) :])).T
+    slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
+    slopes = np.ldexp(
+        slopes, -np.frexp(np.abs(slopes).max(axis=1, keepdims=True, initial=0.0))[1]
+    )  # squares are doubles
+    every = np.concatenate([axes, -axes, slopes, -slopes, random])
+    return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
+
+
+def most_damped(space: Space, sign: float, seed: int = 0) -> list[Array]:
+    """The design and points around it that are nearest to having real roots only, for a given sign of a0."""
+    rays = directions(space, seed)
+    u = space.along(rays[:, None, :], np.broadcast_to(_AROUND, (len(rays), len(_AROUND)))).reshape(-1, rays.shape[1])
+    c = sign * space.coefficients(u)
+    u, c = (
+        part[np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)] for part in (u, c)
+    )
+    ratio = np.min(-(z := roots(c)).real / np.abs(z), axis=1) if len(c) else np.zeros(0)
+    rows = np.argsort(-ratio, kind="stable").tolist()
+    unit = u / np.linalg.norm(u, axis=1, keepdims=True)
+    return [np.zeros(rays.shape[1]), *u[_different(unit, rows)]]
+
+
+def elsewhere(space: Space, distance: float, seed: int) -> list[Array]:
+    """A few points at a distance in random directions, be they stable or not."""
+    rays = np.random.default_rng(seed).standard_normal((_ELSEWHERE, len(space.lower)))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    return [*space.along(rays, np.full(_ELSEWHERE, distance))]
+
+
+def _stable(c: Array) -> Truth:
+    """Up to rounding: a bracket closes in on where that decides."""
+    return is_stable(c, exact=False)
+
+
+def _tests(c: Array) -> Array:
+    """What vanishes on the edges: a0, aₙ, the Hurwitz determinant and the discriminant, shape (…, 4)."""
+    n = c.shape[-1] - 1
+    if n > 4:
+        pair, double = _of_pairs(c)
+    elif n == 1:
+        pair = double = np.ones(c.shape[:-1])  # one root has no other to meet
+    else:
+        by_power = [c[..., k] for k in range(n + 1)]
+        pair, double = hurwitz_minors(by_power)[n - 2], discriminant(by_power)
+    return np.stack([c[..., 0], c[..., -1], pair, double], axis=-1)
+
+
+def _of_pairs(c: Array) -> tuple[Array, Array]:
+    """∏ −(zᵢ + zⱼ) and ∏ (zᵢ − zⱼ)² over pairs of roots: Δₙ₋₁ (Orlando) and the discriminant without powers of a0."""
+    proper = np.all(np.isfinite(c), axis=-1) & (c[..., 0] != 0)
+    z = roots(np.where(proper[..., None], c, np.eye(c.shape[-1])[0]))
+    first, second = np.triu_indices(z.shape[-1], 1)
+    sums, differences = z[..., first] + z[..., second], z[..., first] - z[..., second]
+    pair, double = np.prod(-sums, axis=-1).real, np.prod(differences * differences, axis=-1).real
+    return np.where(proper, pair, np.nan), np.where(proper, double, np.nan)
+
+
+def _different(unit: Array, rows: list[int]) -> NDArray[np.int_]:
+    """The first few of the rows whose directions differ."""
+    kept: list[int] = []
+    for k in rows:
+        if len(kept) < _KEPT and all(float(unit[k] @ unit[other]) < _ALIKE for other in kept):
+            kept.append(k)
+    return np.array(kept, dtype=int)
+
+
+@dataclass(frozen=True)
+class _Bracket:
+    """Points t · ray on either side of a change of a test: `low` has its value `inside`, `high` has not."""
+
+    space: Space
+    test: Callable[[Array], Truth]
+    rays: Array
+    low: Array
+    high: Array
+    inside: Truth
+
+    def rows(self, k: NDArray[np.int_]) -> "_Bracket":
+        """Some of them."""
+        return replace(self, rays=self.rays[k], low=self.low[k], high=self.high[k], inside=self.inside[k])
+
+    def at(self, t: Array) -> Array:
+        """Coefficients at t of shape (rays,) or (rays, points)."""
+        rays = self.rays if t.ndim == 1 else self.rays[:, None, :]
+        return self.space.coefficients(self.space.along(rays, t))
+
+    def narrowed(self, parts: int, times: int) -> "_Bracket":
+        """The first change within each, looked for at a few points at once: calls cost more than points."""
+        low, high = self.low, self.high
+        every = np.arange(len(low))
+        for _ in range(times):
+            t = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, parts + 1)
+            other = self.test(self.at(t[:, 1:-1])) != self.inside[:, None]
+            first = np.where(other.any(axis=1), other.argmax(axis=1) + 1, parts)
+            low, high = t[every, first - 1], t[every, first]
+        return replace(self, low=low, high=high)
+
+    def sides(self) -> tuple[Array, Array]:
+        """Coefficients beyond the edge, signed as on the side where the test holds; that sign."""
+        within, beyond = (self.at(np.where(self.inside == side, self.low, self.high)) for side in (True, False))
+        sign = np.sign(within[:, 0])
+        return sign[:, None] * beyond, sign
+
+    def crossings(self, heavy: bool) -> list[RayCrossing]:
+        """As data."""
+        beyond, sign = self.sides()
+        u = self.space.along(self.rays, self.high)
+        return [
+            RayCrossing(name, float(sign[k]), u[k], float(np.linalg.norm(u[k])))
+            for k, c in enumerate(beyond)
+            for name in losses(c, heavy)
+        ]

@@ -1,0 +1,170 @@
+"""A design, the weights of changes to it, and the polynomials around it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tmsopt.boundaries.axis import edges_at
+from tmsopt.boundaries.boundaries import terms
+from tmsopt.boundaries.rays import Space
+from tmsopt.errors import Fault, InputError, is_number, suggest
+from tmsopt.models import Range
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
+from tmsopt.records import Array
+from tmsopt.roots import is_stable, multiple_real_roots, real_roots
+
+_NOTHING = 1e-12  # of a free parameter's range: what is smaller is 0 but for rounding
+_OPEN = 1e-6  # of the size of the parameter: how near an end that its range excludes it may come
+
+
+@dataclass(frozen=True)
+class WeightedDesign:
+    """A design and the changes that are considered.
+
+    Attributes:
+        parameters: every parameter of the problem's set.
+        weights: parameter → change that counts as 1; the others stay.
+    """
+
+    problem: Problem
+    parameters: Mapping[str, float]
+    weights: Mapping[str, float]
+
+    def displaced(self, u: Any) -> dict[str, Any]:
+        """Every parameter for displacements: one number, array or symbol per weight."""
+        moved = {n: self.parameters[n] + weight * u[k] for k, (n, weight) in enumerate(self.weights.items())}
+        return {**self.parameters, **moved}
+
+    def design(self, u: Array) -> dict[str, float]:
+        """The parameters at a displacement; one at the end of its range is exactly there."""
+        at = self.displaced(u)
+        for k, n in enumerate(self.weights):
+            r = self.problem.parameter_set[n].range
+            at[n] = min(max(float(at[n]), r.lower), r.upper)
+            at[n] = r.lower if u[k] <= self.space.lower[k] and r.closed else at[n]
+            at[n] = r.upper if u[k] >= self.space.upper[k] and r.closed else at[n]
+        return at
+
+    def scaled(self, parameters: Mapping[str, Any]) -> list[Any]:
+        """Coefficients in the unit of time and the size in which the design's own are near 1."""
+        a = self.problem.model.coefficients(parameters, self.problem.parameter_set)
+        return [c / s for c, s in zip(a, self.scale, strict=True)]
+
+    @cached_property
+    def space(self) -> Space:
+        """The polynomials around the design."""
+        ends = [_ends(self.problem.parameter_set[n].range, self.parameters[n], w) for n, w in self.weights.items()]
+        return Space(self._coefficients, np.array([lo for lo, _ in ends]), np.array([hi for _, hi in ends]))
+
+    @cached_property
+    def stable(self) -> bool:
+        """Whether all roots are left of the imaginary axis."""
+        return bool(is_stable(self._own))
+
+    @cached_property
+    def stands_on(self) -> tuple[str, ...]:
+        """The boundaries of stability that the design is on as far as rounding tells."""
+        return edges_at(self.problem, self.parameters)
+
+    @cached_property
+    def heavily_damped(self) -> bool:
+        """Whether all roots are real and negative, multiple ones included."""
+        degree = len(self._own) - 1
+        return self.on_edge or bool(self._own[0] != 0 and real_roots(self._own)[0] == degree)
+
+    @cached_property
+    def on_edge(self) -> bool:
+        """Whether all roots are real and negative and two of them equal, decided by coefficients."""
+        if self._own[0] == 0 or not self.stable:
+            return False
+        found = multiple_real_roots(self._own, STRUCTURE_TOLERANCE)
+        return found is not None and all(r.re < 0 for r in found)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Size of the terms of each coefficient: an equation between coefficients is judged by it."""
+        return terms(self._own) if self._own.any() else np.ones(len(self._own))
+
+    @cached_property
+    def _own(self) -> Array:
+        return np.array([float(c) for c in self.scaled(self.parameters)])
+
+    @cached_property
+    def scale(self) -> Array:
+        """Size of each coefficient in that unit of time."""
+        a = np.array(self.problem.model.coefficients(self.parameters, self.problem.parameter_set), dtype=float)
+        unit = abs(a[-1] / a[0]) ** (1 / (len(a) - 1)) if a[0] and a[-1] else 1.0
+        powers = unit ** np.arange(len(a))
+        return np.asarray(powers * (float(np.abs(a / powers).max()) or 1.0))
+
+    def _coefficients(self, u: Array) -> Array:
+        with np.errstate(all="ignore"):
+            c = self.scaled(self.displaced(np.moveaxis(u, -1, 0)))
+            return np.stack(np.broadcast_arrays(*c, u[..., 0])[:-1], axis=-1)
+
+
+def _ends(allowed: Range, value: float, weight: float) -> tuple[float, float]:
+    """Ends of a displacement, a little inside a range that excludes them."""
+    inset = 0.0 if allowed.closed else _OPEN * abs(value)
+    lower, upper = (allowed.lower + inset - value) / weight, (allowed.upper - inset - value) / weight
+    return min(lower, 0.0), max(upper, 0.0)
+
+
+def placed(problem: Problem, parameters: Mapping[str, float], weights: Mapping[str, float] | None) -> WeightedDesign:
+    """A design with checked parameters and weights.
+
+    Raises:
+        InputError: listing everything that is wrong.
+    """
+    faults = [*parameter_faults(problem, parameters)]
+    faults += [] if weights is None else _weight_faults(problem, weights)
+    if faults:
+        raise InputError(faults)
+    own = {n: float(parameters[n]) for n in problem.parameter_set.names}
+    given = relative(problem, own) if weights is None else weights
+    return WeightedDesign(problem, own, {n: float(given[n]) for n in own if given.get(n, 0.0) > 0})
+
+
+def relative(problem: Problem, parameters: Mapping[str, float]) -> dict[str, float]:
+    """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, 1 without one."""
+    of = problem.parameter_set
+    weights = {}
+    widths = {n: high - low for n, (low, high) in problem.free.items()}
+    sizes = {n: abs(x) if abs(x) > _NOTHING * widths.get(n, 0.0) else 0.0 for n, x in parameters.items()}
+    for p in (p for p in of.parameters if p.may_change(sizes[p.name])):
+        alike = [sizes[q.name] for q in of.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
+        weights[p.name] = sizes[p.name] or max(alike, default=0.0) or 1.0
+    return weights
+
+
+def parameter_faults(problem: Problem, parameters: Mapping[str, float]) -> Iterator[Fault]:
+    """What is wrong with the parameters of a design."""
+    of = problem.parameter_set
+    for name in parameters:
+        if name not in of.names:
+            yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameters", name))
+    for name in of.names:
+        key = ("parameters", name)
+        if name not in parameters:
+            yield Fault("missing; give a value for every parameter", key)
+        elif not is_number(parameters[name]):
+            yield Fault(f"found {parameters[name]!r}; accepted: a finite number", key)
+        elif parameters[name] not in of[name].range:
+            yield Fault(f"found {parameters[name]:.6g}; {of[name].meaning} is {of[name].range}", key)
+
+
+def _weight_faults(problem: Problem, weights: Mapping[str, float]) -> Iterator[Fault]:
+    of = problem.parameter_set
+    for name, weight in weights.items():
+        key = ("weights", name)
+        if name not in of.names:
+            yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", key)
+        elif not is_number(weight) or weight < 0:
+            yield Fault(f"found {weight!r}; accepted: a number above 0, or 0 for a parameter that stays", key)
+    if not any(is_number(w) and w > 0 for w in weights.values()):
+        message = f"no weight is above 0; give one to a parameter that may change: {' '.join(of.names)}"
+        yield Fault(message, ("weights",))

@@ -1,1 +1,0 @@
-from .certify import certify as certify, check_installed as check_installed

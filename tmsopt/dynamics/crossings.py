@@ -1,0 +1,302 @@
+"""Where the roots of a polynomial in s that depends on y meet, or meet the imaginary axis: all such places, exactly.
+
+The coefficients are polynomials with rational coefficients in that number y. A root 0, a root at infinity, a pair ± iω
+and a multiple root are then roots of polynomials in y: of aₙ, of a0, of the resultant of the even and the odd part, and
+of the discriminant. These are isolated in ball arithmetic, so that none is missed, however close to another. Factors
+that hold for every y, such as a root 0, are split off before.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import prod
+from typing import Any
+
+import flint
+
+from tmsopt.algebra.elementary import rational
+from tmsopt.models import Model
+from tmsopt.models.user_spectrum import user_roots, user_structure_name
+from tmsopt.roots.exact import exact_roots
+from tmsopt.roots.polynomial import Root
+from tmsopt.roots.stability import lienard_chipart
+
+Polynomial = Sequence[Any]
+"""Coefficients in y, exact fractions, ascending."""
+
+DIGITS = 120
+"""Of y: a k-fold root then scatters by 1e-120/k."""
+
+_RING = flint.fmpq_mpoly_ctx.get(["s", "y"], "lex")
+_S, _Y = _RING.gens()
+_SAME = 1e-12  # relative to the largest root: difference of two that are one; a k-fold one scatters by 1e-120/k
+_NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
+
+Stretch = tuple[float, float]
+"""Two ends of a band."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A place where roots meet, or meet the imaginary axis.
+
+    Attributes:
+        at: y.
+        kind: ``capsize`` (a root 0), ``weave`` (a pair ± iω), ``infinity`` (a root there), ``EP2``, ``EP3``, … (a real
+            k-fold root) or ``CEP2``, … (a k-fold pair).
+        root: the root of it, with its multiplicity; the upper one of a pair. Of ``infinity`` without meaning.
+        rightmost: whether no root is right of it.
+        changes: whether the polynomial is stable, or marginally so, on one side of it and not on the other.
+    """
+
+    at: float
+    kind: str
+    root: Root
+    rightmost: bool
+    changes: bool
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Every place in a range of y.
+
+    Attributes:
+        found: in ascending order.
+        stable: bands with all Re s < 0, and whether each is known to begin or end at an end of the range is plain
+            from its ends being those.
+        heavily_damped: bands with all s real and negative.
+        always: what holds for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root other than 0),
+            ``capsize`` (a root 0), ``infinity``.
+        marginal: bands with no root right of the axis, those on it simple; a root 0 that is there for every y is left
+            aside. Empty where nothing holds for every y.
+        zeros: multiplicity of the root 0 that is there for every y.
+    """
+
+    found: tuple[Crossing, ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
+    always: tuple[str, ...] = ()
+    marginal: tuple[Stretch, ...] = ()
+    zeros: int = 0
+
+
+def crossings(
+    coefficients: Sequence[Polynomial], lower: Any, upper: Any | None, bands_alone: bool = False
+) -> Crossings:
+    """All crossings with lower < y < upper, in exact numbers; without an upper end where that is None.
+
+    Args:
+        coefficients: of the polynomial in s, descending, each a polynomial in y.
+        bands_alone: what roots do where bands end, which takes most of the time, is not looked at.
+    """
+    lower, upper = rational(lower), None if upper is None else rational(upper)
+    degree = len(coefficients) - 1
+    terms = {(degree - k, j): x for k, c in enumerate(coefficients) for j, x in enumerate(map(rational, c))}
+    p = _RING.from_dict({powers: x for powers, x in terms.items() if x != 0})
+    a, split = _rows(p), _split(p)
+    places = {kind: _real_places(q, lower, upper) for kind, q in _conditions(a, split).items() if not q.is_zero()}
+    named = {} if bands_alone else places
+    found = [(y, *rest) for kind, ys in named.items() for y in ys for rest in _named(a, split, kind, y)]
+    found.sort(key=lambda place: place[0])
+    marks = sorted({y for ys in places.values() for y in ys})
+    cells = list(_cells(marks, lower, upper))
+    states = [_state(_at(a, middle)) for _, _, middle in cells]
+    lasting = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
+    marginal = [any(lasting.values()) and _marginal(split, middle) for _, _, middle in cells]
+    kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
+    changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
+    always = {"infinity": len(a) <= degree} | lasting
+    return Crossings(
+        tuple(Crossing(float(y), kind, root, first, changed[float(y)]) for y, kind, root, first in found),
+        _bands(cells, [stable for stable, _ in states]),
+        _bands(cells, [damped for _, damped in states]),
+        tuple(kind for kind, holds in always.items() if holds),
+        _bands(cells, marginal),
+        split.zeros,
+    )
+
+
+def told(model: Model, found: Crossings) -> Crossings:
+    """Crossings of the polynomial as the user reads them: of a complex system those of its eigenfrequencies."""
+    if model.carrier is None:
+        return found
+    return replace(found, found=each_told(model, found.found), heavily_damped=())
+
+
+def each_told(model: Model, found: Iterable[Crossing]) -> tuple[Crossing, ...]:
+    """The same of single ones."""
+    if model.carrier is None:
+        return tuple(found)
+    own = [c for c in found if c.kind not in ("capsize", "infinity")]
+    roots = [user_roots(model, [replace(c.root, im=-c.root.im)])[0] for c in own]
+    return tuple(replace(c, kind=user_structure_name(model, c.kind), root=z) for c, z in zip(own, roots, strict=True))
+
+
+@dataclass(frozen=True)
+class _Split:
+    """A polynomial p(s, y) = s^zeros · (factors), each part a list of coefficients in y, descending in s.
+
+    Attributes:
+        zeros: multiplicity of the root 0 that is there for every y.
+        mirrored: product of the different factors that are even in s: their roots are s and −s.
+        rest: product of the other factors; it shares no root with its mirror image for every y.
+        once: s (if it divides p), mirrored and rest: p without its repetitions.
+        repeated: whether a factor other than s is there more than once.
+        repeats_mirrored: whether one of those that are even is.
+    """
+
+    zeros: int
+    mirrored: list[Any]
+    rest: list[Any]
+    once: list[Any]
+    repeated: bool
+    repeats_mirrored: bool
+
+
+def _split(p: Any) -> _Split:
+    zeros = int(min(power for power, _ in p.monoms()))
+    p /= _S**zeros
+    factors = [(f, times) for f, times in p.factor_squarefree()[1] if f.degrees()[0] > 0]
+    once = prod((f for f, _ in factors), start=_S**0)
+    mirrored = once.gcd(once.compose(-_S, _Y))
+    repeats_mirrored = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
+    rest, single = _rows(once / mirrored), _rows(once * _S if zeros else once)
+    return _Split(zeros, _rows(mirrored), rest, single, any(times > 1 for _, times in factors), repeats_mirrored)
+
+
+def _conditions(a: Sequence[Any], split: _Split) -> dict[str, Any]:
+    """Polynomials in y that vanish where something happens."""
+    even, odd = (_bivariate(split.rest[::-1][k::2]) for k in (0, 1))
+    once = _bivariate(split.once[::-1])
+    return {
+        "capsize": split.mirrored[-1] * split.rest[-1],
+        "infinity": a[0],
+        "weave": _rows(even.resultant(odd, "s"))[0] if len(split.rest) > 1 else flint.fmpq_poly(),
+        "EP2": _rows(once.discriminant("s"))[0] if len(split.once) > 1 else flint.fmpq_poly(),
+    }
+
+
+def _bivariate(rows: Sequence[Any]) -> Any:
+    """A polynomial in s and y from its coefficients, ascending in s."""
+    terms = {(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row.coeffs())}
+    return _RING.from_dict({powers: x for powers, x in terms.items() if x != 0})
+
+
+def _rows(p: Any) -> list[Any]:
+    """Coefficients of a polynomial in s and y, descending in s, as polynomials in y."""
+    degree, width = p.degrees()
+    rows = [[flint.fmpq(0)] * (width + 1) for _ in range(degree + 1)]
+    for (i, j), value in p.to_dict().items():
+        rows[degree - i][j] = value
+    return [flint.fmpq_poly(row) for row in rows]
+
+
+def _at(rows: Sequence[Any], y: Any) -> list[Any]:
+    """Coefficients for a y."""
+    return [row(y) for row in rows]
+
+
+def _real_places(polynomial: Any, lower: Any, upper: Any | None) -> list[Any]:
+    """Different real roots between two ends, as fractions that are right to the digits carried."""
+    with flint.ctx.workdps(DIGITS):
+        real = [rational(z.real) for z, _ in polynomial.numer().complex_roots() if z.imag == 0]
+    return sorted(y for y in real if y > lower and (upper is None or y < upper))
+
+
+def _marginal(split: _Split, y: Any) -> bool:
+    """Whether no root is right of the axis, and those on it are simple, between two places; roots 0 aside."""
+    rest, mirrored = _at(split.rest, y), _at(split.mirrored, y)
+    if split.repeats_mirrored or not (len(rest) == 1 or _state(rest)[0]):
+        return False
+    return len(mirrored) == 1 or all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
+
+
+def _named(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
+    """What is at a place: kind, root, whether rightmost. A mirrored pair that is real is nothing."""
+    if kind == "infinity":
+        yield kind, Root(float("nan"), 0.0), False
+        return
+    coefficients = _finite_part(_at(a, y))
+    size = _size(a, y, coefficients)
+    roots = _grouped(coefficients, size)
+    if not roots:
+        return
+    line = max(r.re for r in roots)
+
+    def first(root: Root) -> bool:
+        return root.re >= line - _SAME * size
+
+    def within(part: Sequence[Any], root: Root) -> int:
+        """How often a root is one of a part."""
+        own = _grouped(_finite_part(_at(part, y)), size)
+        return sum(o.multiplicity for o in own if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME * size)
+
+    if kind == "capsize":
+        zero = min(roots, key=lambda r: abs(complex(r.re, r.im)))
+        yield kind, Root(0.0, 0.0, zero.multiplicity), first(zero)
+    elif kind == "weave":
+        for root in roots:
+            if abs(root.re) <= _SAME * size < root.im and within(split.rest, root):
+                yield kind, Root(0.0, root.im, root.multiplicity), first(root)
+    else:
+        for root in roots:
+            if root.multiplicity > 1 and root.im >= 0 and within(split.once, root) > 1:
+                yield f"{'CEP' if root.im else 'EP'}{root.multiplicity}", root, first(root)
+
+
+def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
+    """Without leading coefficients that are 0 but for the digits of y: their roots are at infinity."""
+    largest = max(abs(c) for c in coefficients)
+    first = next((k for k, c in enumerate(coefficients) if abs(c) > _NOTHING * largest), len(coefficients) - 1)
+    return coefficients[first:]
+
+
+def _size(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
+    """A bound of the roots that is not 0 where they all come to 0: from the terms in y, which do not cancel."""
+    terms = [flint.fmpq_poly([*map(abs, c.coeffs())])(abs(y)) for c in a[len(a) - len(coefficients) :]]
+    lead = abs(coefficients[0])
+    ratios = ((k, t / lead) for k, t in enumerate(terms) if k and t != 0)
+    return max((float((flint.arb(ratio) ** (flint.arb(1) / k)).mid()) for k, ratio in ratios), default=1.0)
+
+
+def _grouped(coefficients: Sequence[Any], size: float) -> list[Root]:
+    """Roots of a polynomial that is known to many digits, those that are one to a few of these as one."""
+    left = list(exact_roots(coefficients, DIGITS)) if len(coefficients) > 1 else []
+    groups: list[Root] = []
+    while left:
+        z = complex(left[0].re, left[0].im)
+        near = [r for r in left if abs(complex(r.re, r.im) - z) <= _SAME * size]
+        left = [r for r in left if r not in near]
+        number = sum(r.multiplicity for r in near)
+        middle = sum(complex(r.re, r.im) * r.multiplicity for r in near) / number
+        re, im = (x if abs(x) > _SAME * size else 0.0 for x in (middle.real, middle.imag))
+        groups.append(Root(re, im, number))
+    return groups
+
+
+def _state(coefficients: Sequence[Any]) -> tuple[bool, bool]:
+    """Whether a polynomial is stable, and whether it is heavily damped, in exact numbers."""
+    sign = 1 if coefficients[0] > 0 else -1
+    if coefficients[0] == 0 or not all(x > 0 for x in lienard_chipart([sign * c for c in coefficients])):
+        return False, False
+    return True, all(r.im == 0 for r in exact_roots(coefficients))
+
+
+def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
+    """The gaps between marks: both ends, and a number between them."""
+    ends = [lower, *marks]
+    for low, high in zip(ends, [*marks, upper], strict=True):
+        if high is None:
+            yield float(low), float("inf"), low + 1 + abs(low)
+        else:
+            yield float(low), float(high), (low + high) / 2
+
+
+def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Stretch, ...]:
+    """Neighbouring gaps in which something holds, as one. It may fail at a mark between them, in one point."""
+    bands: list[Stretch] = []
+    for (low, high, _), holds in zip(cells, inside, strict=True):
+        if holds and bands and bands[-1][1] == low:
+            bands[-1] = (bands[-1][0], high)
+        elif holds:
+            bands.append((low, high))
+    return tuple(bands)

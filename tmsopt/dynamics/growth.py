@@ -1,0 +1,249 @@
+"""Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.algebra.elementary import exact
+from tmsopt.dynamics.crossings import Crossing, Stretch, crossings, each_told, told
+from tmsopt.dynamics.modes import Mode, modes
+from tmsopt.dynamics.speeds import coefficients_over, speed_of
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
+from tmsopt.models import Model, Parameter, ParameterSet, Values
+from tmsopt.models.user_spectrum import user_root_array
+from tmsopt.problem.files import Given
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.solution import Solution
+from tmsopt.progress import Listener, start_steps
+from tmsopt.records import Array, Tabular, Truth, plain
+from tmsopt.roots import Root, is_stable, roots
+from tmsopt.search.solve import solved_first
+
+SPEEDS = ("Fr", "v")
+"""Parameters that are speeds."""
+
+_BICYCLE = 4  # degree of a bicycle whose modes have names
+_POINTS = 801
+_HALVINGS = 60  # of a step of the grid, to rounding
+_CROWD = np.linspace(-1, 1, 301) ** 5
+_MARGIN = 1.25  # times the last event
+_FAR = 3  # times the design and all that meets the axis: beyond, roots that meet are not waited for
+
+
+@dataclass(frozen=True, repr=False)
+class Growth(Tabular):
+    """Roots of one design over one parameter.
+
+    Attributes:
+        over: the parameter.
+        values: of it, ascending, shape (n,).
+        roots: shape (n, degree), of a complex H s = −i ω, shape (n, size of H); columns are not modes, for modes cannot
+            be told apart at an exceptional point.
+        critical: critical value that the model knows, such as Fr_c, nan if there is none.
+        design: value of the design.
+        structure: structure of its rightmost roots.
+        stable, heavily_damped: bands of values with all Re s < 0; with all s real and negative. Exact where the
+            coefficients are polynomials in the parameter; else `stable` by halving, the other from point to point.
+        problem: that the design solves; its parameters, where `over` is one of them, have the units of its file.
+        modes: the roots again, each followed from meeting to meeting, with a name.
+        events: where roots cross the axis or meet, exact; where the coefficients are no polynomials in `over`, those
+            where stability changes alone.
+        rate: how many 1/s a rate of 1 is, for each value; None without a unit of time.
+        multiple: multiple roots of the design, which its numbers give to half of their digits or less.
+
+    Example:
+        >>> bands = tmsopt.growth("problems/whipple_benchmark.toml").stable
+        >>> [(f"{a:.4f}", f"{b:.4f}") for a, b in bands]  # weave and capsize speed of Meijaard et al. (2007), m/s
+        [('4.2924', '6.0243')]
+
+    More: docs/explanation/weave_and_capsize.md
+    """
+
+    over: Parameter
+    values: Array
+    roots: NDArray[np.complex128]
+    critical: float
+    design: float
+    structure: str
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
+    problem: Problem
+    modes: tuple[Mode, ...] = ()
+    events: tuple[Crossing, ...] = ()
+    rate: Array | None = None
+    multiple: tuple[Root, ...] = ()
+
+    def records(self) -> Iterable[dict[str, Any]]:
+        """The roots at each value, one a row."""
+        names = [f"{part}_{k}" for k in range(1, self.roots.shape[1] + 1) for part in ("re", "im")]
+        parts = np.stack([self.roots.real, self.roots.imag], axis=-1).reshape(len(self.values), -1)
+        for value, row in zip(self.values.tolist(), parts.tolist(), strict=True):
+            yield {self.over.name: value, **dict(zip(names, row, strict=True))}
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return {"parameter": self.over.name, "unit": self.over.unit} | plain(
+            self, "critical design structure stable heavily_damped values roots"
+        )
+
+
+def growth(
+    design: Given, end: float | None = None, over: str | None = None, *, progress: Listener | None = None
+) -> Growth:
+    """Roots over a parameter, all else as designed.
+
+    Points crowd around the design and where roots meet: there they move like a fractional power of the parameter.
+
+    Args:
+        design: a solution, or a problem or its file, solved first.
+        end: of a range that begins at 0; by default of a speed a little beyond the last weave, capsize or meeting of
+            roots (one that is farther than 3 times all else is left out), or for another parameter its box if it is
+            free, and else up to twice the design's value.
+        over: a parameter of the problem or a native one; by default the speed, or the first free one.
+        progress: called with a `tmsopt.Progress` now and then.
+
+    Raises:
+        InputError: for an unknown parameter.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # real roots from c = 2 on
+        >>> roots = tmsopt.growth(tmsopt.Problem(swing, fixed={"c": 1.0}), end=4.0, over="c")
+        >>> [(round(low, 9), round(high, 9)) for low, high in roots.heavily_damped]
+        [(2.0, 4.0)]
+
+    More: docs/explanation/weave_and_capsize.md
+    """
+    design = solved_first(design, progress)
+    start_steps(progress, "following the roots")
+    if not (end is None or (is_number(end) and end != 0)):
+        raise InputError([Fault(f"found {short(end)}; accepted: a number other than 0", ("end",))])
+    of, parameters, name = _written(design, over)
+    model = design.problem.model
+    known = f"{name}_c" in model.quantity_names(of)
+    at, critical = parameters[name], float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
+    speed = name in SPEEDS
+    low, high = _ends(design, name, end, at)
+    try:
+        a = coefficients_over(design.problem, of, parameters, name)
+        met = told(model, crossings(a, exact(low), None if speed and end is None else exact(high)))
+    except InputError:  # no polynomials in it
+        met = None
+    if speed and end is None and met is not None:
+        high = _last(met.found, at)
+    if met is not None:
+        events = tuple(c for c in met.found if low < c.at < high)
+    else:
+        steps = np.linspace(low, high, _POINTS)
+        events = each_told(model, _changes(lambda x: _numbers(model, of, {**parameters, name: x}), steps))
+    centres = [at, *(c.at for c in events if "EP" in c.kind)]
+    first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
+    grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
+    values = grid[(grid > low) & (grid <= high)] if speed else grid[(grid >= low) & (grid <= high)]
+
+    c = _numbers(model, of, {**parameters, name: values})
+    shown = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity can be shown
+    values, c = values[shown], c[shown]
+    found = roots(c)
+    if met is not None:
+        stable, heavily_damped = _within(met.stable, low, high), _within(met.heavily_damped, low, high)
+    else:
+        inside = is_stable(c)
+        stable = tuple(_reaching(values, run, events) for run in _runs(values, inside))
+        heavily_damped = _runs(values, inside & np.all(found.imag == 0, axis=-1))
+    rate = (
+        None if of.rate is None else np.broadcast_to(of.rate({**parameters, name: values}), values.shape).astype(float)
+    )
+    many = [c.at for c in events if _crowded(c.kind)] + [at] * _crowded(design.structure)
+    bicycle = model.words[0] == "weave" and model.degree == _BICYCLE
+    followed = modes(values, found, at, many, bicycle=bicycle, speed=speed)
+    if model.carrier is not None:
+        found = user_root_array(model, found)
+        followed = tuple(
+            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in followed
+        )
+    return Growth(
+        of[name], values, found, critical, at, design.structure, stable, heavily_damped, design.problem, followed,
+        events, rate, tuple(r for r in design.roots if r.multiplicity > 1),
+    )  # fmt: skip
+
+
+def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
+    """The parameters of a design in the set that has the one asked for, and its name."""
+    problem = design.problem
+    own, native = problem.parameter_set, problem.model.sets[0]
+    if over is None:
+        over = speed_of(own) or next(iter(problem.free), own.names[0])
+    if over in own.names:
+        return own, dict(design.parameters), over
+    if over in native.names:
+        return native, dict(design.dimensionless), over
+    accepted = dict.fromkeys((*own.names, *native.names))
+    raise InputError([Fault(f"found '{over}'; {suggest(over, accepted)}", ("over",))])
+
+
+def _ends(design: Solution, name: str, end: float | None, at: float) -> Stretch:
+    if end is not None:
+        return min(end, 0.0), max(end, 0.0)
+    if name in SPEEDS:
+        return 0.0, 2 * max(at, 0.5)
+    low, high = design.problem.free.get(name, (min(2 * at, 0.0), max(2 * at, 0.0)))
+    return (low, high) if low < high else (low - 1.0, high + 1.0)
+
+
+def _last(found: Sequence[Crossing], at: float) -> float:
+    """The end of a range of speeds that shows all that happens."""
+    crossed = max((c.at for c in found if c.kind in ("weave", "capsize", "infinity")), default=0.0)
+    near = _FAR * max(at, crossed, 0.5)
+    last = max((c.at for c in found if c.at <= near), default=0.0)
+    return _MARGIN * max(last, crossed, at) if last else 2 * max(at, 0.5)
+
+
+def _within(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
+    return tuple((max(a, low), min(b, high)) for a, b in bands if a < high and b > low)
+
+
+def _crowded(structure: str) -> bool:
+    """Whether more than two roots meet at a design."""
+    return "EP" in structure and structure != "EP2"
+
+
+def _numbers(model: Model, of: ParameterSet, columns: Mapping[str, Any]) -> Array:
+    """Coefficients for columns of parameters, shape (n, degree + 1)."""
+    shape = np.broadcast_shapes(*(np.shape(column) for column in columns.values()))
+    return np.stack([np.broadcast_to(c, shape) for c in model.coefficients(columns, of)], axis=-1).astype(float)
+
+
+def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:
+    """Where stability begins or ends between points of a grid, by halving."""
+    inside = is_stable(coefficients(grid))
+    for k in np.flatnonzero(inside[1:] != inside[:-1]):
+        low, high = grid[k : k + 2]
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if is_stable(coefficients(middle)) == inside[k] else (low, middle)
+        there = coefficients(high)
+        if not np.all(np.isfinite(there)) or there[0] == 0:  # a pole, or a root at infinity: nothing crosses the axis
+            continue
+        found = roots(there)
+        first = found[np.abs(found.real).argmin()]
+        kind = "weave" if first.imag else "capsize"
+        yield Crossing(float(high), kind, Root(0.0, abs(float(first.imag))), rightmost=True, changes=True)
+
+
+def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:
+    """First and last value of each run of points in which something holds."""
+    changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
+    return tuple((float(values[k]), float(values[m - 1])) for k, m in changes.reshape(-1, 2))
+
+
+def _reaching(values: Array, run: Stretch, events: Sequence[Crossing]) -> Stretch:
+    """A run of points up to where stability changes between its ends and the points beside them."""
+    low, high = run
+    before, after = values[values < low][-1:], values[values > high][:1]
+    begin = [c.at for c in events if before.size and before[0] <= c.at <= low]
+    end = [c.at for c in events if after.size and high <= c.at <= after[0]]
+    return max(begin, default=low), min(end, default=high)

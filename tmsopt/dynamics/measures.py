@@ -1,0 +1,134 @@
+"""What an engineer reads off a motion: peak, overshoot, settling time, refined so that no step of a grid is in them."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from tmsopt.dynamics.flow import at_times, sampled
+from tmsopt.records import Array, plain
+
+SETTLED = 0.02
+"""Share of the peak within which a motion counts as settled."""
+
+FINEST, _LEAST, MOST = 24, 1024, 2**19  # points of a period of the fastest oscillation; points of a grid
+_EARLY = 256  # further points before the first of the grid, where fast roots die out
+_NEAR = 0.95  # of the largest sample: a peak between samples may be that much larger
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Of one coordinate or torque over a whole motion; nan where there is no such number.
+
+    Attributes:
+        name: such as ``delta``.
+        peak: the value that is largest in size, with its sign.
+        at: when that is.
+        overshoot: after it, the largest excursion to the other side of 0, as a share of the peak; 0 if none.
+        settling: from when on it stays within 2 % of its peak; nan where it does not, as of a design that is not
+            stable.
+    """
+
+    name: str
+    peak: float
+    at: float
+    overshoot: float
+    settling: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return plain(self, "name peak at overshoot settling")
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A motion at times that miss nothing: 24 in a period of the fastest oscillation, and closer ones at the start."""
+
+    A: Array
+    times: Array
+    states: Array
+
+
+def grid(A: Array, x: Array, end: float, fastest: float, largest: float) -> Watched:
+    """The motion up to a time.
+
+    Args:
+        fastest: greatest |Im s|.
+        largest: greatest |s|.
+    """
+    count = int(min(max(FINEST * fastest * end / (2 * math.pi), _LEAST), MOST)) + 1
+    step = end / (count - 1)
+    times, states = np.linspace(0.0, end, count), sampled(A, x, step, count)
+    if largest * step > 0.1:
+        early = np.geomspace(0.01 / largest, step, _EARLY, endpoint=False)
+        times = np.concatenate([times[:1], early, times[1:]])
+        states = np.concatenate([states[:1], at_times(A, x, early), states[1:]])
+    return Watched(A, times, states)
+
+
+def measured(name: str, row: Array, on: Watched, settles: bool) -> Measure:
+    """The measures of the output c x; Brent's method on the exact motion between two points of the grid.
+
+    Args:
+        settles: whether the motion dies out within the grid.
+    """
+    values, slopes = on.states @ row, on.states @ on.A.T @ row
+    turns = np.flatnonzero(slopes[:-1] * slopes[1:] < 0)
+    at, peak = max((_largest(row, on, turns, values, sign) for sign in (1.0, -1.0)), key=lambda each: abs(each[1]))
+    if peak == 0:
+        return Measure(name, 0.0, 0.0, 0.0, 0.0 if settles else math.nan)
+    after = turns[on.times[turns + 1] > at]
+    back = _largest(row, on, after, np.where(on.times >= at, values, 0.0), -math.copysign(1.0, peak))[1]
+    overshoot = max(0.0, -back / peak)
+    settling = _settling(row, on, turns, values, SETTLED * abs(peak)) if settles else math.nan
+    return Measure(name, peak, at, overshoot, settling)
+
+
+def _largest(row: Array, on: Watched, turns: NDArray[np.intp], values: Array, sign: float) -> tuple[float, float]:
+    """Time and value of the greatest sign · c x: at an end of the grid, or at a turn, found exactly."""
+    best = int(np.argmax(sign * values))
+    found = [(float(on.times[best]), float(values[best]))]
+    sizes = np.maximum(sign * values[turns], sign * values[turns + 1])
+    for k in turns[sizes >= _NEAR * sign * values[best]] if sign * values[best] > 0 else ():
+        found.append(_turn(row, on, int(k)))
+    return max(found, key=lambda each: sign * each[1])
+
+
+def _turn(row: Array, on: Watched, k: int) -> tuple[float, float]:
+    """Time and value where c x turns between two points of the grid."""
+    slope = partial(_after, on.A, on.states[k], on.A.T @ row)
+    own = _zero(slope, on.times[k + 1] - on.times[k])
+    return float(on.times[k] + own), _after(on.A, on.states[k], row, own)
+
+
+def _settling(row: Array, on: Watched, turns: NDArray[np.intp], values: Array, within: float) -> float:
+    """When |c x| was above the limit for the last time; nan where it still is at the end."""
+    above = np.flatnonzero(np.abs(values) > within)
+    if not above.size:
+        return 0.0
+    last = int(above[-1])
+    if last == len(values) - 1:
+        return math.nan
+    begin, state, end = on.times[last], on.states[last], on.times[last + 1]
+    for k in (k for k in turns if k >= last and max(abs(values[k]), abs(values[k + 1])) > _NEAR * within):
+        at, value = _turn(row, on, int(k))
+        if abs(value) > within:
+            begin, state, end = at, at_times(on.A, on.states[k], np.array([at - on.times[k]]))[0], on.times[k + 1]
+    sign = math.copysign(1.0, float(row @ state))
+    return float(begin + _zero(lambda s: sign * _after(on.A, state, row, s) - within, end - begin))
+
+
+def _after(A: Array, x: Array, row: Array, time: float) -> float:
+    return float(row @ at_times(A, x, np.array([time]))[0])
+
+
+def _zero(function: Any, end: float) -> float:
+    """Of a function that changes its sign between 0 and `end`; the end that is nearer 0 where rounding hides that."""
+    first, last = function(0.0), function(end)
+    if first * last >= 0:
+        return 0.0 if abs(first) <= abs(last) else end
+    return float(brentq(function, 0.0, end, xtol=1e-15 * end, rtol=8.9e-16))

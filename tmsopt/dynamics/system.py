@@ -1,0 +1,161 @@
+"""A design as one linear system of first order x′ = A x, the path of its wheels among the states."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tmsopt.errors import Fault, InputError
+from tmsopt.models import Model
+from tmsopt.models.bicycles.bicycle import contact_path
+from tmsopt.models.model import Feedback
+from tmsopt.problem.problem import Problem
+from tmsopt.records import Array, Table
+
+ANGLES, RATES, TORQUES = ("phi", "delta"), ("phidot", "deltadot"), ("T_phi", "T_delta")
+"""Names of lean and steer, to the right, of their rates, and of a controller's torques on them."""
+
+PATH = ("x", "psi", "y_rear", "y_front")
+"""Way along the road, yaw to the right, and how far the contacts are to the right of the first line."""
+
+_SINGULAR = 1e15  # condition of a mass matrix, columns of one size, from which on it cannot be inverted
+
+
+@dataclass(frozen=True)
+class System:
+    """x′ = A x, in the units of time, torque and length of `units`.
+
+    Attributes:
+        names: of the states; of a bicycle without the last two, which are yaw and the way of the rear contact aside.
+        coordinates: those that one looks at: lean and steer, or those of a stated system.
+        A: shape (n, n).
+        rows: column of a table → row c of the output c x; torques of a controller, and the path, too.
+        impulses: ``T_phi``, ``T_delta`` → what an impulse of 1 of that torque adds to x; empty without torques.
+        speed: of a bicycle, at which it runs along; nan for other systems.
+        units: ``t``, and name of a column → its unit, empty without one.
+    """
+
+    names: tuple[str, ...]
+    coordinates: tuple[str, ...]
+    A: Array
+    rows: Table[Array]
+    impulses: Table[Array]
+    speed: float
+    units: Table[str]
+
+    @property
+    def torques(self) -> tuple[str, ...]:
+        """The torques of a controller."""
+        return tuple(n for n in TORQUES if n in self.rows)
+
+
+def is_bicycle(model: Model) -> bool:
+    """Whether the first coordinates of a model are lean and steer."""
+    return model.words[0] == "weave"
+
+
+def matrices_of(model: Model) -> Any:
+    """The matrices of a model by its native parameters, of a complex H those of (Re ψ, Im ψ).
+
+    Raises:
+        InputError: where it is known by its characteristic polynomial alone.
+    """
+    if model.double is not None:
+        return model.double
+    if model.pencil is None:
+        advice = "write its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
+        message = f"'{model.name}' is given by its coefficients alone, which tell roots and no motion; {advice}"
+        raise InputError([Fault(message, ("model",))])
+    return model.pencil
+
+
+def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
+    """Names of the coordinates of a mode: lean and steer, ``q1 …``, ``x1 …`` or, of a complex H, ``psi1 …``."""
+    if is_bicycle(model):
+        return ANGLES
+    n, letter = len(pencil[0]), "q" if len(pencil) == 3 else "x"
+    if model.double is not None:
+        n, letter = n // 2, "psi"
+    return tuple(f"{letter}{k}" for k in range(1, n + 1))
+
+
+def system_of(problem: Problem, parameters: Mapping[str, float]) -> System:
+    """The linear system of a design, in SI where the problem is written so, else in the model's own units.
+
+    M q″ + D q′ + K q = 0 becomes x′ = A x, x = (q, q′); two matrices I, −A are it already. Of a bicycle the yaw and
+    the rear contact of `contact_path` are further states, so that they are exact too. Of ψ′ = −i H ψ, H = R + i J as
+    written, they are Re ψ₁, Im ψ₁, Re ψ₂ …, of A = [[J, R], [−R, J]] in that order.
+
+    Raises:
+        InputError: without matrices, or where the mass matrix cannot be inverted.
+    """
+    model, of = problem.model, problem.parameter_set
+    native = of.native(parameters)
+    pencil = [np.array(P, dtype=float) for P in matrices_of(model)(native)]
+    n = len(pencil[0])
+    scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
+    if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled) > _SINGULAR:
+        message = "the mass matrix of this design is singular: a root is at infinity, and there is no motion to show"
+        raise InputError([Fault(message, ("parameters",))])
+    A = -np.linalg.solve(pencil[0], pencil[-1])
+    if len(pencil) == 3:
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [A, -np.linalg.solve(pencil[0], pencil[1])]])
+    if is_bicycle(model):
+        feedback = model.feedback(native) if model.feedback else None
+        mass = pencil[0] if feedback is None else np.array(feedback.mass, dtype=float)
+        moving = _bicycle(A, mass, feedback, native)
+        rate = 1.0 if of.rate is None else float(of.rate(parameters))
+        torque = 1.0 if of.torque is None else float(of.torque(parameters))
+        length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
+        return replace(_in_units(moving, rate, torque, length), units=_units(of.rate is not None))
+    if model.double is not None:
+        order = np.arange(n).reshape(2, -1).T.ravel()
+        names = tuple(f"{name}_{part}" for name in coordinates_of(model, pencil) for part in ("re", "im"))
+        unit = Table(dict(zip(names, np.eye(n), strict=True)))
+        return System(names, names, A[np.ix_(order, order)], unit, Table(), math.nan, Table())
+    q = coordinates_of(model, pencil)
+    names = (*q, *(f"{name}dot" for name in q)) if len(pencil) == 3 else q
+    return System(names, q, A, Table(dict(zip(names, np.eye(len(names)), strict=True))), Table(), math.nan, Table())
+
+
+def _bicycle(A: Array, mass: Array, feedback: Feedback | None, native: Mapping[str, Any]) -> System:
+    """In the model's own units: the path as two more states, and the torques of a controller as rows."""
+    driven = () if feedback is None else tuple(TORQUES[k] for k in sorted(feedback.driven))
+    lagged = feedback is not None and feedback.lag is not None
+    names = (*ANGLES, *RATES, *(driven if lagged else ()))
+    yaw, yaw_of_rate, v, w, aside = map(float, contact_path(native))
+    n = len(names)
+    whole = np.zeros((n + 2, n + 2))
+    whole[:n, :n] = A
+    whole[n, [1, 3]] = yaw, yaw_of_rate
+    whole[n + 1, n] = v
+    unit = np.eye(n + 2)
+    rows = {**dict(zip(names, unit, strict=False)), "psi": unit[n], "y_rear": unit[n + 1]}
+    rows["y_front"] = unit[n + 1] + w * unit[n] + aside * unit[1]
+    if feedback is not None and not lagged:
+        gains = np.hstack([np.array(feedback.gains, dtype=float), np.zeros((2, 2))])
+        rows |= {TORQUES[k]: -gains[k] for k in sorted(feedback.driven)}
+    jumps = np.linalg.inv(mass)
+    impulses = {name: np.r_[0.0, 0.0, jumps[:, k], np.zeros(n - 2)] for k, name in enumerate(TORQUES)}
+    return System(names, ANGLES, whole, Table(rows), Table(impulses), v, Table())
+
+
+def _in_units(system: System, rate: float, torque: float, length: float) -> System:
+    """The same where a rate of 1 is `rate` 1/s, a torque of 1 `torque` N m and a length of 1 `length` m."""
+    one = dict.fromkeys(RATES, rate) | dict.fromkeys(TORQUES, torque) | {"y_rear": length, "y_front": length}
+    states = np.array([one.get(name, 1.0) for name in (*system.names, "psi", "y_rear")])
+    rows = {name: one.get(name, 1.0) * row / states for name, row in system.rows.items()}
+    impulses = {name: rate / torque * states * jump for name, jump in system.impulses.items()}
+    A = rate * states[:, None] * system.A / states
+    return replace(system, A=A, rows=Table(rows), impulses=Table(impulses), speed=system.speed * rate * length)
+
+
+def _units(si: bool) -> Table[str]:
+    """Of time, angles, rates, torques and lengths."""
+    time, rate, torque, length = ("s", "rad/s", "N m", "m") if si else ("√(w/g)", "rad √(g/w)", "m_B g w", "w")
+    return Table(
+        {"t": time} | dict.fromkeys((*ANGLES, "psi"), "rad") | dict.fromkeys(RATES, rate)
+        | dict.fromkeys(TORQUES, torque) | dict.fromkeys(("x", "y_rear", "y_front"), length)
+    )  # fmt: skip

@@ -1,0 +1,220 @@
+"""Many designs of one problem at once, in which nothing is free: what `recheck` and `certified` say of each, by arrays.
+
+Double precision with bounds of its error. What these leave in doubt is left to them: a nearly multiple root, a limit
+missed by no more than tolerance, a coefficient that does not exist.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tmsopt import laws
+from tmsopt.algebra.rounding import Bounded, as_bounded
+from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
+from tmsopt.evaluation.law_rows import SAME_LAW
+from tmsopt.evaluation.recheck import FEASIBLE
+from tmsopt.models import Values, tms
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
+from tmsopt.problem.validate import SMALLEST
+from tmsopt.records import Array, Truth
+from tmsopt.roots import is_stable
+from tmsopt.roots.discs import Motions, enclose_motions
+
+BLOCK = 8192
+"""Designs at once: their numbers stay in the cache. No bit of an answer depends on it."""
+
+KNOWN = 5e-10
+"""Share of its size within which a number is known, or its design is left to the recheck: numbers are equal to 1e-9."""
+
+_UNIT = 2.0**-53  # relative rounding of a parameter
+_DOUBT = 2.0  # tolerances within which a limit is left to the recheck
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """Designs as columns, one value for each.
+
+    Attributes:
+        certain: whether the other values are known; of the others they mean nothing.
+        objective, abscissa, damping_ratio: as in `Solution`; the abscissa is also that of the parameters as stored.
+        oscillates: whether the structure is ``pair``; else it is ``real``.
+        violations: name of a constraint → by how much it is violated, nan where it is not.
+        bound, gap: of the feasible ones; no gap is closed.
+        by_relation: whether the bound is one by relations of the coefficients.
+        laws: label → relative residual, nan where the law does not apply.
+        reports: expression → its value.
+    """
+
+    certain: Truth
+    objective: Array
+    abscissa: Array
+    damping_ratio: Array
+    oscillates: Truth
+    violations: Mapping[str, Array]
+    bound: Array
+    gap: Array
+    by_relation: Truth
+    laws: Mapping[str, Array]
+    reports: Mapping[str, Array]
+
+
+def judgeable(problem: Problem) -> bool:
+    """Whether designs of a problem may be judged at once: nothing is free, listed, located or searched for, and roots
+    are told as they are."""
+    listed = problem.free or problem.variations or problem.tolerances or problem.model.carrier is not None
+    return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
+
+
+def verdicts(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Verdicts | None:
+    """The designs that differ from a problem's in some of its fixed parameters; None where formulas take no arrays.
+
+    Args:
+        columns: parameter → its value in every design, at least one.
+        reports: expressions.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            return _judged(problem, columns, reports)
+    except Exception:  # of a formula that does not take arrays, or has no value: each design will tell by itself
+        return None
+
+
+def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
+    model, of = problem.model, problem.parameter_set
+    given = {n: np.float64(v) for n, v in problem.ordered({}).items()} | dict(columns)
+    m = len(next(iter(columns.values())))
+    wide = Values(model, of, {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()})
+    coefficients = [_spread(c, m) for c in wide.coefficients]
+    found = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
+    certain = found.simple & _possible(problem, given)
+
+    def settled(number: Any) -> Array:
+        nonlocal certain
+        spread = _spread(number, m)
+        certain = certain & (spread.holds(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
+        return np.asarray(spread.value)
+
+    known = {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
+    doubles = {name: settled(number) for name, number in known.items()}
+    for name, number in known.items():
+        wide.define(name, number)
+    objective = np.full(m, np.nan) if problem.objective is None else settled(problem.objective.enclosure(wide))
+    plain = Values(model, of, {n: np.asarray(x) for n, x in given.items()}, extra=ARRAY_ROOT_QUANTITIES)
+    for name, column in (doubles | {ANGULAR_FREQUENCY: found.frequency}).items():
+        plain.define(name, column)
+    violations, doubt = _violations(problem, plain, found)
+    certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
+    feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)
+    bound, related = np.full(m, -np.inf), np.zeros(m, dtype=bool)
+    if bounded(problem):
+        bound, related = _bounds(problem, coefficients, settled)
+        bound = np.where(feasible, bound, -np.inf)
+        certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
+    said = _laws(wide, plain, coefficients, feasible, settled) if model is tms else {}
+    return Verdicts(
+        certain, objective, doubles["abscissa"], doubles["damping_ratio"], found.oscillates, violations, bound,
+        np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf), related, said,
+        {text: _column(problem.read(text)(plain), m) for text in reports},
+    )  # fmt: skip
+
+
+def _spread(number: Any, m: int) -> Bounded:
+    """One number of each design."""
+    wide = as_bounded(number)
+    return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.value, wide.error)))
+
+
+def _column(number: Any, m: int) -> Array:
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(number, dtype=float), m))
+
+
+def _possible(problem: Problem, given: Mapping[str, Any]) -> Truth:
+    """Whether a design may be posed: parameters within their ranges, no angle 0, which rational bounds ask for."""
+    of, possible = problem.parameter_set, np.True_
+    for p in of.parameters:
+        x, inside = given[p.name], p.range
+        low, high = (x >= inside.lower, x <= inside.upper) if inside.closed else (x > inside.lower, x < inside.upper)
+        size = np.abs(x)
+        possible = possible & low & high & (((size >= SMALLEST) & (size <= 1 / SMALLEST)) | (x == 0))
+        possible = possible & ~(p.tangent & (x == 0))
+    for name, (other, _) in of.needs.items():
+        possible = possible & ((given[name] == 0) | (given[other] > 0))
+    return np.asarray(possible)
+
+
+def _violations(problem: Problem, values: Values, found: Motions) -> tuple[dict[str, Array], Truth]:
+    """By how much each constraint is violated, and which designs are too close to a limit to be told here."""
+    m = len(found.simple)
+    amounts, doubt = {}, np.zeros(m, dtype=bool)
+    for name, condition in problem.conditions.items():
+        left, right = (_column(side, m) for side in condition.each(values))
+        difference = left - right
+        excess, size = condition.excess(difference), np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
+        relative = excess / size
+        doubt |= ~np.isfinite(difference) | ((relative > 0) & (relative <= _DOUBT * FEASIBLE))
+        if set(condition.names) & set(ROOT_NAMES):  # of numeric roots in the recheck
+            doubt |= np.abs(difference) <= (_DOUBT * FEASIBLE + found.scatter) * size
+        amounts[name] = np.where(relative > FEASIBLE, excess, np.nan)
+    return amounts, doubt
+
+
+def _bounds(problem: Problem, coefficients: Sequence[Bounded], settled: Callable[[Any], Array]) -> tuple[Array, Truth]:
+    """The bound of `instant_bound` on the abscissa of each design, and where it is one by relations.
+
+    Coefficients that do not vary have relations of two: with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and with aₙ.
+
+    Args:
+        settled: rounds numbers to doubles, and notes where that is not certain.
+    """
+    model, of, n = problem.model, problem.parameter_set, problem.model.degree
+    quotients = settled(abs(coefficients[-1] / coefficients[0]))
+    known = -(quotients ** (1 / n)) * (1 + ROUNDING)
+    if any(p.tangent for p in of.parameters) or not is_rational(model, of):
+        return known, np.zeros(len(known), dtype=bool)
+    least = np.full(len(known), np.inf)
+    for j in range(n + 1):
+        up, down = coefficients[j] / coefficients[0] / math.comb(n, j), coefficients[n] / coefficients[j]
+        for power, ratio, linear in ((j, up, j == 1), (n - j, down * math.comb(n, j), n == 1)):
+            if power:
+                root = ratio.root(power)
+                zero = settled(root) + root.error
+                least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is one of a derivative
+    other = np.nextafter(-least, -np.inf)
+    return np.maximum(other, known), other > known
+
+
+def _laws(
+    wide: Values, values: Values, coefficients: Sequence[Bounded], feasible: Truth, settled: Callable[[Any], Array]
+) -> dict[str, Array]:
+    """Relative residual of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
+    m = len(feasible)
+    names = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
+    p = {n: settled(wide[n]) for n in names}
+    shape = {n: p[n] for n in names[1:]}
+    heights, tilt = {k: p[k] for k in ("zeta_B", "zeta_H")}, {"lambda_s": p["lambda_s"]}
+    number = _spread(wide["Fr_c"], m)
+    exists = np.isfinite(number.value)
+    critical = np.where(exists, settled(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)
+
+    def relative(numeric: Any, law: Any, applies: Any) -> Array:
+        law = _column(law, m)
+        residual = (numeric - law) / np.where(law == 0, 1.0, np.abs(law))
+        settled(np.where(feasible & applies, residual, 0.0))  # a law without a value
+        return np.where(feasible & applies, residual, np.nan)
+
+    stable = is_stable(np.stack([settled(c) for c in coefficients], axis=-1))
+    printed = np.all(laws.lscf(p["Fr"], **shape), axis=0)
+    one = p["chi_H"] == 1
+    first = np.sqrt(np.maximum(np.nan_to_num(laws.Frc1(p["chi_B"], **heights, **tilt)), 0.0))
+    best = laws.chibm(**heights)
+    optimal = np.abs(p["chi_B"] - best) <= SAME_LAW * np.maximum(np.abs(p["chi_B"]), np.abs(best))
+    return {
+        "lscf": relative(1.0 * stable, 1.0 * printed, (p["lambda_s"] > 0) & (p["chi_H"] >= 1)),
+        "flus": relative(critical, laws.Fr_c(**shape), exists),
+        "Frc1": relative(critical, first, one & exists),
+        "frm": relative(critical, laws.frm(**heights, **tilt), one & exists & optimal),
+    }

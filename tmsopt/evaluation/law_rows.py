@@ -1,0 +1,146 @@
+"""The closed-form laws of the paper beside a design, one row each."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tmsopt import laws
+from tmsopt.problem.solution import Solution
+from tmsopt.records import plain
+from tmsopt.roots import is_stable
+
+_CLOSED = "a1a3, a2, w0"  # equations that give several parameters
+LAWS = (
+    "w0", "4poly", "chib", "a2", "a1a3 a2 w0 Fr", "a1a3 a2 w0 mu", "a1a3 a2 w0 tan(lambda_s)", "lscf", "flus", "Frc1",
+    "frm", "w01", "chib1", "tls", "frep4", "epset",
+)  # fmt: skip
+"""Names of all laws, in the order of `law_rows`."""
+
+SAME_LAW = 1e-9
+"""Relative difference up to which number and law count as agreeing; coefficients are matched to 1e-10."""
+
+
+@dataclass(frozen=True)
+class LawRow:
+    """One law beside the design.
+
+    Attributes:
+        label: equation label in the paper.
+        subject: what the numbers are.
+        numeric: the number of the design, found without the law.
+        law: the number that the law gives.
+        reason: why the law says nothing about this design; empty where it applies.
+    """
+
+    label: str
+    subject: str
+    numeric: float
+    law: float
+    reason: str = ""
+
+    @property
+    def name(self) -> str:
+        """The label, with what it is about where that is of several; without commas, for tables."""
+        return f"{self.label} {self.subject.split(',')[0]}".replace(",", "") if self.label == _CLOSED else self.label
+
+    @property
+    def applies(self) -> bool:
+        """Whether the law's conditions hold for the design."""
+        return not self.reason
+
+    @property
+    def residual(self) -> float:
+        """Numeric minus law."""
+        return self.numeric - self.law
+
+    @property
+    def relative(self) -> float:
+        """Residual relative to the law, or to 1 where the law says 0."""
+        return self.residual / (abs(self.law) or 1.0)
+
+    @property
+    def agrees(self) -> bool | None:
+        """Whether number and law agree; None where the law does not apply."""
+        return abs(self.relative) <= SAME_LAW if self.applies else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        found = plain(self, "label subject numeric law residual relative applies agrees reason")
+        return found if self.applies else found | {"residual": None, "relative": None}
+
+
+def law_rows(design: Solution) -> Iterator[LawRow]:
+    """Every law, with the reason where its conditions do not hold."""
+    p = {name: float(value) for name, value in design.dimensionless.items()}
+    heights = {k: p[k] for k in ("zeta_B", "zeta_H")}
+    tilt = {"lambda_s": p["lambda_s"]}
+    not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_why_not_ep4(design)}"
+    not_one = "" if p["chi_H"] == 1 else f"needs chi_H = 1; here chi_H = {p['chi_H']:.6g}"
+    special = not_one or not_ep4
+    r, T = design.abscissa, math.tan(p["lambda_s"])
+
+    yield LawRow("w0", "abscissa, the 4-fold root", r, _f(laws.w0(p["mu"], p["chi_H"], **heights, **tilt)), not_ep4)
+    a = np.array([design.quantities[f"a{k}"] for k in range(5)])
+    mismatch = np.max(np.abs(a / a[0] / laws.poly4(r) - 1)) if r and a[0] else math.nan
+    yield LawRow("4poly", "largest relative mismatch of a coefficient", _f(mismatch), 0.0, not_ep4)
+    yield LawRow("chib", "chi_B", p["chi_B"], _f(laws.chib(r, p["chi_H"], **heights)), not_ep4)
+    a2 = laws.a2(p["Fr"], p["mu"], p["chi_H"], **heights, **tilt, omega0=r)
+    yield LawRow("a2", "left minus right side", _f(a2), 0.0, not_ep4)
+
+    general = not_ep4 or ("" if not_one else "at chi_H = 1 the mass ratio is free; see the laws for chi_H = 1")
+    branch = _nearest(laws.ep4(r, **heights, chi_H=p["chi_H"]), p)
+    closed = (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s))
+    for subject, numeric, law in closed:
+        yield LawRow(_CLOSED, f"{subject}, closed form for any chi_H", numeric, _f(law), general)
+
+    yield from _speed_rows(design, p, not_one)
+    yield LawRow("w01", "abscissa, the 4-fold root", r, _f(laws.w01(**heights)), special)
+    yield LawRow("chib1", "chi_B", p["chi_B"], _f(laws.chib1(**heights)), special)
+    yield LawRow("tls", "tan(lambda_s)", T, _f(laws.tls(**heights)), special)
+    yield LawRow("frep4", "Fr", p["Fr"], _f(laws.frep4(**heights)[0]), special)
+    on_set = design.structure in ("EP4", "2EP2", "CEP2")
+    off_set = not_one or ("" if on_set else f"holds on the EP set; the structure is '{design.structure}'")
+    yield LawRow("epset", "Fr", p["Fr"], _f(laws.epset(**heights, **tilt)), off_set)
+
+
+def _speed_rows(design: Solution, p: Mapping[str, float], not_one: str) -> Iterator[LawRow]:
+    """Laws of stability and of the critical Froude number."""
+    heights = {k: p[k] for k in ("zeta_B", "zeta_H")}
+    tilt = {"lambda_s": p["lambda_s"]}
+    shape = {k: p[k] for k in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")}
+    stable = bool(is_stable([design.quantities[f"a{k}"] for k in range(5)]))
+    printed = bool(np.all(laws.lscf(p["Fr"], **shape)))
+    regime = "" if p["lambda_s"] > 0 else "stated for lambda_s > 0"
+    if not regime and p["chi_H"] < 1:
+        regime = "incomplete for chi_H < 1: a1 > 0 is missing"
+    yield LawRow("lscf", "stable (1) or not (0)", float(stable), float(printed), regime)
+    critical = design.quantities["Fr_c"]
+    absent = "" if math.isfinite(critical) else "the design has no weave boundary"
+    yield LawRow("flus", "Fr_c", critical, _f(laws.Fr_c(**shape)), absent)
+    frc1 = math.sqrt(max(_f(laws.Frc1(p["chi_B"], **heights, **tilt)), 0.0))
+    yield LawRow("Frc1", "Fr_c", critical, frc1, not_one or absent)
+    optimal = _f(laws.chibm(**heights))
+    off = "" if math.isclose(p["chi_B"], optimal, rel_tol=SAME_LAW) else f"holds at chi_B = {optimal:.6g}"
+    yield LawRow("frm", "Fr_c, least over chi_B", critical, _f(laws.frm(**heights, **tilt)), not_one or absent or off)
+
+
+def _why_not_ep4(design: Solution) -> str:
+    binding = ", ".join(design.active)
+    why = f" because {binding} bind{'s' if len(design.active) == 1 else ''}" if binding else ""
+    if not design.problem.free:
+        why = " and nothing is free"
+    return f"the structure is '{design.structure}'{why}"
+
+
+def _nearest(branches: tuple[laws.EP4, laws.EP4], p: Mapping[str, float]) -> laws.EP4:
+    """The algebraic branch that the design is on."""
+    T = math.tan(p["lambda_s"])
+    distance = [abs(_f(b.tan_lambda_s) - T) + abs(_f(b.Fr) - p["Fr"]) for b in branches]
+    return branches[1] if distance[1] < distance[0] else branches[0]
+
+
+def _f(x: Any) -> float:
+    return float(x)

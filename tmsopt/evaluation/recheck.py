@@ -1,0 +1,316 @@
+"""What a design really is, computed from its parameters alone and without the NLP that produced it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.algebra.intervals import ranges
+from tmsopt.algebra.walk import NotAccepted
+from tmsopt.boundaries.nearest import Robustness, robustness_at
+from tmsopt.models import Model, Values
+from tmsopt.models.user_spectrum import public_names
+from tmsopt.problem.cases import Case
+from tmsopt.problem.dependence import depends_on_case
+from tmsopt.problem.expression import Expression
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE, roots_at
+from tmsopt.problem.verdict.meetings import is_crossing
+from tmsopt.records import Array, Table
+from tmsopt.roots import Root, Structure, pattern_distance, roots
+
+FEASIBLE = 1e-9
+"""Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
+
+MATCHED = 1e-10
+"""Relative change of a coefficient up to which a pattern counts as located."""
+
+_SCATTER = 2e-3  # of the largest root: five times what numeric roots beside a 4-fold one are off
+_TAKEN = 10 * STRUCTURE_TOLERANCE  # of the terms of a polynomial, more than those are off that are taken for multiple
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A design's roots, objective and violations: in its worst case, where it has several.
+
+    Attributes:
+        violations: name → violation relative to the size of the two sides, where beyond tolerance.
+        amounts: the same in the units of the sides.
+        worst: the case with the largest abscissa, of those looked at.
+        least_damped: the case with the least damping ratio.
+        fastest: the case with the greatest angular frequency, where the problem asks for that.
+        around: the boundaries nearest to the design, where the problem asks for the robustness radius.
+        crossing: whether the pattern is violated by eigenvectors alone: roots meet, and no Jordan chain is so long.
+    """
+
+    structure: Structure
+    realised: float
+    objective: float
+    violations: Table[float]
+    amounts: Table[float]
+    quantities: Table[float]
+    dimensionless: Table[float]
+    worst: Case = field(default_factory=Case)
+    least_damped: Case = field(default_factory=Case)
+    fastest: Case = field(default_factory=Case)
+    around: Robustness | None = None
+    crossing: bool = False
+
+
+def recheck(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    cases: Sequence[Case] | None = None,
+    around: Robustness | None = None,
+) -> Evaluation:
+    """Evaluate a design independently of any solver: constraints, pattern, roots and objective, in the given cases.
+
+    Args:
+        around: the boundaries nearest to this design, where they are known already.
+    """
+    looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
+    listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
+    violations, amounts = _violated(problem, looked, problem.conditions)
+    crossing = False
+    structure = each[top]["structure"]
+    if not math.isfinite(structure.abscissa):
+        exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
+        violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or none
+    if problem.pattern is not None:
+        a = [float(c) for c in nominal.coefficients]
+        distance = pattern_distance(problem.pattern, a, nominal.roundings(), MATCHED)
+        crossing = distance <= MATCHED and is_crossing(problem, problem.pattern, parameters)
+        if crossing or not distance <= MATCHED:
+            violations[problem.pattern.name] = 1.0 if crossing else distance
+    of = problem.parameter_set
+    names = [n for n in (*public_names(problem.model, of), "damping_ratio") if n not in problem.model.sets[0].names]
+    if around is not None:
+        names.append(RADIUS)
+    if problem.asks(ANGULAR_FREQUENCY):
+        names.append(ANGULAR_FREQUENCY)
+    if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
+        nominal.define("abscissa", structure.abscissa)
+        nominal.define("structure", structure)
+    return Evaluation(
+        structure=structure,
+        realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
+        objective=_objective(problem, nominal, each, listed),
+        violations=Table(violations),
+        amounts=Table(violations | amounts),
+        quantities=Table({name: float(nominal[name]) for name in names}),
+        dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
+        worst=listed[top] if listed else Case(),
+        least_damped=listed[looked.least] if listed else Case(),
+        fastest=listed[looked.fastest] if listed else Case(),
+        around=around,
+        crossing=crossing,
+    )
+
+
+def missed(
+    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
+) -> dict[str, float]:
+    """Limits on the roots that the exact roots of the parameters as stored miss → by how much, in their own units.
+
+    Args:
+        around: as for `recheck`.
+    """
+    asked = {n: problem.conditions[n] for n in problem.asked_of_roots if RADIUS not in problem.conditions[n].names}
+    if not asked:
+        return {}
+    looked = _look(problem, parameters, cases, around)
+    near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(problem, c))}
+    return _violated(problem, _look(problem, parameters, cases, looked.around, stored=True), near)[1] if near else {}
+
+
+def _is_near(condition: Expression, values: Values) -> bool:
+    """Whether numeric roots leave it open that a condition is missed."""
+    left, right = condition.sides(values)
+    slack = -condition.sign * (left - right)
+    return condition.equality or not slack > _SCATTER * max(1.0, abs(left), abs(right))
+
+
+def _violated(
+    problem: Problem, looked: "_Look", conditions: Mapping[str, Expression]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Violations of conditions beyond tolerance, relative and in the units of the sides."""
+    violations, amounts = {}, {}
+    for name, condition in conditions.items():
+        at = looked.at(problem, condition)
+        violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
+        if is_violated(problem, condition, violation, worst):
+            violations[name] = violation
+            amounts[name] = float(condition.excess(float(condition(worst))))
+    return violations, amounts
+
+
+def is_violated(
+    problem: Problem, condition: Expression, violation: float, values: Values | Mapping[str, float]
+) -> bool:
+    """Whether a condition is violated by so much of the size of its sides that it is not for rounding alone.
+
+    Args:
+        values: of the parameters, and of the root quantities that it names.
+    """
+    return not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, values))
+
+
+def _beyond(problem: Problem, condition: Expression, values: Values | Mapping[str, float]) -> bool:
+    """Whether no design within `FEASIBLE` of another meets a condition, so that a small excess is none of rounding.
+
+    Parameters move by so much of their size or of their range, root quantities of theirs; (Fr - 1.7)**4 <= 0 is missed
+    by 1e-16 at Fr = 1.6999, and by 1e-4 of the speed. By intervals: of the condition, and of its slopes.
+    """
+    of = problem.parameter_set
+    names = (*of.names, *(n for n in ROOT_NAMES if n in condition.names))
+    at = np.array([float(values[n]) for n in names])
+    ends = np.array([problem.free.get(n, (0.0, 0.0)) for n in names])
+    reach = FEASIBLE * np.maximum(np.abs(at), np.where(np.arange(len(at)) < len(of.names), np.ptp(ends, axis=1), 1.0))
+    try:
+        function = _sloped(problem.model, of.name, condition, names)
+        centre, around = (ranges(function, list(zip(at - r, at + r, strict=True))) for r in (0 * reach, reach))
+    except NotAccepted:
+        return False
+    with np.errstate(invalid="ignore"):  # a slope may be without bound
+        slack = float(np.abs(around[1]).max(axis=1) @ reach)
+    signs = (1.0, -1.0) if condition.equality else (condition.sign,)
+    return any(min(s * e for e in centre[0][0]) > slack or min(s * e for e in around[0][0]) > 0 for s in signs)
+
+
+@lru_cache(maxsize=256)
+def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> ca.Function:
+    """A condition and its slopes, as a function of parameters and root quantities."""
+    symbols = {name: ca.SX.sym(name) for name in names}
+    of = model.parameter_set(set_name)
+    values = Values(model, of, {n: symbols[n] for n in of.names})
+    for name in names[len(of.names) :]:
+        values.define(name, symbols[name])
+    difference, x = ca.SX(condition.symbolic(values)), ca.vertcat(*symbols.values())
+    return ca.Function("sloped", [x], [difference, ca.densify(ca.gradient(difference, x))])
+
+
+def excesses(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
+    """Amount by which each constraint's limit must be moved for a design: 0 or more, signed for an equality."""
+    looked = _look(problem, parameters, cases)
+    found = {}
+    for name, condition in problem.conditions.items():
+        differences = [left - right for left, right in (condition.sides(v) for v in looked.at(problem, condition))]
+        if condition.equality:
+            found[name] = differences[0]
+        else:
+            found[name] = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
+    return found
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A design in its cases, with root quantities the worst over them.
+
+    Attributes:
+        top: number of the case with the largest abscissa.
+        least: number of the case with the least damping ratio.
+        fastest: number of the case with the greatest angular frequency, where that is asked for, else `top`.
+    """
+
+    cases: list[Case]
+    nominal: Values
+    each: list[Values]
+    top: int
+    least: int
+    fastest: int
+    around: Robustness | None
+
+    def at(self, problem: Problem, condition: Expression) -> list[Values]:
+        """The cases that a condition holds in."""
+        return self.each if depends_on_case(problem, condition, self.cases) else [self.nominal]
+
+
+def _look(
+    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None,
+    stored: bool = False,
+) -> _Look:  # fmt: skip
+    """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
+    listed = [case for case in cases if not case.direction]
+    designs = [case.applied(parameters) for case in listed] or [dict(parameters)]
+    nominal = problem.values(parameters)
+    each = [problem.values(design) for design in designs] if listed else [nominal]
+    near_top, near_least, near_fastest = _candidates(each)
+    if stored:
+        for design, values in zip((*designs, parameters), (*each, nominal), strict=True):
+            values.define("structure", Structure("undecided", realised_roots(problem, design), 0.0))
+    top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
+    least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
+    worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
+    fastest = top
+    if problem.asks(ANGULAR_FREQUENCY):
+        fastest = max(near_fastest, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
+        worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]
+    if around is None and problem.asks_radius:
+        around = robustness_at(problem, parameters)
+    if around is not None:
+        worst[RADIUS] = around.radius
+    for values in (nominal, *each):
+        for name, value in worst.items():
+            values.define(name, value)
+    return _Look(listed, nominal, each, top, least, fastest, around)
+
+
+def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int], list[int]]:
+    """Cases that may have the largest abscissa, the least damping ratio and the greatest angular frequency.
+
+    Numeric roots are off by 4e-4 at most, simple ones by far less.
+    """
+    a = np.array([[float(c) for c in values.coefficients] for values in each])
+    if len(each) == 1 or not np.all(np.isfinite(a)) or np.any(a[:, 0] == 0):
+        return list(range(len(each))), list(range(len(each))), list(range(len(each)))
+    z = roots(a)
+    off = _off(a, z)
+    ratio = np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+    off_ratio = np.minimum(_SCATTER, np.max(off / (np.abs(z) + 1e-300), axis=1))
+    top, fastest = (
+        np.flatnonzero((part + off).max(axis=1) >= (part - off).max(axis=1).max()).tolist() for part in (z.real, z.imag)
+    )
+    least = np.flatnonzero(ratio - 2 * off_ratio <= (ratio + 2 * off_ratio).min()).tolist()
+    return top, least, fastest
+
+
+def _off(a: Array, z: NDArray[np.complex128]) -> Array:
+    """How far numeric roots may be off: by what the polynomial is off over its slope, at most as multiple ones are."""
+    size = np.abs(z)
+    powers = np.arange(a.shape[1] - 1, -1, -1)
+    terms = (np.abs(a)[:, None] * size[..., None] ** powers).sum(axis=-1)
+    slope = np.abs((a[:, None, :-1] * powers[:-1] * z[..., None] ** (powers[:-1] - 1)).sum(axis=-1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = np.nan_to_num(_TAKEN * terms / slope, nan=np.inf)
+    return np.asarray(np.minimum(first, _SCATTER * size.max(axis=1, keepdims=True)))
+
+
+def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:
+    """The objective, the worst over the cases where it differs between them."""
+    if problem.objective is None:
+        return math.nan
+    if not depends_on_case(problem, problem.objective, cases):
+        return float(problem.objective(nominal))
+    sign = problem.sign
+    return sign * max((sign * float(problem.objective(values)) for values in each), key=_or_infinite)
+
+
+def _or_infinite(value: float) -> float:
+    """A number for comparison in which one that does not exist is the worst."""
+    return math.inf if math.isnan(value) else value
+
+
+def realised_abscissa(problem: Problem, parameters: Mapping[str, float]) -> float:
+    """Abscissa of the parameters exactly as stored."""
+    found = realised_roots(problem, parameters)
+    return found[0].re if found else math.nan
+
+
+def realised_roots(problem: Problem, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
+    """Roots of the parameters exactly as stored, rightmost first; none where a coefficient does not exist."""
+    return roots_at(problem.model, problem.parameter_set, parameters)

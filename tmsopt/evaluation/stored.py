@@ -1,0 +1,282 @@
+"""A design near another that meets limits on the roots exactly as stored, where the doubles of the other miss them.
+
+Beside an m-fold root s₀ a change ε of a coefficient moves roots by ε^(1/m), so the doubles nearest to an ideal design
+miss a limit by 1e-8 at a double root, by 4e-4 at a 4-fold one. With u the direction along the limit, s = s₀ + u t, and
+∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m, roots that are spread evenly over −h ≤ t ≤ h stay within d of their line while cₖ
+is within h^(k−1) d / 2 of its aim across the limit, and within hᵏ / 8 along it (k ≥ 2). The line may stand inside the
+limit by some h²; that and the spread cost h² each.
+
+Doubles near such a design are a lattice. Its point that comes closest, in these units, is found by a reduced basis
+(Lenstra, Lenstra and Lovász 1982) and the nearest plane (Babai 1986), and judged by its exact roots. h grows until one
+keeps every limit.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import flint
+import numpy as np
+
+from tmsopt.evaluation.recheck import FEASIBLE, Evaluation, missed, recheck
+from tmsopt.problem.cases import Case
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import amounts_text, unit_at
+from tmsopt.records import Array
+from tmsopt.roots import Root, Structure
+from tmsopt.roots.exact import isolated_roots
+from tmsopt.roots.patterns.enclosed import nearest_roots
+
+_DIGITS = 150  # slopes are differences over 2⁻¹⁰⁰ of a parameter
+_SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from what a structure tolerates up to 5e-7
+_LINE = 1e-6  # relative distance from the worst root up to which another is on the limit too
+_STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # of Newton's method; designs judged; basis vectors added to the nearest point
+_GONE = 1e-24  # of its natural size: what is left of a cₖ after these steps, where the slopes are not all but singular
+_RANK = 1e-9  # of the steepest direction, below which one moves nothing
+_MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
+_LEAST = 1e-3  # of its range: natural size of a parameter near 0
+_FINEST = 1e-20  # relative: steps of a parameter that is 0
+_BITS = 60  # behind the point, of the coordinates of the lattice
+_NOTHING = 1e-14  # of the size of roots: less is rounding
+_APART, _SHOWN = 1e-6, 7  # relative difference of two abscissae from which both are shown; digits, which show it
+_AT_END = 1e-9  # of a range: a parameter so close to an end stays there
+
+
+@dataclass(frozen=True)
+class _Cluster:
+    """A multiple root on a limit.
+
+    Attributes:
+        case: in which it is there.
+        root: of the ideal design, on or above the real axis.
+        along: unit vector along the limit, the inside of which is on its left.
+        exactly: whether the limit is an equality.
+        anywhere: whether the mean of its roots may be where it is, instead of at the root.
+    """
+
+    case: Case
+    root: Root
+    along: complex
+    exactly: bool
+    anywhere: bool = False
+
+    @property
+    def place(self) -> complex:
+        """The root as a number."""
+        return complex(self.root.re, self.root.im)
+
+    def parts(self) -> Iterator[tuple[int, bool]]:
+        """Order k of each cₖ, and whether it is its real part; without those that are 0 or free to move."""
+        for k in range(2 if self.anywhere else 1, self.root.multiplicity + 1):
+            for real in (True, False):
+                if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.along.imag == 0)):
+                    yield k, real
+
+
+def held(
+    problem: Problem, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case]
+) -> tuple[Mapping[str, float], Evaluation, Mapping[str, float]]:
+    """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
+
+    The structure remains that of the ideal design. Where no such design is found, the one that is given, and what it
+    misses → by how much.
+    """
+    amounts = {} if checked.violations else missed(problem, parameters, cases, checked.around)
+    if not amounts:
+        return parameters, checked, amounts
+    clusters = _clusters(problem, parameters, checked, cases, list(amounts))
+    ends = problem.free.items()
+    inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
+    for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if clusters else ():
+        for spread in _SPREADS.tolist() if names else ():
+            for design in _nearest(problem, parameters, clusters, names, spread):
+                if not all(lo <= design[n] <= hi for n, (lo, hi) in ends) or missed(problem, design, cases):
+                    continue
+                again = recheck(problem, design, cases, checked.around)
+                if set(again.violations) <= set(problem.asked_of_roots):
+                    return design, _structured(problem, design, checked, again), {}
+    return parameters, checked, amounts
+
+
+def multiple_roots_exist(problem: Problem, parameters: Mapping[str, float]) -> bool:
+    """Whether a design within rounding of one has exactly the multiple roots that this one has to rounding.
+
+    There Newton's method, in 150 digits, gains digits with every step; where equations are all but singular it stalls.
+    """
+    roots = problem.values(parameters)["structure"].roots
+    clusters = [
+        _Cluster(Case(), r, 1j, True, True) for r in roots if r.multiplicity > 1 and r.im >= 0 and (r.re or r.im)
+    ]
+    target, _, size = _aims(clusters, 0.0) if clusters else (np.empty(0),) * 3
+    with flint.ctx.workdps(_DIGITS):
+        _, off, _ = _solved(problem, parameters, clusters, list(problem.free), target, size)
+        return all(abs(float(x)) <= _GONE * scale for x, scale in zip(off, size.tolist(), strict=True))
+
+
+def abscissa_as_stored(solution: Solution) -> str:
+    """The abscissa of the parameters as stored in words, with the ideal one unless that is the objective.
+
+    Empty where the two differ by no more than a millionth.
+    """
+    ideal, realised = solution.abscissa, solution.abscissa_realised
+    size = max((math.hypot(root.re, root.im) for root in solution.of_polynomial.roots), default=0.0)
+    ideal, realised = (x if abs(x) > _NOTHING * size else 0.0 for x in (ideal, realised))
+    if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
+        return ""
+    at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
+    unit, goal = unit_at(solution.problem, "abscissa", at), solution.problem.minimize or solution.problem.maximize or ""
+    first = "" if goal.strip() == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
+    return f"{first}as stored {unit.number(realised, _SHOWN)}"
+
+
+def missed_note(problem: Problem, amounts: Mapping[str, float]) -> tuple[str, ...]:
+    """What parameters miss as they are stored, as a sentence for the reader."""
+    why = "no doubles nearby that meet every limit were found" if problem.free else "the ideal design does not"
+    return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
+
+
+def _clusters(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    checked: Evaluation,
+    cases: Sequence[Case],
+    names: Sequence[str],
+) -> list[_Cluster]:
+    """The multiple roots that stand on the limits of these names."""
+    asked = {name for limit in names for name in problem.conditions[limit].names}
+    exactly = any(problem.conditions[limit].equality for limit in names)
+    found = []
+    for case in [case for case in cases if not case.direction] or [Case()]:
+        structure = problem.values(case.applied(parameters))["structure"]
+        size = _LINE * max(math.hypot(r.re, r.im) for r in structure.roots)
+        for root in structure.roots:
+            z = complex(root.re, root.im)
+            if root.multiplicity == 1 or root.im < 0 or z == 0:
+                continue
+            if ANGULAR_FREQUENCY in asked and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size:
+                found.append(_Cluster(case, root, -1.0, exactly))
+            elif "damping_ratio" in asked and -root.re <= (checked.quantities["damping_ratio"] + _LINE) * abs(z):
+                found.append(_Cluster(case, root, z / abs(z), exactly))
+            elif root.re >= checked.structure.abscissa - size:
+                found.append(_Cluster(case, root, 1j, exactly))
+    return found
+
+
+def _nearest(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    clusters: Sequence[_Cluster],
+    names: Sequence[str],
+    spread: float,
+) -> Iterator[dict[str, float]]:
+    """Doubles close to a design whose clusters are spread along their limits, the most promising first."""
+    target, leeway, size = _aims(clusters, spread)
+    with flint.ctx.workdps(_DIGITS):
+        at, _, slope = _solved(problem, parameters, clusters, names, target, size)
+        start = {n: float(at[n]) for n in names}
+        off = [float(x) for x in _off(problem, {**at, **{n: flint.arb(x) for n, x in start.items()}}, clusters, target)]
+        aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
+    if not np.all(np.isfinite([*off, *start.values(), *slope.ravel()])):
+        return
+    widths = _widths(problem, parameters, names)
+    units = np.maximum([math.ulp(x) for x in start.values()], _FINEST * widths)
+    rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / (_MOVE * widths))])
+    for counts in _rounded(rows, np.array([*(off / leeway), *(aside / (_MOVE * widths))])):
+        moves = zip(start.items(), counts, units.tolist(), strict=True)
+        yield {**parameters, **{n: x + count * unit for (n, x), count, unit in moves}}
+
+
+def _widths(problem: Problem, parameters: Mapping[str, float], names: Sequence[str]) -> Array:
+    """Natural sizes of parameters."""
+    return np.array([max(abs(parameters[n]), _LEAST * np.ptp(problem.free[n])) for n in names])
+
+
+def _solved(
+    problem: Problem, parameters: Mapping[str, float], clusters: Sequence[_Cluster], names: Sequence[str],
+    target: Array, size: Array,
+) -> tuple[dict[str, Any], list[Any], Array]:  # fmt: skip
+    """A design after some steps of Newton's method with the first slopes, what is off there, and those slopes."""
+    widths = _widths(problem, parameters, names)
+    at = {n: flint.arb(x) for n, x in parameters.items()}
+    known, slopes = _off(problem, at, clusters, target), []
+    for n, width in zip(names, widths.tolist(), strict=True):
+        step = flint.arb(width) * flint.arb(2) ** -100
+        moved = _off(problem, {**at, n: at[n] + step}, clusters, target)
+        slopes.append([float((b - a) / step) for a, b in zip(known, moved, strict=True)])
+    slope = np.array(slopes)
+    if np.all(np.isfinite(slope)):
+        inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
+        for _ in range(_STEPS):
+            steps = widths * (inverse @ (np.array([float(x) for x in known]) / size))
+            at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(names, steps.tolist(), strict=True)}
+            known = _off(problem, at, clusters, target)
+    return at, known, slope
+
+
+def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Array]:
+    """Of each part of each cₖ: what it is in the spread, how far it may be off, and its natural size."""
+    aims = []
+    for cluster in clusters:
+        m, size = cluster.root.multiplicity, abs(cluster.place)
+        h = size * math.sqrt(spread * math.comb(m, 2))
+        inside = 0.0 if cluster.exactly else size * spread
+        c = np.poly(h * np.linspace(-1, 1, m) + 1j * inside)
+        across = (FEASIBLE * size + inside) / 2
+        for k, real in cluster.parts():
+            aims.append((c[k].real, h**k / 8, size**k) if real else (c[k].imag, h ** (k - 1) * across, size**k))
+    target, leeway, sizes = (np.array(column) for column in zip(*aims, strict=True))
+    return target, leeway, sizes
+
+
+def _off(problem: Problem, parameters: Mapping[str, Any], clusters: Sequence[_Cluster], target: Array) -> list[Any]:
+    """Each part of each cₖ of an exact design, minus what is aimed at."""
+    found = []
+    for cluster in clusters:
+        a = problem.model.coefficients(cluster.case.applied(parameters), problem.parameter_set)
+        if not all(c.is_finite() for c in a):
+            return [flint.arb("nan")] * len(target)
+        z = [z for z, m in isolated_roots(a) for _ in range(m)]
+        place, c = flint.acb(cluster.place), [flint.acb(1)]
+        z.sort(key=lambda z: float(abs(z - place)))
+        own = z[: cluster.root.multiplicity]
+        place = sum(own, flint.acb(0)) / len(own) if cluster.anywhere else place
+        for root in own:
+            t = (root - place) / flint.acb(cluster.along)
+            c = [a - t * b for a, b in zip([*c, 0], [0, *c], strict=True)]
+        found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]
+    return [(x - t).mid() for x, t in zip(found, target.tolist(), strict=True)]
+
+
+def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
+    """Integer combinations of rows that cancel best what is off, the best first."""
+    whole = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
+    reduced, transform = flint.fmpz_mat(whole).lll(True)
+    n = len(rows)
+    basis = np.array([[math.ldexp(int(reduced[i, j]), -_BITS) for j in range(len(off))] for i in range(n)])
+    q, r = np.linalg.qr(basis.T)
+    rest, nearest = off, [0] * n
+    for i in range(n)[::-1]:
+        nearest[i] = -round(float(q[:, i] @ rest / r[i, i]))
+        rest = rest + nearest[i] * basis[i]
+    beside = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
+    ranked = sorted(beside, key=lambda more: float(np.abs(rest + more @ basis[: len(more)]).max()))
+    for more in ranked[:_TRIALS]:
+        by = [a + b for a, b in itertools.zip_longest(nearest, more, fillvalue=0)]
+        yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
+
+
+def _structured(problem: Problem, design: Mapping[str, float], checked: Evaluation, again: Evaluation) -> Evaluation:
+    """The recheck of a design, with the structure of the ideal one that it was moved from."""
+    structure = again.structure
+    if structure.name != checked.structure.name:
+        with flint.ctx.workdps(_DIGITS):
+            exact = {n: flint.arb(x) for n, x in checked.worst.applied(design).items()}
+            a = problem.model.coefficients(exact, problem.parameter_set)
+            found = nearest_roots(checked.structure.name, a, checked.structure.roots) or ()
+        roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in found) or checked.structure.roots
+        structure = Structure(checked.structure.name, roots, checked.structure.distance)
+    return replace(again, structure=structure, violations=checked.violations, amounts=checked.amounts)

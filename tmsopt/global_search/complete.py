@@ -1,0 +1,367 @@
+"""All designs of a box with a pattern: boxes without one dropped, each of the others proved to hold exactly one."""
+
+import importlib.util
+import math
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import flint
+
+from tmsopt.algebra.balls import Number, number
+from tmsopt.algebra.formal import variable
+from tmsopt.algebra.intervals import interval
+from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
+from tmsopt.algebra.walk import NotAccepted
+from tmsopt.global_search.conditions import Ends, Sheet, sheets
+from tmsopt.global_search.pruning import Box, Pruned, Puzzle, ends, partial, prune, tree
+from tmsopt.killable import Killable
+from tmsopt.problem.expression import Expression
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import lifted_quantities
+from tmsopt.program.nlp import Scale, reaches_of, scale_of
+from tmsopt.progress import Counts
+from tmsopt.records import Table, plain
+
+SECONDS = 60.0
+"""Time for a proof, by default."""
+
+_MISSING = "codac is not installed; pip install 'tmsopt[certify]' brings it"
+_SINGULAR = "the equations are singular there, or nearly so: one of a continuum of designs, or one where two meet"
+_TIME = "time was over"
+_STOPPED = "interrupted"
+_UNITS = 1.375  # of the usual unit: roots are often at 1, where large and small ones meet
+_CARRIED, _DIGITS, _SHOWN = 60, 40, 25  # decimal digits: of arithmetic, of a zero, of a design
+_TURN, _LONGEST = 0.25, 1e6  # seconds
+_SMALL, _COARSE = 1e-7, 1e-2  # of the first box: what is smaller is not split
+_MOST = 400  # boxes so small, and they are no isolated designs: from then on ten times as large ones are small
+_SAID = 12  # places that are named
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """A part of the box of which nothing is proved.
+
+    Attributes:
+        ranges: of each free parameter.
+        reason: why not.
+    """
+
+    ranges: Table[tuple[float, float]]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """Whether the designs of a box with a pattern are all known.
+
+    Attributes:
+        complete: whether it is proved that the box holds `designs` and no other.
+        reason: why not, in words.
+        designs: free parameters of each that is proved to exist and to be the only one near, angles in radians.
+        limits: of each, the limit on which it lies as far as can be told, so that it may be just beyond; mostly empty.
+        boxes: that interval branch and prune looked at.
+        seconds: that it took.
+        undecided: where it did not decide.
+        stopped: whether Ctrl-C ended it.
+    """
+
+    complete: bool
+    reason: str = ""
+    designs: tuple[Table[Number], ...] = ()
+    limits: tuple[str, ...] = ()
+    boxes: int = 0
+    seconds: float = 0.0
+    undecided: tuple[Undecided, ...] = ()
+    stopped: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return plain(self) | {"seconds": round(self.seconds, 4)}
+
+
+def available() -> bool:
+    """Whether codac is there."""
+    return importlib.util.find_spec("codac") is not None
+
+
+def completeness(problem: Problem, seconds: float = SECONDS, progress: Counts | None = None) -> Completeness:
+    """Every design in the box of a problem with its pattern, and whether that is proved.
+
+    Boxes in the parameters and the unknowns of the pattern are contracted and split until interval arithmetic shows
+    that they hold no design, or the test of Krawczyk that a box around them holds exactly one. Numbers stand for the
+    decimals that print them. Ctrl-C ends it with what is proved so far.
+
+    Args:
+        problem: one with a pattern, and as many conditions as free parameters.
+        progress: called with seconds passed and seconds at most.
+    """
+    if not available():
+        return Completeness(False, _MISSING)
+    began = time.perf_counter()
+    with flint.ctx.workdps(_CARRIED):
+        try:
+            posed = [(sheet, *_puzzle(sheet)) for sheet in _sheets(problem)]
+        except (NotAccepted, TypeError, ZeroDivisionError) as error:
+            return Completeness(False, f"branch and prune cannot take {error}")
+        run = _Run(began + seconds, seconds, progress)
+        try:
+            for sheet, puzzle, box in posed:
+                run.search(sheet, puzzle, box)
+        except KeyboardInterrupt:
+            run.stopped = _STOPPED
+        finally:
+            run.worker.end()
+        return run.stated(problem, time.perf_counter() - began)
+
+
+@dataclass(frozen=True)
+class _Zero:
+    """A solution of the equations of a sheet, proved.
+
+    Attributes:
+        near: the box in which it is the only one.
+    """
+
+    sheet: Sheet
+    enclosure: Enclosure
+    near: Box
+
+
+@dataclass
+class _Run:
+    """A search under way; discarded once it is stated."""
+
+    end: float
+    seconds: float
+    progress: Counts | None
+    worker: Killable = field(default_factory=Killable)
+    boxes: int = 0
+    stopped: str = ""
+    zeros: list[_Zero] = field(default_factory=list)
+    left: list[tuple[Sheet, Box, str]] = field(default_factory=list)
+
+    def search(self, sheet: Sheet, puzzle: Puzzle, first: Box) -> None:
+        """All zeros of a sheet in its box."""
+        known: list[_Zero] = []
+        waiting: list[Box] = [first]
+        small: list[Box] = []
+        most, least = _MOST, _SMALL
+        try:
+            while waiting and not self.stopped:
+                proved = [zero.near for zero in known]
+                pruned = self.asked(puzzle, waiting, proved, most - len(small), least)
+                self.boxes += pruned.boxes
+                waiting = list(pruned.left)
+                small += pruned.small
+                for box in pruned.met:
+                    zero = _zero(sheet, box)
+                    if zero and not any(_within(zero.enclosure.balls, sheet.names, other.near) for other in known):
+                        known.append(zero)
+                        waiting.append(box)
+                    elif halves := _halves(box, puzzle.widths, least):
+                        waiting += halves
+                    else:
+                        small.append(box)
+                if len(small) >= most:
+                    if least >= _COARSE:
+                        break
+                    most, least = most + _MOST, 10 * least
+        except KeyboardInterrupt:
+            self.stopped, waiting = _STOPPED, [first]  # whatever was in hand
+        self.zeros += known
+        self.left += [(sheet, box, _SINGULAR) for box in small]
+        self.left += [(sheet, box, self.stopped or _SINGULAR) for box in waiting]
+
+    def _found(self) -> str:
+        return f"{self.boxes:,} boxes" if self.boxes else ""
+
+    def asked(self, puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], most: int, least: float) -> Pruned:
+        """What a worker makes of boxes; these again where time is over."""
+        left = self.end - time.perf_counter()
+        if self.progress:
+            self.progress(min(self.seconds - left, self.seconds), self.seconds, self._found())
+        if left > 0:
+            answer = self.worker.call(prune, puzzle, boxes, proved, min(_TURN, left), most, least)
+            try:
+                return answer.result(min(left, _LONGEST) + _TURN)  # type: ignore[no-any-return]
+            except TimeoutError:
+                pass
+            except Exception:  # of the process, or raised there
+                self.stopped = "branch and prune ended by an error"
+        self.stopped = self.stopped or _TIME
+        return Pruned(0, tuple(boxes), (), ())
+
+    def stated(self, problem: Problem, seconds: float) -> Completeness:
+        """What is proved by now."""
+        designs: list[tuple[Mapping[str, Any], str]] = []
+        for zero in self.zeros:
+            at = {n: zero.enclosure.balls[n] for n in problem.free}
+            limit = _standing(zero)
+            if limit is not None and not any(all(at[n].overlaps(b[n]) for n in at) for b, _ in designs):
+                designs.append((at, limit))
+        designs.sort(key=lambda found: [float(x) for x in found[0].values()])
+        places = _places(problem, self.left)
+        undecided = tuple(Undecided(_ranges(problem, box), reason) for box, reason in places)
+        reasons = dict.fromkeys(u.reason for u in undecided)
+        return Completeness(
+            complete=not (self.left or self.stopped),
+            reason="; ".join(reasons) or self.stopped,
+            designs=tuple(Table(_numbers(problem, at)) for at, _ in designs),
+            limits=tuple(limit for _, limit in designs),
+            boxes=self.boxes,
+            seconds=seconds,
+            undecided=undecided,
+            stopped=self.stopped == _STOPPED,
+        )
+
+
+def _sheets(problem: Problem) -> Iterator[Sheet]:
+    """The equations, one for each way in which the roots may be small or large."""
+    assert problem.pattern is not None
+    equalities = tuple(c for c in problem.conditions.values() if c.equality)
+    middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
+    lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
+    scale = scale_of(problem)
+    scale = Scale(_UNITS * scale.unit, scale.lead)
+    held = problem.exactly(problem.fixed)
+    for pieces in sheets(problem.pattern.form):
+        yield Sheet(problem, pieces, scale, equalities, lifted, held)
+
+
+def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
+    """Equations and limits as plain data, and the box of all unknowns.
+
+    Raises:
+        NotAccepted: for equations that have no such form.
+    """
+    names = sheet.names
+    at = {n: variable(n) for n in names}
+    equations = tuple(tree(e, names) for e in sheet(at))
+    limits = [*sheet.nonnegative(at), *sheet.ascending(at)]
+    values = sheet.values(at)
+    for condition in sheet.problem.conditions.values():
+        if not condition.equality:
+            try:
+                limits.append(-condition.sign * condition.enclosure(values))
+            except (NotAccepted, TypeError, KeyError, ZeroDivisionError):
+                continue  # it takes no part, and is asked of every design that is found
+    box = tuple(_range(ends) for ends in _ends(sheet))
+    guarded = set().union(*(partial(e) for e in equations))
+    trees = tuple(tree(limit, names) for limit in limits)
+    more = tuple(tree(e, names) for e in sheet.shared(at))
+    widths = tuple(_width(*limits) for limits in box)
+    return Puzzle(equations, trees, tuple(sorted(guarded)), widths, more), box
+
+
+def _width(lo: float, hi: float) -> float:
+    return hi - lo if math.isfinite(hi - lo) else 1.0
+
+
+def _ends(sheet: Sheet) -> list[tuple[Any, Any]]:
+    """Least and greatest value of each unknown, as balls."""
+    problem = sheet.problem
+    found: list[tuple[Any, Any]] = []
+    for name, (least, greatest) in problem.free.items():
+        lo, hi = (flint.arb(problem.exactly({name: end})[name]) for end in (least, greatest))
+        found.append((lo.tan(), hi.tan()) if problem.parameter_set[name].tangent else (lo, hi))
+    for low, high in [(q.range.lower, q.range.upper) for q in sheet.lifted] + [
+        r for p in sheet.pieces for r in p.ranges
+    ]:
+        found.append((flint.arb(low), flint.arb(high)))
+    return found
+
+
+def _range(limits: tuple[Any, Any]) -> Ends:
+    lo, hi = (ends(x) if x.is_finite() else (float(x), float(x)) for x in limits)
+    return lo[0], hi[1]
+
+
+def _zero(sheet: Sheet, box: Box) -> _Zero | None:
+    """The zero beside a box, proved; None where the test fails."""
+    start = {n: flint.arb(lo + (hi - lo) / 2) for n, (lo, hi) in zip(sheet.names, box, strict=True)}
+    units = reaches_of(sheet.problem)
+    try:
+        middle = refined(sheet, start, sheet.names, _DIGITS, units)
+        found = enclosed(sheet, middle, sheet.names, _DIGITS, units)
+    except (Refused, ZeroDivisionError, ValueError):
+        return None
+    around = {n: found.uniqueness * units.get(n, 1.0) for n in sheet.names}
+    near = [(middle[n] - r, middle[n] + r) for n, r in around.items()]
+    return _Zero(sheet, found, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
+
+
+def _within(balls: Mapping[str, Any], names: Sequence[str], box: Box) -> bool:
+    return all(balls[n] > lo and balls[n] < hi for n, (lo, hi) in zip(names, box, strict=True))
+
+
+def _standing(zero: _Zero) -> str | None:
+    """The limit on which a design lies as far as can be told, or empty; None for one beyond a limit."""
+    sheet, at = zero.sheet, zero.enclosure.balls
+    values = sheet.values(at)
+    room: list[tuple[str, Any]] = []
+    for name, (lo, hi) in zip(sheet.names, _ends(sheet), strict=True):
+        said = "" if name.startswith(":") else name
+        room += [(said and f"the least {said}", at[name] - lo), (said and f"the greatest {said}", hi - at[name])]
+    room += [("the edge of the pattern", x) for x in sheet.nonnegative(at)]
+    room += [("", x) for x in sheet.ascending(at)]
+    for name, condition in sheet.problem.conditions.items():
+        if not condition.equality:
+            excess = condition.sign * flint.arb(condition.enclosure(values))
+            if not excess.is_finite() and not _met(sheet.problem, condition, at):
+                return None
+            room.append((f"constraint {name}", -excess))
+    if any(x < 0 for _, x in room):
+        return None
+    on = [said for said, x in room if said and not x > 0]
+    return ", ".join(on + ["a0 = 0"] * flint.arb(values.coefficients[0]).contains(0))
+
+
+def _met(problem: Problem, condition: Expression, at: Mapping[str, Any]) -> bool:
+    """Whether a constraint that may not exist somewhere near exists at the middle, and is met."""
+    values = problem.values(problem.ordered({name: float(at[name].mid()) for name in problem.free}))
+    return bool(condition.violation(values) <= 0)
+
+
+def _halves(box: Box, widths: Sequence[float], least: float) -> list[Box]:
+    """A box cut across its longest side; none for one that is small."""
+    share = [(hi - lo) / w if w > 0 else 0.0 for (lo, hi), w in zip(box, widths, strict=True)]
+    k = max(range(len(box)), key=share.__getitem__)
+    lo, hi = box[k]
+    middle = lo + (hi - lo) / 2
+    if not (share[k] > least and lo < middle < hi):
+        return []
+    return [(*box[:k], ends, *box[k + 1 :]) for ends in ((lo, middle), (middle, hi))]
+
+
+def _places(problem: Problem, left: Iterable[tuple[Sheet, Box, str]]) -> list[tuple[Box, str]]:
+    """Hulls in the free parameters of boxes that touch."""
+    count = len(problem.free)
+    places: list[tuple[Box, str]] = []
+    for _, box, reason in left:
+        own, rest = box[:count], []
+        for other, why in places:
+            if why == reason and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(own, other, strict=True)):
+                own = tuple((min(a[0], b[0]), max(a[1], b[1])) for a, b in zip(own, other, strict=True))
+            else:
+                rest.append((other, why))
+        places = [*rest, (own, reason)]
+    if len(places) > _SAID:
+        hull = tuple((min(p[0][k][0] for p in places), max(p[0][k][1] for p in places)) for k in range(count))
+        return [(hull, "; ".join(dict.fromkeys(why for _, why in places)))]
+    return places
+
+
+def _ranges(problem: Problem, box: Box) -> Table[Ends]:
+    """A box in the parameters themselves, angles in radians."""
+    of = problem.parameter_set
+    return Table({
+        n: (math.atan(lo), math.atan(hi)) if of[n].tangent else (lo, hi)
+        for n, (lo, hi) in zip(problem.free, box, strict=True)
+    })  # fmt: skip
+
+
+def _numbers(problem: Problem, at: Mapping[str, Any]) -> dict[str, Any]:
+    of = problem.parameter_set
+    return {n: number(x.atan() if of[n].tangent else x, _SHOWN) for n, x in at.items()}

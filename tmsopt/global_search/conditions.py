@@ -1,0 +1,233 @@
+"""A pattern as equations in the parameters and few unknowns, all of these bounded: designs at infinity are none.
+
+Only the roots that the pattern ties are unknown; the others drop out where p is divided by their factors. Roots s of
+at most a unit of size are unknown as themselves, larger ones as 1/s in the reversed polynomial: every unknown has a
+range, whatever the leading coefficient does, and no equation has a quotient.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import flint
+
+from tmsopt.algebra.elementary import exact, quotient
+from tmsopt.models import Quantity, Values
+from tmsopt.problem.expression import Expression
+from tmsopt.problem.problem import Problem
+from tmsopt.program.nlp import Scale
+from tmsopt.roots import product as multiplied
+from tmsopt.roots.patterns.parts import Part, parts_of
+
+Ends = tuple[float, float]
+
+_AWAY = flint.fmpq(3, 4)  # factors of one kind are told apart by b + 3c/4, which is rarely the same of two
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A factor of a pattern, to a power.
+
+    Attributes:
+        kind: ``root``, ``pair``, ``meeting`` (two real roots), ``axis`` or ``zero``.
+        order: the power.
+        outer: whether the unknowns are those of 1/s.
+        first: number of its first unknown.
+    """
+
+    kind: str
+    order: int
+    outer: bool
+    first: int
+
+    @property
+    def ranges(self) -> tuple[Ends, ...]:
+        """Of each unknown, where no root is larger than 1."""
+        return {
+            "root": ((-1.0, 1.0),), "pair": ((-2.0, 2.0), (0.0, 1.0)), "meeting": ((-2.0, 2.0), (-1.0, 1.0)),
+            "axis": ((0.0, 1.0),), "zero": (),
+        }[self.kind]  # fmt: skip
+
+    def own(self, unknowns: Sequence[Any]) -> Sequence[Any]:
+        """Its unknowns among all."""
+        return unknowns[self.first : self.first + len(self.ranges)]
+
+    def factor(self, unknowns: Sequence[Any]) -> list[Any]:
+        """Monic, in s or in 1/s."""
+        u = self.own(unknowns)
+        match self.kind:
+            case "root":
+                return [1, -u[0]]
+            case "axis":
+                return [1, 0, u[0]]
+            case "zero":
+                return [1, 0]
+        return [1, *u]
+
+    def place(self, unknowns: Sequence[Any]) -> Any:
+        """What ascends among factors that may change places."""
+        u = self.own(unknowns)
+        return u[0] if len(u) == 1 else u[0] + _AWAY * u[1]
+
+    def nonnegative(self, unknowns: Sequence[Any]) -> list[Any]:
+        """What must be ≥ 0 beside the ranges."""
+        u = self.own(unknowns)
+        if self.kind == "pair":
+            return [4 * u[1] - u[0] * u[0]]
+        if self.kind == "meeting":
+            return [u[0] * u[0] - 4 * u[1], 1 + u[0] + u[1], 1 - u[0] + u[1]]
+        return []
+
+
+def sheets(name: str) -> Iterator[tuple[Piece, ...]]:
+    """The ways in which the roots of a pattern may be small or large."""
+    for choice in product(*(list(_ways(part)) for part in parts_of(name))):
+        pieces: list[Piece] = []
+        for kind, order, outer in (piece for way in choice for piece in way):
+            pieces.append(Piece(kind, order, outer, sum(len(p.ranges) for p in pieces)))
+        yield tuple(pieces)
+
+
+def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
+    """Kind, power and place of the factors of a part."""
+    if part.kind == "capsize":
+        yield [("zero", 1, False)]
+    elif part.kind in ("weave", "resonance"):
+        yield from ([("axis", part.order + (part.kind == "resonance"), outer)] for outer in (False, True))
+    elif part.kind == "EP" and part.count == 2:
+        yield [("meeting", part.order, False)]
+        yield [("meeting", part.order, True)]
+        yield [("root", part.order, False), ("root", part.order, True)]
+    else:
+        kind = "root" if part.kind == "EP" else "pair"
+        for inner in range(part.count + 1):
+            yield [(kind, part.order, k >= inner) for k in range(part.count)]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The equations of a pattern where some of its roots are small and the others large; names go to any numbers.
+
+    A parameter goes by its name, an angle by its tangent; a quantity with an equation of its own by its name; the
+    unknowns of the pattern by ``:0``, ``:1`` and so on.
+
+    Attributes:
+        scale: of the roots and the coefficients.
+        equalities: the == constraints.
+        lifted: quantities in them that are unknowns with an equation.
+        held: the fixed parameters, as they are taken exactly.
+    """
+
+    problem: Problem
+    pieces: tuple[Piece, ...]
+    scale: Scale
+    equalities: tuple[Expression, ...]
+    lifted: tuple[Quantity, ...]
+    held: Mapping[str, Any]
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Those of the pattern."""
+        return tuple(f":{k}" for k in range(sum(len(p.ranges) for p in self.pieces)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All that is unknown."""
+        return (*self.problem.free, *(q.name for q in self.lifted), *self.unknowns)
+
+    def values(self, at: Mapping[str, Any]) -> Values:
+        """Everything that follows from numbers by name."""
+        problem = self.problem
+        of, known = problem.parameter_set, {q.name for q in self.lifted}
+        free = {n: at[n].atan() if of[n].tangent else at[n] for n in problem.free}
+        own = {n: free.get(n, self.held.get(n)) for n in of.names}
+        values = Values(problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
+        if (abscissa := self._abscissa([at[n] for n in self.unknowns])) is not None:
+            values.define("abscissa", abscissa)
+        return values
+
+    def __call__(self, at: Mapping[str, Any]) -> list[Any]:
+        """Left sides of the equations: as many as unknowns."""
+        values = self.values(at)
+        left = conditions(self._scaled(values), self.pieces, [at[n] for n in self.unknowns])
+        left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
+        return left + [e.enclosure(values) for e in self.equalities]
+
+    def shared(self, at: Mapping[str, Any]) -> list[Any]:
+        """What must be 0 beside the equations where roots of size 1 count as small and as large."""
+        return shared(self._scaled(self.values(at)), self.pieces, [at[n] for n in self.unknowns])
+
+    def _scaled(self, values: Values) -> list[Any]:
+        lead, unit = exact(self.scale.lead), exact(self.scale.unit)
+        return [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
+
+    def nonnegative(self, at: Mapping[str, Any]) -> list[Any]:
+        """What must be ≥ 0 for the unknowns to be those of the pattern."""
+        u = [at[n] for n in self.unknowns]
+        return [x for piece in self.pieces for x in piece.nonnegative(u)]
+
+    def ascending(self, at: Mapping[str, Any]) -> list[Any]:
+        """What is ≥ 0 for one of the ways to call the factors of a design by number."""
+        u = [at[n] for n in self.unknowns]
+        pairs = zip(self.pieces, self.pieces[1:], strict=False)
+        alike = [(p, q) for p, q in pairs if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
+        return [q.place(u) - p.place(u) for p, q in alike]
+
+    def _abscissa(self, u: Sequence[Any]) -> Any:
+        """Largest real part where the pattern makes up all roots; None elsewhere."""
+        pattern = self.problem.pattern
+        if pattern is None or pattern.abscissa is None:
+            return None
+        (piece,) = self.pieces
+        unit, own = exact(self.scale.unit), piece.own(u)
+        if piece.kind == "root":
+            return quotient(unit, own[0]) if piece.outer else unit * own[0]
+        return quotient(-unit * own[0], 2 * own[1]) if piece.outer else -unit * own[0] / 2
+
+
+def conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
+    """Expressions that are all 0 where the factors divide a polynomial, each as often as its power says.
+
+    Where they make up all of it, its coefficients less those of the product, in fewer terms; else the remainders, of
+    small and of large roots apart. See `shared`.
+    """
+    left: list[Any] = []
+    for outer in (False, True):
+        rest = a[::-1] if outer else a
+        factors = [p.factor(unknowns) for p in pieces if p.outer == outer for _ in range(p.order)]
+        whole = multiplied(*factors)
+        if len(whole) == len(a):
+            return left + [c - rest[0] * f for c, f in zip(rest[1:], whole[1:], strict=True)]
+        for factor in factors:
+            rest, remainder = divided(rest, factor)
+            left += remainder
+    return left
+
+
+def shared(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
+    """What `conditions` leaves out: that a small and a large root are two, though both are of size 1.
+
+    Remainders of what the factors of small roots leave, divided by those of large ones; none where all are of a kind.
+    """
+    inner, outer = ([p.factor(unknowns) for p in pieces if p.outer == o for _ in range(p.order)] for o in (False, True))
+    left: list[Any] = []
+    if inner and outer:
+        for factor in inner:
+            a, _ = divided(a, factor)
+        a = a[::-1]
+        for factor in outer:
+            a, remainder = divided(a, factor)
+            left += remainder
+    return left
+
+
+def divided(a: Sequence[Any], monic: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+    """Quotient and remainder of polynomials, descending."""
+    rest = list(a)
+    count = len(a) - len(monic) + 1
+    for k in range(count):
+        for j, f in enumerate(monic[1:], start=1):
+            if not (isinstance(f, int) and f == 0):
+                rest[k + j] = rest[k + j] - rest[k] * f
+    return rest[:count], rest[count:]

@@ -1,0 +1,182 @@
+"""Root quantities for branch and bound: half-planes by interlacing parts, sectors by bounded factors."""
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.algebra.intervals import Interval, ranges, root_bound
+from tmsopt.global_search.interlacing import interlace, squares_of, unknowns
+from tmsopt.models import Model, Values
+from tmsopt.program.formulate import Builder
+from tmsopt.program.lifts import Lifted, quadratic_pairs
+from tmsopt.program.nlp import AddedVariable
+from tmsopt.roots import Pattern, product, shift
+from tmsopt.roots.patterns.pattern import Roots
+
+_PLAIN = 4  # degree up to which the powers of the unit are near enough to 1
+
+
+@dataclass(frozen=True)
+class Frame:
+    """How coefficients are looked at.
+
+    Attributes:
+        signs: case → sign of the leading one; cases without are left aside.
+        unit: usual size of the roots, a power of two.
+        touching: whether a line must have a root on it, lest more be claimed than is so.
+        compact: whether squared frequencies are taken as X/(1 − X).
+        least: what the leading coefficient of the model is not below in the first case, in absolute value.
+    """
+
+    model: Model
+    signs: Mapping[int, int]
+    unit: float
+    touching: bool = False
+    compact: bool = False
+    least: float = 0.0
+
+    def coefficients(self, values: Sequence[Values], case: int) -> list[Any]:
+        """Coefficients for roots in the unit, with a leading one that is positive, in the compact form of the model."""
+        a = compact(self.model, values[case])
+        return [self.signs[case] * c * self.lead / self.unit**k for k, c in enumerate(a)]
+
+    @property
+    def lead(self) -> float:
+        """What all coefficients are multiplied by, so that none is far smaller than the others are large."""
+        return float(self.unit ** (self.model.degree // 2)) if self.model.degree > _PLAIN else 1.0
+
+    def about(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
+        """The same of p(t + line)."""
+        return shift(self.coefficients(values, case), line / self.unit)
+
+    def largest(self, ranges: Sequence[Interval], first: bool) -> float:
+        """Bound on the roots for coefficients in ranges, of the first case or of another."""
+        (lower, upper), *others = ranges
+        least = self.least * self.lead if first else -math.inf
+        return root_bound([(max(lower, least), max(upper, least)), *others])
+
+
+def compact(model: Model, values: Values) -> list[Any]:
+    """Coefficients but for a positive factor, in as few products as the model knows."""
+    with suppress(ZeroDivisionError):  # by a parameter that is fixed at 0
+        if model.compact is not None:
+            return model.compact(**model.algebraic({name: values[name] for name in model.sets[0].names}))
+    return list(values.coefficients)
+
+
+def over(build: Builder, expressions: Sequence[Any]) -> list[Interval]:
+    """Ranges of expressions over the variables so far, by interval arithmetic."""
+    function = ca.Function("over", [ca.vertcat(*build.x)], [ca.densify(ca.vertcat(*map(ca.SX, expressions)))])
+    return ranges(function, build.bounds)[0]
+
+
+def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lifted:
+    """Every root of every case at or left of a line: a known one, or a variable."""
+    covered, values = build.covered, build.values
+    looked = [case for case in covered if case in frame.signs]
+    at = build.variable("abscissa", *_reach(frame, build, looked)) if line is None else line
+    for case in looked:
+        c = frame.about(values, case, at)
+        edges = interlace(build, case, c, frame.largest(over(build, c), case == covered[0]), frame.compact)
+        if line is None and frame.touching and len(covered) == 1:
+            build.row("abscissa", math.prod(edges), 0.0, 0.0)
+    size = (line is None) + len(looked) * unknowns(frame.model.degree)
+    return Lifted(ca.SX(at), AddedVariable("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ())
+
+
+def _reach(frame: Frame, build: Builder, looked: Sequence[int]) -> tuple[float, float]:
+    """Range of the abscissa: it is no larger than the largest root, unless that is one of a case not looked at."""
+    most = max(
+        frame.unit * frame.largest(over(build, frame.coefficients(build.values, case)), case == looked[0])
+        for case in looked
+    )
+    return -most, most if len(build.values) == 1 or not frame.touching else math.inf
+
+
+def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
+    """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
+
+    A root s > 0 has ζ = −1, and with another s < 0 no such factor. Where ζ may be −1, the factors are s² + pᵢ s + qᵢ,
+    with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked. An odd degree
+    has one factor s + d more, d ≥ 0 asked only of other ζ: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
+    """
+    covered, values = build.covered, build.values
+    zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
+    looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
+    size = int(ratio is None)
+    for case in looked:
+        a = frame.coefficients(values, case)
+        largest = frame.largest(over(build, a), case == covered[0])
+        pairs, monic = [], []
+        for k in range(1, (len(a) - 1) // 2 + 1):
+            p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
+            w = build.variable(f"w{k}.{case}", 0.0, largest)
+            q = build.variable(f"q{k}.{case}", -largest * largest, largest * largest) if ratio is None else w * w
+            size += 2 + (ratio is None)
+            pairs.append(p)
+            monic.append([1, p, q])
+            build.row("damping_ratio", p - 2 * zeta * w, 0.0, np.inf)
+            if ratio is None:
+                build.row("damping_ratio", (1 + zeta) * (w * w - q), 0.0, 0.0)
+                build.row("damping_ratio", w * w - q, 0.0, np.inf)
+        if len(a) % 2 == 0:
+            d = build.variable(f"d.{case}", 0.0 if ratio is not None else -largest, largest)
+            size += 1 + (ratio is None)
+            monic.append([1, d])
+            if ratio is None:
+                e = build.variable(f"e.{case}", 0.0, largest)
+                build.row("damping_ratio", (1 + zeta) * (e - d), 0.0, 0.0)
+                build.row("damping_ratio", e - d, 0.0, np.inf)
+        for one, other in pairwise(pairs):  # their order means nothing
+            build.row("damping_ratio", other - one, 0.0, np.inf)
+        build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
+    build.row("damping_ratio", 1 - zeta, 0.0, np.inf)  # real roots would satisfy any larger one, too
+    guess = partial(_sector_guess, frame, looked, ratio, build.unit)
+    return Lifted(ca.SX(zeta), AddedVariable("damping_ratio", size, guess), (), ())
+
+
+def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
+    """Ranges for the unknown factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
+    count = len(pattern.unknowns)
+    largest = root_bound(over(build, compact(frame.model, build.values[0]))) / build.unit
+    symbols = build.x[-count:]
+    for factor in pattern.factors(symbols):
+        for k, c in enumerate(factor[1:], start=1):
+            for j, symbol in enumerate(symbols):
+                if any(ca.is_equal(ca.SX(c), e, 2) for e in (symbol, -symbol)):
+                    most = math.comb(len(factor) - 1, k) * largest**k
+                    lower, upper = build.bounds[j - count]
+                    build.bounds[j - count] = (max(lower, -most), min(upper, most))
+
+
+def _half_plane_guess(
+    frame: Frame, covered: Sequence[int], line: float | None, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    """The least line, if it is not known, and squared frequencies."""
+    at = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
+    squares = [x for case in covered for x in squares_of([float(c) for c in frame.about(values, case, at)])]
+    return [[*([at] if line is None else []), *(x / (1 + x) if frame.compact else x for x in squares)]]
+
+
+def _sector_guess(
+    frame: Frame, covered: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    """Damping ratio, if it is not known, and factors; the roots are given in the unit of the NLP."""
+    factors = []
+    for case in covered:
+        split = quadratic_pairs(z[case] * unit / frame.unit)
+        for p, q in sorted((float(-r.sum().real), float(r.prod().real)) for r in split if len(r) == 2):
+            unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
+            factors += [p, abs(p) / 2 if unstable else math.sqrt(q), *([q] if ratio is None else [])]
+        for d in (-float(r[0].real) for r in split if len(r) == 1):
+            factors += [d, abs(d)] if ratio is None else [d]
+    if ratio is not None:
+        return [factors]
+    return [[min(float(values[case]["damping_ratio"]) for case in covered), *factors]]

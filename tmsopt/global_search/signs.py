@@ -1,0 +1,55 @@
+"""No stable design, by signs: a polynomial has all roots left of the axis only where its coefficients have one sign."""
+
+from collections import deque
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.algebra.intervals import ranges
+from tmsopt.algebra.walk import NotAccepted
+from tmsopt.problem.problem import Problem
+
+_BOXES = 300  # looked at, beyond which it is left to others
+
+
+def none_stable(problem: Problem) -> bool:
+    """Whether it is certain, by interval arithmetic alone, that no design of the box is stable, limits or not.
+
+    In each part of the box two coefficients have different signs, or one and a Hurwitz determinant of degree 3 or 4. Of
+    a problem with several cases nothing is said.
+    """
+    if problem.cases or not problem.free:
+        return False
+    x = ca.SX.sym("x", len(problem.free))
+    a = problem.model.coefficients(
+        problem.ordered(dict(zip(problem.free, ca.vertsplit(x), strict=True))), problem.parameter_set
+    )
+    tests = ca.vertcat(*map(ca.SX, [*a, *_determinants(a)]))
+    function = ca.Function("signs", [x], [ca.densify(tests)], {"cse": True})
+    left = deque([[(lo, hi) for lo, hi in problem.free.values()]])
+    widths = np.array([hi - lo for lo, hi in problem.free.values()])
+    for _ in range(_BOXES):
+        if not left:
+            return True
+        box = left.popleft()
+        try:
+            (ends,) = (np.array(row) for row in ranges(function, box))
+        except NotAccepted:
+            return False
+        if (ends[:, 0] > 0).any() and (ends[:, 1] < 0).any():
+            continue
+        k = int(np.argmax(np.array([hi - lo for lo, hi in box]) / widths))
+        lo, hi = box[k]
+        middle = lo + (hi - lo) / 2
+        left += [[*box[:k], part, *box[k + 1 :]] for part in ((lo, middle), (middle, hi))]
+    return not left
+
+
+def _determinants(a: list[Any]) -> list[Any]:
+    """A Hurwitz determinant of degree 3 or 4 that has the coefficients' sign where all roots are left of the axis."""
+    if len(a) == 4:
+        return [a[0] * (a[1] * a[2] - a[0] * a[3])]
+    if len(a) == 5:
+        return [a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2]
+    return []

@@ -1,0 +1,335 @@
+"""An NLP as factorable polynomial equations for SCIP.
+
+Every product of two expressions that are not affine gets a variable, and so does every expression that is used twice:
+what the formula shares, the relaxation shares. Quotients, radicals and arctangents become equations without them.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import flint
+
+from tmsopt.algebra.intervals import INTERVALS, Interval, ball, interval
+from tmsopt.algebra.walk import NotAccepted, walk
+from tmsopt.program.nlp import NLP
+
+FEASIBILITY = 1e-9
+"""SCIP's feasibility tolerance: rows may be off by so much."""
+
+_LEAST_POWER = -60  # of two, of a scale: what is smaller is as good as 0
+_HUGE = 1e15  # beyond which numbers are left to nobody: from 1e20 SCIP takes them for infinite
+_LARGE = 1e3  # numbers up to which a coefficient below 1e-9 counts for nothing: SCIP drops it
+_WHOLE = 1000  # exponent up to which a power is taken
+
+_CANCELLED = 2.0**-10
+"""Of the largest summand: rows are not scaled by less, lest they be held to less than a rounding."""
+
+
+@dataclass(frozen=True)
+class Translated:
+    """An NLP as a SCIP model.
+
+    Attributes:
+        model: of pyscipopt; its objective is not set.
+        variables: SCIP's variable for each of the NLP's, and what it is to be multiplied by.
+        objective: expression to minimise.
+        impossible: whether a row without any variable is violated.
+    """
+
+    model: Any
+    variables: tuple[tuple[Any, float], ...]
+    objective: Any
+    impossible: bool
+
+
+def translate(nlp: NLP) -> Translated:
+    """The SCIP model of an NLP.
+
+    Raises:
+        NotAccepted: for an operation that cannot be written for SCIP.
+    """
+    built = _Translation()
+    x = [built.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
+    objective, rows = walk(nlp.functions, x, built.arithmetic(), built.variable)
+    for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
+        built.between(row, lower, upper)
+    least = built.variable(objective[0]).expression
+    return Translated(built.scip, tuple((v.symbol, v.scale) for v in x), least, built.impossible)
+
+
+@dataclass(frozen=True)
+class Term:
+    """A result on the way: an expression of SCIP with its degree and range.
+
+    Attributes:
+        expression: a number where it is _constant.
+        degree: 0, 1 or 2.
+        ball: its range.
+        size: bound on its summands, which may cancel.
+        tangent: what it is the arctangent of.
+        symbol, scale: of a variable, which is the expression divided by its scale.
+    """
+
+    expression: Any
+    degree: int
+    ball: Any
+    size: float
+    tangent: "Term | None" = None
+    symbol: Any = None
+    scale: float = 1.0
+
+    @property
+    def ends(self) -> Interval:
+        return interval(self.ball) if self.degree else (self.expression, self.expression)
+
+    @property
+    def unit(self) -> float:
+        """What a row of it is divided by to be about 1, a power of two; never more than 1."""
+        return max(_scale_of(max(map(abs, self.ends))), min(_CANCELLED * _scale_of(self.size), 1.0))
+
+
+class _Translation:
+    """Collects variables and rows of a SCIP model; discarded once it is solved."""
+
+    def __init__(self) -> None:
+        import pyscipopt
+
+        self.functions = pyscipopt
+        self.scip = pyscipopt.Model()
+        self.scip.hideOutput()
+        self.count = 0
+        self.impossible = False
+        self.known: dict[int, Term] = {}
+        self.kept: list[Term] = []
+
+    def free(self, lower: float, upper: float, over: Any = None) -> Term:
+        """A variable, scaled by a power of two to about 1."""
+        scale = _scale_of(max(abs(lower), abs(upper)))
+        ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
+        self.count += 1
+        symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
+        over = ball((lower, upper)) if over is None else over
+        return Term(scale * symbol, 1, over, max(abs(lower), abs(upper)), symbol=symbol, scale=scale)
+
+    def defined(self, over: Any, lower: float = -math.inf) -> Term:
+        """A variable for something with a known range."""
+        ends = interval(over)
+        return self.free(max(ends[0], lower), ends[1], over)
+
+    def variable(self, term: Term) -> Term:
+        """The same, at most affine: what is of degree 2 gets a variable, once."""
+        if term.degree < 2:
+            return term
+        if id(term) not in self.known:
+            new = self.defined(term.ball)
+            self.between(Term(new.expression - term.expression, 2, term.ball, term.size), 0.0, 0.0)
+            self.known[id(term)] = new
+            self.kept.append(term)
+        return self.known[id(term)]
+
+    def between(self, term: Term, lower: float, upper: float) -> None:
+        """A row, scaled to about 1."""
+        if term.degree == 0:
+            self.impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
+            return
+        size = term.unit
+        if lower == upper:
+            self.scip.addCons(term.expression / size == lower / size)
+            return
+        if math.isfinite(lower):
+            self.scip.addCons(term.expression / size >= lower / size)
+        if math.isfinite(upper):
+            self.scip.addCons(term.expression / size <= upper / size)
+
+    def arithmetic(self) -> dict[int, Any]:
+        """CasADi's operations."""
+        functions = {"exp": ca.OP_EXP, "log": ca.OP_LOG, "sin": ca.OP_SIN, "cos": ca.OP_COS}
+        return {
+            ca.OP_CONST: _constant,
+            ca.OP_ADD: lambda a, b: self.sum(a, b, 1.0),
+            ca.OP_SUB: lambda a, b: self.sum(a, b, -1.0),
+            ca.OP_NEG: lambda a: self.times(a, -1.0),
+            ca.OP_TWICE: lambda a: self.times(a, 2.0),
+            ca.OP_MUL: self.product,
+            ca.OP_SQ: self.square,
+            ca.OP_DIV: self.quotient,
+            ca.OP_INV: lambda a: self.quotient(_constant(1.0), a),
+            ca.OP_SQRT: self.root,
+            ca.OP_POW: self.power,
+            ca.OP_CONSTPOW: self.power,
+            ca.OP_TAN: self.tangent,
+            ca.OP_ATAN: self.arctangent,
+            ca.OP_ASIN: lambda a: self.inverse(a, "sin", ca.OP_ASIN),
+            ca.OP_ACOS: lambda a: self.inverse(a, "cos", ca.OP_ACOS),
+            ca.OP_FABS: self.size,
+            ca.OP_FMAX: lambda a, b: self.extreme(a, b, 0.5),
+            ca.OP_FMIN: lambda a, b: self.extreme(a, b, -0.5),
+            **{op: lambda a, name=name, op=op: self.applied(a, name, op) for name, op in functions.items()},
+        }
+
+    def sum(self, a: Term, b: Term, sign: float) -> Term:
+        over = INTERVALS[ca.OP_ADD](a.ball, sign * b.ball)
+        return Term(a.expression + sign * b.expression, max(a.degree, b.degree), over, max(a.size, b.size))
+
+    def times(self, a: Term, factor: float) -> Term:
+        if 0 < abs(factor) < FEASIBILITY:
+            _refuse_huge(a.ball, "a small multiple", _LARGE)
+        return Term(factor * a.expression, a.degree, factor * a.ball, abs(factor) * a.size)
+
+    def product(self, a: Term, b: Term) -> Term:
+        for fixed, other in ((a, b), (b, a)):
+            if fixed.degree == 0:
+                return self.times(other, fixed.expression)
+        a, b = self.variable(a), self.variable(b)
+        return Term(a.expression * b.expression, 2, a.ball * b.ball, a.size * b.size)
+
+    def square(self, a: Term) -> Term:
+        return replace(self.product(a, a), ball=INTERVALS[ca.OP_SQ](a.ball))
+
+    def quotient(self, a: Term, b: Term) -> Term:
+        """q with q b = a; where b may vanish, of any size."""
+        if b.degree == 0:
+            return self.times(a, 1 / b.expression) if b.expression else self.undefined()
+        b = self.variable(b)
+        q = self.defined(a.ball / b.ball)
+        self.between(Term(q.expression * b.expression - a.expression, 2, a.ball, a.size), 0.0, 0.0)
+        return q
+
+    def root(self, a: Term) -> Term:
+        """r ≥ 0 with r² = a."""
+        least, most = (max(e, 0.0) for e in a.ends)
+        self.impossible |= a.ends[1] < 0
+        r = self.free(math.nextafter(math.sqrt(least), 0), math.nextafter(math.sqrt(most), math.inf))
+        self.between(Term(r.expression * r.expression - a.expression, 2, a.ball, a.size), 0.0, 0.0)
+        return r
+
+    def power(self, a: Term, b: Term) -> Term:
+        if b.degree > 0:  # a^b = exp(b log a), where a cannot be 0, nor negative with a b that is whole
+            if not a.ends[0] > 0:
+                raise NotAccepted("a power with a variable exponent of what may be 0 or negative")
+            return self.applied(self.product(b, self.applied(a, "log", ca.OP_LOG)), "exp", ca.OP_EXP)
+        exponent = b.expression
+        if exponent == 0.5:
+            return self.root(a)
+        if abs(exponent) > _WHOLE:
+            raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
+        if a.degree > 0 and a.ball.is_finite():
+            _refuse_huge(INTERVALS[ca.OP_POW](a.ball, b.ball), "a power")
+        if exponent < 0:
+            return self.quotient(_constant(1.0), self.power(a, _constant(-exponent)))
+        if exponent != int(exponent):
+            return self.fractional(a, exponent)
+        if exponent == 0:
+            return _constant(1.0)
+        half = self.power(a, _constant(exponent // 2)) if exponent > 1 else _constant(1.0)
+        even = self.square(half) if exponent > 1 else half
+        return self.product(even, a) if exponent % 2 else even
+
+    def fractional(self, a: Term, exponent: float) -> Term:
+        """a ≥ 0 to a positive power, 0 included."""
+        least, most = (max(e, 0.0) for e in a.ends)
+        self.impossible |= a.ends[1] < 0
+        a = self.variable(a)
+        power = flint.arb(exponent)
+        low, high = (flint.arb(e) ** power if math.isfinite(e) else flint.arb("inf") for e in (least, most))
+        v = self.free(max(interval(low)[0], 0.0), interval(high)[1])
+        self.scip.addCons(v.expression / v.scale == a.expression**exponent / v.scale)
+        return v
+
+    def applied(self, a: Term, name: str, operation: int) -> Term:
+        """A function that SCIP has; CasADi itself computes those of numbers, but for the base of a power."""
+        if a.degree == 0:
+            return _constant(getattr(math, name)(a.expression))
+        if name == "exp":
+            _refuse_huge(INTERVALS[operation](a.ball), "exp")
+        if a.tangent is not None and name in ("sin", "cos"):
+            cosine, sine = self.on_circle(a.tangent)
+            return sine if name == "sin" else cosine
+        a = self.variable(a)
+        v = self.defined(INTERVALS[operation](a.ball))
+        if name == "log":  # SCIP keeps the argument of its own away from 0
+            self.scip.addCons(a.expression / a.scale == self.functions.exp(v.expression) / a.scale)
+        else:
+            # Others than exp are as small as their argument is known.
+            size = v.scale if name == "exp" else max(v.scale, _CANCELLED)
+            self.scip.addCons(v.expression / size == getattr(self.functions, name)(a.expression) / size)
+        return v
+
+    def on_circle(self, t: Term) -> tuple[Term, Term]:
+        """Cosine and sine of the arctangent of t: C > 0, S = t C, C² + S² = 1."""
+        key = -id(t)
+        if key not in self.known:
+            angle = t.ball.atan()
+            cosine, sine = self.defined(angle.cos(), lower=0.0), self.defined(angle.sin())
+            self.between(self.sum(sine, self.product(t, cosine), -1.0), 0.0, 0.0)
+            self.between(self.sum(self.square(sine), self.square(cosine), 1.0), 1.0, 1.0)
+            self.known[key] = Term((cosine, sine), 1, None, 1.0)
+            self.kept.append(t)
+        pair: tuple[Term, Term] = self.known[key].expression
+        return pair
+
+    def arctangent(self, t: Term) -> Term:
+        """An angle, its sine and cosine through its tangent."""
+        t = self.variable(t)
+        key = id(t)
+        if key not in self.known:
+            angle = self.defined(t.ball.atan())
+            self.known[key] = Term(angle.expression, 1, angle.ball, angle.size, tangent=t)
+            self.kept.append(t)
+            cosine, sine = self.on_circle(t)
+            for part, name in ((cosine, "cos"), (sine, "sin")):
+                self.scip.addCons(part.expression == getattr(self.functions, name)(angle.expression))
+        return self.known[key]
+
+    def tangent(self, a: Term) -> Term:
+        if a.tangent is not None:
+            return a.tangent
+        return self.quotient(self.applied(a, "sin", ca.OP_SIN), self.applied(a, "cos", ca.OP_COS))
+
+    def inverse(self, a: Term, name: str, operation: int) -> Term:
+        """An angle whose sine or cosine is given."""
+        ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
+        over = INTERVALS[operation](a.ball)
+        angle = self.defined(over) if over.is_finite() else self.free(*ends)
+        self.scip.addCons(self.variable(a).expression == getattr(self.functions, name)(angle.expression))
+        return angle
+
+    def size(self, a: Term) -> Term:
+        """|a|, which SCIP has."""
+        a = self.variable(a)
+        lower, upper = a.ends
+        if lower >= 0 or upper <= 0:
+            return self.times(a, 1.0 if lower >= 0 else -1.0)
+        v = self.defined(abs(a.ball), lower=0.0)
+        self.scip.addCons(v.expression / v.scale == abs(a.expression) / v.scale)
+        return v
+
+    def extreme(self, a: Term, b: Term, half: float) -> Term:
+        """The greater of two, for half 1/2, or the lesser, for −1/2: (a + b)/2 ± |a − b|/2."""
+        middle = self.times(self.sum(a, b, 1.0), 0.5)
+        return self.sum(middle, self.times(self.size(self.sum(a, b, -1.0)), half), 1.0)
+
+    def undefined(self) -> Term:
+        """What does not exist, for any design."""
+        self.impossible = True
+        return _constant(0.0)
+
+
+def _constant(value: float) -> Term:
+    if math.isfinite(value) and abs(value) > _HUGE:
+        raise NotAccepted(f"numbers beyond {_HUGE:g}")
+    return Term(float(value), 0, flint.arb(value), abs(float(value)))
+
+
+def _refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
+    if over.is_finite() and max(map(abs, interval(over))) > most:
+        raise NotAccepted(f"{name} of numbers beyond {most:g}")
+
+
+def _scale_of(size: float) -> float:
+    """What to divide a variable or row by that is at most so large."""
+    if not (math.isfinite(size) and size > 0):
+        return 1.0
+    return float(2.0 ** min(max(math.ceil(math.log2(size)), _LEAST_POWER), 0))

@@ -1,0 +1,18 @@
+from .advice.remedies import Relaxation as Relaxation, moved_limits as moved_limits, with_limits as with_limits
+from .array_function import array_function as array_function
+from .cases import Band as Band, Case as Case
+from .expression import (
+    Expression as Expression, ExpressionError as ExpressionError, parse_comparison as parse_comparison,
+    parse_value as parse_value,
+)
+from .files import Given as Given, load as load, as_problem as as_problem, as_solvable as as_solvable
+from .limit import limit_of as limit_of, with_limit as with_limit
+from .problem import Problem as Problem, degrees_of_freedom as degrees_of_freedom
+from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
+from .searches import Starts as Starts, expected_unseen as expected_unseen, is_enough as is_enough
+from .solution import Bound as Bound, Solution as Solution
+from .unit_system import (
+    Unit as Unit, amounts_text as amounts_text, rate_of as rate_of, show_at as show_at, unit_at as unit_at,
+    unit_of as unit_of, unit_of_all as unit_of_all, units_of as units_of,
+)
+from .verdict.status import NotSolved as NotSolved, status_text as status_text

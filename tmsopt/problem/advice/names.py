@@ -1,0 +1,89 @@
+"""Every name that an expression may use, with its meaning, and what was meant by one that is not among them."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from operator import itemgetter
+
+from tmsopt.errors import nearest, suggest
+from tmsopt.models import MODELS, Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.user_spectrum import public_names
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
+
+_NEAR = 0.7  # of a misspelt word; what is less alike is looked for among the meanings first
+
+_USUAL = ((1.0, 0.5, 2.0), (-1.0, -2.0, -0.5), (0.5, 0.2, 1.0))  # a value with a range about it, the first that fits
+
+_SENSE = "minimize or maximize"
+_KEYS = {
+    "objective": {
+        **dict.fromkeys(("optimise", "optimize", "goal", "objective", "target", "function"), _SENSE),
+        **dict.fromkeys(("pattern", "find"), "locate"), "min": "minimize", "max": "maximize",
+    },
+    "": {
+        **dict.fromkeys(("goal", "goals", "target", "optimise", "optimize", "minimise", "maximise"), "objective"),
+        **dict.fromkeys(("minimize", "maximize", "locate", "pareto"), "objective"),
+        **dict.fromkeys(("limits", "bounds"), "constraints"), **dict.fromkeys(("variables", "params"), "parameters"),
+    },
+}  # fmt: skip
+"""Section → word that others use for one of its keys → that key."""
+
+
+def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity]:
+    """Every name that an expression may use, in the order of the documentation."""
+    native = () if of is model.sets[0] else model.sets[0].parameters
+    known: dict[str, Parameter | Quantity] = {
+        n: Quantity(n, "", _power(model.degree - k), f"a_{{{k}}}", itemgetter(n))
+        for k, n in enumerate(model.coefficient_names())
+    }
+    derived = (*model.quantities, *of.quantities, *ROOT_QUANTITIES, NO_RADIUS)
+    known |= {p.name: p for p in (*native, *of.parameters)} | {q.name: q for q in derived}
+    if model.carrier is not None:
+        known["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
+    return {name: known[name] for name in (*of.names, *public_names(model, of), *root_names(model))}
+
+
+def _power(k: int) -> str:
+    what = "constant coefficient" if k == 0 else f"coefficient of s^{k}" if k > 1 else "coefficient of s"
+    return f"{what} in the characteristic polynomial"
+
+
+def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:
+    """What to write for a name that is none: the nearest by spelling, or the one that means it."""
+    if name in model.absent:
+        return model.absent[name]
+    if name == "s" and accepted is None:
+        return f"s is the eigenvalue: write abscissa for the largest Re s, {ANGULAR_FREQUENCY} for the largest |Im s|"
+    if meaning := _elsewhere(name, model):
+        return meaning
+    known = vocabulary(model, of)
+    names = list(known if accepted is None else accepted)
+    if not nearest(name.lower(), [n.lower() for n in names], _NEAR):
+        words = name.lower().replace("_", " ")
+        for n in names:
+            meaning = known[n].meaning.lower()
+            if len(words) > 3 and (words in meaning or words.replace(" ", "") in meaning.replace(" ", "")):
+                return f"write {n} ({known[n].meaning}); accepted: {' '.join(names)}"
+    return suggest(name, names)
+
+
+def _elsewhere(name: str, model: Model) -> str:
+    """What to write for a name that another bicycle knows."""
+    for other in MODELS.values() if model.name in MODELS else ():
+        known = {p.name: p.meaning for s in other.sets for p in s.parameters}
+        known |= {q.name: q.meaning for q in (*other.quantities, *(q for s in other.sets for q in s.quantities))}
+        if other.name != model.name and name in known:
+            return f'model = "{other.name}" has it ({known[name]}), {model.name} has not'
+    return ""
+
+
+def example_of(parameter: Parameter) -> tuple[str, str]:
+    """A value of a parameter, and a range, as a file would write them: such as the parameter may have."""
+    value, low, high = next(u for u in _USUAL if all(x in parameter.range for x in u))
+    return f"{parameter.name} = {value}", f"{parameter.name} = {{ min = {low:g}, max = {high:g} }}"
+
+
+def unknown_key(key: str, accepted: Mapping[str, object], section: str = "") -> str:
+    """What to write for a key that a section, or the file itself, does not have."""
+    meant = _KEYS.get(section, {}).get(key.lower())
+    written = f"write {meant if section else f'[{meant}]'}; " if meant else ""
+    return written + suggest(key, accepted)

@@ -1,0 +1,124 @@
+"""What would free a problem without an answer: limits moved as a file would write them, and the speed that it takes."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from tmsopt.problem.expression import written_sides
+from tmsopt.problem.limit import limit_of, with_limit
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.unit_system import unit_of
+from tmsopt.records import Table, plain
+
+DIGITS = 5
+"""Significant digits of a limit that is to be written."""
+
+_LEFT = 1e-11  # of a limit: what rounding, also that of amounts upwards, leaves of it
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """The smallest move of limits that leaves a feasible design.
+
+    Attributes:
+        parameters: a design that is feasible once the limits are moved.
+        amounts: limit → how far it is moved, in its own units; signed for an equality, else towards what it forbids.
+        conflict: limits that no design was found to meet together in the box, and ends beyond which the others are met.
+        alone: limit → how far it must be moved if it is the only one, where the problem with it was solved again.
+        irreducible: whether designs were found that meet the others without any one of the conflict, and a whole search
+            found none for it; never where limits about the roots leave a0 free to vanish, for needles hide there.
+        remedies: limits as a file would write them, each set enough: the problem was solved again with it, and where
+            stability is wanted the answer is stable. The smallest change comes first; none where none was found.
+    """
+
+    parameters: Table[float] = field(default_factory=Table)
+    amounts: Table[float] = field(default_factory=Table)
+    conflict: tuple[str, ...] = ()
+    alone: Table[float] = field(default_factory=Table)
+    irreducible: bool = False
+    remedies: tuple[Table[str], ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return plain(self, "amounts conflict irreducible alone remedies parameters")
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a parameter that is fixed, or held below or above it, would have to be for a design that meets all else.
+
+    Attributes:
+        parameter: such as the speed; everything else may move as the problem says.
+        value: the nearest at which such a design was found; nan where none was.
+        most: whether it is a greatest value, and not a least one.
+        looked: from where to where it was looked for.
+        design: every parameter of that design; empty where none was found.
+        shown: the value rounded to where designs are, at which the problem was solved again.
+    """
+
+    parameter: str
+    value: float
+    most: bool
+    looked: tuple[float, float]
+    design: Table[float] = field(default_factory=Table)
+    shown: float = math.nan
+
+    @property
+    def found(self) -> bool:
+        """Whether there is such a value."""
+        return math.isfinite(self.value)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; a value that was not found is None."""
+        return plain(self, "parameter value shown most looked design")
+
+
+def rounded_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
+    """A number rounded up, or down, to significant digits; 0 for what is no number."""
+    if not x or not math.isfinite(x):
+        return 0.0
+    step = 10.0 ** (math.floor(math.log10(abs(x))) - digits + 1)
+    return (math.ceil if up else math.floor)(round(x / step, 6)) * step
+
+
+def moved_limits(problem: Problem, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
+    """Limits moved by amounts, as a file would write them, rounded so that they suffice.
+
+    Of an end of a range, such as ``v.max``, the number with its unit; of a constraint its whole text, in which numbers
+    have no units.
+    """
+    return {name: _moved(problem, name, amount, digits) for name, amount in amounts.items()}
+
+
+def with_limits(problem: Problem, written: Mapping[str, str]) -> Problem:
+    """The problem with limits as they are written.
+
+    Raises:
+        InputError: for an end that its parameter cannot have.
+    """
+    ends: dict[str, Any] = dict(problem.free)
+    for name, text in written.items():
+        parameter, _, end = name.rpartition(".")
+        if name not in problem.constraints:
+            (low, high), new = ends[parameter], text if unit_of(problem, name).text else float(text)
+            ends[parameter] = (low, new) if end == "max" else (new, high)
+    kept = {name: written.get(name, text) for name, text in problem.constraints.items()}
+    return replace(problem, constraints=kept, free=ends, start={})
+
+
+def _moved(problem: Problem, name: str, amount: float, digits: int) -> str:
+    if name not in problem.constraints:
+        parameter, _, end = name.rpartition(".")
+        up, unit = end == "max", unit_of(problem, name)
+        new = rounded_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
+        return f"{new:.{DIGITS}g} {unit.text}".rstrip()
+    text = problem.constraints[name]
+    (left, sign, right), limit = written_sides(text), limit_of(text)
+    if limit is None:
+        more = rounded_outwards(abs(amount), True, digits)
+        return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {more:.{DIGITS}g}"
+    on_right = with_limit(text, 0.5) == f"{left} {sign} 0.5"
+    change = -amount if (on_right and sign == ">=") or (not on_right and sign != ">=") else amount
+    new = rounded_outwards(limit + change, change > 0, digits) if abs(limit + change) > _LEFT * abs(limit) else 0.0
+    return f"{left} {sign} {new:.{DIGITS}g}" if on_right else f"{new:.{DIGITS}g} {sign} {right}"

@@ -1,0 +1,298 @@
+"""Problem files: TOML to a Problem, with every fault placed at its line."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, StrictFloat, StrictInt, StrictStr
+
+from tmsopt.errors import Fault, InputError, short, suggest, visible
+from tmsopt.models import MODELS, Model, gain_names
+from tmsopt.models.bicycle_files import read_bicycle
+from tmsopt.problem.advice.names import unknown_key
+from tmsopt.problem.cases import POINTS, Band
+from tmsopt.problem.model_table import stated_model
+from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.toml import Number, Page, Section, read_page, validate_tables
+from tmsopt.problem.validate import VARIATIONS
+
+_NO_PARAMETERS = "missing section [parameters]"
+
+
+class _FreeParameter(Section):
+    """Bounds between which a free parameter may move."""
+
+    min: Number = Field(description="The least value.")
+    max: Number = Field(description="The greatest value.")
+    start: Number | None = Field(default=None, description="A value to start the search from, among others.")
+
+
+class _Band(Section):
+    """Every value between two, at all of which the design must do."""
+
+    min: Number = Field(description="The least value.")
+    max: Number = Field(description="The greatest value.")
+    points: StrictInt = Field(default=POINTS, description="How many values are looked at first, 2 to 99.")
+
+
+class _Objective(Section):
+    """What is asked: minimize or maximize an expression, locate a pattern of roots, both, or a front of several."""
+
+    minimize: StrictStr | None = Field(
+        default=None, description='An expression to make small, such as "abscissa", the largest real part of the roots.'
+    )
+    maximize: StrictStr | None = Field(
+        default=None, description='An expression to make large, such as "damping_ratio".'
+    )
+    pareto: list[StrictStr] | None = Field(
+        default=None, description='Two or three expressions to minimise, such as ["abscissa", "-lambda_s"].'
+    )
+    locate: StrictStr | None = Field(
+        default=None, description='A pattern of roots to find, such as "EP4" (four equal roots) or "weave".'
+    )
+
+
+class _File(Section):
+    """A design problem: which parameters are fixed, which are free, and what is asked of them."""
+
+    title: StrictStr = Field(default="", description="One line for reports.")
+    model: StrictStr | dict[str, Any] = Field(
+        default="tms",
+        description="The system: a name in quotes, or a table [model] with matrices or coefficients of your own.",
+    )
+    bicycle: StrictStr | None = Field(
+        default=None, description="A parameter file of BicycleParameters beside this one; [parameters] go before it."
+    )
+    parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr] = Field(
+        description='A number fixes, a table { min = …, max = … } frees; texts have units, such as "40 cm".'
+    )
+    feedback: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr] = Field(
+        default_factory=dict,
+        description="Gains of a controller, such as k_phidot against the lean rate, each as in [parameters].",
+    )
+    objective: _Objective = Field(
+        default_factory=_Objective, description="What is asked; a chart and a trace need nothing."
+    )
+    constraints: dict[str, StrictStr] = Field(
+        default_factory=dict,
+        description='Limits such as arm = "u_H >= 0.02", with <=, >= or ==; numbers in m, kg, s, rad and N.',
+    )
+    scenarios: dict[str, _Band | list[Number]] = Field(
+        default_factory=dict, description="Values at each of which the design must do: { min = …, max = … } or a list."
+    )
+    tolerances: dict[str, Number] = Field(
+        default_factory=dict, description="How far a parameter may be off either way; the worst product counts."
+    )
+    weights: dict[str, Number] = Field(
+        default_factory=dict, description="Size of a change that counts as 1 in radius, the robustness radius."
+    )
+
+
+SHAPE: type[Section] = _File
+"""The shape of a problem file, for editors."""
+
+Given = Problem | Solution | str | PathLike[str]
+"""What every verb takes: a problem, the path of its file, or a solution, which has its problem."""
+
+
+def load(path: str | PathLike[str]) -> Problem:
+    """Read a problem file, whether it asks something or not: what must be asked is the verb's business.
+
+    Raises:
+        InputError: listing every fault with file, line, key, what was found and what is accepted.
+
+    Example:
+        >>> problem = tmsopt.load("problems/ep4.toml")
+        >>> problem.minimize, problem.free["chi_B"]
+        ('abscissa', (1.01, 5.0))
+
+    More: docs/reference/problem_file.md
+    """
+    return _read(path, lambda problem: [])
+
+
+def as_problem(given: object) -> Problem:
+    """What a verb is given: a problem as it is, the one in a file, or the one that a solution is of.
+
+    Raises:
+        InputError: for a file with faults, and for anything else.
+    """
+    return _given(given, lambda problem: [])
+
+
+def as_solvable(given: object, front: bool = False) -> Problem:
+    """The same, which must ask for one design, or may ask for a `front` as well.
+
+    Raises:
+        InputError: also where parameters are free and nothing is asked of them; of a file, at its line.
+    """
+    return _given(given, lambda problem: [] if front and problem.pareto else question_faults(problem))
+
+
+def _given(given: object, faults_of: Callable[[Problem], list[Fault]]) -> Problem:
+    if isinstance(given, str | PathLike):
+        return _read(given, faults_of)
+    if not isinstance(given, Problem | Solution):
+        message = f"found {short(given)}; accepted: a Problem, the path of a problem file, or a Solution"
+        raise InputError([Fault(message, ("problem",))])
+    problem = given if isinstance(given, Problem) else given.problem
+    if faults := faults_of(problem):
+        raise InputError(faults)
+    return problem
+
+
+def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]) -> Problem:
+    page = read_page(path, "problem")
+    if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
+        written = page.data.get("problem")
+        own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
+        message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
+        raise InputError([Fault(message, file=page.file)])
+    faults, problem = problem_from_tables(_with_bicycle(page), visible(Path(page.file).stem))
+    if problem is not None and not faults:  # a misspelt [objective] asks something
+        faults = [*faults, *faults_of(problem)]
+    if problem is None or faults:
+        raise page.error(faults)
+    return problem
+
+
+def _with_bicycle(page: Page) -> Mapping[str, Any]:
+    """The tables with the parameters of the bicycle that they name, which those of the file itself go before."""
+    data = page.data
+    named = data.get("bicycle")
+    if not isinstance(named, str) or not isinstance(given := data.get("parameters", {}), dict):
+        return data
+    try:
+        bicycle = read_bicycle(Path(page.file).parent / named)
+    except InputError as error:
+        raise page.error(
+            f if f.line else Fault(f"{short(named)} {f.message}; the name is relative to this file", ("bicycle",))
+            for f in error.faults
+        ) from None
+    scenarios = data.get("scenarios", {})
+    measured = {n: v for n, v in bicycle.parameters.items() if n not in scenarios}
+    return {"model": "whipple", **data, "parameters": {**measured, **given}}
+
+
+def problem_from_tables(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | None]:
+    """The problem of a problem file's tables, and what is wrong with them.
+
+    Args:
+        title: of a problem that has none.
+    """
+    gains_faults, gains, data = _with_gains(data)
+    shape_faults, parsed = validate_tables(data, _File, _shape_fault)
+    if any(hint in f.message for f in shape_faults for hint in ("did you mean 'parameters'", "write [parameters]")):
+        shape_faults = [f for f in shape_faults if f.message != _NO_PARAMETERS]  # they are there, under another name
+    model_faults, model = _model(data.get("model", "tms"))
+    shape_faults += model_faults
+    faults, problem = shape_faults, None
+    if model is not None and parsed is not None:
+        tables = _tables(parsed)
+        for fault in shape_faults:
+            if fault.key[:1] in (("parameters",), ("scenarios",)) and len(fault.key) > 1:
+                tables["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
+        try:
+            problem = Problem(
+                model=model, constraints=parsed.constraints, title=parsed.title.strip() or title, **tables,
+                **vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()},
+            )  # fmt: skip
+        except InputError as error:
+            reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
+            reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
+            faults = faults + [f for f in error.faults if f.key[:2] not in reported]
+    typed = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
+    return gains_faults + typed, problem
+
+
+def _with_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping[str, Any]]:
+    """What is wrong with [feedback] itself, its names, and the tables with these among the parameters."""
+    gains, parameters, model = data.get("feedback", {}), data.get("parameters", {}), data.get("model", "tms")
+    if not isinstance(gains, dict) or not isinstance(parameters, dict):
+        return [], set(), data
+    if gains and not (isinstance(model, str) and model in MODELS):
+        message = "is for the bicycles tms and whipple; your own system takes B, C and G in [model]"
+        found = [] if isinstance(model, str) else [Fault(message, ("feedback",))]  # of a misspelt name something else
+        return found, set(), {k: v for k, v in data.items() if k != "feedback"}
+    faults, known = [], gain_names(model) if gains else ()
+    for name in gains:
+        if name not in known:
+            faults.append(Fault(f"unknown gain {short(name)}; {suggest(name, known)}", ("feedback", name)))
+        elif name in parameters:
+            faults.append(Fault(f"'{name}' stands in [parameters] too; keep one", ("feedback", name)))
+    own = {n: v for n, v in gains.items() if n in known}
+    others = {k: v for k, v in data.items() if k != "feedback"}
+    return faults, set(own), {**others, "parameters": {**parameters, **own}} if own else others
+
+
+def _model(written: Any) -> tuple[list[Fault], Model | None]:
+    """The model of that name, or of a table that states one."""
+    if isinstance(written, dict):
+        return stated_model(written)
+    if not isinstance(written, str):
+        return [], None  # a fault of shape
+    model = MODELS.get(written)
+    unknown = f"unknown model {short(written)}; {suggest(written, MODELS)}; your own goes in a table [model]"
+    return ([Fault(unknown, ("model",))] if model is None else []), model
+
+
+def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:  # noqa: PLR0911, PLR0912 - one per case
+    """One pydantic complaint in the words of the problem file."""
+    tags = ("_FreeParameter", "_Band", "float", "int", "str", "dict[str,any]")
+    key = tuple(str(k) for k in where if k not in tags)
+    match key:
+        case (section,) if kind == "extra_forbidden":
+            return Fault(f"unknown key {short(section)}; {unknown_key(section, _File.model_fields)}", key)
+        case ("model",):
+            return Fault(f"found {short(found)}; accepted: the name of a model in quotes, or a table [model]", key)
+        case ("parameters",) if kind == "missing":
+            return Fault(_NO_PARAMETERS, key)
+        case ("parameters", name, end) if kind == "extra_forbidden":
+            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _FreeParameter.model_fields)}", key)
+        case ("parameters", name, end) if kind == "missing":
+            return Fault(f"missing {end} of {name}; write {name} = {{ min = …, max = … }}", key)
+        case ("parameters", _, *_):
+            accepted = "a number, a text with a unit such as '5 deg', or { min = …, max = …, start = … }"
+            return Fault(f"found {short(found)}; accepted: {accepted}", key[:3])
+        case ("objective", sense, *_) if kind == "extra_forbidden":
+            return Fault(f"unknown key {short(sense)}; {unknown_key(sense, _Objective.model_fields, 'objective')}", key)
+        case ("scenarios", name, end, *_) if kind == "extra_forbidden":
+            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _Band.model_fields)}", key)
+        case ("scenarios", name, end) if kind == "missing":
+            return Fault(f"missing {end} of {name}; write {name} = {{ min = …, max = …, points = 7 }}", key)
+        case ("scenarios", _, *_):
+            accepted = "{ min = …, max = …, points = … }, or a list of values such as [1, 2.5]"
+            return Fault(f"found {short(found)}; accepted: {accepted}", key[:2])
+        case ("feedback",):
+            return Fault(f"found {short(found)}; accepted: a table of gains, such as k_phidot = -20", key)
+        case (("tolerances" | "weights"), _, *_):
+            return Fault(f"found {short(found)}; accepted: a number, or a text with a unit such as '5 mm'", key[:2])
+        case ("objective", "pareto", *_):
+            return Fault(f"found {short(found)}; accepted: two or three texts, such as ['abscissa', 'Fr']", key[:2])
+        case ("constraints", *_):
+            return Fault(f"found {short(found)}; accepted: a comparison in quotes, such as 'nu_H >= 0.02'", key)
+        case _:
+            table = key[0] in ("parameters", "objective", *VARIATIONS)
+            return Fault(f"found {short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key)
+
+
+def _tables(written: _File) -> dict[str, Any]:
+    """Tables of a problem, numbers as typed."""
+    free = {n: v for n, v in written.parameters.items() if isinstance(v, _FreeParameter)}
+
+    def ends(band: _Band) -> tuple[Any, Any]:
+        return band.min, band.max
+
+    return {
+        "fixed": {n: v for n, v in written.parameters.items() if n not in free},
+        "free": {n: (v.min, v.max) for n, v in free.items()},
+        "start": {n: v.start for n, v in free.items() if v.start is not None},
+        "scenarios": {
+            n: Band(*ends(s), s.points) if isinstance(s, _Band) else s for n, s in written.scenarios.items()
+        },
+        "tolerances": written.tolerances, "weights": written.weights,
+    }  # fmt: skip

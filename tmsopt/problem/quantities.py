@@ -1,0 +1,195 @@
+"""Quantities of the roots, for any model: what an expression may say about stability."""
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import flint
+import numpy as np
+
+from tmsopt.models import Model, ParameterSet, Quantity, Values
+from tmsopt.records import Array
+from tmsopt.roots import Root, Structure, exact_roots, find_motion, roots, structure
+
+STRUCTURE_TOLERANCE = 1e-11
+"""Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
+
+SIMPLE = ("real", "pair", "undecided")
+"""Structures whose roots are numeric, as they are."""
+
+_SCATTER, _ROUNDING = 1e-11, 4 * np.finfo(float).eps  # of roots, relative, beyond which exact ones are computed
+
+_DIGITS = 120  # products of five doubles are exact, and the tangent is right far beyond the answer
+
+_KEPT = 64  # structures: several quantities are asked of the same design, and of each of its worst cases
+
+_LARGEST = 1e50
+"""Of a root: products of a few larger ones are no doubles."""
+
+
+def _beyond(a: Array) -> Any:
+    """Whether the leading coefficient is 0, or so small that a root may be too large for doubles."""
+    ends = np.abs(a[..., 0]) * _LARGEST <= np.abs(a).max(axis=-1)
+    if ends.any():
+        with np.errstate(all="ignore"):
+            sizes = np.abs(a[..., 1:] / a[..., :1]) ** (1 / np.arange(1, a.shape[-1]))
+        ends &= ~(sizes.max(axis=-1) < _LARGEST)  # where all are 0, too
+    return ends
+
+
+def _structure(values: Mapping[str, Any]) -> Structure:
+    assert isinstance(values, Values)
+    a = [float(c) for c in values.coefficients]
+    if not all(map(math.isfinite, a)) or _beyond(np.array(a)):
+        return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
+    off = values.roundings()
+    if abs(a[0]) <= off[0] < math.inf:
+        return Structure("undecided", (), math.inf)  # rounding alone keeps it from 0; where all are such, all fits
+    found = _known_structure(tuple(a), tuple(map(float, off)))
+    simple = found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots)
+    if simple and _scatter(np.array(a), found) > _SCATTER:  # numeric roots are not to be trusted
+        found = replace(found, roots=roots_at(*values.given) or found.roots)
+    return found
+
+
+def _scatter(a: Array, found: Structure) -> float:
+    """How far simple numeric roots may be off by rounding, relative to the largest."""
+    z = np.array([complex(root.re, root.im) for root in found.roots])
+    terms, slope = np.polyval(np.abs(a), np.abs(z)), np.abs(np.polyval(np.polyder(a), z))
+    return float((_ROUNDING * terms / (slope + np.finfo(float).tiny)).max() / (np.abs(z).max() or 1.0))
+
+
+@lru_cache(maxsize=_KEPT)
+def _known_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure:
+    return structure(a, STRUCTURE_TOLERANCE, off)
+
+
+def roots_at(model: Model, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
+    """Roots of parameters exactly as they are, rightmost first; none where a coefficient does not exist.
+
+    Coefficients at 120 digits, roots isolated in ball arithmetic.
+    """
+    with flint.ctx.workdps(_DIGITS):
+        exact = {name: flint.arb(value) for name, value in parameters.items()}
+        coefficients = model.coefficients(exact, of)
+    if not all(c.is_finite() for c in coefficients):
+        return ()
+    leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
+    if leading is None or leading == len(coefficients) - 1:
+        return ()
+    return exact_roots(coefficients[leading:])
+
+
+def _damping_ratio(values: Mapping[str, Any]) -> float:
+    if isinstance(values, Values) and values.model.carrier is not None:
+        return math.nan  # frequencies without a zero
+    roots = values["structure"].roots
+    ratios = (-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
+    return min(ratios, default=math.nan)
+
+
+def _angular_frequency(values: Mapping[str, Any]) -> float:
+    return max((abs(r.im) for r in values["structure"].roots), default=math.nan)
+
+
+ANGULAR_FREQUENCY = "angular_frequency"
+"""Of the fastest oscillation; 0 where all roots are real."""
+
+ROOT_QUANTITIES = (
+    Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", lambda v: float(v["structure"].abscissa)),
+    Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
+    Quantity(ANGULAR_FREQUENCY, "1", "greatest |Im s| over the roots", r"\omega", _angular_frequency),
+)
+"""Quantities of the roots, each the worst over the cases that a problem lists."""
+
+STRUCTURE = Quantity("structure", "", "structure of the roots, multiple roots recognised", "", _structure)
+
+RADIUS = "radius"
+"""Distance to the nearest loss of stability, in the problem's weights; found by a search of its own."""
+
+_RADIUS = "robustness radius, the least change of the parameters, in their weights, after which it is unstable"
+
+NO_RADIUS = Quantity(RADIUS, "1", _RADIUS, "r", lambda values: math.nan)
+"""Where it was not searched for, the radius is not known."""
+
+
+ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
+
+
+def root_names(model: Model) -> tuple[str, ...]:
+    """Names of the quantities of the roots that a model has."""
+    return tuple(name for name in ROOT_NAMES if name not in model.absent)
+
+
+def expand_names(text: str, of: ParameterSet) -> str:
+    """An expression with the names that are short for others written out: decay_rate as -(abscissa*sqrt(g/w)).
+
+    What is no text is for the parser to refuse.
+    """
+    short = {q.name: q.stands_for for q in of.quantities if q.stands_for}
+    return (
+        re.sub(rf"\b({'|'.join(short)})\b", lambda found: short[found[0]], text)
+        if short and isinstance(text, str)
+        else text
+    )
+
+
+def regular(coefficients: Array) -> Array:
+    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root is far away.
+
+    Those of a design at which one does not exist are those of sⁿ, so that a search may start there.
+    """
+    exist = np.all(np.isfinite(coefficients), axis=-1, keepdims=True)
+    a = np.where(exist, coefficients, np.eye(coefficients.shape[-1])[0])
+    size = np.abs(a).max(axis=-1, initial=0.0) + 1e-300
+    return np.concatenate([np.where(_beyond(a), 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
+
+
+def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Abscissa and damping ratio, each kept for when it is asked; nan where a coefficient does not exist."""
+    assert isinstance(values, Values)
+    a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
+    exist, a = np.all(np.isfinite(a), axis=-1), regular(a)
+    motion = find_motion(list(np.moveaxis(a, -1, 0)))
+    abscissa, ratio = (np.where(exist, each, np.nan) for each in (motion.abscissa, motion.damping_ratio))
+    values.define("abscissa", abscissa)
+    values.define("damping_ratio", ratio)
+    return abscissa, ratio
+
+
+def _array_frequency(values: Mapping[str, Any]) -> Array:
+    """Greatest imaginary part; nan likewise."""
+    assert isinstance(values, Values)
+    a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
+    return np.where(np.all(np.isfinite(a), axis=-1), roots(regular(a)).imag.max(axis=-1), np.nan)
+
+
+_ARRAY_FORMULAS = (
+    lambda values: _array_motion(values)[0], lambda values: _array_motion(values)[1], _array_frequency,
+)  # fmt: skip
+
+ARRAY_ROOT_QUANTITIES = (
+    *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)), NO_RADIUS,
+)  # fmt: skip
+"""The same for arrays of designs, by numeric roots."""
+
+
+def lifted_quantities(
+    model: Model, of: ParameterSet, parameters: Mapping[str, Any], expressions: Iterable[Callable[[Values], Any]]
+) -> tuple[Quantity, ...]:
+    """The quantities in expressions that have an equation of their own, by which a proof takes them as unknowns."""
+    found: dict[str, Quantity] = {}
+
+    def note(quantity: Quantity, values: Values) -> None:
+        if quantity.equation is not None:
+            found[quantity.name] = quantity
+
+    values = Values(model, of, parameters, lift=note)
+    for name in ROOT_NAMES:
+        values.define(name, math.nan)
+    for expression in expressions:
+        expression(values)
+    return tuple(found.values())

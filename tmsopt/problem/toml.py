@@ -1,0 +1,197 @@
+"""A TOML file that knows at which line each of its keys is, so that every fault can be placed."""
+
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
+
+from tmsopt.errors import LISTED, Fault, InputError, short
+from tmsopt.files import path_of, read_text
+from tmsopt.problem.advice.lines import line_advice
+
+MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
+"""Parts of a dotted key; lists and tables one in another; characters of a number, or of a name without quotes."""
+
+_EXPLAINED = 10 * LISTED  # complaints, of which a key may have several
+
+Number = StrictFloat | StrictInt | StrictStr
+"""A number, or a text with a unit."""
+
+
+class Section(BaseModel):
+    """A table of a file, in which no other key may stand."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+S = TypeVar("S", bound=Section)
+Key = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A TOML file as read.
+
+    Attributes:
+        data: its tables.
+        lines: section or key that begins a line → number of that line.
+    """
+
+    file: str
+    data: Mapping[str, Any]
+    lines: Mapping[Key, int]
+
+    def error(self, faults: Iterable[Fault]) -> InputError:
+        """The faults, each at its line of this file unless it is placed already, in the order of the lines."""
+        placed = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
+        return InputError(sorted(placed, key=lambda f: f.line))
+
+    def _line_of(self, key: Key) -> int:
+        """Line of the longest part of a key path that the file has; 1 for something missing altogether."""
+        for end in range(len(key), 0, -1):
+            if key[:end] in self.lines:
+                return self.lines[key[:end]]
+        return 1
+
+
+def read_page(path: str | PathLike[str], kind: str) -> Page:
+    """Read a TOML file of some kind, such as ``problem``.
+
+    Raises:
+        InputError: for a file that cannot be read, or is not TOML.
+    """
+    path_of(path, f"a {kind} file")
+    file = str(path) or "."
+    text = read_text(file, f"TOML {kind} file")
+    scan = _scanned(text)
+    if scan.fault:
+        raise InputError([scan.fault.at(file, scan.fault.line)])
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"line (\d+)", str(error))
+        line = scan.unclosed or (int(place[1]) if place else text.count("\n") + 1)
+        written = "".join(text.split("\n")[line - 1 : line])  # none where the end of the file is at fault
+        raise InputError([Fault(f"not TOML: {error}{line_advice(written)}").at(file, line)]) from None
+    return Page(file, data, scan.lines)
+
+
+def validate_tables(
+    data: Mapping[str, Any], schema: type[S], explain: Callable[[tuple[int | str, ...], str, Any], Fault]
+) -> tuple[list[Fault], S | None]:
+    """Faults of shape, and what is left of the data without the faulty keys.
+
+    Args:
+        explain: place, kind and found value of a complaint → the fault in the words of the file.
+    """
+    faults: dict[Key, Fault] = {}
+    pruned: dict[str, Any] = dict(data)
+    for _ in range(2):
+        try:
+            return list(faults.values()), schema.model_validate(pruned)
+        except ValidationError as error:
+            complaints = error.errors(include_url=False, include_context=False)
+            found = [explain(d["loc"], d["type"], d["input"]) for d in complaints[:_EXPLAINED]]
+            found += _unexplained(d["loc"] for d in complaints[_EXPLAINED:])
+            deepest: dict[Key, int] = {}
+            for fault in found:
+                deepest[fault.key[:2]] = max(len(fault.key), deepest.get(fault.key[:2], 0))
+            for fault in found:
+                if len(fault.key) == deepest[fault.key[:2]]:
+                    faults.setdefault(fault.key, fault)
+        pruned = _without(pruned, {key[:2] for key in faults})
+    return list(faults.values()), None
+
+
+def _unexplained(places: Iterable[tuple[int | str, ...]]) -> list[Fault]:
+    keys = dict.fromkeys(tuple(map(str, where[:2])) for where in places)
+    return [Fault("accepted: what the other faults say", key) for key in keys]
+
+
+def within(section: str, faults: Iterable[Fault]) -> list[Fault]:
+    """Faults of a table that is itself in a section."""
+    return [replace(f, key=(section, *f.key)) for f in faults]
+
+
+def _without(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:
+    inner = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in data.items() if isinstance(t, dict)}
+    plain = {n for n, *rest in keys if not rest or n not in inner}
+    return {n: inner.get(n, value) for n, value in data.items() if n not in plain}
+
+
+_TOKEN = re.compile(
+    r"""\"{3}(?:[^"\\]++|\\.|"(?!""))*+(?:"{3,5})?|'{3}(?:[^']++|'(?!''))*+(?:'{3,5})?"""
+    r"""|\"(?:[^"\\\n]++|\\[^\n])*+"?|'[^'\n]*+'?|\#[^\n]*+|[\w+:-]++|[^ \t\r]""",
+    re.DOTALL,
+)
+"""Every character of a text is looked at once, whatever it holds: a text that is not closed ends with the file."""
+
+_MARKS = frozenset("[]{}=.,")
+_STATEMENT = re.compile(r"[ \t]*+(?:[\w.\-\"' \t]++=|\[[A-Za-z_][\w.]*+\][ \t]*+(?:\#[^\n]*+)?$)", re.MULTILINE)
+
+
+@dataclass
+class _Scan:
+    """What a file says of its lines before it is read, and why it is not to be read at all.
+
+    Attributes:
+        lines: section or key that begins a line → number of that line, but for lines in a list or a text of several.
+        unclosed: line of a list that is still open where another key or section begins; 0 for none.
+    """
+
+    lines: dict[Key, int] = field(default_factory=dict)
+    unclosed: int = 0
+    fault: Fault | None = None
+
+
+def _scanned(text: str) -> _Scan:
+    """Where sections and keys are; stops at what would take the parser more time or memory than files need."""
+    found = _Scan()
+    section: Key = ()
+    line, begun, depth, run = 1, 1, 0, 0
+    head: list[str] | None = []  # parts of the section or key that is being read; None in a value
+    end = after = "="  # of the head, "]" for a section; the token before this one
+    for match in _TOKEN.finditer(text):
+        token = match[0]
+        if token == "\n":
+            if depth == 0:
+                head, end, begun = [], "=", line + 1
+            elif not found.unclosed and _STATEMENT.match(text, match.end()):
+                found.unclosed = begun
+        elif token in _MARKS:
+            if head is None:
+                depth = max(0, depth + (token in "[{") - (token in "]}"))
+            elif token == "[" and not head:
+                end = "]"
+            elif token == end:
+                key = tuple(head)
+                section, key = (key, key) if end == "]" else (section, (*section, *key))
+                found.lines.setdefault(key, line)
+                head = None
+        elif token[0] != "#":
+            run = run + 1 if after == "." else 1
+            if head is not None:
+                head.append(token.strip("\"'"))
+        if wrong := _beyond(token, run, depth):
+            found.fault = Fault(wrong, line=line)
+            break
+        line += token.count("\n")
+        after = token
+    found.unclosed = found.unclosed or (begun if depth else 0)
+    return found
+
+
+def _beyond(token: str, parts: int, depth: int) -> str:
+    """What is larger than files need; empty where nothing is."""
+    if parts > MOST_PARTS:
+        return f"found a key of more than {MOST_PARTS} parts; accepted: up to {MOST_PARTS}"
+    if depth > MOST_DEEP:
+        return f"found lists or tables more than {MOST_DEEP} deep; accepted: up to {MOST_DEEP}"
+    if len(token) > LONGEST_WORD and token[0] not in "\"'#":
+        accepted = f"numbers, and names without quotes, of up to {LONGEST_WORD}"
+        return f"found {len(token)} characters, {short(token)}; accepted: {accepted}"
+    return ""

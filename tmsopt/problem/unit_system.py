@@ -1,0 +1,189 @@
+"""The units in which a problem was written: of parameters, of quantities, and of any expression in them."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tmsopt.models import Parameter, Quantity
+from tmsopt.problem.expression import Expression, dimension, parse_comparison, parse_value, written_sides
+from tmsopt.problem.limit import limit_of
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY
+from tmsopt.problem.units import Dimension, factor
+from tmsopt.problem.validate import SMALLEST
+
+_PER_SECOND = "1/s"
+_FREQUENCY, _HERTZ = "frequency", "Hz"  # which is a rate, and no 1/s to a reader
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit that a problem was written in.
+
+    Attributes:
+        text: such as ``km/h``; empty without one.
+        one: what one of it is in the unit that the number is kept in (SI, rad).
+    """
+
+    text: str = ""
+    one: float = 1.0
+
+    def number(self, value: float, digits: int = 5, error: float = 0.0) -> str:
+        """A number in this unit, without its name; ``none`` where it does not exist, and no −0.
+
+        Args:
+            digits: at most.
+            error: of the value: fewer digits where no more hold, and 0 for what is 0 within it.
+        """
+        if not math.isfinite(value):
+            return "none"
+        if abs(value) <= max(error, SMALLEST):
+            return "0"
+        if error > 0:
+            digits = min(digits, max(math.floor(math.log10(abs(value))) - math.floor(math.log10(error)), 1))
+        return f"{value / self.one + 0.0:.{digits}g}"
+
+    def show(self, value: float, digits: int = 5) -> str:
+        """A number in this unit, with its name."""
+        return f"{self.number(value, digits)}{f' {self.text}' if self.text and math.isfinite(value) else ''}"
+
+
+def unit_of(problem: Problem, text: str) -> Unit:
+    """The unit in which a problem has a parameter, a bound such as ``v.max``, a constraint or any expression.
+
+    What was typed with a unit has that one; a quantity has the one in which most parameters of its kind were typed; a
+    plain number the model's own.
+    """
+    units = si_units(problem)
+    name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
+    if name in problem.parameter_set.names:
+        return _typed(problem.units.get(name, ""), units[name])
+    if units.get(_FREQUENCY) == _HERTZ and set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name))) == {
+        _FREQUENCY
+    }:
+        return Unit(_HERTZ)
+    if name in units:
+        return _of_kind(problem, Dimension.of(units[name]))
+    return _of_kind(problem, dimension_of(problem, text, units))
+
+
+def rate_of(problem: Problem, text: str, parameters: Mapping[str, Any]) -> Any:
+    """How many 1/s one unit of an expression is at a design, where it is per √(g/w) and a second is known; else None.
+
+    Of numbers and of arrays.
+    """
+    of = problem.parameter_set
+    if of.rate is None or of.root_unit == _PER_SECOND or unit_of(problem, text).text != of.root_unit:
+        return None
+    return of.rate(parameters)
+
+
+def unit_at(problem: Problem, text: str, parameters: Mapping[str, float]) -> Unit:
+    """The unit in which a reader has an expression at a design: rates in 1/s where there are seconds."""
+    rate = rate_of(problem, text, parameters)
+    return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
+
+
+def unit_of_all(problem: Problem, text: str, held: Mapping[str, float] | None = None) -> Unit:
+    """The same where a second is one for all designs of a problem, for bounds and differences; else its own unit.
+
+    Args:
+        held: what these designs have in common; by default what is fixed, and nowhere varied.
+    """
+    if held is None:
+        held = {n: x for n, x in problem.fixed.items() if n not in {*problem.scenarios, *problem.tolerances}}
+    try:
+        return unit_at(problem, text, held)
+    except KeyError:
+        return unit_of(problem, text)
+
+
+def show_at(problem: Problem, text: str, parameters: Mapping[str, float], value: float, digits: int = 5) -> str:
+    """A number in the unit of `unit_at`, and where that is another in its own behind."""
+    shown, own = unit_at(problem, text, parameters), unit_of(problem, text)
+    behind = f" ({own.show(value, digits)})" if shown != own and math.isfinite(value) else ""
+    return f"{shown.show(value, digits)}{behind}"
+
+
+def si_units(problem: Problem) -> dict[str, str]:
+    """The unit in which each parameter, quantity and root quantity of a problem is computed; ``1`` without one."""
+    of = problem.parameter_set
+    listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
+    rates = {"abscissa": of.root_unit, ANGULAR_FREQUENCY: of.root_unit}
+    if of.rate is not None:  # else there are no seconds
+        rates |= {"decay_rate": _PER_SECOND, "decay_time": "s", _FREQUENCY: _HERTZ}
+    return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
+
+
+def amounts_text(problem: Problem, amounts: Mapping[str, float]) -> str:
+    """By how much each limit is violated, in the units in which the problem was written."""
+    return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in amounts.items())
+
+
+def limit_text(problem: Problem, name: str) -> str:
+    """A limit with its number in the unit in which the problem was written; empty for what is none."""
+    parameter, _, end = name.rpartition(".")
+    if name not in problem.constraints:
+        known = parameter in problem.free and end in ("min", "max")
+        return (
+            f"{'>=' if end == 'min' else '<='} {unit_of(problem, name).show(problem.free[parameter][end == 'max'], 6)}"
+            if known
+            else ""
+        )
+    text, unit = problem.constraints[name], unit_of(problem, name)
+    value = limit_of(text)
+    if value is None or not unit.text:
+        return text
+    left, sign, right = written_sides(text)
+    shown = unit.show(value, 9)
+    return f"{left} {sign} {shown}" if _is_number(right) else f"{shown} {sign} {right}"
+
+
+def _is_number(side: str) -> bool:
+    try:
+        float("".join(side.split()))
+    except ValueError:
+        return False
+    return True
+
+
+def units_of(problem: Problem, texts: Iterable[str] = ()) -> dict[str, str]:
+    """The unit of each number that has one, as it is kept, computed and written as data: rad and SI.
+
+    Args:
+        texts: expressions beside parameters, quantities and constraints.
+    """
+    units = si_units(problem)
+    asked = {
+        text: dimension_of(problem, text, units).unit
+        for text in (*problem.constraints, *(t for t in texts if t not in units))
+    }
+    return {name: unit for name, unit in {**units, **asked}.items() if unit != "1"}
+
+
+def dimension_of(problem: Problem, text: str, units: Mapping[str, str] | None = None) -> Dimension:
+    """Of an expression, or of a constraint, by its name or its text."""
+    text = problem.constraints.get(text, text)
+    parse: Callable[..., Expression] = (
+        parse_comparison if any(sign in text for sign in ("<=", ">=", "==")) else parse_value
+    )
+    try:
+        return dimension(parse(text, problem.vocabulary), si_units(problem) if units is None else units)
+    except ValueError:  # a pattern, or what else has no unit
+        return Dimension()
+
+
+def _of_kind(problem: Problem, dimension: Dimension) -> Unit:
+    """The unit most parameters of a dimension were typed in."""
+    of, unit = problem.parameter_set, dimension.unit
+    typed = Counter(problem.units[n] for n in of.names if n in problem.units and Dimension.of(of[n].unit) == dimension)
+    return _typed(typed.most_common(1)[0][0] if typed else "", unit)
+
+
+def _typed(written: str, unit: str) -> Unit:
+    if unit == "1":
+        return Unit()
+    return Unit(written, factor(written, unit)) if written else Unit(unit)

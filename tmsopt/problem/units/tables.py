@@ -1,0 +1,82 @@
+"""The tables of a problem, in which any number may be a text with a unit."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import is_dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from tmsopt.errors import Fault
+from tmsopt.models import ParameterSet, decimal
+from tmsopt.models.exact import Exact
+from tmsopt.problem.units.text import LONGEST, read
+
+TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
+"""Tables of a problem that hold numbers; a unit that is typed first stands."""
+
+
+Typed = dict[str, dict[float, str]]
+"""Parameter → double → the exact number that was typed for it, where the double's own decimal is another."""
+
+
+def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
+    """The tables of a problem with texts such as "25 cm" as numbers.
+
+    Args:
+        tables: those of `TABLES`, of numbers and texts.
+
+    Returns:
+        The tables; the units that were typed; the exact numbers that were typed; what is wrong.
+    """
+    units: dict[str, str] = {}
+    typed: Typed = {}
+    faults: list[Fault] = []
+
+    def number(value: Any, table: str, name: str, *end: str) -> Any:
+        if name not in of.names or not isinstance(value, str | Fraction | int) or isinstance(value, bool):
+            return value
+        unit = of[name].unit
+        sizes = table in ("tolerances", "weights")
+        if unit == "1" and sizes:
+            unit = of[name].multiple_of or unit  # a tolerance of 5 mm is one of 0.005 wheelbases of 1 m
+        try:
+            found, written, exact = read(value, unit) if isinstance(value, str) else (value, "", Exact(Fraction(value)))
+            if not sizes and exact and exact.fraction != decimal(float(found)):
+                typed.setdefault(name, {})[float(found)] = str(exact)
+        except OverflowError:  # a whole number that is no double
+            return value
+        except ValueError as error:
+            faults.append(Fault(f"{error}{_meant(value)}", (table, name, *end)))
+            return value
+        if written and not sizes:
+            units.setdefault(name, written)
+        return found
+
+    def read_table(table: str, key: str) -> Iterator[tuple[str, Any]]:
+        for name, value in tables[table].items():
+            if is_dataclass(value) and not isinstance(value, type):  # a band
+                ends = {end: number(getattr(value, end), key, name, end) for end in ("min", "max")}
+                yield name, replace(value, **ends)
+            elif table == "free" and isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2:
+                yield name, tuple(number(x, key, name, end) for x, end in zip(value, ("min", "max"), strict=True))
+            elif table == "scenarios" and isinstance(value, Sequence) and not isinstance(value, str):
+                yield name, tuple(number(x, key, name) for x in value)
+            else:
+                yield name, number(value, key, name, *(["start"] if table == "start" else []))
+
+    keys = dict.fromkeys(("fixed", "free", "start"), "parameters")
+    found = {t: dict(read_table(t, keys.get(t, t))) if isinstance(tables[t], Mapping) else tables[t] for t in TABLES}
+    return found, units, typed, faults
+
+
+def _meant(text: object) -> str:
+    """The end of a sentence that says what to write for a text that is refused; empty where that is not known."""
+    if not isinstance(text, str) or len(text) > LONGEST:
+        return ""
+    if comma := re.fullmatch(r"\s*([+-]?\d+),(\d+.*)", text):
+        return f'; write a decimal point: "{comma[1]}.{comma[2]}"'
+    if share := re.fullmatch(r"\s*([+-]?\d+\.?\d*)\s*%\s*", text):
+        return (
+            f"; write {float(share[1]) / 100:.12g} for a share of {share[1]} %; {share[1]} % of a value as its amount"
+        )
+    return ""

@@ -1,0 +1,293 @@
+"""Everything that can be wrong with a problem, each fault with its place and the accepted values."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
+from tmsopt.models import Model, ParameterSet
+from tmsopt.models.names import MEANT
+from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
+from tmsopt.problem.advice.names import example_of, unknown
+from tmsopt.problem.cases import Band, points_of
+from tmsopt.problem.expression import ExpressionError, UnknownName, parse_comparison, parse_value
+from tmsopt.problem.quantities import expand_names, root_names
+
+VARIATIONS = ("scenarios", "tolerances", "weights")
+"""Tables of a problem that name parameters beside those of `fixed` and `free`."""
+
+SMALLEST = 1e-50
+"""Size of a parameter but 0; its inverse is the largest."""
+
+MOST_TOLERANCES = 8
+"""Parameters with a tolerance: a box has two corners for one, 256 for eight."""
+
+
+MOST = {"constraints": 1000, "scenarios": 100}
+"""Constraints of a problem, and values of a scenario."""
+
+_LONGEST = 200  # characters of the name of a pattern
+
+Stated = Any
+"""A Problem as its author stated it: any field may be of any type."""
+
+
+def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
+    """The parameter set that most of the names belong to, the native one when in doubt."""
+    return max(model.sets, key=lambda s: sum(n in s.names for n in names))
+
+
+_TABLES = {
+    "fixed": "{'mu': 0.1}", "free": "{'Fr': (0.1, 5)}", "constraints": "{'trail': 'nu_H >= 0.02'}",
+    "start": "{'Fr': 2}", "scenarios": "{'v': Band(2, 6)}", "tolerances": "{'lambda_s': 0.01}", "weights": "{'v': 1}",
+    "units": "{'v': 'km/h'}", "written": "{'v': {2.6666666666666665: '8/3'}}",
+}  # fmt: skip
+"""Arguments that are tables, each with an example."""
+
+
+def shape_faults(problem: Stated) -> Iterator[Fault]:
+    """Arguments of a problem that are no model, tables and texts: nothing more can be said before they are."""
+    if not isinstance(problem.model, Model):
+        accepted = "a model, such as tmsopt.models.tms"
+        yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
+    for name, example in _TABLES.items():
+        yield from table_faults(name, getattr(problem, name), example)
+    if isinstance(problem.constraints, Mapping):
+        yield from _size_faults("constraints", problem.constraints, "constraints")
+        for name in (n for n in problem.constraints if isinstance(n, str)):
+            yield from text_faults(name, "constraints", name)
+    if isinstance(problem.scenarios, Mapping):
+        for name, values in problem.scenarios.items():
+            yield from _size_faults("scenarios", values, "scenarios", str(name))
+    yield from text_faults(problem.title, "title")
+
+
+def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
+    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > MOST[what]:
+        yield Fault(f"found {len(values)}; accepted: up to {MOST[what]}", key)
+
+
+def faults(problem: Stated) -> Iterator[Fault]:
+    """What is wrong with a problem, everything at once."""
+    names = {**problem.fixed, **problem.free, **problem.scenarios}
+    of = guess_parameter_set(problem.model, names)
+    yield from _name_faults(problem, of)
+    for name in of.names:
+        yield from _value_faults(problem, of, name)
+    yield from _need_faults(problem, of)
+    yield from _variation_faults(problem, of)
+    yield from _objective_faults(problem)
+    yield from _expression_faults(problem, of)
+
+
+def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
+    advice = at_first(unknown)
+    tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
+    for table, name in ((t, n) for t, names in tables.items() for n in names):
+        if name in of.names:
+            continue
+        if name in others:
+            yield Fault(
+                f"{others[name]} parameter '{name}' beside {of.name} ones; the two sets are not mixed: "
+                f"write all in one of them ({' '.join(of.names)})",
+                (table, name),
+            )
+        else:
+            yield Fault(f"unknown parameter {short(name)}; {advice(name, problem.model, of, of.names)}", (table, name))
+    for name in problem.fixed:
+        if name in problem.free:
+            yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
+    given = tables["parameters"].keys() | problem.scenarios
+    if missing := [p.name for p in of.parameters if p.name not in given and p.default is None]:
+        example = " or ".join(example_of(of[missing[0]]))
+        meant = "".join(f"; {MEANT[name]}" for name in missing if name in MEANT)
+        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{meant}", ("parameters",))
+    for name in problem.start:
+        if name not in problem.free:
+            yield Fault(f"start for '{name}', which is not a free parameter", ("parameters", name, "start"))
+
+
+def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Fault]:
+    key = ("parameters", name)
+    if name in problem.fixed:
+        yield from _number_faults(of, name, problem.fixed[name], key)
+    if name not in problem.free:
+        return
+    try:
+        lower, upper = problem.free[name]
+    except (TypeError, ValueError):
+        yield Fault(f"found {short(problem.free[name])}; accepted: a pair (least, greatest)", key)
+        return
+    ends = {"min": lower, "max": upper}
+    if name in problem.start:
+        ends["start"] = problem.start[name]
+    found = [f for end, value in ends.items() for f in _number_faults(of, name, value, (*key, end))]
+    yield from found
+    if found:
+        return
+    if lower > upper:
+        yield Fault(f"min = {lower:.6g} is greater than max = {upper:.6g}; swap them", key)
+    elif name in problem.start and not lower <= problem.start[name] <= upper:
+        yield Fault(
+            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}", (*key, "start")
+        )
+
+
+def _need_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    """Parameters that may differ from 0 where one that they need may be 0."""
+    for name, (needed, otherwise) in of.needs.items():
+        try:
+            least = min(_reached(problem, of, needed))
+            some = any(value != 0 for value in _reached(problem, of, name))
+        except (TypeError, ValueError):
+            continue  # reported as a value
+        if some and not least > 0:
+            message = f"{needed} may be 0 while {name} is not: {otherwise}; keep {needed} above 0, or leave {name} out"
+            yield Fault(message, ("parameters", needed))
+
+
+def _reached(problem: Stated, of: ParameterSet, name: str) -> list[float]:
+    """The ends of what a parameter may be."""
+    given = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
+    return [float(x) for x in (given or (problem.fixed.get(name, of[name].default),))]
+
+
+def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    for name, scenario in problem.scenarios.items():
+        if name in of.names:
+            yield from _scenario_faults(problem, of, name, scenario)
+    for table, needed in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
+        for name, value in getattr(problem, table).items():
+            if name in of.names and not _is_size(value, zero=table == "weights"):
+                sizes = f"a number {needed}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
+                yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
+            elif table == "tolerances" and name in of.names:
+                yield from _room_faults(problem, of, name, float(value))
+    if len(problem.tolerances) > MOST_TOLERANCES:
+        message = f"{len(problem.tolerances)} tolerances; accepted: {MOST_TOLERANCES}, those that matter most"
+        yield Fault(message, ("tolerances",))
+
+
+def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any) -> Iterator[Fault]:
+    key = ("scenarios", name)
+    if name in problem.free:
+        yield Fault(f"'{name}' is both free and in scenarios; keep one", key)
+    if isinstance(scenario, Band):
+        found = [f for end in ("min", "max") for f in _number_faults(of, name, getattr(scenario, end), (*key, end))]
+        yield from found
+        if not found and scenario.min >= scenario.max:
+            yield Fault(f"min = {scenario.min:.6g} is not less than max = {scenario.max:.6g}", key)
+        if isinstance(scenario.points, bool) or not isinstance(scenario.points, int) or not 2 <= scenario.points <= 99:
+            yield Fault(f"points = {short(scenario.points)}; accepted: a whole number from 2 to 99", (*key, "points"))
+    elif not isinstance(scenario, Sequence) or isinstance(scenario, str) or not scenario:
+        yield Fault(f"found {short(scenario)}; accepted: {{ min = …, max = …, points = … }}, or a list of values", key)
+    else:
+        for value in scenario:
+            yield from _number_faults(of, name, value, key)
+
+
+def _room_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
+    """Faults of a tolerance that takes a parameter out of its physical range."""
+    given = problem.free.get(name) or points_of(problem.scenarios.get(name, ())) or (problem.fixed.get(name),)
+    try:
+        least, greatest = min(map(float, given)) - tolerance, max(map(float, given)) + tolerance
+    except (TypeError, ValueError):
+        return  # reported as a value
+    for value in (least, greatest):
+        if value not in of[name].range:
+            message = (
+                f"with the tolerance {tolerance:.6g}, {name} reaches {value:.6g}, which is not physical: "
+                f"{of[name].meaning} is {of[name].range}; keep {name} off the end of its range by the tolerance"
+            )
+            yield Fault(message, ("tolerances", name))
+
+
+def _is_size(value: Any, zero: bool) -> bool:
+    try:
+        number = math.nan if isinstance(value, bool | str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return _is_square(number) and (number >= 0 if zero else number > 0)
+
+
+def _is_square(number: float) -> bool:
+    """Whether a number is 0 or of a size whose products with a few others are doubles."""
+    return number == 0 or SMALLEST <= abs(number) <= 1 / SMALLEST
+
+
+def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]) -> Iterator[Fault]:
+    parameter = of[name]
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    try:
+        number = math.nan if isinstance(value, bool | str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
+    elif not _is_square(number):
+        yield Fault(f"found {number:g}; accepted: 0, or a size from {SMALLEST:g} to {1 / SMALLEST:g}{unit}", key)
+    elif number not in parameter.range:
+        degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
+        down = -number in parameter.range and parameter.meaning.endswith("downward")
+        degrees = f"; z points down: write {-number:.6g}{unit} for what is above the ground" if down else degrees
+        found = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{degrees}"
+        yield Fault(found, key)
+
+
+def _objective_faults(problem: Stated) -> Iterator[Fault]:
+    key = ("objective",)
+    if problem.minimize is not None and problem.maximize is not None:
+        yield Fault("minimize and maximize together; keep one of them", key)
+    if problem.pareto and (problem.minimize is not None or problem.maximize is not None):
+        yield Fault("pareto beside minimize or maximize; keep one of them", key)
+    yield from _pareto_faults(problem.pareto)
+    if problem.locate is not None:
+        yield from pattern_faults(problem.locate, problem.model, (*key, "locate"))
+
+
+def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
+    """What is wrong with the name of a pattern for the polynomials of a model."""
+    try:
+        if not isinstance(name, str):
+            raise ValueError(f"{short(name)} is no pattern")
+        if len(name) > _LONGEST:
+            raise ValueError(f"{short(name)} is no pattern")
+        known = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
+        if known != name and known in patterns_of(model):
+            yield Fault(f"unknown pattern: '{name}' is {known} in data; write {known}", key)
+            return
+        pattern_of(model, name)
+    except ValueError as error:
+        joined = ", or several, joined by +" if model.degree > 4 else ""
+        yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{joined}", key)
+
+
+def _pareto_faults(texts: Any) -> Iterator[Fault]:
+    accepted = "accepted: two or three different expressions to minimise, such as ['abscissa', 'Fr', '-lambda_s']"
+    listed = isinstance(texts, Sequence) and not isinstance(texts, str)
+    if not listed or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
+        yield Fault(f"found {short(texts)}; {accepted}, where a minus sign maximises", ("objective", "pareto"))
+
+
+def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    accepted = (*of.names, *public_names(problem.model, of), *root_names(problem.model))
+    advice = at_first(unknown)
+
+    def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
+        try:
+            parse(text, accepted)
+            parse(expand_names(text, of), accepted)  # which may be too long where the text is not
+        except UnknownName as error:
+            yield Fault(f"{error.found}; {advice(error.name, problem.model, of)}", key)
+        except ExpressionError as error:
+            yield Fault(str(error), key)
+
+    for sense, text in (("minimize", problem.minimize), ("maximize", problem.maximize)):
+        if text is not None:
+            yield from parsed(parse_value, text, "objective", sense)
+    if isinstance(problem.pareto, Sequence) and not isinstance(problem.pareto, str):
+        for text in problem.pareto:
+            yield from parsed(parse_value, text, "objective", "pareto")
+    for name, text in problem.constraints.items():
+        yield from parsed(parse_comparison, text, "constraints", name)

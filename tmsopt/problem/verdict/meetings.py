@@ -1,0 +1,167 @@
+"""Where roots meet, whether eigenvectors meet too: ranks of the model's matrices at its multiple roots."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import flint
+import numpy as np
+
+from tmsopt.models.user_spectrum import user_roots
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.verdict.stability import MultipleRoot
+from tmsopt.records import Array, Complex
+from tmsopt.roots import Pattern, Root, jordan
+from tmsopt.roots.jordan import equilibrated
+from tmsopt.roots.patterns.structure import nearest_unknowns
+
+_RANK = 1e-10  # relative singular value that counts as 0
+_CLOSE = 1e-3  # singular values that may vanish beside the design: those of a double root are off by √1e-10 and less
+_REACH = 3e-5  # of the box: how far from a design its crossing may be, which coefficients see to their square root
+_STEP, _STEPS = 1e-6, 6  # of the box, for differences; of Gauss and Newton
+_MET = 1e-12  # of the terms of the matrices: what is left of a block that vanishes
+_NEAR = 1e-6  # of their size: a located root and one shown are the same
+_UNIT = 1e-3  # of the largest root: the unit in which matrices are weighed at a smaller one
+
+
+def meetings(problem: Problem, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
+    """The multiple ones among roots of the polynomial of a design, rightmost first, as users read them."""
+    found: list[MultipleRoot] = []
+    of_H = problem.model.carrier is not None
+    for root in roots:
+        if root.multiplicity > 1 and (root.im < 0 if of_H else root.im >= 0):
+            (told,) = user_roots(problem.model, [root])
+            meeting = _meeting(problem, parameters, root, told, roots)
+            found += [meeting] if of_H or not root.im else [meeting, replace(meeting, im=-root.im)]
+    return tuple(sorted(found, key=lambda m: (-m.re, -m.im)))
+
+
+def is_crossing(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> bool:
+    """Whether a located multiple root has more than one eigenvector, so that it is no exceptional point."""
+    return any(not m.exceptional for m in located_meetings(problem, pattern, parameters))
+
+
+def located_meetings(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> tuple[MultipleRoot, ...]:
+    """The multiple roots that ``EP`` in the name of a pattern asks for; none without matrices."""
+    if problem.model.pencil is None or "EP" not in pattern.name:
+        return ()
+    return meetings(problem, parameters, _located(problem, pattern, parameters))
+
+
+def _located(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
+    """The multiple roots of the nearest polynomial of a pattern."""
+    values = problem.values(parameters)
+    try:
+        (unknowns, *_) = nearest_unknowns(pattern, np.array([float(c) for c in values.coefficients]))
+    except ValueError:
+        return []
+    return [
+        Root(float(z.real), float(z.imag) if abs(z.imag) > 0 else 0.0, count)
+        for factor, count in pattern.counted(unknowns)
+        if not ("resonance" in pattern.form and len(factor) > 2 and factor[1] == 0)
+        for z in np.roots(np.array(factor, dtype=float))
+        if count > 1
+    ]
+
+
+def every_meeting(
+    problem: Problem, parameters: Mapping[str, float], roots: Sequence[Root], violated: Collection[str]
+) -> tuple[MultipleRoot, ...]:
+    """The multiple roots of a solution: first those of its pattern, unless that is violated, then the others."""
+    shown, pattern = meetings(problem, parameters, roots), problem.pattern
+    lost = any(name in violated for name in problem.located)
+    located = located_meetings(problem, pattern, parameters) if pattern is not None and not lost else ()
+    ours = [m for m in shown if any(_beside(m, other) for other in located)]
+    rest = [m for m in located if not any(_beside(m, other) for other in shown)]
+    return (*ours, *rest, *(m for m in shown if m not in ours))
+
+
+def _beside(one: MultipleRoot, other: MultipleRoot) -> bool:
+    size = abs(complex(one.re, one.im)) + abs(complex(other.re, other.im))
+    return abs(complex(one.re - other.re, one.im - other.im)) <= _NEAR * (size or 1.0)
+
+
+def nearest_crossing(
+    problem: Problem, pattern: Pattern, parameters: Mapping[str, float]
+) -> dict[str, float]:  # fmt: skip
+    """The parameters at which located roots cross beside a design: sharper than coefficients see them."""
+    roots = _located(problem, pattern, parameters)
+    root = max(roots, key=lambda r: r.multiplicity)
+    found, _ = _crossed(problem, parameters, complex(root.re, root.im), root.multiplicity, _unit(root, roots))
+    return {n: min(max(found[n], low), high) for n, (low, high) in problem.free.items()}
+
+
+def _meeting(
+    problem: Problem, parameters: Mapping[str, float], root: Root, told: Root, roots: Sequence[Root]
+) -> MultipleRoot:  # fmt: skip
+    k, pencil = root.multiplicity, problem.model.pencil
+    if pencil is None:
+        return MultipleRoot(told.re, told.im, k, None, k)
+    of = problem.parameter_set
+    unit = _unit(root, roots)
+    at, s = _crossed(problem, parameters, complex(root.re, root.im), k, unit)
+    matrices = pencil(of.native({n: flint.arb(x) for n, x in at.items()}))
+    found = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK, unit)
+    partial = found.partial or (k - found.geometric + 1,)
+    return MultipleRoot(told.re, told.im, k, found.geometric, partial[0])
+
+
+def _unit(root: Root, roots: Sequence[Root]) -> float:
+    """The size of a root in which matrices are weighed."""
+    return max(abs(complex(root.re, root.im)), _UNIT * max(abs(complex(r.re, r.im)) for r in roots)) or 1.0
+
+
+def _crossed(
+    problem: Problem, parameters: Mapping[str, float], s: complex, k: int, unit: float
+) -> tuple[Mapping[str, float], complex]:
+    """The crossing beside a design, and its root: the design itself where there is none so near.
+
+    Coefficients see a crossing to the square root of their digits alone, so a design may be 1e-5 away from it. There
+    the block of L(s) that belongs to the least singular values vanishes, which is regular in the parameters.
+    """
+    free = [n for n, (low, high) in problem.free.items() if high > low]
+    widths = np.array([problem.free[n][1] - problem.free[n][0] for n in free])
+    at = [np.array(P, dtype=float) for P in _matrices(problem, parameters)]
+    size, scale = equilibrated(at, unit)
+    scale = scale / np.linalg.norm(size * scale, 2)  # held, lest it jumps as entries change
+
+    def weighed(x: Array, z: complex) -> Complex:
+        matrices = _matrices(problem, {**parameters, **dict(zip(free, x.tolist(), strict=True))})
+        whole = sum(np.array(P, dtype=float) * z ** (len(matrices) - 1 - j) for j, P in enumerate(matrices))
+        return np.asarray(scale * whole, dtype=complex)
+
+    for count in range(k, 1, -1):
+        x, z = np.array([float(parameters[n]) for n in free]), s
+        for _ in range(_STEPS):
+            left, values, right = np.linalg.svd(weighed(x, z))
+            if count > len(values) or values[-count] > _CLOSE:
+                break
+            if values[-count] <= _MET:
+                return {**parameters, **dict(zip(free, x.tolist(), strict=True))}, z
+            step = _step(weighed, x, widths, z, unit, left[:, -count:], right[-count:])
+            x, z = x + widths * step[:-2], z + unit * complex(*step[-2:])
+            if (np.abs(x - [parameters[n] for n in free]) > _REACH * widths).any():
+                break
+    return parameters, s
+
+
+def _matrices(problem: Problem, parameters: Mapping[str, float]) -> Sequence[Any]:
+    assert problem.model.pencil is not None
+    return problem.model.pencil(problem.parameter_set.native(dict(parameters)))
+
+
+def _step(
+    weighed: Callable[[Array, complex], Complex], x: Array, widths: Array, z: complex, unit: float, left: Complex,
+    right: Complex,
+) -> Array:  # fmt: skip
+    """Gauss and Newton for a block of L that shall vanish, in shares of the box and of the unit of the root."""
+
+    def block(at: Array, root: complex) -> Array:
+        B = (left.conj().T @ weighed(at, root) @ right.conj().T).ravel()
+        return np.concatenate([B.real, B.imag])
+
+    base = block(x, z)
+    moves = [*(widths * row for row in np.eye(len(x))), *np.zeros((2, len(x)))]
+    turns = [*([0.0] * len(x)), unit, 1j * unit]
+    columns = [(block(x + _STEP * m, z + _STEP * t) - base) / _STEP for m, t in zip(moves, turns, strict=True)]
+    return np.asarray(np.linalg.lstsq(np.array(columns).T, -base, rcond=1e-9)[0])

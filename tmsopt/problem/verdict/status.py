@@ -1,0 +1,81 @@
+"""How a search ended: the words for each status, and the exception that carries a solution that is none."""
+
+from typing import TYPE_CHECKING
+
+from tmsopt.problem.unit_system import amounts_text
+from tmsopt.problem.verdict.stability import UNSTABLE, stability_in_words
+
+if TYPE_CHECKING:
+    from tmsopt.problem.problem import Problem
+    from tmsopt.problem.solution import Solution
+
+
+def status_text(problem: "Problem", status: str) -> str:
+    """A status in words; where nothing is free, a design is judged: it is not optimal but feasible."""
+    return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
+
+
+def status_in_words(solution: "Solution") -> str:
+    """How a search ended, as a headline says it."""
+    problem, bound, status = solution.problem, solution.bound, solution.status
+    if solution.interrupted and status != "optimal":
+        return "stopped before the end, the best design so far"
+    proved = ", proved" if bound.proven else ""
+    if status == "infeasible":
+        return f"infeasible{'' if problem.free else ' as given'}{proved}"
+    if solution.without_best:
+        return "no best design exists"
+    if status != "optimal":
+        return "none found" if problem.sense == "locate" else "not converged, so a better design may be near"
+    if problem.objective is None or not problem.free:
+        return "found" if problem.free else "as given"
+    unproved = "stopped before it was proved" if solution.interrupted else "not proved"
+    return ", ".join(["optimal", *(["proved"] if bound.proven else [*solution.starts.sureness, unproved])])
+
+
+def verdict_in_words(solution: "Solution") -> str:
+    """Whether a solution is stable; for one that is not though that was sought, whether any is."""
+    problem, known, found = solution.problem, solution.any_stable, solution.stability
+    located_none = problem.sense == "locate" and solution.status == "not_converged"
+    if located_none or (solution.status == "infeasible" and known is not False):
+        return ""
+    limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
+    none = f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
+    others = none if known is False else "" if solution.interrupted else "no stable design found, not proved"
+    sought = solution.stability_sought and not known
+    if found.verdict != UNSTABLE:
+        model = problem.model
+        words = stability_in_words(
+            found, exact=solution.edge_is_exact, of_matrices=model.pencil is not None, of_H=model.carrier is not None
+        )
+        return f"{words}; {others}" if found.on_edge and sought and others else words
+    if known:
+        return "not stable, though there are stable designs in the box"
+    return others if known is False or (sought and others) else "not stable"
+
+
+class NotSolved(RuntimeError):
+    """Raised by `solve` when there is no optimal design; `solution` holds the best point found.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # no abscissa below -1
+        >>> asked = tmsopt.Problem(swing, free={"c": (0, 3)}, minimize="c", constraints={"fast": "abscissa <= -2"})
+        >>> try:
+        ...     tmsopt.solve(asked)
+        ... except tmsopt.NotSolved as error:
+        ...     print(error.solution.status)
+        infeasible
+
+    More: docs/how_to/infeasible.md
+    """
+
+    def __init__(self, solution: "Solution") -> None:
+        self.solution, violated = solution, amounts_text(solution.problem, solution.violations)
+        super().__init__(
+            f"{solution.problem.title or 'problem'}: {solution.status}"
+            + (f"; violated: {violated}" if violated else "")
+            + "".join(f"; {note}" for note in solution.notes)
+        )
+
+    def __reduce__(self) -> tuple[type["NotSolved"], tuple["Solution"]]:
+        return NotSolved, (self.solution,)

@@ -1,0 +1,92 @@
+"""The box of a problem as a unit cube, in which designs are drawn and told apart."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.problem.problem import Problem
+from tmsopt.records import Array
+
+_STEEP = 7.0  # half of the scale beside zero sees the inner 3 % of a range, its inner tenth the inner 2e-3
+_DECADES = 100.0  # ratio of the ends of a range beyond which its values are spread by their logarithms
+
+
+@dataclass(frozen=True)
+class Cube:
+    """The box of a problem as a unit cube: tangents and, over decades, logarithms evenly spread."""
+
+    problem: Problem
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return len(self.problem.free)
+
+    def designs(self, u: Array) -> dict[str, Array]:
+        """Columns of parameters for points of shape (…, size)."""
+        lower, upper, first, width = (e.reshape(-1, *[1] * (u.ndim - 1)) for e in self._ends)
+        place = np.moveaxis(u, -1, 0)
+        rows = zip(self.problem.free, first + width * place, strict=True)
+        x = np.minimum(np.maximum(np.stack([self._plain(name, row) for name, row in rows]), lower), upper)
+        x = np.where(place <= 0, lower, np.where(place >= 1, upper, x))  # to the last digit
+        return dict(zip(self.problem.free, x, strict=True))
+
+    def points(self, designs: Mapping[str, float]) -> Array:
+        """The point of one design."""
+        found = []
+        for name, ends in self.problem.free.items():
+            lower, upper, x = self._stretched(name, np.array([*ends, designs[name]]))
+            found.append((x - lower) / (upper - lower))
+        return np.asarray(np.clip(found, 0.0, 1.0))
+
+    def even(self, u: Array) -> tuple[Array, Array]:
+        """Points on a scale between the cube's own and x = b sinh(c y)/sinh(c), which sees values beside zero.
+
+        And its slopes there.
+        """
+        rows, size, ends = self._zeros
+        moved, slopes = u.copy(), np.ones_like(u)
+        x = (self._ends[2] + self._ends[3] * u)[..., rows]
+        moved[..., rows] = (u[..., rows] + (np.arcsinh(x / size) - ends[0]) / (ends[1] - ends[0])) / 2
+        slopes[..., rows] = (1 + self._ends[3][rows] / np.hypot(x, size) / (ends[1] - ends[0])) / 2
+        return np.clip(moved, 0.0, 1.0), slopes
+
+    def drawn_beside_zero(self, u: Array) -> Array:
+        """Points that are as even on the scale x = b sinh(c y)/sinh(c) as `u` in the cube, in ranges with 0 in them."""
+        rows, size, ends = self._zeros
+        moved = u.copy()
+        x = size * np.sinh(ends[0] + (ends[1] - ends[0]) * u[..., rows])
+        moved[..., rows] = np.clip((x - self._ends[2][rows]) / self._ends[3][rows], 0.0, 1.0)
+        return moved
+
+    @cached_property
+    def _zeros(self) -> tuple[NDArray[np.int_], Array, Array]:
+        """Which parameters have 0 in their range; the unit of their scale, and its ends, shape (2, number)."""
+        plain = [not (self._tangent(n) or self._logarithmic(n)) for n in self.problem.free]
+        rows = np.flatnonzero(np.array(plain, dtype=bool) & (self._ends[0] <= 0) & (self._ends[1] >= 0))
+        ends = self._ends[:2][:, rows]
+        size = np.abs(ends).max(axis=0, initial=0.0) / np.sinh(_STEEP)
+        return rows, size, np.arcsinh(ends / size)
+
+    @cached_property
+    def _ends(self) -> Array:
+        """Lower and upper ends; the lower ones and the widths, stretched. Shape (4, size)."""
+        plain = np.array([*self.problem.free.values()]).reshape(-1, 2)
+        ends = np.array([self._stretched(n, e) for n, e in zip(self.problem.free, plain, strict=True)]).reshape(-1, 2)
+        return np.stack([*plain.T, ends[:, 0], ends[:, 1] - ends[:, 0]])
+
+    def _stretched(self, name: str, x: Array) -> Array:
+        return np.asarray(np.tan(x) if self._tangent(name) else np.log(x) if self._logarithmic(name) else x)
+
+    def _plain(self, name: str, x: Array) -> Array:
+        return np.asarray(np.arctan(x) if self._tangent(name) else np.exp(x) if self._logarithmic(name) else x)
+
+    def _tangent(self, name: str) -> bool:
+        return self.problem.parameter_set[name].tangent
+
+    def _logarithmic(self, name: str) -> bool:
+        lower, upper = self.problem.free[name]
+        return lower > 0 and upper > _DECADES * lower

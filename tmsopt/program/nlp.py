@@ -1,0 +1,310 @@
+"""An NLP as plain data, the units it is written in, and what its solver needs to start."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.algebra.sequence import golden_steps
+from tmsopt.models import Values
+from tmsopt.problem.cases import Case
+from tmsopt.problem.problem import Problem
+from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES, regular
+from tmsopt.records import Array
+from tmsopt.roots import roots
+from tmsopt.roots.patterns.pattern import Roots
+
+_TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where two factors share it, digits are lost
+
+_TIE = 1e-3
+"""Difference of distances that are the same."""
+
+_FIRST = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
+_DESIGNS = 33
+_ORDINARY = (1e-2, 1e3)
+
+Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
+"""Starting values of lifted variables for a numeric design and its roots, the nominal design first and then each
+case; several where there is a choice."""
+
+
+@dataclass(frozen=True)
+class AddedVariable:
+    """Variables that the formulation adds to the parameters, and how to start them.
+
+    Attributes:
+        close: how to start them beside a solution, if otherwise.
+    """
+
+    name: str
+    size: int
+    guess: Guess
+    close: Guess | None = None
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One way in which a root can stand on the edge that a root quantity describes, or a kink on one of its pieces.
+
+    Attributes:
+        distance: how far the root is from the edge at a point of the NLP; of several ways, the least is taken. Without
+            it, what the row is off 0.
+        variable, row: what is held at a value.
+    """
+
+    distance: Callable[[Array], float] | None = None
+    variable: int | None = None
+    row: int | None = None
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class MaximumVariable:
+    """A variable t that stands for the greatest of several pieces, and its rows t − piece ≥ 0.
+
+    Attributes:
+        quotient: it stands for a quotient instead, with one row t · denominator − numerator = 0.
+    """
+
+    variable: int
+    rows: tuple[int, ...]
+    quotient: bool = False
+
+
+@dataclass(frozen=True)
+class Factor:
+    """Where an NLP keeps a factor t² + βt + κ, or s² + ps + w², or t + δ.
+
+    Attributes:
+        squared: whether the second variable is w, not its square.
+        linear: whether there is no second one.
+    """
+
+    first: int
+    squared: bool = False
+    linear: bool = False
+
+    def real_roots(self, x: Array) -> tuple[float, ...]:
+        """Its real roots, the smaller first; none of a complex pair."""
+        if self.linear:
+            return (-float(x[self.first]),)
+        half, q = -x[self.first] / 2, x[self.first + 1]
+        rest = half * half - (q * q if self.squared else q)
+        return (float(half - np.sqrt(rest)), float(half + np.sqrt(rest))) if rest >= 0 else ()
+
+
+@dataclass(frozen=True)
+class NLP:
+    """minimise f(x) subject to lower ≤ x ≤ upper and row_lower ≤ g(x) ≤ row_upper.
+
+    Attributes:
+        formulation: ``abscissa`` or ``matching``.
+        variables: names; the free parameters come first, each as itself or as its tangent.
+        functions: CasADi function x → (f, g); with settings, (x, p) → (f, g).
+        rows: name of each row of g: a constraint's name, or the equation it belongs to.
+        lifts: the variables after the free parameters, in order.
+        cases: the variations of the design that its rows cover.
+        touches: root quantity or kink → the ways in which it is met exactly; unless one is held, the NLP only bounds
+            it, which is too little for those that are listed.
+        kinks: those that others are made of come first.
+        products: the factors of each polynomial.
+        exact: whether starts satisfy the equations of all cases.
+        settings: values of the numbers p that differ between the problems of a family.
+        unit: of the roots in its variables.
+        size: of the objective, as far as it is known beforehand.
+        units: of the first variables, the free parameters, in which a solver of absolute tolerances moves them.
+        objective_unit: likewise, of the objective where it is small.
+        hessian: (x, p, λ of f, λ of g) → that of the Lagrangian, its upper half, where it need not be derived.
+    """
+
+    formulation: str
+    variables: tuple[str, ...]
+    functions: ca.Function = field(repr=False)
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    rows: tuple[str, ...]
+    row_lower: tuple[float, ...]
+    row_upper: tuple[float, ...]
+    lifts: tuple[AddedVariable, ...] = field(repr=False, default=())
+    cases: tuple[Case, ...] = field(repr=False, default=())
+    touches: Mapping[str, tuple[Contact, ...]] = field(repr=False, default_factory=dict)
+    kinks: tuple[MaximumVariable, ...] = field(repr=False, default=())
+    products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
+    exact: bool = False
+    settings: tuple[float, ...] = ()
+    unit: float = 1.0
+    size: float = 1.0
+    units: tuple[float, ...] = ()
+    objective_unit: float = 1.0
+    hessian: ca.Function | None = field(repr=False, default=None)
+
+    def at(self, x: Any, settings: Any = None) -> Any:
+        """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
+        x = x.tolist() if isinstance(x, np.ndarray) else x
+        if not self.settings:
+            return self.functions(x)
+        return self.functions(x, self.settings if settings is None else settings)
+
+    @cached_property
+    def derived(self) -> tuple[ca.Function, dict[str, ca.Function]]:
+        """(x, p) → (f, g), and what CasADi else derives of it anew for every solver."""
+        x, p = ca.SX.sym("x", len(self.variables)), ca.SX.sym("p", len(self.settings))
+        function = ca.Function("nlp", [x, p], self.at(x, p), ["x", "p"], ["f", "g"])
+        first = {of: function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
+        second = self.hessian or function.factory(
+            "dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]}
+        )
+        return function, {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
+
+    @property
+    def equations(self) -> int:
+        """Number of equality rows."""
+        return sum(lo == hi for lo, hi in zip(self.row_lower, self.row_upper, strict=True))
+
+    def touchings(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
+        """The same with everything in `touches` met exactly: in the ways that a point is closest to, then in others.
+
+        In each of the others one way is exchanged for one that is as close, but for a `tie`.
+        """
+        rows = np.array(self.at(x)[1]).ravel() if self.kinks else x
+        ranked: list[list[Contact]] = []
+        for ways in self.touches.values():
+            distances = [float(rows[way.row]) if way.distance is None else way.distance(x) for way in ways]
+            order = np.argsort(distances, kind="stable")
+            ranked.append([ways[k] for k in order if distances[k] <= distances[order[0]] + tie or k == order[0]])
+        nearest = [close[0] for close in ranked]
+        yield self._held(nearest)
+        for k, close in enumerate(ranked):
+            for way in close[1:]:
+                yield self._held([*nearest[:k], way, *nearest[k + 1 :]])
+
+    def _held(self, ways: Sequence[Contact]) -> "NLP":
+        lower, upper, row_upper = list(self.lower), list(self.upper), list(self.row_upper)
+        for way in ways:
+            if way.variable is not None:
+                lower[way.variable] = upper[way.variable] = way.value
+            if way.row is not None:
+                row_upper[way.row] = way.value
+        return replace(self, lower=tuple(lower), upper=tuple(upper), row_upper=tuple(row_upper))
+
+    def filled(self, x: Array) -> Array:
+        """A point with every kink the greatest of its pieces."""
+        x = x.copy()
+        for kink in self.kinks:
+            x[kink.variable] = 0.0
+            value = -float(np.array(self.at(x)[1]).ravel()[list(kink.rows)].min())
+            if kink.quotient:
+                x[kink.variable] = 1.0
+                denominator = float(np.array(self.at(x)[1]).ravel()[kink.rows[0]]) + value
+                value = value / denominator if denominator else 0.0
+            x[kink.variable] = value if np.isfinite(value) else 0.0
+        return x
+
+    def tangled(self, x: Array) -> bool:
+        """Whether two factors share a root that is double in neither of them.
+
+        Such a double root cannot become a pair, so the point may be stationary for the NLP and not for the design:
+        with both of it in one factor, the way is open.
+        """
+        for factors in self.products:
+            real = [found for factor in factors if (found := factor.real_roots(x))]
+            for one, other in combinations(real, 2):
+                near = _TANGLED * (1 + max(map(abs, (*one, *other))))
+                shared = min(abs(r - t) for r in one for t in other) <= near
+                double = any(len(pair) == 2 and pair[1] - pair[0] <= near for pair in (one, other))
+                if shared and not double:
+                    return True
+        return False
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Powers of 2, so that scaling does not round.
+
+    Attributes:
+        unit: of the roots.
+        lead: of the leading coefficient.
+    """
+
+    unit: float = 1.0
+    lead: float = 1.0
+
+    def scaled(self, coefficients: Sequence[Any]) -> list[Any]:
+        """Coefficients, descending, of the polynomial in s/unit, over the unit of the leading one."""
+        if self == Scale():
+            return list(coefficients)
+        n = len(coefficients) - 1
+        return [c / (self.lead * self.unit**k) for k, c in zip(range(n + 1), coefficients, strict=True)]
+
+
+def scale_of(problem: Problem) -> Scale:
+    """Median sizes of roots and leading coefficients over some designs of the box.
+
+    Every unit is as exact as another; this one makes tolerances mean the same for all equations.
+    """
+    if problem.model.natural:
+        return Scale()
+    with np.errstate(all="ignore"):
+        found = problem.model.coefficients(problem.ordered(_designs(problem)), problem.parameter_set)
+        a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in found)), axis=-1)
+    a = a.reshape(-1, a.shape[-1])
+    a = a[np.all(np.isfinite(a), axis=1) & np.any(a != 0, axis=1)]
+    if not len(a):
+        return Scale()
+    a = regular(a)
+    size = np.abs(roots(a))
+    size = size[(size > 0) & (size < 1e100)]
+    return Scale(_power_of_two(size), _power_of_two(np.abs(a[:, 0])))
+
+
+def objective_size(problem: Problem) -> float:
+    """Size below which differences of the objective are none, relative: that of the roots where it is about these."""
+    about = problem.objective.names if problem.objective else ()
+    return min(1.0, scale_of(problem).unit) if about == ("abscissa",) else 1.0
+
+
+def _designs(problem: Problem) -> dict[str, Any]:
+    """Columns of designs spread over the box."""
+    names = list(problem.free)
+    share = (0.5 + np.arange(_DESIGNS)[:, None] * golden_steps(len(names))) % 1.0 if names else np.zeros((1, 0))
+    lower, upper = (np.array([ends[k] for ends in problem.free.values()]) for k in (0, 1))
+    return dict(zip(names, (lower + (upper - lower) * share).T, strict=True))
+
+
+def objective_unit(problem: Problem) -> float:
+    """A power of 2 near the size of a small objective: a solver brings large ones down by itself, but none up."""
+    if problem.model.natural or problem.objective is None or not problem.free:
+        return 1.0
+    columns = {n: np.broadcast_to(x, _DESIGNS) for n, x in problem.ordered(_designs(problem)).items()}
+    values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)
+    size = np.abs(np.atleast_1d(problem.objective(values)))
+    size = size[np.isfinite(size) & (size > 0)]
+    return _power_of_two(size) if len(size) and np.median(size) < _ORDINARY[0] else 1.0
+
+
+def units_of(problem: Problem) -> tuple[float, ...]:
+    """For each free parameter a power of 2 near the size of its range, or 1 where that is near enough."""
+    if problem.model.natural:
+        return ()
+    sizes = [max(map(abs, ends)) for ends in problem.free.values()]
+    return tuple(ordinary(size) for size in sizes)
+
+
+def reaches_of(problem: Problem) -> dict[str, float]:
+    """For each free parameter a power of 2 near its size, or its range where it is large: what a proof moves it by."""
+    units = dict(zip(problem.free, units_of(problem), strict=False))  # none of natural units
+    return {n: u if u <= 1 else ordinary(problem.free[n][1] - problem.free[n][0]) for n, u in units.items()}
+
+
+def ordinary(size: float) -> float:
+    """A power of 2 near a size, or 1 where that is near enough, or there is none."""
+    near = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
+    return 1.0 if near else _power_of_two(np.array([size]))
+
+
+def _power_of_two(sizes: Any) -> float:
+    return float(2.0 ** np.round(np.log2(np.median(sizes)))) if len(sizes) else 1.0

@@ -1,0 +1,50 @@
+"""Where to start from beside a sample: designs with one root, or one pair, of full multiplicity."""
+
+from dataclasses import replace
+from itertools import chain, zip_longest
+
+from tmsopt.models.user_spectrum import full_patterns
+from tmsopt.problem.problem import degrees_of_freedom
+from tmsopt.program.formulate import matching
+from tmsopt.program.ipopt import ipopt
+from tmsopt.program.starts import initial_point
+from tmsopt.search.multistart import HOPELESS_AFAR, candidate_of, distinct
+from tmsopt.search.workspace import LocalEnd, Workspace
+
+_LEADS = 3  # designs with one root, and with one pair, that are started from
+_LEADLESS = 8  # starts that led to none, after which no more are tried
+
+
+def exceptional(work: Workspace) -> list[dict[str, float]]:
+    """Designs with one root, or one pair, of full multiplicity: those of least abscissa, where enough is free for them.
+
+    The least abscissa is often at one, and where a0 may vanish it may stand in so thin a needle that no sample sees it,
+    while equations lead there.
+    """
+    part, sampler, sample, degree = work.part, work.sampler, work.sample, work.part.model.degree
+    limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
+    found: list[LocalEnd] = []
+    if sampler is None or sample is None or degree == 1:
+        return []
+    most = HOPELESS_AFAR if sample.far_off else _LEADLESS
+    memory = work.family.memory(part)
+    for pattern in full_patterns(part.model):
+        asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
+        asked = replace(asked, scenarios={}, tolerances={})
+        if degrees_of_freedom(asked).count < 0:
+            continue
+        leading = matching(asked)
+        lead, ended = ipopt(leading, work.options), list[LocalEnd]()
+        before = memory.leads.get(pattern, []) if memory else []
+        turns = zip_longest(*([(seen, k) for k in range(len(seen))] for seen in (sample.boldest, sample.refined)))
+        afar = (sampler.design(seen, k) for seen, k in (turn for pair in turns for turn in pair if turn))
+        for count, design in enumerate(chain(before, afar), 1):
+            ended.append(candidate_of(asked, leading, lead(initial_point(leading, asked, design))))
+            led = any(c.feasible for c in ended)
+            enough = count >= len(before) + most and (sample.refined.out_of_reach(degree) or not led)
+            if enough or (led and count == len(before)):
+                break
+        if memory and len(ended) > len(before):
+            memory.leads[pattern] = [*before, *(work.design_at(c.run.x) for c in distinct(ended)[:_LEADS])]
+        found += distinct(ended, found)[:_LEADS]
+    return [work.design_at(c.run.x) for c in found]

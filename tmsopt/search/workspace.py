@@ -1,0 +1,318 @@
+"""What solving needs of a problem again and again, made once: for one problem, or for many that differ in numbers."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeVar
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.boundaries.nearest import Robustness, robustness_at
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
+from tmsopt.evaluation.recheck import Evaluation, recheck
+from tmsopt.global_search.signs import none_stable
+from tmsopt.models import Quantity, Values
+from tmsopt.problem.cases import Case
+from tmsopt.problem.dependence import demands_heavy_damping, needs_two_sided_bounds, rewards_change_of
+from tmsopt.problem.limit import limit_of
+from tmsopt.problem.problem import Freedom, Problem, degrees_of_freedom
+from tmsopt.problem.verdict.meetings import is_crossing
+from tmsopt.program.formulate import LIMIT, design_of, formulate, middle
+from tmsopt.program.ipopt import Point, Run, ipopt, polisher
+from tmsopt.program.nlp import NLP, objective_unit, scale_of, units_of
+from tmsopt.program.options import DEFAULTS, Options
+from tmsopt.records import Array
+from tmsopt.search.sample import Remembered, Sample, SampleCache, Sampler
+
+_KEPT = 32
+"""NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
+
+_THIN = 1e-9
+"""Width of a part of the box below which it is not worth a search of its own."""
+
+T = TypeVar("T")
+
+
+class Family:
+    """NLPs, solvers and polishers that have been built, of problems that differ in some numbers.
+
+    Not to be shared between threads, as no solver is. A lone problem is a family in which nothing varies.
+
+    Args:
+        varied: names of the numbers that differ: fixed parameters, and ``trail.limit`` for the number that the
+            constraint ``trail`` compares with. They are parameters of the NLPs; the box may differ too.
+        known: what other such problems met, which families of other objectives may share; given where all but limits
+            is the same.
+        name: under which this family has designs there.
+        box: ranges of the free parameters that hold those of all problems, for NLPs to serve all of them.
+    """
+
+    def __init__(
+        self, varied: Collection[str] = (), known: SampleCache | None = None, name: Hashable = None,
+        box: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:  # fmt: skip
+        self.varied, self._known, self._name, self._box = tuple(varied), known, name, box
+        self._memories: OrderedDict[Hashable, Remembered] = OrderedDict()
+        self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
+        self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
+        self._around: OrderedDict[Hashable, Robustness] = OrderedDict()
+
+    def formulate(
+        self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None, lead: int = 0
+    ) -> NLP:
+        """What `formulate` gives, with the problem's numbers in place of another's of the family."""
+        if not self.varied and not self._box:
+            return formulate(problem, cases, damping_ratio=damping_ratio, lead=lead)
+        wide = replace(problem, free=self._box) if self._box else problem
+        symbols = {name: ca.SX.sym(name) for name in self.varied}
+        nlp = _kept(
+            self._nlps,
+            (tuple(cases), damping_ratio, lead, *_decisions(wide, self.varied)),
+            lambda: formulate(wide, cases, damping_ratio=damping_ratio, settings=symbols, lead=lead),
+        )
+        return narrowed(replace(nlp, settings=tuple(_value(problem, name) for name in self.varied)), problem)
+
+    def ipopt(self, nlp: NLP, options: Options, start: str) -> Callable[..., Run]:
+        """A solver of an NLP of the family; see `ipopt`."""
+        return self._of(nlp, (options.of_ipopt, start), lambda: ipopt(nlp, options, start))
+
+    def polisher(self, nlp: NLP) -> Callable[[Run, NLP], Point]:
+        """A polisher of an NLP of the family; see `polisher`."""
+        return self._of(nlp, (), lambda: polisher(nlp))
+
+    def around(self, problem: Problem, parameters: Mapping[str, float]) -> Robustness | None:
+        """The boundaries nearest to a design, where the problem asks for the radius; met again as cases are added."""
+        if not problem.asks_radius:
+            return None
+        key = (tuple(parameters.items()), tuple(problem.weights.items()))
+        return _kept(self._around, key, lambda: robustness_at(problem, parameters))
+
+    def memory(self, part: Problem) -> Remembered | None:
+        """What was seen of a part of the box."""
+        if (known := self._known) is None:
+            return None
+        box = tuple(part.free.items())
+        return _kept(self._memories, box, lambda: Remembered(known, (self._name, box), box))
+
+    def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
+        """Something made of an NLP's functions, which are kept with it lest another gets their address."""
+        made: T = _kept(self._made, (id(nlp.functions), options), lambda: (nlp.functions, make()), 3 * _KEPT)[1]
+        return made
+
+
+@dataclass(frozen=True)
+class LocalEnd:
+    """Where one start ended.
+
+    Attributes:
+        nlp: with the limits that held.
+        objective: of the NLP; inf unless finite.
+        feasible: whether rows and bounds hold as IPOPT left them, and located roots have Jordan chains.
+        crossing: whether these chains alone are missing.
+    """
+
+    nlp: NLP
+    run: Run
+    objective: float
+    feasible: bool
+    crossing: bool = False
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """One problem, and everything that solving it asks for more than once.
+
+    Attributes:
+        part: the problem on the part of the box that designs are drawn from, e.g. one sign of one parameter.
+        name: of the part, e.g. ``normal rake``; empty for the whole box.
+        family: that the problem is one of.
+        extra_starts: designs that may be close to the optimum, to be started from.
+        without_sample: whether to do without a sample.
+        met: where starts ended in any part of the box, each with the NLP that it was started in.
+    """
+
+    problem: Problem
+    part: Problem
+    options: Options
+    family: Family
+    name: str = ""
+    extra_starts: tuple[Mapping[str, float], ...] = ()
+    without_sample: bool = False
+    met: list[tuple[NLP, LocalEnd]] = field(default_factory=list, compare=False)
+
+    def chained(self, candidate: LocalEnd) -> LocalEnd:
+        """The same, not feasible where roots that a pattern makes meet have no Jordan chain."""
+        pattern = self.part.pattern
+        if pattern is None or not candidate.feasible:
+            return candidate
+        crossing = is_crossing(self.part, pattern, self.part.ordered(self.design_at(candidate.run.x)))
+        return replace(candidate, feasible=not crossing, crossing=crossing)
+
+    @cached_property
+    def freedom(self) -> Freedom:
+        """Degrees of freedom of the problem."""
+        return degrees_of_freedom(self.problem)
+
+    @cached_property
+    def sampler(self) -> Sampler | None:
+        """Looks at designs of this part; None where arrays cannot tell what is asked of them."""
+        told = self.part.pattern is None and not self.part.asks_radius and not self.without_sample
+        return Sampler(self.part, self.options.seed, self.family.memory(self.part)) if told else None
+
+    @cached_property
+    def sample(self) -> Sample | None:
+        """What was seen of this part before any solver."""
+        return self.sampler.sample() if self.sampler else None
+
+    @cached_property
+    def _seen(self) -> Sample | None:
+        """The sample, of a pattern that of the limits alone."""
+        part = self.part
+        limits_alone = part.pattern and part.conditions and not (part.asks_radius or self.without_sample)
+        return Sampler(replace(part, locate=None), self.options.seed).sample() if limits_alone else self.sample
+
+    @property
+    def out_of_reach(self) -> bool:
+        """Whether all designs of a sample are far from what the limits allow, be it without the pattern asked for."""
+        return self._seen is not None and self._seen.refined.out_of_reach(self.part.model.degree)
+
+    @property
+    def needles(self) -> bool:
+        """Whether limits about the roots may be met where the mass matrix is nearly singular, which few starts find."""
+        about = self.part.asked_of_roots or self.part.pattern
+        return bool(about) and self._seen is not None and self._seen.singular
+
+    @cached_property
+    def never_stable(self) -> bool:
+        """Whether it is certain at once that no design of this part is stable."""
+        return none_stable(self.part)
+
+    def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None, lead: int = 0) -> NLP:
+        """The NLP of the problem on this part of the box."""
+        nlp = self.family.formulate(self.problem, cases, damping_ratio, lead)
+        return narrowed(nlp, self.part) if self.part is not self.problem else nlp
+
+    def ipopt(self, nlp: NLP, start: str) -> Callable[..., Run]:
+        """A solver of an NLP; see `formulation.ipopt`."""
+        return self.family.ipopt(nlp, self.options, start)
+
+    def design_at(self, x: Array) -> dict[str, float]:
+        """The free parameters at a point of an NLP, inside the part of the box."""
+        return design_of(self.part, x.tolist())
+
+    def recheck(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> Evaluation:
+        """What a design is in the given cases; see `checks.recheck`."""
+        return recheck(self.problem, parameters, cases, self.family.around(self.problem, parameters))
+
+    def parts(self, near: Mapping[str, float] | None = None) -> "tuple[Workspace, ...]":
+        """The parts into which a parameter with two sides divides the box, positive values first.
+
+        Args:
+            near: a design; only the parts that it is on.
+        """
+        of = self.problem.parameter_set
+        for name, (lower, upper) in self.problem.free.items():
+            names = of[name].sides
+            if names is not None and lower < -_THIN and upper > _THIN:
+                halves = [(names[1], (0.0, upper)), (names[0], (lower, 0.0))]
+                if near and name in near:
+                    halves = [half for half in halves if half[1][0] <= near[name] <= half[1][1]]
+                return tuple(replace(self, part=_on(self.problem, name, ends), name=side) for side, ends in halves)
+        return (self,)
+
+    def holds(self, design: Mapping[str, float]) -> bool:
+        """Whether a design, as far as it is given, is on this part."""
+        return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in self.part.free.items())
+
+
+def workspace(
+    problem: Problem, options: Options = DEFAULTS, family: Family | None = None,
+    extra_starts: Sequence[Mapping[str, float]] = (), without_sample: bool = False,
+) -> Workspace:  # fmt: skip
+    """The workspace of a problem in its whole box."""
+    return Workspace(
+        problem, problem, options, family or Family(), extra_starts=tuple(extra_starts), without_sample=without_sample
+    )
+
+
+def _on(problem: Problem, name: str, ends: tuple[float, float]) -> Problem:
+    """The problem with a smaller range of one parameter, and its start where that fits."""
+    inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
+    return replace(problem, free={**problem.free, name: ends}, start=problem.start if inside else {})
+
+
+def narrowed(nlp: NLP, problem: Problem) -> NLP:
+    """An NLP with the box of a problem that has the same free parameters."""
+    of = problem.parameter_set
+    lower, upper = list(nlp.lower), list(nlp.upper)
+    for k, (name, ends) in enumerate(problem.free.items()):
+        lower[k], upper[k] = (float(np.tan(e)) if of[name].tangent else e for e in ends)
+    return replace(nlp, lower=tuple(lower), upper=tuple(upper))
+
+
+def _kept(known: OrderedDict[Hashable, T], key: Hashable, make: Callable[[], T], most: int = _KEPT) -> T:
+    """What is known, or is made now; of too many, the one that was not used for longest goes."""
+    if key not in known:
+        known[key] = make()
+        if len(known) > most:
+            known.popitem(last=False)
+    known.move_to_end(key)
+    return known[key]
+
+
+def _value(problem: Problem, name: str) -> float:
+    if name.endswith(LIMIT):
+        limit = limit_of(problem.constraints[name.removesuffix(LIMIT)])
+        assert limit is not None  # a study checks what it varies
+        return limit
+    return problem.fixed[name]
+
+
+def _decisions(problem: Problem, varied: Sequence[str]) -> tuple[Hashable, ...]:
+    """What decides on variables and rows beside the numbers that are parameters of the NLP."""
+    heavy = problem.pattern is None and demands_heavy_damping(problem)
+    texts = tuple(problem.constraints.items()) if heavy else ()
+    nearest = problem.pattern is not None and problem.objective is None and degrees_of_freedom(problem).count > 0
+    # The box decides which quotients may have a pole in it.
+    box = (tuple(problem.free.items()), tuple(middle(problem).items()) if nearest else ())
+    zero = tuple(problem.fixed.get(name) == 0 for name in varied) if problem.asks_radius else ()
+    units = (scale_of(problem), units_of(problem), objective_unit(problem))
+    roots = (needs_two_sided_bounds(problem), *(rewards_change_of(problem, name) for name in _pieced(problem)))
+    return units, heavy, texts, box, zero, roots
+
+
+def _pieced(problem: Problem) -> list[str]:
+    """Quantities in pieces that are asked for: whether they become variables depends on what more of them does."""
+    found: dict[str, None] = {}
+
+    def seen(quantity: Quantity, values: Values) -> Any:
+        if quantity.pieces:
+            found[quantity.name] = None
+        return ca.SX.sym(quantity.name) if quantity.pieces or quantity.equation is not None else None
+
+    names = {n for e in (problem.objective, *problem.conditions.values()) if e for n in e.names}
+    quantities = {q.name: q for q in (*problem.model.quantities, *problem.parameter_set.quantities)}
+    asked = names & quantities.keys()
+    if any(q.pieces for q in quantities.values()) and asked:
+        values = Values(
+            problem.model, problem.parameter_set, {n: ca.SX.sym(n) for n in problem.parameter_set.names}, lift=seen
+        )
+        for name in sorted(asked):
+            values[name]
+    return sorted(found)
+
+
+def check_near(problem: Problem, near: Mapping[str, float]) -> None:
+    """Refuse a design to start near that names no parameters, or has no numbers.
+
+    Raises:
+        InputError: with everything that is wrong.
+    """
+    names = problem.parameter_set.names
+    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
+    wrong = (n for n, value in near.items() if not is_number(value))
+    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
+    if faults:
+        raise InputError(faults)
