@@ -267,7 +267,7 @@ def test_proofs_leave_what_is_proved(run: Run, monkeypatch: pytest.MonkeyPatch, 
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-@pytest.mark.parametrize("where", ["tmsopt.global_search.race Crew.race", "tmsopt.proofs.certify doubt"])
+@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify doubt"])
 def test_a_proof_that_is_stopped_leaves_the_design(
     run: Run, monkeypatch: pytest.MonkeyPatch, where: str, tmp_path: Path
 ) -> None:
@@ -319,7 +319,7 @@ def test_what_a_global_solver_raises_is_heard(run: Run, monkeypatch: pytest.Monk
         assert str(failed.exception()) == "must be real number, not types.SimpleNamespace"
     finally:
         process.end()
-    monkeypatch.setattr(race.Crew, "race", lambda *_: race._decisions([failed]))
+    monkeypatch.setattr(race.SolverPool, "race", lambda *_: race._decisions([failed]))
     status, out, _ = run("solve", box(tmp_path), "--certify")
     assert status == 0
     assert "note: SCIP failed: TypeError: must be real number" in " ".join(out.split())

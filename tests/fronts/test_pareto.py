@@ -284,7 +284,7 @@ def sides(forward, backward):
 )
 def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
     end = front_data.FrontPoint(end, None, ())
-    ask = subproblems.Asker(problem(free=TILTED), options.Options(), ends=(end,), easier={0: halves})
+    ask = subproblems.FrontSolver(problem(free=TILTED), options.Options(), ends=(end,), easier={0: halves})
     assert ask._hopeless(subproblems.subproblem(ask, k, limits), ()) == out
 
 

@@ -24,7 +24,7 @@ team = import_module("tmsopt.fronts.team")
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 FREE = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.035, 1.4)}
 PROBLEM = tmsopt.Problem(tms, FIXED, FREE, pareto=["abscissa", "Fr"], constraints={"decay": "abscissa <= -0.3"})
-ASK = subproblems.Asker(PROBLEM, options.Options())
+ASK = subproblems.FrontSolver(PROBLEM, options.Options())
 
 
 def each(function, items, processes):
@@ -68,8 +68,8 @@ def test_a_round_knows_what_the_rounds_before_met_and_nothing_else(processes):
 
 
 def test_new_designs_come_first_and_the_oldest_are_forgotten():
-    old = sample.Met({"here": np.arange(float(sample.REMEMBERED))[:, None]})
-    met = [sample.Met({"here": np.concatenate([[[x], [x + 1]], old.refined["here"]])}) for x in (-8.0, -4.0)]
+    old = sample.SampleCache({"here": np.arange(float(sample.REMEMBERED))[:, None]})
+    met = [sample.SampleCache({"here": np.concatenate([[[x], [x + 1]], old.refined["here"]])}) for x in (-8.0, -4.0)]
     joined = team._joined(old, met).refined["here"].ravel()
     assert joined.tolist() == [-8, -7, -4, -3, *range(sample.REMEMBERED - 4)]
 

@@ -38,7 +38,7 @@ def problem(**asked: Any) -> tmsopt.Problem:
 
 
 def judged(stated: tmsopt.Problem, drawn: list[dict[str, float]]) -> Any:
-    return judgement.judged(stated, {n: np.array([d[n] for d in drawn]) for n in stated.free})
+    return judgement.evaluate(stated, {n: np.array([d[n] for d in drawn]) for n in stated.free})
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_
         from_coefficients([1, x - y]), free={"x": (0.0, 9.0)}, scenarios={"y": [0.0, 2.0]}, tolerances={"x": 1.0},
         minimize="abscissa + x", constraints={"decay": "abscissa <= -0.5", "own": "x == 4", "all": "x - y >= 2"},
     )  # fmt: skip
-    found = judgement.judged(stated, {"x": np.array([3.0, 4.0, 6.0])})
+    found = judgement.evaluate(stated, {"x": np.array([3.0, 4.0, 6.0])})
     # The objective: x is 1 more at worst, beside the worst abscissa.
     assert found.worth == pytest.approx([4.0, 4.0, 4.0], abs=1e-12)
     assert found.excess == pytest.approx(np.array([[0.5, 0, 0], [1.0, 0, 2.0], [2.0, 1.0, 0]]), abs=1e-12)
@@ -89,7 +89,7 @@ def test_a_design_without_motion_is_none() -> None:
     stated = tmsopt.Problem(
         model, free={"x": (-1.0, 1.0), "y": (0.0, 1.0)}, minimize="x", constraints={"own": "y <= 2"}
     )
-    found = judgement.judged(stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])})
+    found = judgement.evaluate(stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])})
     assert np.isfinite(found.worth).tolist() == [False, False, True, False]
     assert found.excess.tolist() == [[np.inf, np.inf, 0.0, np.inf]]
     assert set(recheck(stated, {"x": 0.0, "y": 1.0}).violations) == {"a0"}
@@ -99,7 +99,7 @@ def test_a_design_without_motion_is_none() -> None:
 def test_designs_come_in_any_shape(shape: tuple[int, ...]) -> None:
     stated, drawn = problem(minimize="abscissa"), designs(6, seed=1)
     columns = {n: np.array([d[n] for d in drawn]) for n in stated.free}
-    flat = judgement.judged(stated, columns)
-    found = judgement.judged(stated, {n: c.reshape(shape) for n, c in columns.items()})
+    flat = judgement.evaluate(stated, columns)
+    found = judgement.evaluate(stated, {n: c.reshape(shape) for n, c in columns.items()})
     assert np.array_equal(found.worth, flat.worth.reshape(shape))
     assert np.array_equal(found.excess, flat.excess.reshape(-1, *shape))

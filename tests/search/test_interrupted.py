@@ -79,7 +79,7 @@ def test_it_is_raised_like_any_design_that_is_no_optimum() -> None:
 
 def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its sample was refined to 4e-4 of the box, where the well has the curvature 3 x² − 1 = 2.3."""
-    monkeypatch.setattr(import_module("tmsopt.search.multistart").Runner, "ended", stop)
+    monkeypatch.setattr(import_module("tmsopt.search.multistart").Runner, "solve_from", stop)
     found = tmsopt.solve(problem(), throw=False)
     assert (found.status, found.interrupted, found.starts.tried) == ("not_converged", True, 0)
     assert depth(LEAST) <= found.value <= depth(LEAST) + 2.3 / 2 * (4 * 4e-4) ** 2

@@ -44,7 +44,7 @@ def test_no_random_design_is_near_the_needle() -> None:
     """So that the test before this one asks for something."""
     rng = np.random.default_rng(0)
     drawn = {n: rng.uniform(*ends, 20000) for n, ends in BOX.items()}
-    found = import_module("tmsopt.program.judgement").judged(NEEDLE, drawn)
+    found = import_module("tmsopt.program.judgement").evaluate(NEEDLE, drawn)
     assert np.min(found.worth[found.excess.max(axis=0) == 0]) > -1
 
 

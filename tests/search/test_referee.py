@@ -51,13 +51,13 @@ def depth(at: float) -> float:
 
 def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> None:
     """Whatever a start is, its end is that of another one."""
-    real = multistart.Runner.ended
+    real = multistart.Runner.solve_from
 
     def ended(self: Any, design: Any, near: bool = False, hopeful: bool = True) -> Any:
         found = real(self, {"x": at}, near, hopeful)
         return found if feasible else replace(found, feasible=False)
 
-    monkeypatch.setattr(multistart.Runner, "ended", ended)
+    monkeypatch.setattr(multistart.Runner, "solve_from", ended)
 
 
 @pytest.mark.parametrize("objective", ["abscissa", "x**4/4 - x**2/2 + x/10 - 1"])
@@ -118,11 +118,11 @@ def test_no_optimum_stands_that_a_start_ended_better_than(
     asked = problem([1, WELLS[1] - worse], WIDE, scenarios={"y": tmsopt.Band(0.0, 1.0, 3)}, minimize="abscissa")
     work = workspaces.workspace(asked)
     nlp = work.formulate(asked.cases)
-    ends = {at: multistart.Runner(work, nlp).ended({"x": at}, near=True) for at in (LEFT, RIGHT)}
-    trial = outcome.survivor(work, nlp, [ends[found]])
+    ends = {at: multistart.Runner(work, nlp).solve_from({"x": at}, near=True) for at in (LEFT, RIGHT)}
+    trial = outcome.best_checked(work, nlp, [ends[found]])
     own = searching._covered(work, nlp, [ends[found]], trial, outcome.counted([], 0.0))
     assert own.status == "optimal"
-    left = referee.outdone(work, own)
+    left = referee.demote_if_beaten(work, own)
     assert left.status == status
     assert left.checked.objective == pytest.approx(value, abs=MET)
 

@@ -51,13 +51,13 @@ def test_roots_at_0_but_for_rounding_have_no_damping_ratio() -> None:
 @pytest.mark.parametrize(("off", "status"), [(1e-9, "optimal"), (1e-4, "not_converged")])
 def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch: pytest.MonkeyPatch, off: float, status: str) -> None:
     module = import_module("tmsopt.search.solve")
-    plain = module.certified
+    plain = module.certified_numbers
 
     def exact(*given: Any) -> Any:
         numbers = plain(*given)
         return replace(numbers, value=numbers.value + off)
 
-    monkeypatch.setattr(module, "certified", exact)
+    monkeypatch.setattr(module, "certified_numbers", exact)
     assert tmsopt.solve(PLAIN, throw=False).status == status
 
 
@@ -65,7 +65,7 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch: pytest.Monkey
     ("room", "name", "said"),
     [
         ("outcome", "unclear", lambda problem, checked: True),
-        ("search", "outdone", lambda work, finding: replace(finding, status="not_converged")),
+        ("search", "demote_if_beaten", lambda work, finding: replace(finding, status="not_converged")),
     ],
 )
 def test_every_optimum_is_asked(monkeypatch: pytest.MonkeyPatch, room: str, name: str, said: Any) -> None:

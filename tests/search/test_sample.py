@@ -72,13 +72,13 @@ def test_what_is_even_in_the_cube() -> None:
 
 def test_every_design_that_is_judged_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
-    real = sampling.judged
+    real = sampling.evaluate
 
     def counting(stated: Any, columns: Any) -> Any:
         seen.append(len(columns["x"]))
         return real(stated, columns)
 
-    monkeypatch.setattr(sampling, "judged", counting)
+    monkeypatch.setattr(sampling, "evaluate", counting)
     design = tmsopt.solve(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")))
     starts = design.to_json()["starts"]
     assert set(starts) == {"tried", "converged", "at_best", "expected_unseen"}
