@@ -14,9 +14,23 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 
 LONGEST = (
-    "test_engines", "test_certify", "test_trace", "test_store", "test_problems", "test_study", "test_domain", "test_pareto",
-    "test_solve", "test_relax", "test_family", "test_cli", "test_digits", "test_cases", "test_nearest", "test_sides",
-)  # fmt: skip
+    "test_engines",
+    "test_certify",
+    "test_trace",
+    "test_store",
+    "test_problems",
+    "test_study",
+    "test_domain",
+    "test_pareto",
+    "test_solve",
+    "test_relax",
+    "test_family",
+    "test_cli",
+    "test_digits",
+    "test_cases",
+    "test_nearest",
+    "test_sides",
+)
 """Files that come first: one begun at the end would keep a single worker busy while the others wait."""
 
 

@@ -159,8 +159,19 @@ def writes(source: str) -> list[int]:
     return calls(source, "print", "input") + streams
 
 
-WRITERS = ("write_text", "write_bytes", "savefig", "to_netcdf", "to_csv", "to_parquet", "write_table", "savez",
-    "savez_compressed", "savetxt", "tofile")  # fmt: skip
+WRITERS = (
+    "write_text",
+    "write_bytes",
+    "savefig",
+    "to_netcdf",
+    "to_csv",
+    "to_parquet",
+    "write_table",
+    "savez",
+    "savez_compressed",
+    "savetxt",
+    "tofile",
+)
 
 
 def written(module: str, source: str) -> Iterator[str]:
@@ -295,12 +306,18 @@ def test_files_are_written_whole() -> None:
     found = {place for m, s in SOURCES.items() for place in written(m, s)}
     assert found == {
         "tmsopt.cli.ending.streams",  # stdout
-        "tmsopt.charts.folder.write", "tmsopt.charts.folder.sync", "tmsopt.charts.folder._create",  # recorded last
+        "tmsopt.charts.folder.write",
+        "tmsopt.charts.folder.sync",
+        "tmsopt.charts.folder._create",  # recorded last
         "tmsopt.files.write_atomic",  # itself
-        "tmsopt.display.page._picture", "tmsopt.display.pictures._image", "tmsopt.plots.style.rendered",  # in memory
+        "tmsopt.display.page._picture",
+        "tmsopt.display.pictures._image",
+        "tmsopt.plots.style.rendered",  # in memory
         "tmsopt.killable.serve",  # a pipe
-        "tmsopt.studies.export._csv", "tmsopt.studies.export._netcdf", "tmsopt.studies.export._parquet",  # by `export`
-    }  # fmt: skip
+        "tmsopt.studies.export._csv",
+        "tmsopt.studies.export._netcdf",
+        "tmsopt.studies.export._parquet",  # by `export`
+    }
 
 
 def test_pint_is_named_in_one_module_and_inside_a_function() -> None:

@@ -259,14 +259,20 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ("problem, study and bicycle files", "files.LARGEST problem.toml.MOST_DEEP problem.toml.MOST_PARTS"),
         ("faults that are listed", "errors.LISTED"),
-        ("expressions", "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE"),
+        (
+            "expressions",
+            "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE",
+        ),
         ("quantities of a model", "models.stated.texts.MOST_QUANTITIES"),
         ("numbers of parameters", "models.exact.MOST_DIGITS problem.units.text.LONGEST"),
-        ("CSV files of rows", "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS"),
+        (
+            "CSV files of rows",
+            "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS",
+        ),
         ("a store that is received", "files.LARGEST_JSON studies.store.LARGEST"),
         ("a chart", "charts.survey.MOST charts.survey.MOST_TILES"),
     ],
-)  # fmt: skip
+)
 def test_limits_of_what_is_read_are_those_in_force(line: str, constants: str) -> None:
     page = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^\| {line}.*\|$", page, re.MULTILINE)

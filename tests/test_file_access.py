@@ -33,7 +33,7 @@ WRITERS: dict[str, Callable[[Path, Any], None]] = {
     "a.nc": lambda path, plane: plane.save(path),
     "a.png": lambda path, plane: save(chart_figure(plane), path),
     **{f"rows.{ending}": lambda path, _: export(ROWS, path) for ending in FORMATS},
-}  # fmt: skip
+}
 
 
 @pytest.fixture

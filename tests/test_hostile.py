@@ -34,10 +34,12 @@ IHxz = -0.0076\nrF = 0.35\nmF = 3\nIFxx = 0.14\nIFyy = 0.28\n"""
 
 DRAWN = os.environ.get("TMSOPT_FUZZ")
 FUZZ = settings(
-    max_examples=int(DRAWN or 150), derandomize=DRAWN is None,
+    max_examples=int(DRAWN or 150),
+    derandomize=DRAWN is None,
     deadline=timedelta(seconds=20),  # of what is read at once; a hundred times as long is a hang
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], print_blob=True,
-)  # fmt: skip
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    print_blob=True,
+)
 
 NUMBERS = ["nan", "-inf", "1e309", "5e-324", "1e-400", "-0.0", "0", "9" * 5000, "0x" + "f" * 4000, "1_0", "true"]
 TEXTS = [
@@ -53,11 +55,41 @@ TEXTS = [
     "a\nb",
     "/dev/zero",
 ]
-FORMULAS = ["Fr**-99999999999", "Fr**9223372036854775808", "9**9**9**9*Fr", "(Fr**99)**99", "1/0", "0**-1*Fr", "0*Fr", "Fr <= Fr",
-            "exp(exp(exp(9*Fr)))", "tan(1e300*Fr)", "log(-1)*Fr", "sqrt(Fr-9)", "min(Fr)", "(" * 400 + "Fr" + ")" * 400, "-" * 1500 + "Fr",
-            "+".join(["Fr"] * 400), "Fr.real", "Fr[0]", "lambda: 1", "__import__('os')", "Fr\u200b", "1e308*1e308*Fr"]  # fmt: skip
-TABLES = ["[]", "{}", "[[[]]]", "{ min = 1, max = 0 }", "{ min = 1e-300, max = 1e300 }", "{ min = nan, max = 1 }", "[" * 5000 + "]" * 5000,
-          "{ min = 0, max = 1, points = 1000000000 }", "1979-05-27"]  # fmt: skip
+FORMULAS = [
+    "Fr**-99999999999",
+    "Fr**9223372036854775808",
+    "9**9**9**9*Fr",
+    "(Fr**99)**99",
+    "1/0",
+    "0**-1*Fr",
+    "0*Fr",
+    "Fr <= Fr",
+    "exp(exp(exp(9*Fr)))",
+    "tan(1e300*Fr)",
+    "log(-1)*Fr",
+    "sqrt(Fr-9)",
+    "min(Fr)",
+    "(" * 400 + "Fr" + ")" * 400,
+    "-" * 1500 + "Fr",
+    "+".join(["Fr"] * 400),
+    "Fr.real",
+    "Fr[0]",
+    "lambda: 1",
+    "__import__('os')",
+    "Fr\u200b",
+    "1e308*1e308*Fr",
+]
+TABLES = [
+    "[]",
+    "{}",
+    "[[[]]]",
+    "{ min = 1, max = 0 }",
+    "{ min = 1e-300, max = 1e300 }",
+    "{ min = nan, max = 1 }",
+    "[" * 5000 + "]" * 5000,
+    "{ min = 0, max = 1, points = 1000000000 }",
+    "1979-05-27",
+]
 VALUES = st.sampled_from([*NUMBERS, *TABLES]) | st.sampled_from([*TEXTS, *FORMULAS]).map(json.dumps)
 BYTES = st.sampled_from(
     [
@@ -145,20 +177,27 @@ def test_bicycle_files_are_read_or_refused(data: st.DataObject, ending: str, tmp
 
 
 @FUZZ
-@given(text=st.recursive(
-    st.sampled_from(["Fr", "mu", "2", "1e308", "5e-324", "0", "abscissa", "a4", "pi"]),
-    lambda part: st.builds("({} {} {})".format, part, st.sampled_from(["+", "-", "*", "/", "**"]), part)
-    | st.builds("{}({})".format, st.sampled_from(["sin", "exp", "log", "sqrt", "abs", "-"]), part),
-    max_leaves=12,
-) | st.sampled_from(FORMULAS), sense=st.sampled_from(["minimize", "maximize"]))  # fmt: skip
+@given(
+    text=st.recursive(
+        st.sampled_from(["Fr", "mu", "2", "1e308", "5e-324", "0", "abscissa", "a4", "pi"]),
+        lambda part: (
+            st.builds("({} {} {})".format, part, st.sampled_from(["+", "-", "*", "/", "**"]), part)
+            | st.builds("{}({})".format, st.sampled_from(["sin", "exp", "log", "sqrt", "abs", "-"]), part)
+        ),
+        max_leaves=12,
+    )
+    | st.sampled_from(FORMULAS),
+    sense=st.sampled_from(["minimize", "maximize"]),
+)
 def test_formulas_are_computed_or_refused(text: str, sense: str) -> None:
     def ask() -> None:
         problem = tmsopt.Problem(
             model=tmsopt.models.tms,
             fixed={"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1},
             free={"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.01, 1.5)},
-            constraints={"c": f"{text} <= 3"}, **{sense: text},
-        )  # fmt: skip
+            constraints={"c": f"{text} <= 3"},
+            **{sense: text},
+        )
         values = problem.values({**problem.fixed, "Fr": 2.0, "chi_B": 1.5, "lambda_s": 0.3})
         assert problem.objective is not None
         float(problem.objective(values))
@@ -216,8 +255,12 @@ def test_stores_are_read_or_refused(data: st.DataObject, tmp_path: Path, made: P
         (tmp_path / "s.sqlite").write_bytes(raw)
     else:
         with closing(sqlite3.connect(tmp_path / "s.sqlite")) as connection:
-            tables = {n: [c[1] for c in connection.execute(f"PRAGMA table_info({n})")] for (n,) in connection.execute(
-                "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite%'").fetchall()}  # fmt: skip
+            tables = {
+                n: [c[1] for c in connection.execute(f"PRAGMA table_info({n})")]
+                for (n,) in connection.execute(
+                    "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite%'"
+                ).fetchall()
+            }
             table = data.draw(st.sampled_from(sorted(tables)))
             column = data.draw(st.sampled_from(sorted(tables[table])))
             junk = data.draw(

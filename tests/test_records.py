@@ -41,13 +41,15 @@ OUTER = Outer("x", Inner(-math.inf, (1 / 3, 2 + 1j / 3)), Table({"b": math.nan, 
 
 
 def test_fields_stand_in_their_order_and_what_is_not_finite_is_none() -> None:
-    assert json.dumps(plain(OUTER), allow_nan=False) == json.dumps({
-        "name": "x",
-        "inner": {"re": None, "pair": [1 / 3, {"re": 2.0, "im": 1 / 3}]},
-        "table": {"b": None, "a": 2.0},
-        "values": [1.0, None],
-        "absent": None,
-    })  # fmt: skip
+    assert json.dumps(plain(OUTER), allow_nan=False) == json.dumps(
+        {
+            "name": "x",
+            "inner": {"re": None, "pair": [1 / 3, {"re": 2.0, "im": 1 / 3}]},
+            "table": {"b": None, "a": 2.0},
+            "values": [1.0, None],
+            "absent": None,
+        }
+    )
 
 
 def test_names_choose_attributes_and_their_order() -> None:

@@ -176,8 +176,10 @@ def _text(value: Any, room: int) -> str:
     """What `repr` says, little more of it than is shown: a file may hold numbers and lists of any size and depth."""
     if type(value) in (list, tuple, dict) and value:
         entries = value.items() if isinstance(value, dict) else ((None, x) for x in value)
-        said = [_text(x, room // 4) if k is None else f"{_text(k, 0)}: {_text(x, room // 4)}" for k, x in
-                islice(entries, room)]  # fmt: skip
+        said = [
+            _text(x, room // 4) if k is None else f"{_text(k, 0)}: {_text(x, room // 4)}"
+            for k, x in islice(entries, room)
+        ]
         inner = ", ".join([*said, "…"] if len(value) > room else said)
         if isinstance(value, dict):
             return f"{{{inner}}}"

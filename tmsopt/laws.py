@@ -54,9 +54,15 @@ LABELS: dict[str, str] = {
 }
 
 bench: dict[str, float] = {
-    "w": 1.0, "lambda_s": np.pi * 5 / 180, "m_H": 1.0, "m_B": 10.0,
-    "x_B": 1.2, "x_H": 1.02, "z_B": -0.4, "z_H": -0.2,
-}  # fmt: skip
+    "w": 1.0,
+    "lambda_s": np.pi * 5 / 180,
+    "m_H": 1.0,
+    "m_B": 10.0,
+    "x_B": 1.2,
+    "x_H": 1.02,
+    "z_B": -0.4,
+    "z_H": -0.2,
+}
 """`bench`: the benchmark bicycle in SI units (m, kg, rad)."""
 
 

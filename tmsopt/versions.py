@@ -9,9 +9,20 @@ SCHEMA = 1
 """Version of the JSON of every command."""
 
 NEEDED = (
-    "casadi", "numpy", "scipy", "matplotlib", "textalloc", "python-flint", "pydantic", "pint", "click", "lazy-loader",
-    "threadpoolctl", "loky", "filelock",
-)  # fmt: skip
+    "casadi",
+    "numpy",
+    "scipy",
+    "matplotlib",
+    "textalloc",
+    "python-flint",
+    "pydantic",
+    "pint",
+    "click",
+    "lazy-loader",
+    "threadpoolctl",
+    "loky",
+    "filelock",
+)
 EXTRA = ("pyscipopt", "codac", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
 """Distributions that tmsopt needs, and those of its extras certify, fast, cluster and data."""
 

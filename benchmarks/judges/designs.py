@@ -180,8 +180,10 @@ def exactly(problem: Problem, design: Mapping[str, float]) -> Iterator[Exactly]:
     """Of a design as stored, by isolated roots and quantities of 120 digits; then of the multiple roots it rounds."""
     at = Designs(problem)
     x = np.array([float(design[n]) for n in at.names])
-    box = max((max(lo - v, v - hi, 0.0) / max(1.0, abs(v)) for v, lo, hi in zip(x, at.lower, at.upper, strict=True)),
-              default=0.0)  # fmt: skip
+    box = max(
+        (max(lo - v, v - hi, 0.0) / max(1.0, abs(v)) for v, lo, hi in zip(x, at.lower, at.upper, strict=True)),
+        default=0.0,
+    )
     try:
         for z in near_roots(problem, design):
             with flint.ctx.workdps(DIGITS):

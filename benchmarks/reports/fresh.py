@@ -46,9 +46,15 @@ def report(asked: Asked) -> str:
     ]
     silent = [f"- {name}: {v.answer}" for name, v in verdicts.items() if not v.answered]
     return page(
-        "Fresh", asked, _ABOUT, table(header, [*rows, _row("all", verdicts)]),
-        "### False", "\n".join(lines) or "None.", "### Without an answer", "\n".join(silent) or "None.",
-    )  # fmt: skip
+        "Fresh",
+        asked,
+        _ABOUT,
+        table(header, [*rows, _row("all", verdicts)]),
+        "### False",
+        "\n".join(lines) or "None.",
+        "### Without an answer",
+        "\n".join(silent) or "None.",
+    )
 
 
 _ABOUT = (

@@ -33,10 +33,15 @@ def rows(digits: int, points: int) -> Iterator[Row]:
     fractions = Problem(
         models.tms,
         fixed={
-            "Fr": 17 / 12, "mu": 0.1, "chi_B": 2.0, "chi_H": 1.0, "zeta_B": -2.0, "zeta_H": -0.5,
+            "Fr": 17 / 12,
+            "mu": 0.1,
+            "chi_B": 2.0,
+            "chi_H": 1.0,
+            "zeta_B": -2.0,
+            "zeta_H": -0.5,
             "lambda_s": math.atan(17 / 48),
         },
-    )  # fmt: skip
+    )
     exact = {"Fr": Fraction(17, 12), "tan(lambda_s)": Fraction(17, 48)}
     solution = solve(fractions)
     yield _timed("EP4 in fractions", solution, solution.parameters, digits, exact)
@@ -79,16 +84,27 @@ def report(asked: Asked) -> str:
     ]
     cells = [
         (
-            r.place, r.proof.pattern if r.proof.proved else f"{r.proof.pattern}: not proved, {r.proof.reason}",
-            _first(r.proof), f"{r.proof.radius:.0e}" if r.proof.radius else "exact",
+            r.place,
+            r.proof.pattern if r.proof.proved else f"{r.proof.pattern}: not proved, {r.proof.reason}",
+            _first(r.proof),
+            f"{r.proof.radius:.0e}" if r.proof.radius else "exact",
             f"{r.proof.uniqueness:.1g}" if math.isfinite(r.proof.uniqueness) else "–",
-            f"{r.proof.distance:.0e}" if r.proof.moved else "–", _answers(r.proof), duration(r.seconds),
+            f"{r.proof.distance:.0e}" if r.proof.moved else "–",
+            _answers(r.proof),
+            duration(r.seconds),
         )
         for r in found[DIGITS[0]]
-    ]  # fmt: skip
+    ]
     header = (
-        "point", "pattern", "abscissa", "radius", "unique within", "stored design off by", "stable, damped", "time"
-    )  # fmt: skip
+        "point",
+        "pattern",
+        "abscissa",
+        "radius",
+        "unique within",
+        "stored design off by",
+        "stable, damped",
+        "time",
+    )
     return page(
         "Proofs of the paper's exceptional points",
         asked,

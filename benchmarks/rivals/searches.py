@@ -59,10 +59,12 @@ def local(method: str, problem: Problem, starts: int = STARTS, watch: Watch | No
     function, constraints, options = {
         "SLSQP": (reduced.abscissa, rows, {"ftol": 1e-14, "maxiter": 300}),
         "Nelder–Mead": (
-            reduced.penalised, [], {"xatol": 1e-12, "fatol": 1e-12, "maxiter": 1000 * n, "maxfev": 1000 * n}
+            reduced.penalised,
+            [],
+            {"xatol": 1e-12, "fatol": 1e-12, "maxiter": 1000 * n, "maxfev": 1000 * n},
         ),
         "COBYLA": (reduced.abscissa, rows, {"maxiter": 5000, "tol": 1e-12, "rhobeg": 0.1 * least}),
-    }[method]  # fmt: skip
+    }[method]
     search: dict[str, Any] = {"method": method.replace("–", "-"), "constraints": constraints, "options": options}
     began = time.perf_counter()
     ends: list[Found] = []

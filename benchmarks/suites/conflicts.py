@@ -176,10 +176,18 @@ def _slow(rng: np.random.Generator) -> Conflict:
 _KINDS: Mapping[str, Callable[[np.random.Generator], Conflict]] = {
     kind.__name__: kind
     for kind in (
-        _contradiction, _bound, _geometric_mean, _heights, _no_damping,
-        _band, _equality, _loads, _tolerance, _slow,
+        _contradiction,
+        _bound,
+        _geometric_mean,
+        _heights,
+        _no_damping,
+        _band,
+        _equality,
+        _loads,
+        _tolerance,
+        _slow,
     )
-}  # fmt: skip
+}
 
 
 def _conflict(

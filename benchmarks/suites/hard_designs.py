@@ -53,9 +53,7 @@ def _machine(rng: np.random.Generator, index: int, armed: bool, wheels: bool) ->
         arm = frame.at_anchor("u_H")
         least = number(min(rng.uniform(0.002, 0.01), 0.7 * abs(arm)), 2)
         both = rng.random() < 0.4
-        constraints.append(
-            f"abs(u_H) >= {least}" if both else f"u_H >= {least}" if arm > 0 else f"u_H <= {-least}"
-        )  # fmt: skip
+        constraints.append(f"abs(u_H) >= {least}" if both else f"u_H >= {least}" if arm > 0 else f"u_H <= {-least}")
     quantities = WHIPPLE if wheels else SI
     draw = rng.random()
     if draw < 0.4:
@@ -130,8 +128,9 @@ def _any_frame(rng: np.random.Generator, least: int, most: int = 7) -> Frame:
 def _mixed(rng: np.random.Generator, index: int, templates: Sequence[str], least: int = 1) -> Asked:
     """One to three limits of one kind, perhaps one on the roots."""
     frame = _any_frame(rng, least)
-    constraints = [frame.limit(frame.one_of(templates), str(rng.choice(["<=", ">="])))
-                   for _ in range(int(rng.integers(1, 4)))]  # fmt: skip
+    constraints = [
+        frame.limit(frame.one_of(templates), str(rng.choice(["<=", ">="]))) for _ in range(int(rng.integers(1, 4)))
+    ]
     if rng.random() < 0.6:
         return _rooted(rng), constraints, frame
     return _goal(rng, frame, [frame.one_of(CURVED)]), [*constraints, _on_roots(rng, frame)], frame
@@ -274,8 +273,20 @@ def _root_equality(rng: np.random.Generator, index: int) -> Asked:
 def _open(rng: np.random.Generator, index: int) -> Asked:
     """An objective with a pole in the box, so that there is no best design, or beside it."""
     frame = _any_frame(rng, 2, 5)
-    text = frame.filled(str(rng.choice(["1/({a} - {b})", "{b}/({a} + 0.2)", "tan(3*{a}) + {b}", "{c}/({a} - {b})**2",
-                                        "{b}/({a} + 1.3)", "1/({a}**2 + {b}**2)"])))  # fmt: skip
+    text = frame.filled(
+        str(
+            rng.choice(
+                [
+                    "1/({a} - {b})",
+                    "{b}/({a} + 0.2)",
+                    "tan(3*{a}) + {b}",
+                    "{c}/({a} - {b})**2",
+                    "{b}/({a} + 1.3)",
+                    "1/({a}**2 + {b}**2)",
+                ]
+            )
+        )
+    )
     return (str(rng.choice(["minimize", "maximize"])), text), [_on_roots(rng, frame)], frame
 
 
@@ -315,7 +326,16 @@ _MAKERS: Mapping[str, Callable[[np.random.Generator, int], Asked]] = {
     "open": _open,
     "no interior": _flat,
 }
-_MACHINES = ("machine, arm limited", "machine, arm free", "machine, arm limited", "machine, arm free",
-             "machine, arm limited", "machine, arm free", "machine, arm limited", "machine, arm free",
-             "wheels, arm limited", "wheels, arm free")  # fmt: skip
+_MACHINES = (
+    "machine, arm limited",
+    "machine, arm free",
+    "machine, arm limited",
+    "machine, arm free",
+    "machine, arm limited",
+    "machine, arm free",
+    "machine, arm limited",
+    "machine, arm free",
+    "wheels, arm limited",
+    "wheels, arm free",
+)
 _OTHERS = (*(name for name in _MAKERS if name[:5] not in ("machi", "wheel")), "sliver")

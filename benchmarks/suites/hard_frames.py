@@ -147,8 +147,11 @@ def native(rng: np.random.Generator, count: int, tilt: str = "") -> Frame:
     free = {str(n) for n in rng.choice(list(ranges), count, replace=False)}
     if tilt == "either" and "lambda_s" not in free:
         free = {*sorted(free)[1:], "lambda_s"}
-    boxes = {n: ranges[n] if n == "lambda_s" and tilt == "either" else drawn_box(rng, n, ranges[n])
-             for n in ranges if n in free}  # fmt: skip
+    boxes = {
+        n: ranges[n] if n == "lambda_s" and tilt == "either" else drawn_box(rng, n, ranges[n])
+        for n in ranges
+        if n in free
+    }
     return Frame(tms, {n: rounded(drawn_value(rng, n, ranges[n])) for n in ranges if n not in free}, boxes, rng)
 
 

@@ -28,8 +28,12 @@ _TERMS = (
 )
 
 
-def system(matrices: Mapping[str, Entries], free: Mapping[str, tuple[float, float]], given: Mapping[str, float],
-           rng: np.random.Generator) -> Frame:  # fmt: skip
+def system(
+    matrices: Mapping[str, Entries],
+    free: Mapping[str, tuple[float, float]],
+    given: Mapping[str, float],
+    rng: np.random.Generator,
+) -> Frame:
     """A frame of matrices, or of coefficients in one row, as text."""
     texts = [text for rows in matrices.values() for row in rows for text in row]
     symbols = {n: ca.SX.sym(n) for n in (*given, *free)}
@@ -38,9 +42,10 @@ def system(matrices: Mapping[str, Entries], free: Mapping[str, tuple[float, floa
         n: [[eval(text, dict(_SYMBOLIC), symbols) for text in row] for row in rows] for n, rows in matrices.items()
     }
     model = (
-        from_coefficients(made["coefficients"][0], name="hard") if "coefficients" in made
+        from_coefficients(made["coefficients"][0], name="hard")
+        if "coefficients" in made
         else from_matrices(name="hard", **made)
-    )  # fmt: skip
+    )
     fixed = {n: v for n, v in given.items() if n in used}
     return Frame(model, fixed, {n: b for n, b in free.items() if n in used}, rng)
 
@@ -104,8 +109,9 @@ def feedback(rng: np.random.Generator, count: int, zero: bool = False, push: flo
             i, j = (int(k) for k in rng.integers(size, size=2))
             text[i][j] += f" + {_term(rng, name, names, 1.0)}"
     if push:  # the trace stays where it is, so that the mean of the roots does
-        text = [[t if i != j else f"{number(float(plant[i, j]))}" for j, t in enumerate(row)]
-                for i, row in enumerate(text)]  # fmt: skip
+        text = [
+            [t if i != j else f"{number(float(plant[i, j]))}" for j, t in enumerate(row)] for i, row in enumerate(text)
+        ]
         text[0][1] += "".join(f" + {n}" for n in names)
     if zero:
         text = [[*row, "0"] for row in text] + [[f"{number(float(x))}" for x in rng.normal(size=size)] + ["0"]]
@@ -121,8 +127,9 @@ def _gains(rng: np.random.Generator, names: list[str]) -> dict[str, tuple[float,
     return {n: (number(-rng.uniform(0.8, 2.5), 2), number(rng.uniform(0.8, 2.5), 2)) for n in names}
 
 
-def _split(rng: np.random.Generator, count: int, matrices: Mapping[str, Entries],
-           ranges: Mapping[str, tuple[float, float]]) -> Frame:  # fmt: skip
+def _split(
+    rng: np.random.Generator, count: int, matrices: Mapping[str, Entries], ranges: Mapping[str, tuple[float, float]]
+) -> Frame:
     names = {str(n) for n in rng.choice(list(ranges), min(count, len(ranges)), replace=False)}
     if not any(n[0] in "dc" for n in names):
         names = {*sorted(names)[1:], "c1"}

@@ -117,9 +117,16 @@ def reference(index: int) -> Reference:
 
         unit: Any = [(0.0, 1.0)] * len(lower)
         ended = differential_evolution(
-            worth, unit, seed=seed, vectorized=True, updating="deferred", popsize=30, maxiter=400, tol=1e-12,
+            worth,
+            unit,
+            seed=seed,
+            vectorized=True,
+            updating="deferred",
+            popsize=30,
+            maxiter=400,
+            tol=1e-12,
             polish=False,
-        )  # fmt: skip
+        )
         found.append(_polished(problem, _placed(ended.x, lower, upper, steep)))
     value, x = min(found, key=lambda pair: pair[0])
     return Reference(attempt, problem.sign * value, [float(v) for v in x])
@@ -161,8 +168,12 @@ def _polished(problem: Hidden, x: Array) -> tuple[float, Array]:
     for reach in (0.03, 1e-3, 1e-5, 1e-3, 1e-6):
         step = reach * np.maximum(np.abs(x), 0.01 * (upper - lower))
         corners = np.concatenate([x[None], x + np.diag(np.where(x + step > upper, -step, step))])
-        ended = minimize(worth, x, method="Nelder-Mead", options={"initial_simplex": corners, "xatol": 1e-13,
-                         "fatol": 1e-15, "maxfev": 250 * len(x)})  # fmt: skip
+        ended = minimize(
+            worth,
+            x,
+            method="Nelder-Mead",
+            options={"initial_simplex": corners, "xatol": 1e-13, "fatol": 1e-15, "maxfev": 250 * len(x)},
+        )
         if ended.fun <= worth(x):
             x = np.clip(ended.x, lower, upper)
     return worth(x), x
@@ -189,11 +200,31 @@ def _scale(x: Array, lower: Array, upper: Array) -> Array:
 
 
 BENCHMARK: Mapping[str, float] = {
-    "w": 1.02, "c": 0.08, "lambda_s": math.radians(18), "g": 9.81, "r_R": 0.3, "m_R": 2.0, "I_Rxx": 0.0603,
-    "I_Ryy": 0.12, "x_B": 0.3, "z_B": -0.9, "m_B": 85.0, "I_Bxx": 9.2, "I_Bzz": 11.0, "I_Bxz": 2.4, "x_H": 0.9,
-    "z_H": -0.7, "m_H": 4.0, "I_Hxx": 0.05892, "I_Hzz": 0.00708, "I_Hxz": -0.00756, "r_F": 0.35, "m_F": 3.0,
-    "I_Fxx": 0.1405, "I_Fyy": 0.28,
-}  # fmt: skip
+    "w": 1.02,
+    "c": 0.08,
+    "lambda_s": math.radians(18),
+    "g": 9.81,
+    "r_R": 0.3,
+    "m_R": 2.0,
+    "I_Rxx": 0.0603,
+    "I_Ryy": 0.12,
+    "x_B": 0.3,
+    "z_B": -0.9,
+    "m_B": 85.0,
+    "I_Bxx": 9.2,
+    "I_Bzz": 11.0,
+    "I_Bxz": 2.4,
+    "x_H": 0.9,
+    "z_H": -0.7,
+    "m_H": 4.0,
+    "I_Hxx": 0.05892,
+    "I_Hzz": 0.00708,
+    "I_Hxz": -0.00756,
+    "r_F": 0.35,
+    "m_F": 3.0,
+    "I_Fxx": 0.1405,
+    "I_Fyy": 0.28,
+}
 """Meijaard, Papadopoulos, Ruina and Schwab (2007), table 1; I_Bzz 2.8 there."""
 
 _STATES = ("k_phi", "k_phidot", "k_delta", "k_deltadot")
@@ -206,12 +237,27 @@ def whipple(p: Mapping[str, float]) -> tuple[Array, Array, Array, Array]:
     m_T = p["m_R"] + p["m_B"] + p["m_H"] + p["m_F"]
     x_T = (p["x_B"] * p["m_B"] + p["x_H"] * p["m_H"] + w * p["m_F"]) / m_T
     z_T = (-p["r_R"] * p["m_R"] + p["z_B"] * p["m_B"] + p["z_H"] * p["m_H"] - p["r_F"] * p["m_F"]) / m_T
-    Txx = (p["I_Rxx"] + p["I_Bxx"] + p["I_Hxx"] + p["I_Fxx"] + p["m_R"] * p["r_R"] ** 2 + p["m_B"] * p["z_B"] ** 2
-           + p["m_H"] * p["z_H"] ** 2 + p["m_F"] * p["r_F"] ** 2)  # fmt: skip
+    Txx = (
+        p["I_Rxx"]
+        + p["I_Bxx"]
+        + p["I_Hxx"]
+        + p["I_Fxx"]
+        + p["m_R"] * p["r_R"] ** 2
+        + p["m_B"] * p["z_B"] ** 2
+        + p["m_H"] * p["z_H"] ** 2
+        + p["m_F"] * p["r_F"] ** 2
+    )
     Txz = p["I_Bxz"] + p["I_Hxz"] - p["m_B"] * p["x_B"] * p["z_B"] - p["m_H"] * p["x_H"] * p["z_H"]
     Txz += p["m_F"] * w * p["r_F"]
-    Tzz = (p["I_Rxx"] + p["I_Bzz"] + p["I_Hzz"] + p["I_Fxx"] + p["m_B"] * p["x_B"] ** 2 + p["m_H"] * p["x_H"] ** 2
-           + p["m_F"] * w * w)  # fmt: skip
+    Tzz = (
+        p["I_Rxx"]
+        + p["I_Bzz"]
+        + p["I_Hzz"]
+        + p["I_Fxx"]
+        + p["m_B"] * p["x_B"] ** 2
+        + p["m_H"] * p["x_H"] ** 2
+        + p["m_F"] * w * w
+    )
     m_A = p["m_H"] + p["m_F"]
     x_A = (p["x_H"] * p["m_H"] + w * p["m_F"]) / m_A
     z_A = (p["z_H"] * p["m_H"] - p["r_F"] * p["m_F"]) / m_A
@@ -226,8 +272,12 @@ def whipple(p: Mapping[str, float]) -> tuple[Array, Array, Array, Array]:
     S_R, S_F = p["I_Ryy"] / p["r_R"], p["I_Fyy"] / p["r_F"]
     S_T, S_A = S_R + S_F, m_A * u_A + mu * m_T * x_T
     M = np.array([[Txx, Alx + mu * Txz], [Alx + mu * Txz, All + 2 * mu * Alz + mu * mu * Tzz]])
-    C1 = np.array([[0.0, mu * S_T + S_F * k + Txz * k / w - mu * m_T * z_T],
-                   [-(mu * S_T + S_F * k), Alz * k / w + mu * (S_A + Tzz * k / w)]])  # fmt: skip
+    C1 = np.array(
+        [
+            [0.0, mu * S_T + S_F * k + Txz * k / w - mu * m_T * z_T],
+            [-(mu * S_T + S_F * k), Alz * k / w + mu * (S_A + Tzz * k / w)],
+        ]
+    )
     K0 = np.array([[m_T * z_T, -S_A], [-S_A, -S_A * s]])
     K2 = np.array([[0.0, (S_T - m_T * z_T) * k / w], [0.0, (S_A + S_F * s) * k / w]])
     return M, C1, K0, K2
@@ -343,8 +393,10 @@ def _plant(rng: np.random.Generator) -> tuple[str, dict[str, Ends], Callable[[Ar
     B = rng.normal(0, 1, size).round(2)
     states = sorted(int(k) for k in rng.choice(size, int(rng.integers(2, 4)), replace=False))
     free = {f"k{s + 1}": _wide(rng) for s in states}
-    rows = [[repr(float(A0[i, j])) + (f" + {float(B[i])!r}*k{j + 1}" if j in states else "") for j in range(size)]
-            for i in range(size)]  # fmt: skip
+    rows = [
+        [repr(float(A0[i, j])) + (f" + {float(B[i])!r}*k{j + 1}" if j in states else "") for j in range(size)]
+        for i in range(size)
+    ]
 
     def roots(x: Array) -> Any:
         A = np.tile(A0, (x.shape[1], 1, 1))
@@ -376,8 +428,10 @@ def _unstable_polynomial(rng: np.random.Generator) -> tuple[str, dict[str, Ends]
     slopes[0] = 0
     base = base.round(3)
     distance = " + ".join(f"(x{k + 1} - {float(c)!r})**2" for k, c in enumerate(centre))
-    rows = [repr(float(b)) + "".join(f" + {float(s)!r}*x{k + 1}" for k, s in enumerate(row) if s)
-            for b, row in zip(base, slopes, strict=True)]  # fmt: skip
+    rows = [
+        repr(float(b)) + "".join(f" + {float(s)!r}*x{k + 1}" for k, s in enumerate(row) if s)
+        for b, row in zip(base, slopes, strict=True)
+    ]
     rows[-1] = f"{float(base[-1])!r}*({radius!r}**2 - ({distance}))/{radius!r}**2"
 
     def roots(x: Array) -> Any:

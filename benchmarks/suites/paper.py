@@ -50,7 +50,9 @@ POINTS = (
     Point("Table 1, Fr_c of row 2", "weave", {**HEIGHTS, "lambda_s": _TILT - 0.05, "chi_B": _ROOT2}, {"Fr": 1.5}),
     Point("Table 1, Fr_c of row 3", "weave", {**HEIGHTS, "lambda_s": _TILT + 0.8, "chi_B": _ROOT2}, {"Fr": 3.9}),
     Point(
-        "optimised benchmark, ω0 not held", "EP4", {**HEIGHTS, "chi_H": 1.02, "mu": 20.846267012761306},
+        "optimised benchmark, ω0 not held",
+        "EP4",
+        {**HEIGHTS, "chi_H": 1.02, "mu": 20.846267012761306},
         {"Fr": 2.34, "chi_B": 1.19, "lambda_s": 0.85},
     ),
     Point("fold, Fr = √5", "2EP2", {**HEIGHTS, "lambda_s": 0.4051965261014}, {"Fr": 2.24, "chi_B": 1.41}),
@@ -63,16 +65,22 @@ POINTS = (
     Point("spire at the tilt of row 2", "EP3", {**HEIGHTS, "lambda_s": _TILT - 0.05}, {"Fr": 2.2352, "chi_B": 1.4283}),
     Point("spire at the tilt of row 2", "EP3", {**HEIGHTS, "lambda_s": _TILT - 0.05}, {"Fr": 2.2171, "chi_B": 1.4025}),
     Point(
-        "dual of row 1", "EP4", {**HEIGHTS, "zeta_B": -0.2, "zeta_H": -0.4},
+        "dual of row 1",
+        "EP4",
+        {**HEIGHTS, "zeta_B": -0.2, "zeta_H": -0.4},
         {"Fr": _FR / _ROOT2, "chi_B": 0.707, "lambda_s": -0.215},
     ),
     Point(
-        "experimental machine", "EP4", {**_MACHINE, "chi_H": 0.921, "chi_B": 1.526},
+        "experimental machine",
+        "EP4",
+        {**_MACHINE, "chi_H": 0.921, "chi_B": 1.526},
         {"Fr": 1.38, "mu": 0.98, "lambda_s": 0.244},
     ),
     Point(
-        "experimental machine, chi_H = 1", "EP3", {**_MACHINE, "mu": 0.1, "chi_H": 1.0, "chi_B": 1.526},
+        "experimental machine, chi_H = 1",
+        "EP3",
+        {**_MACHINE, "mu": 0.1, "chi_H": 1.0, "chi_B": 1.526},
         {"Fr": 1.31, "lambda_s": 0.17},
     ),
-)  # fmt: skip
+)
 """Points of the text, Table 1 and the figures."""

@@ -112,8 +112,12 @@ def _frame(rng: np.random.Generator, count: int) -> dict[str, Any]:
         fixed["chi_H"] = 1.0
     tolerances = _tolerances(rng, [*boxes, *fixed]) if rng.random() < 0.3 else {}
     frame: dict[str, Any] = {
-        "model": tms, "fixed": fixed, "free": boxes, "scenarios": scenarios, "tolerances": tolerances
-    }  # fmt: skip
+        "model": tms,
+        "fixed": fixed,
+        "free": boxes,
+        "scenarios": scenarios,
+        "tolerances": tolerances,
+    }
     return _in_si(rng, frame) if rng.random() < 0.15 else frame
 
 

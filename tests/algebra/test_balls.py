@@ -79,9 +79,17 @@ def test_quantities_that_do_not_exist_are_nan() -> None:
 def test_a_weave_speed_of_0_is_exactly_0() -> None:
     """ζ_B = ζ_H and χ_H = 1 in SI: fractions know x_H/w − 1 = 0 and z_B/w − z_H/w = 0, doubles and balls may not."""
     p = {
-        "w": 0.7, "v": 3.0, "g": 9.81, "lambda_s": 0.2, "m_B": 9.0, "x_B": 0.9, "z_B": -0.3, "m_H": 1.0, "x_H": 0.7,
+        "w": 0.7,
+        "v": 3.0,
+        "g": 9.81,
+        "lambda_s": 0.2,
+        "m_B": 9.0,
+        "x_B": 0.9,
+        "z_B": -0.3,
+        "m_H": 1.0,
+        "x_H": 0.7,
         "z_H": -0.3,
-    }  # fmt: skip
+    }
     assert Values(tms, tms.sets[1], {n: exact(v) for n, v in p.items()})["Fr_c"] == 0
 
 

@@ -43,9 +43,11 @@ def test_gains_are_those_of_a_search_of_each_moved_problem(name, searches):
 def test_what_a_move_lets_in_elsewhere_is_found(searches):
     """At x = 0.7 the limit asks for 0.301 <= 0.3; with 0.002 more of it a far better design may be had there."""
     problem = Problem(
-        OSCILLATOR, free={"x": (0.0, 1.0), "y": (0.0, 1.0)}, minimize="y - 3*max(0, 0.1 - abs(x - 0.7)) - 0.1*x",
+        OSCILLATOR,
+        free={"x": (0.0, 1.0), "y": (0.0, 1.0)},
+        minimize="y - 3*max(0, 0.1 - abs(x - 0.7)) - 0.1*x",
         constraints={"low": "min(x, 0.6*abs(x - 0.7) + 0.301) <= 0.3"},
-    )  # fmt: skip
+    )
     solution = tmsopt.solve(problem)
     assert solution.value == pytest.approx(-0.03, abs=1e-8)
     (lever,) = (lever for lever in tmsopt.explain(solution).levers if lever.name == "low")

@@ -339,9 +339,14 @@ def ep4() -> dict[str, float]:
         T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
         Fr = (r**2 + 6 * r + 1) / (4 * mp.sqrt(h) * (r + 1))
         return {
-            "Fr": float(Fr), "mu": 0.1, "chi_B": float(r), "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2,
+            "Fr": float(Fr),
+            "mu": 0.1,
+            "chi_B": float(r),
+            "chi_H": 1.0,
+            "zeta_B": -0.4,
+            "zeta_H": -0.2,
             "lambda_s": float(mp.atan(T)),
-        }  # fmt: skip
+        }
 
 
 @pytest.fixture(scope="module")

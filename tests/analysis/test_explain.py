@@ -213,11 +213,20 @@ NONE = ("1", "", 1.0)
 @pytest.mark.parametrize(
     ("unit", "size", "text"),
     [
-        (DEG, 1.0, "1 deg"), (DEG, math.radians(3), "0.1 deg"), (CM, 1.2, "1 cm"), (CM, 0.02, "0.1 cm"),
-        (KMH, 4.0, "1 km/h"), (KMH, 0.5, "0.1 km/h"), (("m/s", "m/s", 1.0), 4.0, "0.2 m/s"), (NONE, 10.0, "0.1"),
-        (NONE, 0.02, "0.0002"), (NONE, 0.45, "0.005"), (("kg", "kg", 1.0), 85.0, "1 kg"), (NONE, 0.0, "0.01"),
+        (DEG, 1.0, "1 deg"),
+        (DEG, math.radians(3), "0.1 deg"),
+        (CM, 1.2, "1 cm"),
+        (CM, 0.02, "0.1 cm"),
+        (KMH, 4.0, "1 km/h"),
+        (KMH, 0.5, "0.1 km/h"),
+        (("m/s", "m/s", 1.0), 4.0, "0.2 m/s"),
+        (NONE, 10.0, "0.1"),
+        (NONE, 0.02, "0.0002"),
+        (NONE, 0.45, "0.005"),
+        (("kg", "kg", 1.0), 85.0, "1 kg"),
+        (NONE, 0.0, "0.01"),
     ],
-)  # fmt: skip
+)
 def test_natural_steps(unit, size, text):
     assert natural_step(Unit(*unit[1:]), unit[0], size).text == text
 
@@ -399,7 +408,25 @@ def test_the_command_says_what_it_means():
     assert [row["digits"] for row in meaning["precision"]] == [2, 3, 4, 6]
     assert re.search(r"minimize abscissa = -1.8803015; as stored -1.8[\d]+; four roots meet in one \(EP4\)", printed())
     assert "lambda_s alone  23.5 deg" in printed("--full")
-    contract = ["schema", "title", "model", "status", "objective", "parameters", "abscissa", "abscissa_realised", "roots", "structure", "active", "violations", "bound", "starts", "seconds", "stable", "units"]  # fmt: skip
+    contract = [
+        "schema",
+        "title",
+        "model",
+        "status",
+        "objective",
+        "parameters",
+        "abscissa",
+        "abscissa_realised",
+        "roots",
+        "structure",
+        "active",
+        "violations",
+        "bound",
+        "starts",
+        "seconds",
+        "stable",
+        "units",
+    ]
     data = json.loads(printed("--json"))
     more = {"any_stable", "notes", "verdict", "defective", "geometric_multiplicity"}
     assert set(contract) <= data.keys() <= {*contract, *more}

@@ -249,11 +249,15 @@ def test_a_double_pair_that_is_no_minimum(cep2):
 @pytest.mark.parametrize(
     "asked",
     [
-        {"fixed": {k: v for k, v in BENCHMARK.items() if k != "mu"}, "free": BOX | {"mu": (1.0, 100.0)}, "locate": "EP4"},
+        {
+            "fixed": {k: v for k, v in BENCHMARK.items() if k != "mu"},
+            "free": BOX | {"mu": (1.0, 100.0)},
+            "locate": "EP4",
+        },
         {"fixed": CHI_H_1, "free": BOX | {"Fr": (2.4, 2.6), "lambda_s": (0.02, 0.4)}, "locate": "2EP2"},
     ],
     ids=["EP4 with one more parameter free", "2EP2"],
-)  # fmt: skip
+)
 def test_located_patterns_that_are_no_minima(asked):
     solution = solved(**asked)
     found = judged(solution)
@@ -277,8 +281,10 @@ def test_curvature_decides_where_the_slope_does_not(bend, verdict):
         return abscissa_60(polynomial_60(**design | moved))
 
     with mp.workdps(50):
-        slope = {n: float((growth(**{n: x + mp.mpf("1e-15")}) - growth(**{n: x - mp.mpf("1e-15")})) / mp.mpf("2e-15"))
-                 for n, x in at.items()}  # fmt: skip
+        slope = {
+            n: float((growth(**{n: x + mp.mpf("1e-15")}) - growth(**{n: x - mp.mpf("1e-15")})) / mp.mpf("2e-15"))
+            for n, x in at.items()
+        }
     linear = " + ".join(f"({slope[n]!r})*({n} - {x})" for n, x in at.items())
     square = " + ".join(f"({n} - {x})**2" for n, x in at.items())
     asked = tmsopt.Problem(
@@ -324,11 +330,18 @@ def test_scale_and_speed_together_are_flat():
     """Wheelbase, speed and lengths that grow together keep the spectrum: no strict minimum may be claimed."""
     solution = solved(
         fixed={"m_B": 20.0, "m_H": 2.0},
-        free={"w": (0.5, 1.0), "v": (0.1, 30.0), "x_B": (0.2, 4.0), "x_H": (0.2, 2.0), "z_B": (-2.0, -0.1),
-              "z_H": (-2.0, -0.1), "lambda_s": (0.02, 1.4)},
+        free={
+            "w": (0.5, 1.0),
+            "v": (0.1, 30.0),
+            "x_B": (0.2, 4.0),
+            "x_H": (0.2, 2.0),
+            "z_B": (-2.0, -0.1),
+            "z_H": (-2.0, -0.1),
+            "lambda_s": (0.02, 1.4),
+        },
         minimize="abscissa",
         constraints={"level": "chi_H == 1", "rear": "zeta_B <= -0.4", "front": "zeta_H <= -0.2"},
-    )  # fmt: skip
+    )
     found = judged(solution)
     assert found.verdict == UNDECIDED
     assert "flat" in found.reason

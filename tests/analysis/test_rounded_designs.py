@@ -26,16 +26,22 @@ PROBLEMS = {
     "band": "problems/speed_band.toml",
     "tolerances": "problems/workshop.toml",
     "limits that differ between cases": Problem(
-        models.tms, fixed={"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}, scenarios={"mu": [0.1, 0.2, 0.3]},
+        models.tms,
+        fixed={"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2},
+        scenarios={"mu": [0.1, 0.2, 0.3]},
         free={"Fr": (0.01, 10.0), "chi_B": (1.01, 5.0), "lambda_s": (0.02, 1.4)},
-        minimize="abscissa", constraints={"layout": "chi_B + mu <= 1.5567"},
+        minimize="abscissa",
+        constraints={"layout": "chi_B + mu <= 1.5567"},
     ),
     "whole numbers with EP4": Problem(QUARTIC, free=BOX, locate="EP4", constraints={"place": "d == 1"}),
     "whole numbers with EP4, and limits that it passes": Problem(
-        QUARTIC, fixed={"c": 4.0, "d": 1.0}, free={n: BOX[n] for n in "ab"}, locate="EP4",
+        QUARTIC,
+        fixed={"c": 4.0, "d": 1.0},
+        free={n: BOX[n] for n in "ab"},
+        locate="EP4",
         constraints={"fast": "abscissa <= -0.99", "calm": "angular_frequency <= 1e-6"},
     ),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module", params=PROBLEMS)

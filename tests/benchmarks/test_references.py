@@ -185,9 +185,15 @@ def test_what_is_kept_is_not_computed_again(tmp_path: Path) -> None:
     """A value in the file that no computation could give is still there after a run."""
     path = tmp_path / "references.json"
     row = {
-        "index": 0, "solvable": True, "value": -77.0, "realised": -77.0, "violation": 0.0,
-        "parameters": {"Fr": 1.0}, "known": {"default": -77.0}, "doubtful": [],
-    }  # fmt: skip
+        "index": 0,
+        "solvable": True,
+        "value": -77.0,
+        "realised": -77.0,
+        "violation": 0.0,
+        "parameters": {"Fr": 1.0},
+        "known": {"default": -77.0},
+        "doubtful": [],
+    }
     settings = Settings(starts=1, evolutions=1)
     path.write_text(json.dumps({"settings": {"seed": 2018, "starts": 1, "evolutions": 1}, "problems": [row]}))
     assert run(1, settings, 1, path, "test")[0].value == -77

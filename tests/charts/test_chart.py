@@ -270,9 +270,27 @@ def test_trace_writes_table_csv_and_figure(tmp_path, capsys):
     with table.open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     columns = {
-        "branch", "arclength", "Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s (rad)", "d_Fr", "d_chi_B",
-        "d_lambda_s", "b", "c", "abscissa", "kind", "stable", "heavily_damped", "constraints", "event",
-    }  # fmt: skip
+        "branch",
+        "arclength",
+        "Fr",
+        "mu",
+        "chi_B",
+        "chi_H",
+        "zeta_B",
+        "zeta_H",
+        "lambda_s (rad)",
+        "d_Fr",
+        "d_chi_B",
+        "d_lambda_s",
+        "b",
+        "c",
+        "abscissa",
+        "kind",
+        "stable",
+        "heavily_damped",
+        "constraints",
+        "event",
+    }
     assert set(rows[0]) == columns
     (ep4,) = [row for row in rows if row["kind"] == "EP4"]
     assert float(ep4["Fr"]) == pytest.approx(FR_EP4, abs=1e-12)
@@ -346,7 +364,10 @@ def test_chart_json_is_finite(capsys):
         (["trace", "problems/ep_set.toml", "--pattern", "EP9"], "unknown pattern 'EP9'"),
         (["trace", "problems/ep_set.toml", "--pattern", "EP2"], "takes 2 free parameters"),
         (["trace", "problems/chart.toml"], "no pattern to trace"),
-        (["trace", "problems/ep_set.toml", "--plot", "x.png", "--axes", "Fr,mu"], "accepted: two of the free parameters"),
+        (
+            ["trace", "problems/ep_set.toml", "--plot", "x.png", "--axes", "Fr,mu"],
+            "accepted: two of the free parameters",
+        ),
         (["trace", "problems/ep_set.toml", "--csv", "no/such/x.csv"], "does not exist"),
         (["trace", "problems/ep_set.toml", "--csv", "x.txt"], "ending in csv"),
         (["trace", "problems/ep_set.toml", "--step", "0.5"], "--step"),
@@ -358,7 +379,7 @@ def test_chart_json_is_finite(capsys):
         (["chart", "problems/chart.toml", "--output", "problems/x.csv"], "ending in npz"),
         (["chart", "problems/chart.toml", "--layer", "colour"], "--layer"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, capsys):
     status, out, err = run(capsys, *arguments)
     assert (status, out) == (2, "")

@@ -160,7 +160,10 @@ def test_an_opened_chart_is_the_one_that_was_charted(whole, tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"problem": dataclasses.replace(PLANE, fixed=PLANE.fixed | {"mu": 0.2})}, "problem.fixed.mu: 0.1 there, 0.2 asked"),
+        (
+            {"problem": dataclasses.replace(PLANE, fixed=PLANE.fixed | {"mu": 0.2})},
+            "problem.fixed.mu: 0.1 there, 0.2 asked",
+        ),
         ({"problem": dataclasses.replace(PLANE, free=PLANE.free | {"Fr": (0.01, 4.0)})}, "axes.Fr.max: 5.0 there, 4.0"),
         ({"problem": dataclasses.replace(PLANE, constraints={"trail": "nu_H >= 0.03"})}, 'trail: "nu_H >= 0.02" there'),
         ({"points": (37, 24)}, "axes.lambda_s.points: 23 there, 24 asked for"),
@@ -169,7 +172,7 @@ def test_an_opened_chart_is_the_one_that_was_charted(whole, tmp_path):
         ({"quantities": EXTRA | {"T": "lambda_s"}}, 'layers.T.expression: "tan(lambda_s)" there, "lambda_s" asked for'),
         ({"single": True}, 'layers.margin.dtype: "<f8" there, "<f4" asked for'),
     ],
-)  # fmt: skip
+)
 def test_another_chart_of_that_name_is_refused(change, words, whole):
     before = files(whole.path)
     with pytest.raises(InputError) as refused:
@@ -449,7 +452,7 @@ def test_three_axes_in_one_file(ending, tmp_path, capsys):
         (["problems/ep_set.toml", "--axes", "Fr,mu"], "in any order"),
         (["problems/chart.toml", "-o", "no/such/x.chart"], "does not exist"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, capsys):
     status, out, err = run(capsys, *arguments)
     assert (status, out) == (2, "")

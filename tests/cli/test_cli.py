@@ -23,9 +23,22 @@ if os.name == "posix":
     import termios
 
 KEYS = {
-    "schema", "title", "model", "status", "objective", "parameters", "abscissa", "abscissa_realised", "roots",
-    "structure", "active", "violations", "bound", "starts", "seconds",
-}  # fmt: skip
+    "schema",
+    "title",
+    "model",
+    "status",
+    "objective",
+    "parameters",
+    "abscissa",
+    "abscissa_realised",
+    "roots",
+    "structure",
+    "active",
+    "violations",
+    "bound",
+    "starts",
+    "seconds",
+}
 """Keys of the JSON contract."""
 
 
@@ -128,13 +141,19 @@ def test_infeasible_ends_with_3_and_still_reports(tmp_path, capsys):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["solve"], ["solve", "nothing.toml"], ["solve", "."], ["solv", "problems/ep4.toml"],
-        ["solve", "problems/ep4.toml", "--starts", "0"], ["solve", "problems/ep4.toml", "--linear-solver", "ma27"],
-        ["solve", "problems/ep4.toml", "--plot", "x.bmp"], ["solve", "problems/ep4.toml", "--plot", "no/such/x.png"],
-        ["solve", "problems/ep4.toml", "--wheelbase", "3 kg"], ["solve", "problems/ep4.toml", "--wheelbase", "-1"],
+        ["solve"],
+        ["solve", "nothing.toml"],
+        ["solve", "."],
+        ["solv", "problems/ep4.toml"],
+        ["solve", "problems/ep4.toml", "--starts", "0"],
+        ["solve", "problems/ep4.toml", "--linear-solver", "ma27"],
+        ["solve", "problems/ep4.toml", "--plot", "x.bmp"],
+        ["solve", "problems/ep4.toml", "--plot", "no/such/x.png"],
+        ["solve", "problems/ep4.toml", "--wheelbase", "3 kg"],
+        ["solve", "problems/ep4.toml", "--wheelbase", "-1"],
         ["compare", "pyproject.toml"],
     ],
-)  # fmt: skip
+)
 def test_bad_usage_ends_with_2_and_one_message(arguments, capsys):
     status, out, err = run(capsys, *arguments)
     assert status == 2

@@ -113,9 +113,12 @@ main()
     (tmp_path / "program.py").write_text(program, encoding="utf-8")
     path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
     done = subprocess.run(
-        [sys.executable, "-m", "program", "schema"], env=os.environ | {"PYTHONPATH": path}, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-m", "program", "schema"],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert (done.returncode, done.stdout, done.stderr) == (143, "", STOPPED)
 
 
@@ -366,17 +369,27 @@ WORDS = CHEAP | {
 }
 SILENT = {"new", "example", "figure"}  # write nothing to stdout
 STREAMS = {
-    "full": (">/dev/full", 2), "closed": (">&-", 2), "nobody reads": ("| true", 141), "one line": ("| head -1", (0, 141)),
-    "no stdin": ("<&-", 0), "no stderr": ("2>&-", 0), "full stderr": ("2>/dev/full", 0), "only stdout": ("2>&- <&-", 0),
-}  # fmt: skip
+    "full": (">/dev/full", 2),
+    "closed": (">&-", 2),
+    "nobody reads": ("| true", 141),
+    "one line": ("| head -1", (0, 141)),
+    "no stdin": ("<&-", 0),
+    "no stderr": ("2>&-", 0),
+    "full stderr": ("2>/dev/full", 0),
+    "only stdout": ("2>&- <&-", 0),
+}
 """What follows a command in a shell, and its status then, if it writes to stdout."""
 
 SURROUNDINGS = {
-    "backend": {"MPLBACKEND": "nonsense"}, "no home": {"HOME": "/nonexistent", "MPLCONFIGDIR": "/dev/null/x"},
-    "no temporaries": {"TMPDIR": "/nonexistent"}, "plain": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-    "ascii": {"PYTHONIOENCODING": "ascii"}, "narrow": {"COLUMNS": "1"}, "nonsense": {"COLUMNS": "x", "LINES": "-1"},
+    "backend": {"MPLBACKEND": "nonsense"},
+    "no home": {"HOME": "/nonexistent", "MPLCONFIGDIR": "/dev/null/x"},
+    "no temporaries": {"TMPDIR": "/nonexistent"},
+    "plain": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    "ascii": {"PYTHONIOENCODING": "ascii"},
+    "narrow": {"COLUMNS": "1"},
+    "nonsense": {"COLUMNS": "x", "LINES": "-1"},
     "dumb": {"TERM": "dumb", "NO_COLOR": "1"},
-}  # fmt: skip
+}
 
 
 SURROUNDINGS["all"] = {name: value for variables in SURROUNDINGS.values() for name, value in variables.items()}
@@ -481,9 +494,12 @@ def test_every_command_ends_soon(
     group = f"TMSOPT_TEST={tmp_path}"
     process = subprocess.Popen(
         [sys.executable, "-c", "from tmsopt.cli import main; main()", *WORK[name].split()],
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2]), "TMSOPT_TEST": str(tmp_path)},
-    )  # fmt: skip
+    )
     time.sleep(seconds)
     if process.poll() is not None:
         process.communicate()

@@ -261,13 +261,21 @@ def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path: Path, monkeypatch:
         (Progress("starting"), 3.4, "starting (3 s)"),
         (Progress("searching", 0, unit="start"), 0.5, "searching: 0 starts"),
         (Progress("drawing", 0, 1, "figure", note="growth"), 2.0, "drawing: 0 of 1 figure; growth (2 s)"),
-        (Progress("searching", 3, 64, "start", 2, 40, "best -1"), 1, "searching: 3 of 64 starts, about 39 s left; best -1 (3 s)"),
+        (
+            Progress("searching", 3, 64, "start", 2, 40, "best -1"),
+            1,
+            "searching: 3 of 64 starts, about 39 s left; best -1 (3 s)",
+        ),
         (Progress("solving rows", 14, 15, "row", 9, 2), 3, "solving rows: 14 of 15 rows (12 s)"),
-        (Progress("charting", 12e6, 1e9, "design", 60, 7260), 60, "charting: 12,000,000 of 1,000,000,000 designs, about 2 h 0 min left (2 min 0 s)"),
+        (
+            Progress("charting", 12e6, 1e9, "design", 60, 7260),
+            60,
+            "charting: 12,000,000 of 1,000,000,000 designs, about 2 h 0 min left (2 min 0 s)",
+        ),
         (Progress("bounding the optimum", 2, 60, "s", 2, 58, "gap 0.1"), 1, "bounding the optimum: 3 of 60 s; gap 0.1"),
         (Progress("bounding the optimum", 60, 60, "s", 60, 0), 9, "bounding the optimum: 60 of 60 s"),
     ],
-)  # fmt: skip
+)
 def test_a_record_in_words(told: Progress, since: float, line: str) -> None:
     assert import_module("tmsopt.cli.terminal").words(told, since) == line
 

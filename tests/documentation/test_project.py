@@ -40,10 +40,28 @@ def test_the_citation_has_what_the_format_asks_for() -> None:
     assert {"message", "title", "authors"} <= set(CITED)
     assert CITED["type"] == "software"
     known = {
-        "abstract", "authors", "cff-version", "commit", "contact", "date-released", "doi", "identifiers", "keywords",
-        "license", "license-url", "message", "preferred-citation", "references", "repository", "repository-artifact",
-        "repository-code", "title", "type", "url", "version",
-    }  # fmt: skip
+        "abstract",
+        "authors",
+        "cff-version",
+        "commit",
+        "contact",
+        "date-released",
+        "doi",
+        "identifiers",
+        "keywords",
+        "license",
+        "license-url",
+        "message",
+        "preferred-citation",
+        "references",
+        "repository",
+        "repository-artifact",
+        "repository-code",
+        "title",
+        "type",
+        "url",
+        "version",
+    }
     assert set(CITED) <= known
     assert len(set(CITED["keywords"])) == len(CITED["keywords"]) > 0
     for author in CITED["authors"]:

@@ -47,8 +47,10 @@ def test_gyroscopic_stabilisation():
     """s⁴ + (Ω² − 3) s² + 2: pairs ±iω meet at Ω = 1 + √2 and are simple above; below √2 − 1 all roots are real."""
     found = crossings([[1], [0], [-3, 0, 1], [0], [2]], 0, 5)
     assert [(c.kind, c.root.multiplicity, c.changes) for c in found.found] == [
-        ("EP2", 2, False), ("EP2", 2, False), ("CEP2", 2, True),
-    ]  # fmt: skip
+        ("EP2", 2, False),
+        ("EP2", 2, False),
+        ("CEP2", 2, True),
+    ]
     assert [c.at for c in found.found] == pytest.approx([math.sqrt(2) - 1] * 2 + [math.sqrt(2) + 1], rel=1e-15)
     assert found.found[2].root.im == pytest.approx(2**0.25, rel=1e-15)
     assert (found.stable, found.marginal) == ((), ((pytest.approx(1 + math.sqrt(2)), 5),))

@@ -261,8 +261,15 @@ def test_the_command_answers_in_json() -> None:
     assert data["columns"]["phi"][0] == math.radians(5)
     assert data["disturbance"] == {"start": {"phi": math.radians(5)}, "push": 0, "lean_push": 0, "default": False}
     assert set(data["modes"][0]) == {
-        "re", "im", "multiplicity", "geometric", "partial", "amplitudes", "phases", "steer_per_lean",
-    }  # fmt: skip
+        "re",
+        "im",
+        "multiplicity",
+        "geometric",
+        "partial",
+        "amplitudes",
+        "phases",
+        "steer_per_lean",
+    }
 
 
 @pytest.mark.parametrize(

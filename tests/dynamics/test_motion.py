@@ -226,9 +226,14 @@ def steered(lag: float | None) -> tmsopt.models.Model:
         return sums(convolved(L[0][0], late[1]), [-x for x in convolved(L[0][1], late[0])])
 
     return replace(
-        whipple, pencil=pencil, algebraic=dict, polynomial=polynomial, compact=None, degree=4 if lag is None else 5,
+        whipple,
+        pencil=pencil,
+        algebraic=dict,
+        polynomial=polynomial,
+        compact=None,
+        degree=4 if lag is None else 5,
         feedback=lambda p: Feedback(whipple.pencil(p)[0], GAINS.tolist(), lag),  # type: ignore[misc]
-    )  # fmt: skip
+    )
 
 
 def convolved(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
@@ -295,10 +300,13 @@ def test_a_motor_of_skates_has_its_torque_in_newton_metres(lag: float | None) ->
         A = np.vstack([top, np.hstack([-J @ K, -J @ D, J[:, 1:]]), np.r_[-gains[1], -1] / (lag * rate)])
         pencil, coefficients = (np.eye(5), -A), np.poly(A).tolist()
     driven = replace(
-        tms, degree=len(coefficients) - 1, compact=None, pencil=lambda p: tuple(m.tolist() for m in pencil),
+        tms,
+        degree=len(coefficients) - 1,
+        compact=None,
+        pencil=lambda p: tuple(m.tolist() for m in pencil),
         polynomial=lambda **p: list(coefficients),
         feedback=lambda p: Feedback(M.tolist(), gains.tolist(), lag and lag * rate),
-    )  # fmt: skip
+    )
     asked: dict[str, Any] = {"lean": 2, "push": 0.05, "seconds": 0.4, "points": 41}
     skates, same = (tmsopt.simulate(q, **asked) for q in (tmsopt.Problem(driven, fixed=p), wheels))
     for name in (*STATES, "T_delta", "psi", "y_rear", "y_front"):

@@ -41,8 +41,11 @@ def test_it_is_the_exponential_of_h(seed: int) -> None:
     rows: list[list[Any]] = H.tolist()
     rows[0][0] = f"x + 1j*({float(H[0, 0].imag)!r})"
     start = rng.normal(size=n) + 1j * rng.normal(size=n)
-    asked = {f"psi{k + 1}_{part}": float(getattr(z, p)) for k, z in enumerate(start)
-             for part, p in (("re", "real"), ("im", "imag"))}  # fmt: skip
+    asked = {
+        f"psi{k + 1}_{part}": float(getattr(z, p))
+        for k, z in enumerate(start)
+        for part, p in (("re", "real"), ("im", "imag"))
+    }
     problem = tmsopt.Problem(from_hamiltonian(rows), fixed={"x": float(H[0, 0].real)})
     motion = tmsopt.simulate(problem, start=asked, seconds=2.0, points=41)
     expected = np.array([expm(-1j * H * t) @ start for t in motion["t"]])
@@ -50,8 +53,12 @@ def test_it_is_the_exponential_of_h(seed: int) -> None:
     assert motion.stable == bool(np.linalg.eigvals(H).imag.max() < 0)
     assert omegas(motion) == pytest.approx(sorted(np.linalg.eigvals(H), key=lambda z: -z.imag), abs=1e-9)
     for mode, omega in zip(motion.modes, omegas(motion), strict=True):  # its shape is an eigenvector
-        psi = np.array([a * np.exp(1j * math.radians(p)) if a else 0.0 for a, p in
-                        zip(mode.amplitudes.values(), mode.phases.values(), strict=True)])  # fmt: skip
+        psi = np.array(
+            [
+                a * np.exp(1j * math.radians(p)) if a else 0.0
+                for a, p in zip(mode.amplitudes.values(), mode.phases.values(), strict=True)
+            ]
+        )
         assert psi @ (H.T - omega * np.eye(n)) == pytest.approx(np.zeros(n), abs=1e-8)
 
 

@@ -272,10 +272,17 @@ def test_every_digit_of_designs_with_nothing_free() -> None:
     special = [{}, {"v": 0.0}, {"lambda_s": 0.0}, {"z_B": -0.3, "z_H": -0.3}, {"x_B": 0.8, "x_H": 0.8}, {"w": 1.0}]
     for k in range(30):
         p = {
-            "w": rng.uniform(0.5, 1.5), "v": rng.uniform(0.1, 6), "g": 9.81, "lambda_s": math.atan(rng.uniform(-2, 2)),
-            "m_B": rng.uniform(1, 30), "x_B": rng.uniform(-0.5, 2), "z_B": -rng.uniform(0.1, 1.5),
-            "m_H": rng.uniform(0.1, 9), "x_H": rng.uniform(-0.5, 2), "z_H": -rng.uniform(0.1, 1.5),
-        }  # fmt: skip
+            "w": rng.uniform(0.5, 1.5),
+            "v": rng.uniform(0.1, 6),
+            "g": 9.81,
+            "lambda_s": math.atan(rng.uniform(-2, 2)),
+            "m_B": rng.uniform(1, 30),
+            "x_B": rng.uniform(-0.5, 2),
+            "z_B": -rng.uniform(0.1, 1.5),
+            "m_H": rng.uniform(0.1, 9),
+            "x_H": rng.uniform(-0.5, 2),
+            "z_H": -rng.uniform(0.1, 1.5),
+        }
         p |= special[k % len(special)]
         if k % 2:
             q = tms.sets[1].native(p)
@@ -328,9 +335,15 @@ def test_the_omega0_bound_is_never_above_the_true_one() -> None:
         fixed = {name: float(v) for name, v in p.items()} | {"lambda_s": tilt}
         if k % 2:
             fixed = {
-                "w": w, "g": 9.81, "m_B": 10.0, "m_H": 10 * fixed["mu"], "x_H": w * ahead, "z_H": w * zeta_H,
-                "z_B": w * fixed["zeta_B"], "lambda_s": tilt,
-            }  # fmt: skip
+                "w": w,
+                "g": 9.81,
+                "m_B": 10.0,
+                "m_H": 10 * fixed["mu"],
+                "x_H": w * ahead,
+                "z_H": w * zeta_H,
+                "z_B": w * fixed["zeta_B"],
+                "lambda_s": tilt,
+            }
             free = {"v": (1.0, 5.0), "x_B": (0.4, 1.4)}
         problem = tmsopt.Problem(model=tms, fixed=fixed, free=free, minimize="abscissa")
         bound = omega0_bound(problem, 0.0)

@@ -58,9 +58,12 @@ def test_the_limit_holds_in_every_scenario() -> None:
     """s³ + a s² + b s + c + m is slowest where m is least or greatest."""
     free = dict.fromkeys("abc", (0.0, 20.0))
     problem = tmsopt.Problem(
-        from_coefficients([1, "a", "b", "c + m"]), free=free, minimize="a + b + c",
-        constraints={"fast": "abscissa <= -0.7"}, scenarios={"m": (0.25, 0.75)},
-    )  # fmt: skip
+        from_coefficients([1, "a", "b", "c + m"]),
+        free=free,
+        minimize="a + b + c",
+        constraints={"fast": "abscissa <= -0.7"},
+        scenarios={"m": (0.25, 0.75)},
+    )
     found = tmsopt.solve(problem)
     a, b, c = (found.parameters[n] for n in "abc")
     worst = max(z.real for m in (0.25, 0.75) for z in stored_roots(found, [a, b, mp.mpf(c) + m]))

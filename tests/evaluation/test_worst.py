@@ -44,10 +44,14 @@ def some_designs(count, seed):
     rng = np.random.default_rng(seed)
     for _ in range(count):
         yield {
-            "Fr": rng.uniform(0.5, 4), "mu": rng.uniform(0.05, 3), "chi_B": rng.uniform(0.9, 2),
-            "chi_H": rng.uniform(0.95, 1.2), "zeta_B": rng.uniform(-1, -0.3), "zeta_H": rng.uniform(-0.8, -0.2),
+            "Fr": rng.uniform(0.5, 4),
+            "mu": rng.uniform(0.05, 3),
+            "chi_B": rng.uniform(0.9, 2),
+            "chi_H": rng.uniform(0.95, 1.2),
+            "zeta_B": rng.uniform(-1, -0.3),
+            "zeta_H": rng.uniform(-0.8, -0.2),
             "lambda_s": rng.uniform(0.1, 1.1),
-        }  # fmt: skip
+        }
 
 
 VARIED = [
@@ -214,9 +218,13 @@ def test_root_quantities_are_the_worst_of_the_cases(speeds):
 def test_a_constraint_holds_between_the_points_of_a_band():
     """chi_B ≥ 1.5 − (Fr − 1.7)² for every speed is chi_B ≥ 1.5, which neither end of the band knows."""
     stated = tmsopt.Problem(
-        TMS, fixed={n: v for n, v in DESIGN.items() if n not in ("Fr", "chi_B")}, free={"chi_B": (1.05, 2.0)},
-        scenarios={"Fr": Band(1.2, 2.4, 2)}, constraints={"ahead": "chi_B >= 1.5 - (Fr - 1.7)**2"}, minimize="chi_B",
-    )  # fmt: skip
+        TMS,
+        fixed={n: v for n, v in DESIGN.items() if n not in ("Fr", "chi_B")},
+        free={"chi_B": (1.05, 2.0)},
+        scenarios={"Fr": Band(1.2, 2.4, 2)},
+        constraints={"ahead": "chi_B >= 1.5 - (Fr - 1.7)**2"},
+        minimize="chi_B",
+    )
     assert tmsopt.solve(stated).value == pytest.approx(1.5, abs=1e-8)
 
 
@@ -225,9 +233,13 @@ def test_the_damping_ratio_holds_at_corners_that_the_search_does_not_start_with(
     """Five tolerances have 32 corners, of which a search starts with two."""
     off = {"chi_B": 0.03, "lambda_s": 0.03, "zeta_B": 0.02, "zeta_H": 0.02, "mu": 0.01}
     stated = tmsopt.Problem(
-        TMS, fixed={n: v for n, v in DESIGN.items() if n != "Fr"}, free={"Fr": (1.0, 4.0)}, tolerances=off,
-        constraints={"sway": "damping_ratio >= 0.5"}, minimize="Fr",
-    )  # fmt: skip
+        TMS,
+        fixed={n: v for n, v in DESIGN.items() if n != "Fr"},
+        free={"Fr": (1.0, 4.0)},
+        tolerances=off,
+        constraints={"sway": "damping_ratio >= 0.5"},
+        minimize="Fr",
+    )
     corners = np.array(list(product((-1.0, 1.0), repeat=5))).T
 
     def sway(Fr):
@@ -241,9 +253,13 @@ def test_the_damping_ratio_holds_at_corners_that_the_search_does_not_start_with(
 def test_an_equality_is_one_of_the_nominal_design():
     """chi_T = (chi_B + mu chi_H)/(1 + mu) cannot be 1.15 for every mu; at the mu that is written it gives chi_B."""
     stated = tmsopt.Problem(
-        TMS, fixed={**FIXED_MU, "mu": 1.0}, free={"chi_B": (1.05, 2.0)}, scenarios={"mu": [0.5, 2.0]},
-        constraints={"centre": "chi_T == 1.15", "ahead": "chi_T >= 1.05"}, minimize="abscissa",
-    )  # fmt: skip
+        TMS,
+        fixed={**FIXED_MU, "mu": 1.0},
+        free={"chi_B": (1.05, 2.0)},
+        scenarios={"mu": [0.5, 2.0]},
+        constraints={"centre": "chi_T == 1.15", "ahead": "chi_T >= 1.05"},
+        minimize="abscissa",
+    )
     design = tmsopt.solve(stated)
     assert design.parameters["chi_B"] == pytest.approx(1.15 * 2 - 1.02, abs=1e-9)
     least = replace(stated, constraints={"ahead": "chi_T >= 1.15"}, minimize="chi_B")

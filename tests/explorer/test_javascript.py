@@ -21,9 +21,19 @@ from tmsopt.roots import backward_error, classify, find_motion, quartic_classes,
 
 FOLDER = Path(__file__).parents[2] / "problems"
 FILES = (
-    "ep4", "point_mass_robot", "whipple_ep4", "whipple_benchmark", "brake_squeal", "pt_pair", "ziegler_undamped",
-    "three_masses_pt", "chocolate", "two_mass_spring", "three_masses", "transport_aircraft",
-)  # fmt: skip
+    "ep4",
+    "point_mass_robot",
+    "whipple_ep4",
+    "whipple_benchmark",
+    "brake_squeal",
+    "pt_pair",
+    "ziegler_undamped",
+    "three_masses_pt",
+    "chocolate",
+    "two_mass_spring",
+    "three_masses",
+    "transport_aircraft",
+)
 DESIGNS = 2000
 FEW = 300
 
@@ -251,9 +261,16 @@ def test_kinds_are_exact_beside_boundaries_and_exceptional_points(degree):
 
 
 KNOWN = {
-    (1, 4, 6, 4, 1): 4 - 1, (1, 0, 2, 0, 1): 2, (1, 8, 22, 24, 9): 3, (1, 10, 35, 50, 24): 4, (1, 3, 3, 1, 0): 1,
-    (0, 1, 3, 3, 1): 0, (1, 1, 3, 1, 2): 2, (1, 4, 8, 8, 4): 3, (1, 0, -2, 0, 1): 1,
-}  # fmt: skip
+    (1, 4, 6, 4, 1): 4 - 1,
+    (1, 0, 2, 0, 1): 2,
+    (1, 8, 22, 24, 9): 3,
+    (1, 10, 35, 50, 24): 4,
+    (1, 3, 3, 1, 0): 1,
+    (0, 1, 3, 3, 1): 0,
+    (1, 1, 3, 1, 2): 2,
+    (1, 4, 8, 8, 4): 3,
+    (1, 0, -2, 0, 1): 1,
+}
 """(s+1)⁴, (s²+1)², (s+1)²(s+3)², (s+1)(s+2)(s+3)(s+4), s(s+1)³, none, (s²+1)(s²+s+2), (s²+2s+2)², (s²−1)²: codes.
 
 Heavily damped is what has four *different* real roots, so that an EP4 is stable only.
@@ -284,13 +301,19 @@ MEETINGS = "(rows) => rows.map((a) => meetingsOf(rootsOf(Float64Array.from(a))))
 @pytest.mark.parametrize(
     ("roots_of", "expected"),
     [
-        ([-1] * 4, [[-1, 0, 4]]), ([1j, 1j, -1j, -1j], [[0, 1, 2]]), ([-1, -1, -3, -3], [[-1, 0, 2], [-3, 0, 2]]),
-        ([0, 0, -1, -2], [[0, 0, 2], [-1, 0, 1], [-2, 0, 1]]), ([-2] * 6, [[-2, 0, 6]]), ([-3], [[-3, 0, 1]]),
-        ([*[-1 + 2j, -1 - 2j] * 3, -4], [[-1, 2, 3], [-4, 0, 1]]), ([*[-1 + 1j, -1 - 1j] * 2, -2, -2, -2], [[-1, 1, 2], [-2, 0, 3]]),
-        ([1000] * 3 + [-0.5, -0.5], [[1000, 0, 3], [-0.5, 0, 2]]), ([-1] * 12, [[-1, 0, 12]]),
+        ([-1] * 4, [[-1, 0, 4]]),
+        ([1j, 1j, -1j, -1j], [[0, 1, 2]]),
+        ([-1, -1, -3, -3], [[-1, 0, 2], [-3, 0, 2]]),
+        ([0, 0, -1, -2], [[0, 0, 2], [-1, 0, 1], [-2, 0, 1]]),
+        ([-2] * 6, [[-2, 0, 6]]),
+        ([-3], [[-3, 0, 1]]),
+        ([*[-1 + 2j, -1 - 2j] * 3, -4], [[-1, 2, 3], [-4, 0, 1]]),
+        ([*[-1 + 1j, -1 - 1j] * 2, -2, -2, -2], [[-1, 1, 2], [-2, 0, 3]]),
+        ([1000] * 3 + [-0.5, -0.5], [[1000, 0, 3], [-0.5, 0, 2]]),
+        ([-1] * 12, [[-1, 0, 12]]),
         ([-1, -1 - 2.0**-10, -5], [[-1, 0, 1], [-1 - 2.0**-10, 0, 1], [-5, 0, 1]]),
     ],
-)  # fmt: skip
+)
 def test_roots_that_meet_are_one_with_a_multiplicity(roots_of, expected):
     c = np.poly(roots_of).real  # rounded, by which a multiple root comes apart
     scaled = c * 2.0 ** (7 * np.arange(len(c)) - 30)
@@ -452,8 +475,22 @@ def test_random_expressions_have_the_values_that_python_computes():
         if depth == 0:
             return str(rng.choice(["u", "v", "w", "2", "0.5", "3.25", "1e-3"]))
         sides = written(depth - 1), written(int(rng.integers(depth)))
-        unary = ["-({0})", "abs({0})", "sqrt(abs({0}))", "sin({0})", "cos({0})", "atan({0})", "exp(-abs({0}))", "({0})**2",
-                 "({0})**3", "({0})**(-1)", "abs({0})**1.5", "log(1 + abs({0}))", "tan(sin({0}))", "asin(sin({0}))"]  # fmt: skip
+        unary = [
+            "-({0})",
+            "abs({0})",
+            "sqrt(abs({0}))",
+            "sin({0})",
+            "cos({0})",
+            "atan({0})",
+            "exp(-abs({0}))",
+            "({0})**2",
+            "({0})**3",
+            "({0})**(-1)",
+            "abs({0})**1.5",
+            "log(1 + abs({0}))",
+            "tan(sin({0}))",
+            "asin(sin({0}))",
+        ]
         binary = ["({0}) + ({1})", "({0}) - ({1})", "({0}) * ({1})", "({0}) / ({1})", "min({0}, {1})", "max({0}, {1})"]
         return str(rng.choice(binary + unary if rng.random() < 0.6 else binary)).format(*sides)
 

@@ -305,15 +305,22 @@ def test_close_to_a_known_design_it_says_so(browser: Any, ep4: Path) -> None:
 
 VERDICTS = {
     "s^2 (s^2 + 1)": ('["1", "0", "1", "0", "k - 2"]', "✗ growing A disturbance grows as t: roots meet"),
-    "undamped": ('["1", "0", "1 + k", "0", "k"]', "≈ marginally stable A disturbance neither grows nor dies out: the rightmost"),
-    "(s + k)^3": ('["1", "3*k", "3*k**2", "k**3"]', "✓ stable Every disturbance dies out and nothing swings, on the edge "
-                  "of heavy damping, slowest as t2 e−2 t"),
-    "(s + k)(s + 5)": ('["1", "5 + k", "5*k"]', "✓ heavily damped Every disturbance dies out and nothing swings, slowest as "
-                       "e−2 t"),
+    "undamped": (
+        '["1", "0", "1 + k", "0", "k"]',
+        "≈ marginally stable A disturbance neither grows nor dies out: the rightmost",
+    ),
+    "(s + k)^3": (
+        '["1", "3*k", "3*k**2", "k**3"]',
+        "✓ stable Every disturbance dies out and nothing swings, on the edge of heavy damping, slowest as t2 e−2 t",
+    ),
+    "(s + k)(s + 5)": (
+        '["1", "5 + k", "5*k"]',
+        "✓ heavily damped Every disturbance dies out and nothing swings, slowest as e−2 t",
+    ),
     "(s^2 + s + 1)^2": ('["1", "2", "3", "2", "k - 1"]', "✓ stable Every disturbance dies out, slowest as t e−0.5 t"),
     "both grow": ('["1", "-k - 1", "k + 5", "-5"]', "✗ unstable Divergence and flutter: a disturbance grows as e1 t"),
     "one grows": ('["1", "3 - k", "3 - 2*k", "-4 + k"]', "✗ unstable Divergence: a disturbance grows as e"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow

@@ -126,9 +126,10 @@ def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser: Any, 
         axes = page.evaluate("state.plane.map((k) => DATA.parameters[k].name)")
     problem = tmsopt.load(PROBLEMS / f"{name}.toml")
     plane = tmsopt.Problem(
-        model=problem.model, fixed={n: v for n, v in start.items() if n not in axes},
+        model=problem.model,
+        fixed={n: v for n, v in start.items() if n not in axes},
         free={n: problem.free[n] for n in axes},
-    )  # fmt: skip
+    )
     found = tmsopt.chart(plane, axes, points=(GRID, GRID), layers=["kind"], boundaries=False)
     codes = {"undefined": 0, "unstable by capsize": 1, "unstable by weave": 2, "stable": 3}
     codes["heavily damped (stable, nothing swings)"] = 4
@@ -223,8 +224,10 @@ def test_a_window_that_the_design_stands_in_is_found(browser: Any, tmp_path: Pat
 def test_tiny_numbers_are_told_from_0(browser: Any, tmp_path: Path) -> None:
     """Their products underflow; one of two masses may be 1e-15 of the other."""
     with opened(browser, stated(CAR, tmp_path)) as page:
-        assert page.evaluate("[[1e-170, 1e-170, 1e-170], [1e-170, -1e-170, 1e-170]]"
-                             ".map((a) => crossingKind([1e-170, 1e-170, 1e-170], a))") == ["weave", "weave"]  # fmt: skip
+        assert page.evaluate(
+            "[[1e-170, 1e-170, 1e-170], [1e-170, -1e-170, 1e-170]]"
+            ".map((a) => crossingKind([1e-170, 1e-170, 1e-170], a))"
+        ) == ["weave", "weave"]
         assert page.evaluate("crossingKind([1e-170, 1, 1e-170], [1e-170, 1, -1e-170])") == "capsize"
     light = '[model]\nM = [["1", "0"], ["0", "m"]]\nK = [["1", "0"], ["0", "1e-15"]]\n[parameters]\nm = 1e-15\n'
     with opened(browser, stated(light, tmp_path)) as page:
@@ -255,13 +258,15 @@ def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser: Any, tmp_path: Pat
     assert explorer.solution is not None
     values = explorer.problem.values(explorer.solution.parameters)
     with opened(browser, tmp_path / "page.html") as page:
-        H, turned, foot, on_axis, moved, B, leaned, ahead = np.array(page.evaluate("""() => {
+        H, turned, foot, on_axis, moved, B, leaned, ahead = np.array(
+            page.evaluate("""() => {
             const shape = bicycleShape(state.x);
             const { H, B } = shape;
             const [foot, axis] = [shape.onAxis(shape.alongAxis(H)), shape.onAxis(0.3)];
             const [turned, moved, ahead] = [H, axis, [10, 0, 0]].map((point) => movedPoint(shape, point, true, 0, 0.4));
             return [H, turned, foot, axis, moved, B, movedPoint(shape, B, false, 0.2, 0.4), ahead];
-        }"""))  # fmt: skip
+        }""")
+        )
     arm = values["u_H" if "u_H" in values else "nu_H"]
     assert np.linalg.norm(H - foot) == pytest.approx(abs(arm), rel=1e-12)
     np.testing.assert_allclose(moved, on_axis, atol=1e-12)  # steering moves nothing on its axis

@@ -486,9 +486,20 @@ def test_the_command_writes_table_csv_and_plot(file, tmp_path):
     assert "gap: no efficient design was found with chi_B from 0 to 1.36" in done.stdout
     rows = list(csv.DictReader((tmp_path / "front.csv").read_text(encoding="utf-8").splitlines()))
     assert list(rows[0]) == [
-        "chi_B", "sin(2*chi_B) - 0.3*chi_B", "Fr", "mu", "chi_H", "zeta_B", "zeta_H", "lambda_s (rad)",
-        "abscissa", "structure", "stable", "limits", "label",
-    ]  # fmt: skip
+        "chi_B",
+        "sin(2*chi_B) - 0.3*chi_B",
+        "Fr",
+        "mu",
+        "chi_H",
+        "zeta_B",
+        "zeta_H",
+        "lambda_s (rad)",
+        "abscissa",
+        "structure",
+        "stable",
+        "limits",
+        "label",
+    ]
     assert (
         len(rows) == done.stdout.split("sub-problems")[1].count("\n  ") - 2
     )  # a heading, a row a point, what is left out

@@ -133,7 +133,7 @@ WRONG = {
     "objective beside a study": (STUDY, "[vary]", '[objective]\nminimize = "Fr"\n[vary]', ""),
     "unknown matrix": (OWN, "M =", "Q =", "model"),
     "matrix that is a row": (OWN, "M = [[1]]", "M = [1]", "model.M.0"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN])

@@ -10,12 +10,32 @@ from typing import Any
 import numpy as np
 
 BENCHMARK = {
-    "w": 1.02, "c": 0.08, "lambda_s": math.pi / 10, "g": 9.81, "v": 5.0,
-    "r_R": 0.3, "m_R": 2.0, "I_Rxx": 0.0603, "I_Ryy": 0.12,
-    "x_B": 0.3, "z_B": -0.9, "m_B": 85.0, "I_Bxx": 9.2, "I_Bzz": 2.8, "I_Bxz": 2.4,
-    "x_H": 0.9, "z_H": -0.7, "m_H": 4.0, "I_Hxx": 0.05892, "I_Hzz": 0.00708, "I_Hxz": -0.00756,
-    "r_F": 0.35, "m_F": 3.0, "I_Fxx": 0.1405, "I_Fyy": 0.28,
-}  # fmt: skip
+    "w": 1.02,
+    "c": 0.08,
+    "lambda_s": math.pi / 10,
+    "g": 9.81,
+    "v": 5.0,
+    "r_R": 0.3,
+    "m_R": 2.0,
+    "I_Rxx": 0.0603,
+    "I_Ryy": 0.12,
+    "x_B": 0.3,
+    "z_B": -0.9,
+    "m_B": 85.0,
+    "I_Bxx": 9.2,
+    "I_Bzz": 2.8,
+    "I_Bxz": 2.4,
+    "x_H": 0.9,
+    "z_H": -0.7,
+    "m_H": 4.0,
+    "I_Hxx": 0.05892,
+    "I_Hzz": 0.00708,
+    "I_Hxz": -0.00756,
+    "r_F": 0.35,
+    "m_F": 3.0,
+    "I_Fxx": 0.1405,
+    "I_Fyy": 0.28,
+}
 """Meijaard, Papadopoulos, Ruina and Schwab (2007), table 1."""
 
 BODIES = "w c r_R m_R I_Rxx I_Ryy x_B z_B m_B I_Bxx I_Bzz I_Bxz x_H z_H m_H I_Hxx I_Hzz I_Hxz r_F m_F I_Fxx I_Fyy"
@@ -28,15 +48,32 @@ def bicycles(count: int, seed: int = 0) -> Iterator[dict[str, float]]:
         r, m = rng.uniform(0.1, 0.5, 2), rng.uniform(0.5, 5, 2)
         inertia = m * r * r * rng.uniform(0.3, 1, 2)
         yield {
-            "w": rng.uniform(0.6, 1.6), "c": rng.uniform(-0.2, 0.2), "lambda_s": math.atan(rng.uniform(-2, 2)),
-            "g": rng.uniform(1, 20), "v": rng.uniform(0.1, 12),
-            "r_R": r[0], "m_R": m[0], "I_Rxx": inertia[0] / 2, "I_Ryy": inertia[0],
-            "x_B": rng.uniform(-0.5, 2), "z_B": -rng.uniform(0.1, 1.2), "m_B": rng.uniform(3, 90),
-            "I_Bxx": rng.uniform(0, 10), "I_Bzz": rng.uniform(0, 3), "I_Bxz": rng.uniform(-2, 2),
-            "x_H": rng.uniform(0, 1.5), "z_H": -rng.uniform(0.1, 1.2), "m_H": rng.uniform(0.5, 6),
-            "I_Hxx": rng.uniform(0, 0.3), "I_Hzz": rng.uniform(0, 0.1), "I_Hxz": rng.uniform(-0.05, 0.05),
-            "r_F": r[1], "m_F": m[1], "I_Fxx": inertia[1] / 2, "I_Fyy": inertia[1],
-        }  # fmt: skip
+            "w": rng.uniform(0.6, 1.6),
+            "c": rng.uniform(-0.2, 0.2),
+            "lambda_s": math.atan(rng.uniform(-2, 2)),
+            "g": rng.uniform(1, 20),
+            "v": rng.uniform(0.1, 12),
+            "r_R": r[0],
+            "m_R": m[0],
+            "I_Rxx": inertia[0] / 2,
+            "I_Ryy": inertia[0],
+            "x_B": rng.uniform(-0.5, 2),
+            "z_B": -rng.uniform(0.1, 1.2),
+            "m_B": rng.uniform(3, 90),
+            "I_Bxx": rng.uniform(0, 10),
+            "I_Bzz": rng.uniform(0, 3),
+            "I_Bxz": rng.uniform(-2, 2),
+            "x_H": rng.uniform(0, 1.5),
+            "z_H": -rng.uniform(0.1, 1.2),
+            "m_H": rng.uniform(0.5, 6),
+            "I_Hxx": rng.uniform(0, 0.3),
+            "I_Hzz": rng.uniform(0, 0.1),
+            "I_Hxz": rng.uniform(-0.05, 0.05),
+            "r_F": r[1],
+            "m_F": m[1],
+            "I_Fxx": inertia[1] / 2,
+            "I_Fyy": inertia[1],
+        }
 
 
 def appendix(p: Mapping[str, Any], sine: Any, cosine: Any) -> Any:

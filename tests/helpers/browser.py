@@ -30,8 +30,16 @@ def chromium() -> Iterator[Any]:
 
 
 @contextmanager
-def opened(browser: Any, path: Path, *, width: int = 1280, height: int = 900, link: str = "", faults: list[str] | None = None,
-           **context: Any) -> Iterator[Any]:  # fmt: skip
+def opened(
+    browser: Any,
+    path: Path,
+    *,
+    width: int = 1280,
+    height: int = 900,
+    link: str = "",
+    faults: list[str] | None = None,
+    **context: Any,
+) -> Iterator[Any]:
     """A page of a file, drawn. In the end it must have been without faults and without requests.
 
     Args:

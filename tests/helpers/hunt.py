@@ -139,9 +139,20 @@ def least(
         inside = 1e-14 * (upper - lower) + 1e-15 * (abs(lower) + abs(upper))  # SciPy may round a start beyond its bound
         known = None if centre_ is None else np.clip(centre_, lower + inside, upper - inside)
         found = differential_evolution(
-            cost, list(zip(lower, upper, strict=True)), maxiter=generations, popsize=population, tol=0, atol=1e-13, rng=seed + turn,
-            vectorized=True, updating="deferred", polish=False, mutation=(0.4, 0.9), recombination=0.9, x0=known,
-        )  # fmt: skip
+            cost,
+            list(zip(lower, upper, strict=True)),
+            maxiter=generations,
+            popsize=population,
+            tol=0,
+            atol=1e-13,
+            rng=seed + turn,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            mutation=(0.4, 0.9),
+            recombination=0.9,
+            x0=known,
+        )
         if found.fun <= best:
             centre_, best = found.x, float(found.fun)
         width *= shrink
@@ -159,9 +170,11 @@ def placed(
     """
     k, fall = chi_H - 1, zeta_B - zeta_H
     p1, q1, p2, q2 = (
-        beta_1 - 2 * gamma, kappa_1 - beta_1 * gamma + gamma**2,
-        beta_2 - 2 * gamma, kappa_2 - beta_2 * gamma + gamma**2,
-    )  # fmt: skip
+        beta_1 - 2 * gamma,
+        kappa_1 - beta_1 * gamma + gamma**2,
+        beta_2 - 2 * gamma,
+        kappa_2 - beta_2 * gamma + gamma**2,
+    )
     b1, b2, b3, b4 = p1 + p2, q1 + q2 + p1 * p2, p1 * q2 + p2 * q1, q1 * q2
     with np.errstate(all="ignore"):
         chi_B = chi_H * (1 - b3 / b1 * zeta_B) / (1 - b3 / b1 * zeta_H)

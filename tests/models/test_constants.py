@@ -97,10 +97,12 @@ def test_a_proof_lists_the_numbers_that_it_takes_exactly() -> None:
 @pytest.mark.parametrize(
     ("entry", "im", "listed"),
     [
-        ("1j/3", Fraction(1, 3), "1/3"), ("-1j/3", Fraction(-1, 3), "1/3"), ("2.5j/3", Fraction(5, 6), "2.5/3"),
+        ("1j/3", Fraction(1, 3), "1/3"),
+        ("-1j/3", Fraction(-1, 3), "1/3"),
+        ("2.5j/3", Fraction(5, 6), "2.5/3"),
         ("k + 1j/7", Fraction(1, 7), "1/7"),
     ],
-)  # fmt: skip
+)
 def test_numbers_in_complex_entries_are_listed(entry: str, im: Fraction, listed: str) -> None:
     model = tmsopt.models.from_hamiltonian([[entry, "k"], ["k", 0]])
     assert model.numbers == (listed,)

@@ -15,9 +15,17 @@ from tmsopt.cli import every as main
 from tmsopt.models import canonical, inertia_margin, matrices, whipple
 
 ROBOT = {
-    "w": 0.8, "v": 3.718577772, "g": 9.81, "lambda_s": math.radians(-24.7171588), "m_B": 20.0, "x_B": 0.467199284,
-    "z_B": -0.25, "m_H": 6.0, "x_H": 1.1, "z_H": -0.699557,
-}  # fmt: skip
+    "w": 0.8,
+    "v": 3.718577772,
+    "g": 9.81,
+    "lambda_s": math.radians(-24.7171588),
+    "m_B": 20.0,
+    "x_B": 0.467199284,
+    "z_B": -0.25,
+    "m_H": 6.0,
+    "x_H": 1.1,
+    "z_H": -0.699557,
+}
 """Near the EP4 of problems/point_mass_robot.toml."""
 
 NOTHING = dict.fromkeys(BODIES.split(), 0.0) | {"r_R": 1.0, "r_F": 1.0}
@@ -76,9 +84,18 @@ def test_margin_is_the_least_of_several_crossings():
     rng = np.random.default_rng(0)
     margins = []
     while len(margins) < 40:
-        p = {"w": 1.0, "v": rng.uniform(1, 12), "g": 9.81, "lambda_s": rng.uniform(-1, 1), "m_B": 10.0,
-             "x_B": rng.uniform(0.2, 2), "z_B": -rng.uniform(0.1, 1), "m_H": rng.uniform(0.2, 9),
-             "x_H": rng.uniform(0.7, 1.3), "z_H": -rng.uniform(0.1, 1)}  # fmt: skip
+        p = {
+            "w": 1.0,
+            "v": rng.uniform(1, 12),
+            "g": 9.81,
+            "lambda_s": rng.uniform(-1, 1),
+            "m_B": 10.0,
+            "x_B": rng.uniform(0.2, 2),
+            "z_B": -rng.uniform(0.1, 1),
+            "m_H": rng.uniform(0.2, 9),
+            "x_H": rng.uniform(0.7, 1.3),
+            "z_H": -rng.uniform(0.1, 1),
+        }
         found = inertia_margin(p)
         assert (found is not None) == (abscissa(p) < 0)
         for name, x in (found or {}).items():

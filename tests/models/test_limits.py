@@ -89,10 +89,16 @@ def test_what_is_not_beyond_is_read(written):
 @pytest.mark.parametrize(
     ("written", "found"),
     [
-        ("x*y**2 + x", (3, 0)), ("1/x + 1/y", (1, 2)), ("(x + 1)**5/(y - x)**2", (5, 2)), ("x**-3", (0, 3)),
-        ("(x/y)**-2", (2, 2)), ("sin(x**900)*x", (2, 0)), ("sqrt(x**3)", (3, 0)), ("2*3", (0, 0)),
+        ("x*y**2 + x", (3, 0)),
+        ("1/x + 1/y", (1, 2)),
+        ("(x + 1)**5/(y - x)**2", (5, 2)),
+        ("x**-3", (0, 3)),
+        ("(x/y)**-2", (2, 2)),
+        ("sin(x**900)*x", (2, 0)),
+        ("sqrt(x**3)", (3, 0)),
+        ("2*3", (0, 0)),
     ],
-)  # fmt: skip
+)
 def test_degrees_are_those_of_the_quotient_multiplied_out(written, found):
     """Of x y² + x; (x + y)/(x y); (x + 1)⁵/(y − x)² and so on, by hand."""
     symbols = {"x": degree.Degree(), "y": degree.Degree()}
@@ -158,21 +164,26 @@ def test_a_chain_of_quantities_as_long_as_is_read():
 @pytest.mark.parametrize(
     ("written", "said"),
     [
-        ("1e-99999999 cm", "beyond double precision"), ("1e99999999 cm", "beyond double precision"),
-        ("1e-400 m", "beyond double precision"), ("5 ym^9/Ym^8", "beyond double precision"),
-        ("5 m" + "  m" * 25 + " ?", "does not read as a unit"), ("5 " + "m *" * 25, "does not read as a unit"),
+        ("1e-99999999 cm", "beyond double precision"),
+        ("1e99999999 cm", "beyond double precision"),
+        ("1e-400 m", "beyond double precision"),
+        ("5 ym^9/Ym^8", "beyond double precision"),
+        ("5 m" + "  m" * 25 + " ?", "does not read as a unit"),
+        ("5 " + "m *" * 25, "does not read as a unit"),
         ("5 m" + "  m" * 100_000 + " ?", "300005 characters, and a number has up to 80"),
-        ("1" * 100_000 + "%", "100001 characters"), ("1," + "1" * 100_000, "100002 characters"),
+        ("1" * 100_000 + "%", "100001 characters"),
+        ("1," + "1" * 100_000, "100002 characters"),
     ],
     ids=lambda t: t[:24],
-)  # fmt: skip
+)
 def test_hostile_numbers_with_units_are_refused_at_once(written, said):
     began = time.process_time()
     for table, given in {
-        "fixed": {"fixed": {**SI, "w": written}}, "tolerances": {"fixed": {**SI, "w": 1}, "tolerances": {"w": written}},
+        "fixed": {"fixed": {**SI, "w": written}},
+        "tolerances": {"fixed": {**SI, "w": 1}, "tolerances": {"w": written}},
         "free": {"fixed": SI, "free": {"w": (written, 2)}, "minimize": "abscissa"},
         "scenarios": {"fixed": SI, "scenarios": {"w": [written, 1]}},
-    }.items():  # fmt: skip
+    }.items():
         with pytest.raises(tmsopt.InputError, match="w") as caught:
             tmsopt.Problem(model=tmsopt.models.tms, **given)
         assert any(said in f.message for f in caught.value.faults), table

@@ -43,9 +43,17 @@ NATIVE, SI = tms.sets
 repeatable = settings(max_examples=100, deadline=None, derandomize=True)
 
 BENCHMARK = {
-    "w": 1.0, "v": 3.0, "g": 9.81, "lambda_s": math.radians(5), "m_B": 10.0, "x_B": 1.2, "z_B": -0.4, "m_H": 1.0,
-    "x_H": 1.02, "z_H": -0.2,
-}  # fmt: skip
+    "w": 1.0,
+    "v": 3.0,
+    "g": 9.81,
+    "lambda_s": math.radians(5),
+    "m_B": 10.0,
+    "x_B": 1.2,
+    "z_B": -0.4,
+    "m_H": 1.0,
+    "x_H": 1.02,
+    "z_H": -0.2,
+}
 """Equation `bench` of the paper."""
 
 
@@ -193,16 +201,28 @@ def test_si_there_and_back_to_2_ulp(p: dict[str, float]) -> None:
 def test_si_conversion_is_exact_in_rational_numbers() -> None:
     """Fr = v/√(g w) with g w the square of a rational; balls of 100 digits hold what is exact in each direction."""
     p = {
-        "w": Fraction(9, 4), "v": Fraction(7, 3), "g": Fraction(4), "lambda_s": Fraction(1, 3), "m_B": Fraction(10),
-        "x_B": Fraction(6, 5), "z_B": Fraction(-2, 5), "m_H": Fraction(1, 7), "x_H": Fraction(51, 50),
+        "w": Fraction(9, 4),
+        "v": Fraction(7, 3),
+        "g": Fraction(4),
+        "lambda_s": Fraction(1, 3),
+        "m_B": Fraction(10),
+        "x_B": Fraction(6, 5),
+        "z_B": Fraction(-2, 5),
+        "m_H": Fraction(1, 7),
+        "x_H": Fraction(51, 50),
         "z_H": Fraction(-1, 5),
-    }  # fmt: skip
+    }
     with flint.ctx.workdps(100):
         native = from_si({name: flint.arb(x.numerator) / x.denominator for name, x in p.items()})
         expected = {
-            "Fr": Fraction(7, 9), "mu": Fraction(1, 70), "chi_B": Fraction(8, 15), "chi_H": Fraction(34, 75),
-            "zeta_B": Fraction(-8, 45), "zeta_H": Fraction(-4, 45), "lambda_s": Fraction(1, 3),
-        }  # fmt: skip
+            "Fr": Fraction(7, 9),
+            "mu": Fraction(1, 70),
+            "chi_B": Fraction(8, 15),
+            "chi_H": Fraction(34, 75),
+            "zeta_B": Fraction(-8, 45),
+            "zeta_H": Fraction(-4, 45),
+            "lambda_s": Fraction(1, 3),
+        }
         for name, value in expected.items():
             assert abs(native[name] - flint.arb(value.numerator) / value.denominator) < flint.arb("1e-95")
         back = to_si(native, w=flint.arb(9) / 4, m_B=flint.arb(10), g=flint.arb(4))
@@ -251,11 +271,24 @@ def test_coefficients_for_si_values_are_those_of_their_dimensionless_ones() -> N
 
 
 QUANTITIES = {
-    "nu_H", "omega0", "Fr_c", "chi_T", "load_front", "load_rear", "ballast_rear", "ballast_front", "mass_margin",
-}  # fmt: skip
+    "nu_H",
+    "omega0",
+    "Fr_c",
+    "chi_T",
+    "load_front",
+    "load_rear",
+    "ballast_rear",
+    "ballast_front",
+    "mass_margin",
+}
 SI_UNITS = {
-    "v_c": "m/s", "u_H": "m", "N_F": "N", "N_R": "N", "m_ballast_rear": "kg", "m_ballast_front": "kg",
-}  # fmt: skip
+    "v_c": "m/s",
+    "u_H": "m",
+    "N_F": "N",
+    "N_R": "N",
+    "m_ballast_rear": "kg",
+    "m_ballast_front": "kg",
+}
 
 
 def test_nu_H_is_the_distance_from_the_steer_axis() -> None:
@@ -396,9 +429,18 @@ def test_the_parameters_of_the_contract() -> None:
 
 
 UNITS = {
-    "w": "m", "v": "m/s", "g": "m/s^2", "lambda_s": "rad", "m_B": "kg", "x_B": "m", "z_B": "m", "m_H": "kg",
-    "x_H": "m", "z_H": "m", **dict.fromkeys(("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H"), "1"),
-}  # fmt: skip
+    "w": "m",
+    "v": "m/s",
+    "g": "m/s^2",
+    "lambda_s": "rad",
+    "m_B": "kg",
+    "x_B": "m",
+    "z_B": "m",
+    "m_H": "kg",
+    "x_H": "m",
+    "z_H": "m",
+    **dict.fromkeys(("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H"), "1"),
+}
 EVERY = [p for s in tms.sets for p in s.parameters] + [*tms.quantities, *SI.quantities]
 
 
@@ -412,12 +454,23 @@ def test_every_parameter_and_quantity_is_documented(item: Parameter | Quantity) 
 
 
 PHYSICAL = {
-    "Fr": ([0, 3], [-1e-9]), "mu": ([0, 30], [-0.1]), "chi_B": ([-1, 0, 2], []), "chi_H": ([-1, 0, 2], []),
-    "zeta_B": ([0, -1], [0.1]), "zeta_H": ([0, -1], [0.1]),
-    "lambda_s": ([-1.5, 0, 1.5], [math.pi / 2, -math.pi / 2, 2]), "w": ([1], [0, -1]), "v": ([0, 5], [-1]),
-    "g": ([9.81, 1.62], [0, -9.81]), "m_B": ([1], [0, -1]), "m_H": ([0, 1], [-1]), "x_B": ([-1, 0, 1], []),
-    "x_H": ([-1, 0, 1], []), "z_B": ([-1, 0], [1]), "z_H": ([-1, 0], [1]),
-}  # fmt: skip
+    "Fr": ([0, 3], [-1e-9]),
+    "mu": ([0, 30], [-0.1]),
+    "chi_B": ([-1, 0, 2], []),
+    "chi_H": ([-1, 0, 2], []),
+    "zeta_B": ([0, -1], [0.1]),
+    "zeta_H": ([0, -1], [0.1]),
+    "lambda_s": ([-1.5, 0, 1.5], [math.pi / 2, -math.pi / 2, 2]),
+    "w": ([1], [0, -1]),
+    "v": ([0, 5], [-1]),
+    "g": ([9.81, 1.62], [0, -9.81]),
+    "m_B": ([1], [0, -1]),
+    "m_H": ([0, 1], [-1]),
+    "x_B": ([-1, 0, 1], []),
+    "x_H": ([-1, 0, 1], []),
+    "z_B": ([-1, 0], [1]),
+    "z_H": ([-1, 0], [1]),
+}
 
 
 @pytest.mark.parametrize("parameter", [p for s in tms.sets for p in s.parameters], ids=lambda p: p.name)

@@ -137,9 +137,12 @@ def test_balls_hold_the_exact_coefficients_and_the_floats() -> None:
     exact = model.coefficients({"k": flint.fmpq(3, 2), "c": flint.fmpq(1, 4)})
     third = flint.fmpq(*(0.5).as_integer_ratio())  # (3/2)/3, which is a double
     assert exact == [
-        flint.fmpq(1, 2), 0, 2 * flint.fmpq(5, 4) + flint.fmpq(9, 4) * flint.fmpq(1, 4), 0,
+        flint.fmpq(1, 2),
+        0,
+        2 * flint.fmpq(5, 4) + flint.fmpq(9, 4) * flint.fmpq(1, 4),
+        0,
         flint.fmpq(9, 4) * flint.fmpq(5, 4) + third,
-    ]  # fmt: skip
+    ]
     sines = from_coefficients([1, ca.sin(k), ca.exp(c) + k, ca.sqrt(k) / c, ca.fmax(k, c) ** 3])
     for at in ({"k": 1.5, "c": 0.25}, {"k": 0.1, "c": 3.0}):
         floats = sines.coefficients(at)
@@ -157,9 +160,15 @@ def test_a_model_is_pickled_as_what_it_is() -> None:
 
 @pytest.mark.parametrize(
     "matrix",
-    [np.diag([1.0, 2.0]), [np.array([1.0, 0]), (0, np.int64(2))], ca.DM([[1, 0], [0, 2]]), ca.diag(ca.SX([1, 2])),
-     [[Fraction(1), 0], [0, Fraction(2)]], np.array([[1, 0], [0, ca.SX(2)]], dtype=object)],
-)  # fmt: skip
+    [
+        np.diag([1.0, 2.0]),
+        [np.array([1.0, 0]), (0, np.int64(2))],
+        ca.DM([[1, 0], [0, 2]]),
+        ca.diag(ca.SX([1, 2])),
+        [[Fraction(1), 0], [0, Fraction(2)]],
+        np.array([[1, 0], [0, ca.SX(2)]], dtype=object),
+    ],
+)
 def test_matrices_of_any_kind(matrix: Any) -> None:
     """det(diag(1, 2) s² + k I) = 2 s⁴ + 3 k s² + k²."""
     model = from_matrices(matrix, None, [[k, 0], [0, k]])
@@ -168,13 +177,27 @@ def test_matrices_of_any_kind(matrix: Any) -> None:
 
 @pytest.mark.parametrize(
     ("lead", "degree"),
-    [(ca.sqrt(1 - k), 2), (ca.fmax(0, k - 10), 2), (ca.fmax(0, -k), 2), (ca.log(k - 100), 2), (k - c, 2),
-     (ca.fmax(0, k - 1e30), 2), (ca.fmin(0, c + 1e30), 2),  # 0 at every size that one would try
-     (k - k, 1), ((k + c) ** 2 - k * k - 2 * k * c - c * c, 1), (ca.sin(k) ** 2 + ca.cos(k) ** 2 - 1, 1),
-     (k / (k + c) + c / (k + c) - 1, 1), (ca.sqrt(k) ** 2 - k, 1), (ca.tan(c) * ca.cos(c) - ca.sin(c), 1),
-     (0.1 * k + 0.2 * k - 0.3 * k, 1), (ca.fabs(k - c) ** 4 - (k - c) ** 4, 1), (k * k**-1 - 1, 1),
-     (ca.exp(k / c) - ca.exp(2 * k / (2 * c)), 1), (ca.sqrt(ca.cos(k) ** 2) ** 2 + ca.sin(k) ** 2 - 1, 1)],
-)  # fmt: skip
+    [
+        (ca.sqrt(1 - k), 2),
+        (ca.fmax(0, k - 10), 2),
+        (ca.fmax(0, -k), 2),
+        (ca.log(k - 100), 2),
+        (k - c, 2),
+        (ca.fmax(0, k - 1e30), 2),
+        (ca.fmin(0, c + 1e30), 2),  # 0 at every size that one would try
+        (k - k, 1),
+        ((k + c) ** 2 - k * k - 2 * k * c - c * c, 1),
+        (ca.sin(k) ** 2 + ca.cos(k) ** 2 - 1, 1),
+        (k / (k + c) + c / (k + c) - 1, 1),
+        (ca.sqrt(k) ** 2 - k, 1),
+        (ca.tan(c) * ca.cos(c) - ca.sin(c), 1),
+        (0.1 * k + 0.2 * k - 0.3 * k, 1),
+        (ca.fabs(k - c) ** 4 - (k - c) ** 4, 1),
+        (k * k**-1 - 1, 1),
+        (ca.exp(k / c) - ca.exp(2 * k / (2 * c)), 1),
+        (ca.sqrt(ca.cos(k) ** 2) ** 2 + ca.sin(k) ** 2 - 1, 1),
+    ],
+)
 def test_a_leading_coefficient_is_left_out_only_where_it_is_nought_for_all(lead: Any, degree: int) -> None:
     assert from_coefficients([lead, 1, k + c]).degree == degree
 
@@ -195,7 +218,9 @@ def test_singular_mass_matrices() -> None:
 
 
 def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path: Path) -> None:
-    problem = loaded(tmp_path, """
+    problem = loaded(
+        tmp_path,
+        """
 [model]
 coefficients = ["1", "2*z*w", "w**2"]
 [model.quantities]
@@ -205,7 +230,8 @@ w = "sqrt(k)"
 [parameters]
 c = 3
 k = 4
-""")  # fmt: skip
+""",
+    )
     values = problem.values({"c": 3.0, "k": 4.0})
     assert problem.model.sets[0].names == ("c", "k")
     assert [float(values[n]) for n in ("w", "z", "half", "a1", "a2")] == [2, 0.75, 0.375, 3, 4]
@@ -222,10 +248,21 @@ def test_numbers_of_a_model_are_told_apart_in_full() -> None:
 
 @pytest.mark.parametrize(
     ("name", "symbol"),
-    [("a1", "a_{1}"), ("gamma", r"\gamma"), ("beta1", r"\beta_{1}"), ("mu_r", r"\mu_{r}"), ("W", "W"),
-     ("k_max", r"k_{\mathrm{max}}"), ("m_1_a_b", "m_{1,a,b}"), ("lambda_", r"\lambda"), ("x__1", "x_{1}"),
-     ("CamelCase", r"\mathrm{CamelCase}"), ("rho10b", r"\mathrm{rho10b}"), ("I1", "I_{1}")],
-)  # fmt: skip
+    [
+        ("a1", "a_{1}"),
+        ("gamma", r"\gamma"),
+        ("beta1", r"\beta_{1}"),
+        ("mu_r", r"\mu_{r}"),
+        ("W", "W"),
+        ("k_max", r"k_{\mathrm{max}}"),
+        ("m_1_a_b", "m_{1,a,b}"),
+        ("lambda_", r"\lambda"),
+        ("x__1", "x_{1}"),
+        ("CamelCase", r"\mathrm{CamelCase}"),
+        ("rho10b", r"\mathrm{rho10b}"),
+        ("I1", "I_{1}"),
+    ],
+)
 def test_names_as_symbols(name: str, symbol: str) -> None:
     assert latex(name) == symbol
     MathTextParser("agg").parse(f"${symbol}$")  # raises on what a figure could not show
@@ -281,7 +318,7 @@ def test_no_name_is_taken_twice() -> None:
         ("coefficients = [1, 'k']\nquantities.q = 'q2'\nquantities.q2 = 'q + 1'", 3, "uses itself: q → q2 → q"),
         ("coefficients = [1, 'k']\nquantities.q = 'k/(1 - 1)'", 3, "'k/(1 - 1)' divides by 0"),
     ],
-)  # fmt: skip
+)
 def test_a_statement_that_makes_no_model_is_placed(tmp_path: Path, statement: str, line: int, said: str) -> None:
     file = written(tmp_path, f"[model]\n{statement}\n{PARAMETERS}")
     with pytest.raises(tmsopt.InputError) as caught:
@@ -292,10 +329,13 @@ def test_a_statement_that_makes_no_model_is_placed(tmp_path: Path, statement: st
 
 @pytest.mark.parametrize(
     ("model", "said"),
-    [("model = 'nonsense'", "unknown model 'nonsense'"), ("model = 3", "found 3; accepted: the name of a model"),
-     ("[[model]]\nname = 'x'", "accepted: the name of a model in quotes, or a table"),
-     ("model = 'tms'\n[model]\nname = 'x'", "not TOML")],
-)  # fmt: skip
+    [
+        ("model = 'nonsense'", "unknown model 'nonsense'"),
+        ("model = 3", "found 3; accepted: the name of a model"),
+        ("[[model]]\nname = 'x'", "accepted: the name of a model in quotes, or a table"),
+        ("model = 'tms'\n[model]\nname = 'x'", "not TOML"),
+    ],
+)
 def test_what_is_no_model(tmp_path: Path, model: str, said: str) -> None:
     with pytest.raises(tmsopt.InputError, match=said):
         loaded(tmp_path, model + PARAMETERS)
@@ -375,7 +415,9 @@ def test_no_parameter_is_a_reserved_word() -> None:
 
 def test_parameters_named_like_coefficients(tmp_path: Path) -> None:
     """The parameter or quantity keeps the name, and a chart is of the true coefficients."""
-    problem = loaded(tmp_path, """
+    problem = loaded(
+        tmp_path,
+        """
 [model]
 coefficients = ["1", "a1 + 1", "a2", "a3"]
 quantities.a0 = "2*a1"
@@ -383,7 +425,8 @@ quantities.a0 = "2*a1"
 a1 = { min = 1, max = 3 }
 a2 = { min = 2, max = 4 }
 a3 = 0.5
-""")  # fmt: skip
+""",
+    )
     chart = tmsopt.chart(problem, points=(3, 3))
     expected = [[np.roots([1, x + 1, y, 0.5]).real.max() for x in (1, 2, 3)] for y in (2, 3, 4)]
     assert np.allclose(chart.abscissa, expected, rtol=1e-12)
@@ -434,8 +477,10 @@ def test_roots_of_any_size(tmp_path: Path, size: float) -> None:
     """s³ + x s² + y s + ω³: EP3 at −ω, x = 3 ω, y = 3 ω²."""
     problem = tmsopt.Problem(
         model=from_coefficients([1, ca.SX.sym("x"), ca.SX.sym("y"), size**3 * ca.SX.sym("z")]),
-        fixed={"z": 1}, free={"x": (0, 10 * size), "y": (0, 10 * size**2)}, minimize="abscissa",
-    )  # fmt: skip
+        fixed={"z": 1},
+        free={"x": (0, 10 * size), "y": (0, 10 * size**2)},
+        minimize="abscissa",
+    )
     design = tmsopt.solve(problem)
     assert design.structure == "EP3"
     assert design.parameters["x"] / size == pytest.approx(3, rel=1e-11)

@@ -148,10 +148,14 @@ def skates(count, seed=5):
     rng = np.random.default_rng(seed)
     for _ in range(count):
         yield {
-            "Fr": rng.uniform(0.1, 5), "mu": 10 ** rng.uniform(-1, 1), "chi_B": rng.uniform(-1, 3),
-            "chi_H": rng.uniform(-1, 3), "zeta_B": -rng.uniform(0.1, 1.2), "zeta_H": -rng.uniform(0.1, 1.2),
+            "Fr": rng.uniform(0.1, 5),
+            "mu": 10 ** rng.uniform(-1, 1),
+            "chi_B": rng.uniform(-1, 3),
+            "chi_H": rng.uniform(-1, 3),
+            "zeta_B": -rng.uniform(0.1, 1.2),
+            "zeta_H": -rng.uniform(0.1, 1.2),
             "lambda_s": math.atan(rng.uniform(-3, 3)),
-        }  # fmt: skip
+        }
 
 
 def test_without_wheels_and_trail_it_is_tms_identically():
@@ -282,8 +286,10 @@ def test_crossings_of_small_polynomials():
     one, y = [1], [0, 1]
     found = crossings([one, y, one], -5, 5)
     assert [(c.at, c.kind, c.root.re, c.root.im) for c in found.found] == [
-        (-2, "EP2", 1, 0), (0, "weave", 0, 1), (2, "EP2", -1, 0),
-    ]  # fmt: skip
+        (-2, "EP2", 1, 0),
+        (0, "weave", 0, 1),
+        (2, "EP2", -1, 0),
+    ]
     assert found.stable == ((0, 5),)
     assert found.heavily_damped == ((2, 5),)
     mirrored = crossings([one, [0], y], -1, None)
@@ -304,8 +310,11 @@ def test_crossings_left_of_another_root_change_no_stability():
     """(s² + y s + 1)(s − 3): the root 3 is right of all, and is double at y = −10/3; −3 mirrors it at y = 10/3."""
     found = crossings([[1], [-3, 1], [1, -3], [-3]], -5, 5)
     assert [(c.at, c.kind, c.rightmost, c.changes) for c in found.found] == [
-        (-10 / 3, "EP2", True, False), (-2, "EP2", False, False), (0, "weave", False, False), (2, "EP2", False, False),
-    ]  # fmt: skip
+        (-10 / 3, "EP2", True, False),
+        (-2, "EP2", False, False),
+        (0, "weave", False, False),
+        (2, "EP2", False, False),
+    ]
     assert found.stable == ()
     assert [c.rightmost for c in crossings([[1], [0, 1], [1]], -5, 5).found] == [True, True, True]
 
@@ -524,9 +533,16 @@ def test_ep4_unfolds_by_the_fourth_root(unfold, name, wheels, trail):
         T, v = mp.mpf(15) / 4 - 75 * root2 / 32, 3 * mp.sqrt(110 * root2 - 120) / 8 * mp.sqrt(g)
         r = -(mp.mpf("12.5") ** mp.mpf("0.25")) * mp.sqrt(g)
         p = dict.fromkeys(SI.names, mp.mpf(0)) | {
-            "w": mp.mpf(1), "g": g, "v": v, "m_B": mp.mpf(10), "z_B": mp.mpf("-0.4"), "x_B": root2, "m_H": mp.mpf(1),
-            "x_H": mp.mpf(1), "z_H": mp.mpf("-0.2"),
-        }  # fmt: skip
+            "w": mp.mpf(1),
+            "g": g,
+            "v": v,
+            "m_B": mp.mpf(10),
+            "z_B": mp.mpf("-0.4"),
+            "x_B": root2,
+            "m_H": mp.mpf(1),
+            "x_H": mp.mpf(1),
+            "z_H": mp.mpf("-0.2"),
+        }
         radius = mp.mpf("0.3") * step * wheels or mp.mpf(10) ** -50  # the appendix divides by it
         for k in "RF":
             p |= {f"r_{k}": radius, f"m_{k}": mp.mpf(1), f"I_{k}xx": radius**2 / 2, f"I_{k}yy": radius**2}

@@ -99,8 +99,12 @@ def numbers():
             return [
                 -mp.mpf("0.432") * T - mp.mpf("0.0272") + mp.mpf("0.08") * Fr**2 + mp.mpf("0.004") * mu,
                 mp.mpf("0.368") * T - mp.mpf("0.02") * mu - mp.mpf("0.0032"),
-                mp.mpf("0.192") * T - mp.mpf("0.0048") - mp.mpf("0.136") * Fr + mp.mpf("0.08") * Fr**2 - mp.mpf("0.016") * mu,
-            ]  # fmt: skip
+                mp.mpf("0.192") * T
+                - mp.mpf("0.0048")
+                - mp.mpf("0.136") * Fr
+                + mp.mpf("0.08") * Fr**2
+                - mp.mpf("0.016") * mu,
+            ]
 
         Fr, mu, T = mp.findroot(printed_system, (2.3, 20, 1.1))
         out["e123-Fr"], out["e123-mu"], out["e123-lambda_s"] = Fr, mu, mp.atan(T)
@@ -108,7 +112,10 @@ def numbers():
         root = mp.sqrt(2)
         tilt = mp.atan(mp.mpf(15) / 4 - mp.mpf(75) / 32 * root)
         out["Fr_EP4"] = 3 * mp.sqrt(110 * root - 120) / 8
-        for key, lean, start in (("tab1-2EP2", tilt - mp.mpf("0.05"), (2.26, 4.1)), ("tab1-CEP2", tilt + mp.mpf("0.8"), (4.1, 1.5))):  # fmt: skip
+        for key, lean, start in (
+            ("tab1-2EP2", tilt - mp.mpf("0.05"), (2.26, 4.1)),
+            ("tab1-CEP2", tilt + mp.mpf("0.8"), (4.1, 1.5)),
+        ):
             out[f"{key}-Fr_c"] = oracles.weave_Fr_60(1, root, 1, ZB, ZH, lean)
 
             def pair(Fr, b, lean=lean):
@@ -261,10 +268,15 @@ def test_the_counterexample_to_sufficiency() -> None:
     assert not oracles.routh_exact(oracles.polynomial_exact(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T))
 
 
-@pytest.mark.parametrize(("tilt", "chi_B", "speeds", "real"), [
-    (0.435437, 1.404214, (2.2, 2.3), [2, 0]), (0.435437, 1.424214, (2.2, 2.3), [2, 0]),
-    (0.377177, 1.404214, (2.2, 2.221, 2.23), [2, 4, 2]), (0.377177, 1.424214, (2.23, 2.239, 2.25), [2, 4, 2]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("tilt", "chi_B", "speeds", "real"),
+    [
+        (0.435437, 1.404214, (2.2, 2.3), [2, 0]),
+        (0.435437, 1.424214, (2.2, 2.3), [2, 0]),
+        (0.377177, 1.404214, (2.2, 2.221, 2.23), [2, 4, 2]),
+        (0.377177, 1.424214, (2.23, 2.239, 2.25), [2, 4, 2]),
+    ],
+)
 def test_curves_still_meet_near_the_real_exceptional_points(tilt, chi_B, speeds, real, by_key) -> None:
     """Number of real roots by mpmath at 40 digits, from the oracle's own coefficients."""
     with mp.workdps(40):

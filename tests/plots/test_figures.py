@@ -104,9 +104,14 @@ def random_designs():
     rng = np.random.default_rng(5)
     for _ in range(20):
         yield {
-            "Fr": 1.0, "mu": rng.uniform(0.1, 5), "chi_B": rng.uniform(0.2, 2), "chi_H": rng.uniform(0.7, 1.4),
-            "zeta_B": -rng.uniform(0.1, 1.2), "zeta_H": -rng.uniform(0.1, 1.2), "lambda_s": rng.uniform(-1.2, 1.2),
-        }  # fmt: skip
+            "Fr": 1.0,
+            "mu": rng.uniform(0.1, 5),
+            "chi_B": rng.uniform(0.2, 2),
+            "chi_H": rng.uniform(0.7, 1.4),
+            "zeta_B": -rng.uniform(0.1, 1.2),
+            "zeta_H": -rng.uniform(0.1, 1.2),
+            "lambda_s": rng.uniform(-1.2, 1.2),
+        }
 
 
 @pytest.mark.parametrize("p", [benchmark().parameters, optimised().parameters, *random_designs()])
@@ -483,9 +488,16 @@ def test_sweep_in_si_units():
     """The EP4 design with w = 2 m: the same chart at v = Fr √(g w)."""
     p = table_1()[0].parameters
     si = {
-        "w": 2.0, "g": 9.81, "lambda_s": p["lambda_s"], "m_B": 10.0, "m_H": 1.0, "x_B": 2 * math.sqrt(2), "x_H": 2.0,
-        "z_B": -0.8, "z_H": -0.4,
-    }  # fmt: skip
+        "w": 2.0,
+        "g": 9.81,
+        "lambda_s": p["lambda_s"],
+        "m_B": 10.0,
+        "m_H": 1.0,
+        "x_B": 2 * math.sqrt(2),
+        "x_H": 2.0,
+        "z_B": -0.8,
+        "z_H": -0.4,
+    }
     path = universal_path(tms, tms.parameter_set("SI"), si, "v", np.linspace(0.5, 15, 300))
     speeds = [Fr * math.sqrt(2 * 9.81) for Fr in (FR_C_EP4, FR_EP4)]
     assert [e.value for e in path.events] == pytest.approx(speeds, rel=1e-12)
@@ -496,9 +508,13 @@ def quartic(p, q, r):
 
 
 TOY = Model(
-    "toy", "s⁴ + p s³ + q s² + p s + r", 4,
-    (ParameterSet("native", tuple(Parameter(n, "1", n, n) for n in "pqr"), dict),), dict, quartic,
-)  # fmt: skip
+    "toy",
+    "s⁴ + p s³ + q s² + p s + r",
+    4,
+    (ParameterSet("native", tuple(Parameter(n, "1", n, n) for n in "pqr"), dict),),
+    dict,
+    quartic,
+)
 
 
 def test_another_model_and_a_gap():

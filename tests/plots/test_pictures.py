@@ -286,8 +286,9 @@ def test_a_trace_has_the_colours_of_its_abscissa():
     (ep4,) = (e for e in found.events if e.name == "EP4")
     x, y = band.get_segments()[k].mean(axis=0)
     assert (x, math.radians(y)) == (
-        pytest.approx(ep4.parameters["Fr"], abs=0.05), pytest.approx(ep4.parameters["lambda_s"], abs=0.05)
-    )  # fmt: skip
+        pytest.approx(ep4.parameters["Fr"], abs=0.05),
+        pytest.approx(ep4.parameters["lambda_s"], abs=0.05),
+    )
     assert {line.get_linestyle() for line in ax.lines if len(line.get_xdata()) > 1} == {"-", "--"}  # 2EP2 and CEP2
 
 
@@ -311,9 +312,11 @@ def test_the_unstable_part_of_a_front_is_dashed_and_hollow():
     assert dashed == [part for part, whole in parts if not whole]
     assert solid == [part for part, whole in parts if whole]
     hollow = {
-        tuple(xy) for line in lines if line.get_markerfacecolor() == "white" and line.get_linestyle() == "None"
+        tuple(xy)
+        for line in lines
+        if line.get_markerfacecolor() == "white" and line.get_linestyle() == "None"
         for xy in line.get_xydata().tolist()
-    }  # fmt: skip
+    }
     assert hollow == {tuple(v) for v, s in zip(values, stable, strict=True) if not s}
 
 
@@ -408,18 +411,41 @@ def results(whipple, chart):
     """A result for each function that draws one."""
     ep4 = tmsopt.solve("problems/ep4.toml")
     return {
-        "growth": whipple, "frequencies": whipple, "roots": tmsopt.optimality(ep4), "chart": chart,
-        "domain": chart.domain, "trace": tmsopt.trace("problems/ep_set.toml", starts=2),
-        "speeds": tmsopt.speeds(whipple), "rounding": tmsopt.explain(ep4), "robustness": tmsopt.nearest(ep4, "weave"),
-        "splitting": tmsopt.diagnose(ep4)[0], "comparison": tmsopt.compare(ep4), "bicycle": ep4,
-        "motion": tmsopt.simulate(ep4, lean=5), "ledger": tmsopt.verify(only=["epset*"]), "designs": tmsopt.solve_all("problems/ep4_matching.toml"),
-    }  # fmt: skip
+        "growth": whipple,
+        "frequencies": whipple,
+        "roots": tmsopt.optimality(ep4),
+        "chart": chart,
+        "domain": chart.domain,
+        "trace": tmsopt.trace("problems/ep_set.toml", starts=2),
+        "speeds": tmsopt.speeds(whipple),
+        "rounding": tmsopt.explain(ep4),
+        "robustness": tmsopt.nearest(ep4, "weave"),
+        "splitting": tmsopt.diagnose(ep4)[0],
+        "comparison": tmsopt.compare(ep4),
+        "bicycle": ep4,
+        "motion": tmsopt.simulate(ep4, lean=5),
+        "ledger": tmsopt.verify(only=["epset*"]),
+        "designs": tmsopt.solve_all("problems/ep4_matching.toml"),
+    }
 
 
 NAMES = (
-    "growth", "frequencies", "roots", "chart", "domain", "trace", "speeds", "rounding", "robustness", "splitting",
-    "comparison", "bicycle", "motion", "ledger", "designs",
-)  # fmt: skip
+    "growth",
+    "frequencies",
+    "roots",
+    "chart",
+    "domain",
+    "trace",
+    "speeds",
+    "rounding",
+    "robustness",
+    "splitting",
+    "comparison",
+    "bicycle",
+    "motion",
+    "ledger",
+    "designs",
+)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -184,14 +184,55 @@ def test_a_formula_that_takes_no_symbols_is_evaluated_all_the_same():
 
 
 BINARY = (
-    ca.fmin, ca.fmax, ca.atan2, ca.copysign, ca.fmod, ca.hypot, ca.lt, ca.le, ca.eq, ca.ne, ca.logic_and, ca.logic_or,
-    ca.plus, ca.minus, ca.times, ca.rdivide,
-)  # fmt: skip
+    ca.fmin,
+    ca.fmax,
+    ca.atan2,
+    ca.copysign,
+    ca.fmod,
+    ca.hypot,
+    ca.lt,
+    ca.le,
+    ca.eq,
+    ca.ne,
+    ca.logic_and,
+    ca.logic_or,
+    ca.plus,
+    ca.minus,
+    ca.times,
+    ca.rdivide,
+)
 UNARY = (
-    ca.sqrt, ca.fabs, ca.sign, ca.floor, ca.ceil, ca.sin, ca.cos, ca.tan, ca.exp, ca.atan, ca.asinh, ca.tanh, ca.log1p,
-    ca.expm1, ca.cosh, ca.sinh, ca.acos, ca.asin, ca.acosh, ca.atanh, ca.log, ca.logic_not, lambda x: x**3,
-    lambda x: x**2, lambda x: x**4, lambda x: x**-1, lambda x: x**0.5, lambda x: x**1.5, lambda x: -x, lambda x: x + x,
-)  # fmt: skip
+    ca.sqrt,
+    ca.fabs,
+    ca.sign,
+    ca.floor,
+    ca.ceil,
+    ca.sin,
+    ca.cos,
+    ca.tan,
+    ca.exp,
+    ca.atan,
+    ca.asinh,
+    ca.tanh,
+    ca.log1p,
+    ca.expm1,
+    ca.cosh,
+    ca.sinh,
+    ca.acos,
+    ca.asin,
+    ca.acosh,
+    ca.atanh,
+    ca.log,
+    ca.logic_not,
+    lambda x: x**3,
+    lambda x: x**2,
+    lambda x: x**4,
+    lambda x: x**-1,
+    lambda x: x**0.5,
+    lambda x: x**1.5,
+    lambda x: -x,
+    lambda x: x + x,
+)
 
 
 def random_function(rng, size=40):

@@ -136,15 +136,33 @@ def test_an_empty_table_is_no_controller(tmp_path: Path) -> None:
         (WHEELS, PHI, "k_phi = { min = 1 }", "k_phi", "feedback.k_phi.max: missing max of k_phi"),
         (WHEELS, PHI, "k_phi = { min = 1, max = 2, start = 5 }", "k_phi", "feedback.k_phi.start: start = 5 lies"),
         (WHEELS, PHI, "lag = 0", "lag", "feedback.lag: lag = 0 s is not physical"),
-        (WHEELS, PHI, 'lag = "5 kg"', "lag", "feedback.lag: found the unit 'kg', which is not known or not a unit of s"),
+        (
+            WHEELS,
+            PHI,
+            'lag = "5 kg"',
+            "lag",
+            "feedback.lag: found the unit 'kg', which is not known or not a unit of s",
+        ),
         (WHEELS, "[feedback]", "[feedbck]", "[feedbck]", "feedbck: unknown key 'feedbck'; did you mean 'feedback'?"),
         (WHEELS, '"whipple"', '"wipple"', "model", "model: unknown model 'wipple'; did you mean 'whipple'?"),
-        (SKATES, "k_phi =", "kappa_phi =", "kappa_phi", "feedback.kappa_phi: dimensionless parameter 'kappa_phi' beside"),
+        (
+            SKATES,
+            "k_phi =",
+            "kappa_phi =",
+            "kappa_phi",
+            "feedback.kappa_phi: dimensionless parameter 'kappa_phi' beside",
+        ),
         (PLAIN, "kappa_phi =", "k_phi =", "k_phi", "feedback.k_phi: SI parameter 'k_phi' beside dimensionless ones"),
         (OWN, "k_phi", "k_phi", "[feedback]", "feedback: is for the bicycles tms and whipple"),
-        (WHEELS, '"abscissa"', '"v_weave"', "minimize", "objective.minimize: 'v_weave' uses the unknown name 'v_weave'"),
+        (
+            WHEELS,
+            '"abscissa"',
+            '"v_weave"',
+            "minimize",
+            "objective.minimize: 'v_weave' uses the unknown name 'v_weave'",
+        ),
     ],
-)  # fmt: skip
+)
 def test_one_fault_at_its_line(text: str, old: str, new: str, at: str, said: str, tmp_path: Path) -> None:
     assert old in text
     wrong = text.replace(old, new, 1)

@@ -119,7 +119,7 @@ BAD = {
     "no parameters": ('title = "x"\n', 1, ["parameters", "missing"]),
     "not TOML": (replaced("mu = 0.1", "mu = = 0.1"), 8, ["not TOML"]),
     "duplicate key": (replaced("mu = 0.1", "mu = 0.1\nmu = 0.2"), 9, ["not TOML"]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", BAD)

@@ -85,9 +85,13 @@ def test_what_a_terminal_obeys_is_neither_accepted_nor_written(tmp_path: Path, s
     path, written = tmp_path / "p.toml", f"a{sign}b".encode("unicode_escape").decode()
     quoted = '"a' + "".join(f"\\u{ord(c):04x}" for c in sign) + 'b"'
     for text in (
-        f"title = {quoted}\n{GOOD}", f'{GOOD}[constraints]\n{quoted} = "Fr >= 0"\n', f"{GOOD}{quoted} = 1\n",
-        f"{quoted} = 1\n{GOOD}", f"model = {quoted}\n{GOOD}", f'[model]\nname = {quoted}\ncoefficients = ["1", "k"]\n',
-    ):  # fmt: skip
+        f"title = {quoted}\n{GOOD}",
+        f'{GOOD}[constraints]\n{quoted} = "Fr >= 0"\n',
+        f"{GOOD}{quoted} = 1\n",
+        f"{quoted} = 1\n{GOOD}",
+        f"model = {quoted}\n{GOOD}",
+        f'[model]\nname = {quoted}\ncoefficients = ["1", "k"]\n',
+    ):
         found = "\n".join(refused(path, text))
         assert written.replace("\\\\", "\\") in found
         assert sign == "\n" or sign[0] not in found
@@ -156,10 +160,14 @@ def test_what_is_no_file_is_not_opened(tmp_path: Path, read) -> None:
     os.mkfifo(pipe)
     circle.symlink_to(circle.name)
     for path, words in (
-        (pipe, "is not a regular file"), (Path("/dev/zero"), "is not a regular file"), (tmp_path, "is a directory"),
-        (circle, "is a link to no file"), (tmp_path / ("a" * 5000), "cannot be read"), (odd, r"a\n\x1b[31m: no such file"),
+        (pipe, "is not a regular file"),
+        (Path("/dev/zero"), "is not a regular file"),
+        (tmp_path, "is a directory"),
+        (circle, "is a link to no file"),
+        (tmp_path / ("a" * 5000), "cannot be read"),
+        (odd, r"a\n\x1b[31m: no such file"),
         (tmp_path / "a\0b", r"a\x00b: "),
-    ):  # fmt: skip
+    ):
         with pytest.raises(tmsopt.InputError) as caught:
             read(path)
         assert words in str(caught.value)
@@ -195,9 +203,12 @@ def deep(layers: int) -> list:
 
 
 LARGE = {
-    "integer": 10**5000, "integers": [10**5000] * 9, "lists": deep(100_000), "texts": ["x" * 10**6] * 1000,
+    "integer": 10**5000,
+    "integers": [10**5000] * 9,
+    "lists": deep(100_000),
+    "texts": ["x" * 10**6] * 1000,
     "tables": {"a": {"b": 10**5000}},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", LARGE)

@@ -30,9 +30,14 @@ SIMPLE = 1e-7  # of random designs, whose roots are simple: two algorithms, 1e-9
 
 def problem(**asked: Any) -> tmsopt.Problem:
     free = {
-        "Fr": (0.0, 8.0), "mu": (0.01, 40.0), "chi_B": (-2.0, 4.0), "chi_H": (-2.0, 4.0),
-        "zeta_B": (-3.0, -0.01), "zeta_H": (-3.0, -0.01), "lambda_s": (-1.4, 1.4),
-    }  # fmt: skip
+        "Fr": (0.0, 8.0),
+        "mu": (0.01, 40.0),
+        "chi_B": (-2.0, 4.0),
+        "chi_H": (-2.0, 4.0),
+        "zeta_B": (-3.0, -0.01),
+        "zeta_H": (-3.0, -0.01),
+        "lambda_s": (-1.4, 1.4),
+    }
     drop = asked.pop("drop", ())
     return tmsopt.Problem(TMS, free={n: e for n, e in free.items() if n not in drop}, constraints=LIMITS, **asked)
 
@@ -73,9 +78,13 @@ def test_the_recheck_says_the_same_of_each_design(asked: dict[str, Any]) -> None
 def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_nominal_design() -> None:
     """s + x − y, with y from 0 to 2 and x up to 1 off: the abscissa is y − x, at worst 3 − x."""
     stated = tmsopt.Problem(
-        from_coefficients([1, x - y]), free={"x": (0.0, 9.0)}, scenarios={"y": [0.0, 2.0]}, tolerances={"x": 1.0},
-        minimize="abscissa + x", constraints={"decay": "abscissa <= -0.5", "own": "x == 4", "all": "x - y >= 2"},
-    )  # fmt: skip
+        from_coefficients([1, x - y]),
+        free={"x": (0.0, 9.0)},
+        scenarios={"y": [0.0, 2.0]},
+        tolerances={"x": 1.0},
+        minimize="abscissa + x",
+        constraints={"decay": "abscissa <= -0.5", "own": "x == 4", "all": "x - y >= 2"},
+    )
     found = judgement.evaluate(stated, {"x": np.array([3.0, 4.0, 6.0])})
     # The objective: x is 1 more at worst, beside the worst abscissa.
     assert found.worth == pytest.approx([4.0, 4.0, 4.0], abs=1e-12)

@@ -68,11 +68,12 @@ def test_optimum_beside_a_pole(limits: tuple[str, ...], aim: tuple[float, float]
     [
         (("(x + 1)/(x + y - 1)**2 >= 400",), (0.0, 0.0), lambda u: 1 - u - np.sqrt((u + 1) / 400)),
         (
-            ("1/(x - 0.5) + 1/(y - 0.5) >= 50", "x >= 0.55", "y >= 0.5"), (0.9, 0.9),
+            ("1/(x - 0.5) + 1/(y - 0.5) >= 50", "x >= 0.55", "y >= 0.5"),
+            (0.9, 0.9),
             lambda u: np.where(u < 0.55, np.nan, 0.5 + 1 / (50 - 1 / (np.maximum(u, 0.55) - 0.5))),
         ),
     ],
-)  # fmt: skip
+)
 def test_edges_that_are_curved(limits: tuple[str, ...], aim: tuple[float, float], edge: Any) -> None:
     """The nearest point by a scan of the edge, 1e-6 from the next: its distance is right to 1e-12."""
     across = np.linspace(0, 1, 1_000_001)

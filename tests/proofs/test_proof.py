@@ -468,8 +468,12 @@ def test_a_CEP2_of_oscillators_in_any_unit_of_time(rate: float) -> None:
 
 
 def test_too_few_free_parameters() -> None:
-    problem = tmsopt.Problem(tmsopt.models.tms, fixed={**HEIGHTS, "chi_B": SQRT2, "Fr": 2.236317518367822},
-                             free={"lambda_s": (0.1, 1.0)}, locate="EP4")  # fmt: skip
+    problem = tmsopt.Problem(
+        tmsopt.models.tms,
+        fixed={**HEIGHTS, "chi_B": SQRT2, "Fr": 2.236317518367822},
+        free={"lambda_s": (0.1, 1.0)},
+        locate="EP4",
+    )
     proof = prove_design(problem, solved("ep4").parameters, "EP4")
     assert not proof.proved
     assert "3 conditions and 1 free parameter" in proof.reason
@@ -685,8 +689,9 @@ def test_the_exit_status_of_the_command(tmp_path: Path) -> None:
     text = (PROBLEMS / "ep4.toml").read_text(encoding="utf-8")
     infeasible, none = tmp_path / "infeasible.toml", tmp_path / "none.toml"
     infeasible.write_text(text + '\n[constraints]\nfast = "abscissa <= -3"\n', encoding="utf-8")
-    held = text.replace("{ min = 1.01, max = 5 }", "1.4142135623730951").replace("{ min = 0.01, max = 10 }",
-                                                                                "2.236317518367822")  # fmt: skip
+    held = text.replace("{ min = 1.01, max = 5 }", "1.4142135623730951").replace(
+        "{ min = 0.01, max = 10 }", "2.236317518367822"
+    )
     none.write_text(held.replace('{ min = "1 deg", max = "80 deg" }', "0.4106775324124522").split("[objective]")[0])
     assert run(str(infeasible)).exit_code == 3
     refused = run(str(none))

@@ -190,9 +190,14 @@ def test_si_loads_are_in_newtons_and_ballast_in_kilograms() -> None:
 def test_the_papers_optimum_with_a_heavy_front_pitches_over() -> None:
     """mu = 20.84626701, chi_B = 1.19, chi_H = 1.02: moments 0.19 and 0.02 mu about the front contact."""
     p = {
-        "Fr": 2.337214017, "mu": 20.84626701, "chi_B": 1.19, "chi_H": 1.02, "zeta_B": -0.4, "zeta_H": -0.2,
+        "Fr": 2.337214017,
+        "mu": 20.84626701,
+        "chi_B": 1.19,
+        "chi_H": 1.02,
+        "zeta_B": -0.4,
+        "zeta_H": -0.2,
         "lambda_s": 0.8514403685,
-    }  # fmt: skip
+    }
     got = values(p)
     over = 0.19 + 0.02 * 20.84626701
     assert got["ballast_rear"] == pytest.approx(over, rel=1e-13)
@@ -282,9 +287,14 @@ def test_a_builders_limits_hold_by_statics(tmp_path: Any, limits: dict[str, str]
     assert p["w"] == pytest.approx(0.8, rel=1e-15)
     front, rear = (9.81 * float(x) for x in loads([(p["m_B"], p["x_B"], 0), (p["m_H"], p["x_H"], 0)], p["w"]))
     M, _, _ = meijaard(
-        [(p["m_B"], p["x_B"], p["z_B"])], [(p["m_H"], p["x_H"], p["z_H"])], p["w"], p["v"], 9.81,
-        math.sin(p["lambda_s"]), math.cos(p["lambda_s"]),
-    )  # fmt: skip
+        [(p["m_B"], p["x_B"], p["z_B"])],
+        [(p["m_H"], p["x_H"], p["z_H"])],
+        p["w"],
+        p["v"],
+        9.81,
+        math.sin(p["lambda_s"]),
+        math.cos(p["lambda_s"]),
+    )
     margin = np.linalg.eigvalsh(np.array(M))[0] / (p["m_B"] * p["w"] ** 2)
     weight = front + rear
     slack = {
@@ -308,10 +318,14 @@ def test_a_builders_limits_hold_by_statics(tmp_path: Any, limits: dict[str, str]
 @pytest.mark.parametrize(
     ("value", "unit", "expected"),
     [
-        (0.4, "m", (400.0, "mm")), (1.0, "m/s", (3.6, "km/h")), (math.pi / 2, "rad", (90.0, "deg")),
-        (12.0, "kg", (12.0, "kg")), (9.81, "m/s^2", (9.81, "m/s^2")), (-35.0, "N", (-35.0, "N")),
+        (0.4, "m", (400.0, "mm")),
+        (1.0, "m/s", (3.6, "km/h")),
+        (math.pi / 2, "rad", (90.0, "deg")),
+        (12.0, "kg", (12.0, "kg")),
+        (9.81, "m/s^2", (9.81, "m/s^2")),
+        (-35.0, "N", (-35.0, "N")),
     ],
-)  # fmt: skip
+)
 def test_readings_by_the_definitions_of_the_units(value: float, unit: str, expected: tuple[float, str]) -> None:
     assert reading(value, unit) == expected
 
@@ -346,10 +360,15 @@ def test_si_of_the_benchmark_is_the_motion_in_seconds() -> None:
     M, C, K = map(
         np.array,
         meijaard(
-            [(p["m_B"], p["x_B"], p["z_B"])], [(p["m_H"], p["x_H"], p["z_H"])], p["w"], p["v"], p["g"],
-            math.sin(p["lambda_s"]), math.cos(p["lambda_s"]),
+            [(p["m_B"], p["x_B"], p["z_B"])],
+            [(p["m_H"], p["x_H"], p["z_H"])],
+            p["w"],
+            p["v"],
+            p["g"],
+            math.sin(p["lambda_s"]),
+            math.cos(p["lambda_s"]),
         ),
-    )  # fmt: skip
+    )
     inverse = np.linalg.inv(M)
     z = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]]))
     si = design.to_json()["si"]

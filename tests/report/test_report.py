@@ -20,13 +20,24 @@ from tmsopt.report import design_report, si_parameters
 
 BENCHMARK = dict(tmsopt.load("problems/benchmark.toml").fixed)
 CEP2 = {
-    "Fr": 11 / 6, "mu": 0.1, "chi_B": 2.0, "chi_H": 1.0, "zeta_B": -2.0, "zeta_H": -0.5, "lambda_s": math.atan(11 / 12),
-}  # fmt: skip
+    "Fr": 11 / 6,
+    "mu": 0.1,
+    "chi_B": 2.0,
+    "chi_H": 1.0,
+    "zeta_B": -2.0,
+    "zeta_H": -0.5,
+    "lambda_s": math.atan(11 / 12),
+}
 """Equation copo gives a0 … a4 = (11/6)(1, 2, 3, 2, 1), that is (s² + s + 1)² up to a factor."""
 TWO_PAIRS = {
-    "Fr": 44 / 13, "mu": 0.1, "chi_B": 28 / 13, "chi_H": 1.0, "zeta_B": -1.0, "zeta_H": -0.25,
+    "Fr": 44 / 13,
+    "mu": 0.1,
+    "chi_B": 28 / 13,
+    "chi_H": 1.0,
+    "zeta_B": -1.0,
+    "zeta_H": -0.25,
     "lambda_s": math.atan(528 / 169),
-}  # fmt: skip
+}
 """Likewise (s² + s + 1)(s² + s + 4)."""
 UNITS = {"x_B": "cm", "z_B": "cm", "x_H": "cm", "z_H": "cm", "v": "km/h", "lambda_s": "deg"}
 
@@ -67,9 +78,16 @@ def balance(solution: Solution) -> str:
 def test_lengths_speeds_and_angles_read_as_they_were_written() -> None:
     report = full(solved())
     expected = {
-        "x_B": (120, "cm"), "z_B": (-40, "cm"), "x_H": (102, "cm"), "z_H": (-20, "cm"), "w": (1, "m"),
-        "m_H": (1, "kg"), "m_B": (10, "kg"), "v": (14.4, "km/h"), "lambda_s": (5, "deg"),
-    }  # fmt: skip
+        "x_B": (120, "cm"),
+        "z_B": (-40, "cm"),
+        "x_H": (102, "cm"),
+        "z_H": (-20, "cm"),
+        "w": (1, "m"),
+        "m_H": (1, "kg"),
+        "m_B": (10, "kg"),
+        "v": (14.4, "km/h"),
+        "lambda_s": (5, "deg"),
+    }
     assert {symbol: read(report, symbol) for symbol in expected} == expected
 
 

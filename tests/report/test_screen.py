@@ -93,9 +93,13 @@ def test_numbers_with_units_in_python_are_those_of_a_file() -> None:
     """25 cm is 0.25 m, 18 km/h 5 m/s, 90 deg π/2, to the last bit; what is typed is how it is shown."""
     typed = {"w": "80 cm", "v": "18 km/h", "m_B": "2e4 g", "x_B": 0.4, "z_B": "-40 cm", "m_H": 3.0, "x_H": 0.9}
     problem = tmsopt.Problem(
-        tmsopt.models.tms, fixed=typed, free={"z_H": ("-60 cm", "-0.2 m"), "lambda_s": ("-30 deg", 0.5)},
-        minimize="abscissa", start={"z_H": "-300 mm"}, tolerances={"x_B": "5 mm"},
-    )  # fmt: skip
+        tmsopt.models.tms,
+        fixed=typed,
+        free={"z_H": ("-60 cm", "-0.2 m"), "lambda_s": ("-30 deg", 0.5)},
+        minimize="abscissa",
+        start={"z_H": "-300 mm"},
+        tolerances={"x_B": "5 mm"},
+    )
     assert problem.fixed == {**problem.fixed, "w": 0.8, "v": 5.0, "m_B": 20.0, "x_B": 0.4, "z_B": -0.4}
     assert problem.free == {"z_H": (-0.6, -0.2), "lambda_s": (-30 * 0.017453292519943295, 0.5)}
     assert (problem.start, problem.tolerances) == ({"z_H": -0.3}, {"x_B": 0.005})
@@ -133,8 +137,10 @@ def test_the_fastest_decay_in_seconds(sense: str, expression: str) -> None:
 def test_who_may_vary_the_unit_of_time_is_warned() -> None:
     problem = tmsopt.load("problems/point_mass_robot.toml")
     fixed = {n: v for n, v in problem.fixed.items() if n != "w"}
-    design = replace(tmsopt.solve(tmsopt.load("problems/benchmark.toml")), problem=replace(
-        problem, fixed=fixed, free={**problem.free, "w": (0.6, 1.0)}))  # fmt: skip
+    design = replace(
+        tmsopt.solve(tmsopt.load("problems/benchmark.toml")),
+        problem=replace(problem, fixed=fixed, free={**problem.free, "w": (0.6, 1.0)}),
+    )
     assert any("decay_rate" in w for w in tmsopt.explain(design, resolve=False).warnings)
     assert not any("decay_rate" in w for w in tmsopt.explain(replace(design, problem=problem), resolve=False).warnings)
 
@@ -200,14 +206,18 @@ CROWDED = {
     "model": tmsopt.models.tms,
     "fixed": {"w": 0.6, "m_B": 15},
     "free": {
-        "m_H": (1, 6), "x_B": (0.1, 0.6), "z_B": (-0.7, -0.2), "x_H": (0.3, 0.9), "z_H": (-0.7, -0.1),
+        "m_H": (1, 6),
+        "x_B": (0.1, 0.6),
+        "z_B": (-0.7, -0.2),
+        "x_H": (0.3, 0.9),
+        "z_H": (-0.7, -0.1),
         "lambda_s": ("-35 deg", "35 deg"),
     },
     "constraints": {"steer_arm": "abs(u_H) >= 0.02", "rear": "N_R >= 20", "front": "N_F >= 20"},
     "scenarios": {"v": [2.0, 3.0]},
     "tolerances": {"x_B": 0.003, "z_B": 0.003, "x_H": 0.003, "z_H": 0.003},
     "minimize": "abscissa",
-}  # fmt: skip
+}
 """A robot whose report has more lines than a screen: limits, cases, a side of the tilt that loses."""
 
 

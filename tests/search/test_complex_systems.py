@@ -50,8 +50,14 @@ def test_the_matrix_itself_has_them() -> None:
     with mpmath.workdps(60):
         v, g = mpmath.mpf(1), mpmath.mpf(1)
         three = mpmath.sqrt(3)
-        bosons = mpmath.matrix([[-3j * g, three * v, 0, 0], [three * v, -1j * g, 2 * v, 0],
-                                [0, 2 * v, 1j * g, three * v], [0, 0, three * v, 3j * g]])  # fmt: skip
+        bosons = mpmath.matrix(
+            [
+                [-3j * g, three * v, 0, 0],
+                [three * v, -1j * g, 2 * v, 0],
+                [0, 2 * v, 1j * g, three * v],
+                [0, 0, three * v, 3j * g],
+            ]
+        )
         root = mpmath.sqrt(2)
         trimer = mpmath.matrix([[1j * root, 1, 0], [1, 0, 1], [0, 1, -1j * root]])
         for matrix in (bosons, trimer):
@@ -144,10 +150,12 @@ def test_the_optimum_of_a_lossy_dimer_is_its_trace() -> None:
 def test_the_optimum_where_nothing_is_stable_is_the_mean_gain(size: int) -> None:
     """No greatest gain is below the mean one, which symmetric chains reach; a search for EPs of full order leads on."""
     rows: list[list[str]] = [
-        ["k" if abs(i - j) == 1 else f"1j*{size - i} + d" if i == j == 0 else f"1j*{size - i}" if i == j else "0"
-         for j in range(size)]
+        [
+            "k" if abs(i - j) == 1 else f"1j*{size - i} + d" if i == j == 0 else f"1j*{size - i}" if i == j else "0"
+            for j in range(size)
+        ]
         for i in range(size)
-    ]  # fmt: skip
+    ]
     free = {"d": (-1.0, 1.0), "k": (0.1, 2.0)} if size > 1 else {"d": (-1.0, 1.0)}
     found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(rows), free=free, minimize="abscissa"))
     assert found.abscissa == pytest.approx((1 + size) / 2, abs=1e-9)
@@ -283,9 +291,13 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met() -> None:
 def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix() -> None:
     model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
     asked = tmsopt.Problem(
-        model, fixed={"g2": 0.1}, free={"g1": (0, 3), "d": (-1, 1), "k": (0.05, 1)}, minimize="abscissa",
-        constraints={"c": "k <= 0.6"}, tolerances={"g1": 0.05, "k": 0.02},
-    )  # fmt: skip
+        model,
+        fixed={"g2": 0.1},
+        free={"g1": (0, 3), "d": (-1, 1), "k": (0.05, 1)},
+        minimize="abscissa",
+        constraints={"c": "k <= 0.6"},
+        tolerances={"g1": 0.05, "k": 0.02},
+    )
     report = tmsopt.report.design_report(tmsopt.solve(asked))
     assert "worst case" in report
     assert "damping ratio" not in report

@@ -21,14 +21,17 @@ BOX = dict.fromkeys(NAMES, (-1.0, 1.3))
 
 FAST = tmsopt.Problem(
     tmsopt.models.from_coefficients(["1", *(f"{comb(FOLD, k)} + x{k}" for k in range(1, FOLD + 1))]),
-    free=BOX, minimize="x3", constraints={"far": "abscissa <= -0.99", "x": "x1 >= 0.5"},
-)  # fmt: skip
+    free=BOX,
+    minimize="x3",
+    constraints={"far": "abscissa <= -0.99", "x": "x1 >= 0.5"},
+)
 DAMPED = tmsopt.Problem(
     tmsopt.models.tms,
     fixed={"Fr": 4.829142389714604, "mu": 1.4039653950756779, "chi_H": 1.5255656081856155, "lambda_s": -0.848691680576},
     free={"zeta_B": (-1.5, -0.2), "chi_B": (0.3, 3.0), "zeta_H": (-1.2, -0.1)},
-    minimize="chi_B", constraints={"damped": "damping_ratio >= 0.97", "low": "zeta_H <= -1.0023476412008954"},
-)  # fmt: skip
+    minimize="chi_B",
+    constraints={"damped": "damping_ratio >= 0.97", "low": "zeta_H <= -1.0023476412008954"},
+)
 """A heavily damped design is at chi_B = 1.33, zeta_B = -0.403, zeta_H = -0.463, and few are near it."""
 
 
@@ -92,9 +95,10 @@ def test_a_heavily_damped_design_meets_that_limit_alone() -> None:
 
 
 BOUNDS = tmsopt.Problem(
-    tmsopt.models.from_coefficients(["1", "3 + x", "3 + y", "1"]), free={"x": (0.0, 1.0), "y": (0.0, 1.0)},
+    tmsopt.models.from_coefficients(["1", "3 + x", "3 + y", "1"]),
+    free={"x": (0.0, 1.0), "y": (0.0, 1.0)},
     constraints={"a": "x >= 0.8", "b": "x <= 0.2", "c": "y >= 0.5"},
-)  # fmt: skip
+)
 
 
 def named(problem: tmsopt.Problem, reached):

@@ -175,7 +175,8 @@ def test_a_constraint_on_what_only_the_roots_define_is_refused() -> None:
 
 def test_of_the_command_line(tmp_path: Path) -> None:
     file = tmp_path / "own.toml"
-    file.write_text("""
+    file.write_text(
+        """
 [model]
 M = [[1, 0], [0, 1]]
 D = [["c1", 0], [0, "c2"]]
@@ -187,7 +188,9 @@ k = 0.3
 w = 1.2
 [objective]
 locate = "CEP2"
-""", encoding="utf-8")  # fmt: skip
+""",
+        encoding="utf-8",
+    )
     result = CliRunner().invoke(main, ["solve", str(file), "--all", "--json"])
     data = json.loads(result.stdout)
     assert result.exit_code == 0

@@ -43,11 +43,19 @@ def test_every_member_obeys_the_laws_of_ep4() -> None:
 
 MEMBERS = {
     "matching": (["zeta_H"], lambda v: with_fixed(load("problems/ep4_matching.toml"), zeta_H=v), (-0.2, -0.25)),
-    "constraint": (["trail.limit"], lambda v: limited(replace(EP4, constraints={"trail": "0.05 <= nu_H"}), "trail", v), (0.09, 0.12)),
+    "constraint": (
+        ["trail.limit"],
+        lambda v: limited(replace(EP4, constraints={"trail": "0.05 <= nu_H"}), "trail", v),
+        (0.09, 0.12),
+    ),
     "tolerance": (["z_H"], lambda v: with_fixed(load("problems/workshop.toml"), z_H=v), (-0.2, -0.22)),
     "heavy damping or not": (
         ["damped.limit"],
-        lambda v: limited(replace(EP4, minimize="Fr", constraints={"damped": "damping_ratio >= 0.5", "fast": "abscissa <= -0.5"}), "damped", v),
+        lambda v: limited(
+            replace(EP4, minimize="Fr", constraints={"damped": "damping_ratio >= 0.5", "fast": "abscissa <= -0.5"}),
+            "damped",
+            v,
+        ),
         (0.5, 1.0, 0.7),
     ),
     "quantity in pieces": (
@@ -55,8 +63,12 @@ MEMBERS = {
         lambda v: limited(replace(EP4, constraints={"weight": "ballast_rear <= 0.3"}), "weight", v),
         (0.3, 0.35),
     ),
-    "a fixed tilt": (["lambda_s"], lambda v: replace(EP4, fixed={**EP4.fixed, "lambda_s": v}, free={n: EP4.free[n] for n in ("Fr", "chi_B")}), (0.3, 0.5)),
-}  # fmt: skip
+    "a fixed tilt": (
+        ["lambda_s"],
+        lambda v: replace(EP4, fixed={**EP4.fixed, "lambda_s": v}, free={n: EP4.free[n] for n in ("Fr", "chi_B")}),
+        (0.3, 0.5),
+    ),
+}
 
 
 @pytest.mark.parametrize(

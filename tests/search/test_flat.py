@@ -22,9 +22,15 @@ def violated(limit, **parameters):
 
 
 @pytest.mark.parametrize(
-    "limit", ["(Fr - 1.7)**4 <= 0", "0 >= 3 * (Fr - 1.7)**2", "(Fr - 1.7)**4 == 0", "(Fr - 1.7)**4 * chi_B <= 0",
-              "Fr**2 - 3.4 * Fr + 2.89 <= 0"],
-)  # fmt: skip
+    "limit",
+    [
+        "(Fr - 1.7)**4 <= 0",
+        "0 >= 3 * (Fr - 1.7)**2",
+        "(Fr - 1.7)**4 == 0",
+        "(Fr - 1.7)**4 * chi_B <= 0",
+        "Fr**2 - 3.4 * Fr + 2.89 <= 0",
+    ],
+)
 def test_a_limit_that_one_speed_meets(limit):
     """The excess is 1e-16 or 1e-8 at 1e-4 from it, where nothing within 1e-9 of the box, which is 10 wide, meets it."""
     assert violated(limit, Fr=1.7) == set()

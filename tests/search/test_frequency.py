@@ -28,11 +28,32 @@ SLOW = {"slow": "decay_rate >= 1"}
 
 # The benchmark bicycle of Meijaard, Papadopoulos, Ruina and Schwab (2007), table 1, and table 2 at 5 m/s.
 BENCHMARK = {
-    "w": 1.02, "c": 0.08, "lambda_s": math.pi / 10, "g": 9.81, "v": 5.0, "r_R": 0.3, "m_R": 2.0, "I_Rxx": 0.0603,
-    "I_Ryy": 0.12, "x_B": 0.3, "z_B": -0.9, "m_B": 85.0, "I_Bxx": 9.2, "I_Bzz": 2.8, "I_Bxz": 2.4, "x_H": 0.9,
-    "z_H": -0.7, "m_H": 4.0, "I_Hxx": 0.05892, "I_Hzz": 0.00708, "I_Hxz": -0.00756, "r_F": 0.35, "m_F": 3.0,
-    "I_Fxx": 0.1405, "I_Fyy": 0.28,
-}  # fmt: skip
+    "w": 1.02,
+    "c": 0.08,
+    "lambda_s": math.pi / 10,
+    "g": 9.81,
+    "v": 5.0,
+    "r_R": 0.3,
+    "m_R": 2.0,
+    "I_Rxx": 0.0603,
+    "I_Ryy": 0.12,
+    "x_B": 0.3,
+    "z_B": -0.9,
+    "m_B": 85.0,
+    "I_Bxx": 9.2,
+    "I_Bzz": 2.8,
+    "I_Bxz": 2.4,
+    "x_H": 0.9,
+    "z_H": -0.7,
+    "m_H": 4.0,
+    "I_Hxx": 0.05892,
+    "I_Hzz": 0.00708,
+    "I_Hxz": -0.00756,
+    "r_F": 0.35,
+    "m_F": 3.0,
+    "I_Fxx": 0.1405,
+    "I_Fyy": 0.28,
+}
 WEAVE = 4.46486771378823
 
 # objective, constraints, optimum for z from 0.05 to 3
@@ -99,9 +120,13 @@ def test_the_fastest_case_may_be_another_than_the_worst():
     """Slow, a skate swings fast; fast, it decays slowly."""
     fixed = {"chi_H": 1.0, "zeta_H": -0.2, "zeta_B": -0.4, "mu": 0.1}
     asked = tmsopt.Problem(
-        tmsopt.models.tms, fixed=fixed, free={"chi_B": (1.01, 1.3), "lambda_s": (0.05, 1.2)}, minimize="abscissa",
-        scenarios={"Fr": tmsopt.Band(1.2, 2.4, 3)}, constraints={"f": "angular_frequency <= 0.7"},
-    )  # fmt: skip
+        tmsopt.models.tms,
+        fixed=fixed,
+        free={"chi_B": (1.01, 1.3), "lambda_s": (0.05, 1.2)},
+        minimize="abscissa",
+        scenarios={"Fr": tmsopt.Band(1.2, 2.4, 3)},
+        constraints={"f": "angular_frequency <= 0.7"},
+    )
     design = tmsopt.solve(asked)
     each = {Fr: eigenvalues(asked, {**design.parameters, "Fr": Fr}) for Fr in np.linspace(1.2, 2.4, 501)}
     assert max(s.imag.max() for s in each.values()) == pytest.approx(0.7, abs=TOLERANCE)
@@ -150,9 +175,13 @@ def test_the_benchmark_bicycle():
 def test_a_band_of_speeds_holds_at_every_speed_of_it():
     fixed = {n: x for n, x in BENCHMARK.items() if n not in ("v", "w")}
     asked = tmsopt.Problem(
-        tmsopt.models.whipple, fixed=fixed, free={"w": (0.9, 1.3)}, scenarios={"v": tmsopt.Band(4.5, 6.0, 3)},
-        maximize="w", constraints={"slow": "frequency <= 0.8"},
-    )  # fmt: skip
+        tmsopt.models.whipple,
+        fixed=fixed,
+        free={"w": (0.9, 1.3)},
+        scenarios={"v": tmsopt.Band(4.5, 6.0, 3)},
+        maximize="w",
+        constraints={"slow": "frequency <= 0.8"},
+    )
     design = tmsopt.solve(asked)
     speeds = np.linspace(4.5, 6.0, 1001)
     each = [eigenvalues(asked, {**design.parameters, "v": v}).imag.max() / (2 * math.pi) for v in speeds]
@@ -176,12 +205,17 @@ def decay_and_frequency(design):
     [
         ("minimize", "frequency", SLOW, lambda d, decay, f: f, lambda decay, f: 1 - decay),
         ("maximize", "decay_rate", {"f": "frequency <= 0.24"}, lambda d, decay, f: -decay, lambda decay, f: f - 0.24),
-        ("minimize", "v", {"f": "frequency <= 0.3", "d": "decay_rate >= 0.5"},
-         lambda d, decay, f: d["v"], lambda decay, f: np.maximum(f - 0.3, 0.5 - decay)),
+        (
+            "minimize",
+            "v",
+            {"f": "frequency <= 0.3", "d": "decay_rate >= 0.5"},
+            lambda d, decay, f: d["v"],
+            lambda decay, f: np.maximum(f - 0.3, 0.5 - decay),
+        ),
         ("maximize", "frequency", {"d": "decay_rate >= 0.5"}, lambda d, decay, f: -f, lambda decay, f: 0.5 - decay),
     ],
     ids=["least", "limited", "with a decay", "greatest"],
-)  # fmt: skip
+)
 def test_no_search_finds_a_better_skate(sense, expression, limits, merit, violation):
     asked = tmsopt.Problem(tmsopt.models.tms, fixed=SKATE, free=BOX, constraints=limits, **{sense: expression})
     design = tmsopt.solve(asked)

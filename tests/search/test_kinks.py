@@ -169,8 +169,11 @@ def test_without_kinks_the_nlp_is_the_same():
     plain = bicycle(minimize="abscissa", constraints={"trail": "nu_H >= 0.02", "sway": "damping_ratio >= 0.3"})
     one, other = formulate(plain), abscissa_nlp(plain)
     assert (one.variables, one.rows, one.upper, one.row_upper) == (
-        other.variables, other.rows, other.upper, other.row_upper,
-    )  # fmt: skip
+        other.variables,
+        other.rows,
+        other.upper,
+        other.row_upper,
+    )
     assert one.touches == {}
     assert str(one.functions.serialize()) == str(other.functions.serialize())
 
@@ -197,9 +200,11 @@ def test_members_of_a_family_with_kinks():
     family = Family(["k"])
     for stiffness in (1.0, 4.0, 9.0):
         member = tmsopt.Problem(
-            model=model, fixed={"k": stiffness}, free={"z": (0.05, 3.0)},
+            model=model,
+            fixed={"k": stiffness},
+            free={"z": (0.05, 3.0)},
             minimize="abs(abscissa + 0.3) + abs(z - 0.25) / 2",
-        )  # fmt: skip
+        )
         assert solve(member, family=family).value == pytest.approx(0.025, abs=TOLERANCE)
 
 

@@ -28,11 +28,16 @@ ROBOT = tmsopt.Problem(
     tmsopt.models.tms,
     fixed={"w": 0.25, "m_B": 9.7},
     free={
-        "v": (1.7, 3.0), "m_H": (0.488, 2.56), "x_B": (0.246, 0.363), "x_H": (0.193, 0.246), "z_B": (-0.293, -0.155),
-        "z_H": (-0.3, -0.03), "lambda_s": (0.03, 0.7),
+        "v": (1.7, 3.0),
+        "m_H": (0.488, 2.56),
+        "x_B": (0.246, 0.363),
+        "x_H": (0.193, 0.246),
+        "z_B": (-0.293, -0.155),
+        "z_H": (-0.3, -0.03),
+        "lambda_s": (0.03, 0.7),
     },
     minimize="abscissa",
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 3))])

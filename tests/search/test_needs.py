@@ -88,9 +88,11 @@ def test_the_speed_plays_no_part_where_the_loads_conflict_or_a_limit_is_about_it
     """chi_T <= 1 asks chi_B <= 1 at chi_H = 1; the speed is in no coefficient of that."""
     loads = replace(SLOW, constraints={"load": "load_rear >= 0"})
     limited = replace(
-        SLOW, fixed=FIXED, free={**SLOW.free, "Fr": (0.1, 5.0)},
+        SLOW,
+        fixed=FIXED,
+        free={**SLOW.free, "Fr": (0.1, 5.0)},
         constraints={"decay": "abscissa <= -0.8", "slow": "Fr <= 1"},
-    )  # fmt: skip
+    )
     for problem in (loads, limited):
         design = tmsopt.solve(problem, throw=False)
         assert design.status == "infeasible"

@@ -146,8 +146,13 @@ def test_slowest_heavy_damping_is_an_ep3():
         T = mpmath.tan(mpmath.mpf(radians(10)))
 
         def residuals(Fr, chi_B, r, t):
-            a = (T / 125 * 4, -2 * Fr * (chi_B / 5 - mpmath.mpf(2) / 5) / 5, 2 * Fr**2 / 25 - 6 * T / 25,
-                 2 * Fr * (chi_B - 1) / 5, 2 * T / 5)  # copo with chi_H = 1, zeta_B = -2/5, zeta_H = -1/5  # fmt: skip
+            a = (
+                T / 125 * 4,
+                -2 * Fr * (chi_B / 5 - mpmath.mpf(2) / 5) / 5,
+                2 * Fr**2 / 25 - 6 * T / 25,
+                2 * Fr * (chi_B - 1) / 5,
+                2 * T / 5,
+            )  # copo with chi_H = 1, zeta_B = -2/5, zeta_H = -1/5
             product = (-3 * r - t, 3 * r**2 + 3 * r * t, -(r**3) - 3 * r**2 * t, r**3 * t)
             return [c / a[0] - p for c, p in zip(a[1:], product, strict=True)]
 

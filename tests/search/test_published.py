@@ -199,10 +199,21 @@ def transport_aircraft() -> Answer:
 ANSWERS = {
     answer.__name__: answer
     for answer in (
-        two_mass_spring, freitas_lancaster, chocolate, chocolate_limit, three_masses, three_masses_pt, pt_pair,
-        pt_pair_strong, ziegler, ziegler_undamped, brake_squeal, brake_squeal_coupling, transport_aircraft,
+        two_mass_spring,
+        freitas_lancaster,
+        chocolate,
+        chocolate_limit,
+        three_masses,
+        three_masses_pt,
+        pt_pair,
+        pt_pair_strong,
+        ziegler,
+        ziegler_undamped,
+        brake_squeal,
+        brake_squeal_coupling,
+        transport_aircraft,
     )
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", ANSWERS)
@@ -383,9 +394,16 @@ def test_no_two_gains_are_better() -> None:
         return np.linalg.eigvals(companion).real.max(axis=1)
 
     found = differential_evolution(
-        abscissae, list(asked.free.values()), rng=1, maxiter=150, popsize=20, tol=0, vectorized=True,
-        updating="deferred", polish=False,
-    )  # fmt: skip
+        abscissae,
+        list(asked.free.values()),
+        rng=1,
+        maxiter=150,
+        popsize=20,
+        tol=0,
+        vectorized=True,
+        updating="deferred",
+        polish=False,
+    )
     assert found.fun == pytest.approx(float(transport_aircraft().abscissa), abs=1e-4)
     assert found.fun > float(transport_aircraft().abscissa) - 1e-7
 

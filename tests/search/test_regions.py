@@ -45,43 +45,67 @@ def weaving(d):
 
 QUESTIONS = {
     # sense, expression, constraints; what is to be least, by how much the constraints are violated
-    "slowest that decays": (
-        "minimize", "Fr", ["abscissa <= -0.5"],
-        lambda d: d["Fr"], lambda d: abscissa(d) + 0.5),
+    "slowest that decays": ("minimize", "Fr", ["abscissa <= -0.5"], lambda d: d["Fr"], lambda d: abscissa(d) + 0.5),
     "decay in a band, and some sway": (
-        "minimize", "chi_B", ["abscissa >= -0.5", "abscissa <= -0.1", "damping_ratio <= 0.8"],
-        lambda d: d["chi_B"], lambda d: all_of(-0.5 - abscissa(d), abscissa(d) + 0.1, damping_ratio(d) - 0.8)),
-    "most unstable": (
-        "maximize", "abscissa", [],
-        lambda d: -abscissa(d), anything),
+        "minimize",
+        "chi_B",
+        ["abscissa >= -0.5", "abscissa <= -0.1", "damping_ratio <= 0.8"],
+        lambda d: d["chi_B"],
+        lambda d: all_of(-0.5 - abscissa(d), abscissa(d) + 0.1, damping_ratio(d) - 0.8),
+    ),
+    "most unstable": ("maximize", "abscissa", [], lambda d: -abscissa(d), anything),
     "decays least, heavily damped nearly": (
-        "maximize", "abscissa", ["damping_ratio >= 0.9"],
-        lambda d: -abscissa(d), lambda d: 0.9 - damping_ratio(d)),
+        "maximize",
+        "abscissa",
+        ["damping_ratio >= 0.9"],
+        lambda d: -abscissa(d),
+        lambda d: 0.9 - damping_ratio(d),
+    ),
     "decays most, and sways": (
-        "minimize", "abscissa", ["damping_ratio <= 0.3"],
-        abscissa, lambda d: damping_ratio(d) - 0.3),
+        "minimize",
+        "abscissa",
+        ["damping_ratio <= 0.3"],
+        abscissa,
+        lambda d: damping_ratio(d) - 0.3,
+    ),
     "sways most, and decays": (
-        "minimize", "damping_ratio", ["abscissa <= -0.5"],
-        damping_ratio, lambda d: abscissa(d) + 0.5),
+        "minimize",
+        "damping_ratio",
+        ["abscissa <= -0.5"],
+        damping_ratio,
+        lambda d: abscissa(d) + 0.5,
+    ),
     "sways least at its speed": (
-        "maximize", "damping_ratio", ["Fr == 1.5"],
-        lambda d: -damping_ratio({**d, "Fr": 1.5 + anything(d)}), anything),
+        "maximize",
+        "damping_ratio",
+        ["Fr == 1.5"],
+        lambda d: -damping_ratio({**d, "Fr": 1.5 + anything(d)}),
+        anything,
+    ),
     "slowest that hardly sways": (
-        "minimize", "Fr", ["damping_ratio >= 0.7"],
-        lambda d: d["Fr"], lambda d: 0.7 - damping_ratio(d)),
+        "minimize",
+        "Fr",
+        ["damping_ratio >= 0.7"],
+        lambda d: d["Fr"],
+        lambda d: 0.7 - damping_ratio(d),
+    ),
     "slowest heavily damped": (  # a cuspidal edge: a double root is a pair 1e-8 apart to eigenvalues, a triple one 1e-5
-        "minimize", "Fr", ["damping_ratio >= 1"],
-        lambda d: d["Fr"], lambda d: 1 - 1e-9 - damping_ratio(d)),
-    "slowest weaving": (
-        "minimize", "Fr_c", ["abscissa <= -0.3"],
-        weaving, lambda d: abscissa(d) + 0.3),
-    "weighted": (
-        "minimize", "abscissa + 1.5*Fr", [],
-        lambda d: abscissa(d) + 1.5 * d["Fr"], anything),
+        "minimize",
+        "Fr",
+        ["damping_ratio >= 1"],
+        lambda d: d["Fr"],
+        lambda d: 1 - 1e-9 - damping_ratio(d),
+    ),
+    "slowest weaving": ("minimize", "Fr_c", ["abscissa <= -0.3"], weaving, lambda d: abscissa(d) + 0.3),
+    "weighted": ("minimize", "abscissa + 1.5*Fr", [], lambda d: abscissa(d) + 1.5 * d["Fr"], anything),
     "weighted with sway": (
-        "maximize", "damping_ratio - abscissa - 2*Fr + chi_B/10", [],
-        lambda d: abscissa(d) + 2 * d["Fr"] - damping_ratio(d) - d["chi_B"] / 10, anything),
-}  # fmt: skip
+        "maximize",
+        "damping_ratio - abscissa - 2*Fr + chi_B/10",
+        [],
+        lambda d: abscissa(d) + 2 * d["Fr"] - damping_ratio(d) - d["chi_B"] / 10,
+        anything,
+    ),
+}
 RELAXED = {"slowest heavily damped": 2e-6}
 """Where the search asks 1e-9 less: a cusp makes 1e-6 of that."""
 
@@ -157,8 +181,10 @@ def test_an_equality_of_the_damping_ratio():
     first = int(np.flatnonzero((ratio[:-1] - 0.4) * (ratio[1:] - 0.4) <= 0)[0])
     exact = minimize_scalar(
         lambda Fr: (float(damping_ratio({**fixed, "Fr": np.asarray(Fr)})) - 0.4) ** 2,
-        bounds=(speeds[first], speeds[first + 1]), method="bounded", options={"xatol": 1e-12},
-    ).x  # fmt: skip
+        bounds=(speeds[first], speeds[first + 1]),
+        method="bounded",
+        options={"xatol": 1e-12},
+    ).x
     assert design.value == pytest.approx(exact, abs=1e-8)
     assert design.quantities["damping_ratio"] == pytest.approx(0.4, abs=1e-12)
 

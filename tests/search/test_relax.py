@@ -324,9 +324,12 @@ def test_what_starts_met_on_the_way_counts():
     box = {"mu": (0.034, 3.3), "chi_B": (0.904, 1.33), "zeta_B": (-1.08, -0.25), "zeta_H": (-0.407, -0.222)}
     plane = "(zeta_B + 0.67)/0.42 + (lambda_s - 0.64)/0.61 <= 0.385"
     asked = tmsopt.Problem(
-        TMS, fixed={"Fr": 2.77, "chi_H": 0.795}, free={**box, "lambda_s": (0.03, 1.25)}, maximize="damping_ratio",
+        TMS,
+        fixed={"Fr": 2.77, "chi_H": 0.795},
+        free={**box, "lambda_s": (0.03, 1.25)},
+        maximize="damping_ratio",
         constraints={"damped": "damping_ratio >= 1.009", "plane": plane},
-    )  # fmt: skip
+    )
     design = tmsopt.solve(asked, throw=False, stability=0.0)
     assert dict(design.relaxation.amounts) == {"damped": pytest.approx(0.009, abs=1e-9)}
     relaxed = replace(asked, fixed=design.relaxation.parameters, free={})

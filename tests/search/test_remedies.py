@@ -66,8 +66,12 @@ def test_limits_that_exclude_each_other_are_proved_to():
 
 @pytest.mark.parametrize(
     ("sense", "name", "other"),
-    [("minimize", "damping_ratio", "maximize"), ("maximize", "abscissa", "minimize"), ("maximize", "-damping_ratio", "minimize")],
-)  # fmt: skip
+    [
+        ("minimize", "damping_ratio", "maximize"),
+        ("maximize", "abscissa", "minimize"),
+        ("maximize", "-damping_ratio", "minimize"),
+    ],
+)
 def test_an_objective_that_asks_for_the_least_stable_design_is_told_so(sense, name, other):
     asked = replace(DAMPED, constraints={}, **{"minimize": None, sense: name})
     assert any(f'{other} = "{name}"' in note for note in tmsopt.solve(asked, throw=False).notes)

@@ -96,9 +96,11 @@ def led(objective: str, box: tuple[float, float], places: list[tuple[float, ...]
     u = np.array([sampler.space.points(dict(zip(free, place, strict=True))) for place in places])
     ended = SimpleNamespace(feasible=True, objective=0.0, nlp=SimpleNamespace(size=1.0), run=SimpleNamespace(x=end))
     work = SimpleNamespace(
-        part=problem, sampler=sampler, sample=SimpleNamespace(leaders=sampler.look(u)),
+        part=problem,
+        sampler=sampler,
+        sample=SimpleNamespace(leaders=sampler.look(u)),
         design_at=lambda x: dict(zip(free, x, strict=True)),
-    )  # fmt: skip
+    )
     left = [*range(len(places))]
     count = import_module("tmsopt.search.basins.leaders").led(work, ended, left)
     assert count == len(places) - len(left)

@@ -378,9 +378,14 @@ def test_bound_holds_on_random_designs():
     for _ in range(20):
         free = {}
         for name, low, high in (
-            ("Fr", 0.1, 5), ("mu", 0.01, 20), ("chi_B", 0.5, 3), ("chi_H", 1.0, 1.3),
-            ("zeta_B", -1.5, -0.1), ("zeta_H", -1, -0.05), ("lambda_s", 0.05, 1.2),
-        ):  # fmt: skip
+            ("Fr", 0.1, 5),
+            ("mu", 0.01, 20),
+            ("chi_B", 0.5, 3),
+            ("chi_H", 1.0, 1.3),
+            ("zeta_B", -1.5, -0.1),
+            ("zeta_H", -1, -0.05),
+            ("lambda_s", 0.05, 1.2),
+        ):
             a, b = sorted(rng.uniform(low, high, 2))
             free[name] = (a, b)
         problem = tmsopt.Problem(TMS, free=free, minimize="abscissa")

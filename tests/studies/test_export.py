@@ -35,9 +35,19 @@ METADATA = {"definition": {"title": "χ"}, "versions": {"tmsopt": "0.1.0"}, "lon
 
 def solved(number: int, x: float = 0.1, **varied: float) -> Row:
     return Row(
-        number, number, Table(varied or {"mu": 0.1}), "optimal", objective=x, structure="EP4", parameters=Table({"Fr": x}),
-        reports=Table({"Fr / Fr_c": x}), bound=x, proven=number % 2 == 0, laws=Table({"chib": x}), host="here",
-    )  # fmt: skip
+        number,
+        number,
+        Table(varied or {"mu": 0.1}),
+        "optimal",
+        objective=x,
+        structure="EP4",
+        parameters=Table({"Fr": x}),
+        reports=Table({"Fr / Fr_c": x}),
+        bound=x,
+        proven=number % 2 == 0,
+        laws=Table({"chib": x}),
+        host="here",
+    )
 
 
 def broken(number: int) -> Row:
@@ -65,8 +75,10 @@ def read_netcdf(path: Path, group: str | None = None) -> dict[str, list[Any]]:
 
 
 READERS: dict[str, Callable[[Path], dict[str, list[Any]]]] = {
-    "csv": read_csv, "parquet": read_parquet, "nc": read_netcdf,
-}  # fmt: skip
+    "csv": read_csv,
+    "parquet": read_parquet,
+    "nc": read_netcdf,
+}
 
 
 def bits(value: Any) -> bytes:
@@ -95,13 +107,42 @@ def test_every_double_comes_back_bit_by_bit(ending: str, tmp_path: Path) -> None
 
 def test_the_header() -> None:
     """In the order of a row's fields; a table's names have a prefix, but for parameters."""
-    row = Row(0, 0, Table({"mu": 1.0}), "optimal", parameters=Table({"mu": 1.0, "seed": 2.0}), reports=Table({"chi_T": 3.0}),
-        laws=Table({"chib": 4.0}), violations=Table({"trail": 5.0}))  # fmt: skip
+    row = Row(
+        0,
+        0,
+        Table({"mu": 1.0}),
+        "optimal",
+        parameters=Table({"mu": 1.0, "seed": 2.0}),
+        reports=Table({"chi_T": 3.0}),
+        laws=Table({"chib": 4.0}),
+        violations=Table({"trail": 5.0}),
+    )
     assert list(columns([row])) == [
-        "number", "seed", "varied.mu", "status", "cause", "objective", "abscissa", "abscissa_realised", "damping_ratio",
-        "structure", "stable", "mu", "parameter.seed", "report.chi_T", "bound", "gap", "proven", "method", "law.chib", "violation.trail",
-        "starts", "warm", "seconds", "host",
-    ]  # fmt: skip
+        "number",
+        "seed",
+        "varied.mu",
+        "status",
+        "cause",
+        "objective",
+        "abscissa",
+        "abscissa_realised",
+        "damping_ratio",
+        "structure",
+        "stable",
+        "mu",
+        "parameter.seed",
+        "report.chi_T",
+        "bound",
+        "gap",
+        "proven",
+        "method",
+        "law.chib",
+        "violation.trail",
+        "starts",
+        "warm",
+        "seconds",
+        "host",
+    ]
 
 
 def test_whether_a_row_is_stable(tmp_path: Path) -> None:

@@ -85,18 +85,32 @@ def test_numbers_of_a_csv_file_take_eight_bytes_each(tmp_path):
 @pytest.mark.parametrize(
     ("study", "vary", "words"),
     [
-        ("", "mu = { min = 0.1, max = 1, points = 100000 }\nzeta_H = { min = -1, max = 1, points = 100000 }", "10000000000"),
+        (
+            "",
+            "mu = { min = 0.1, max = 1, points = 100000 }\nzeta_H = { min = -1, max = 1, points = 100000 }",
+            "10000000000",
+        ),
         ("", f"mu = {{ min = 0.1, max = 1, points = 0x{'F' * 900} }}", "about 1084 digits"),
         ("", f"mu = [0x{'F' * 900}]", "about 1084 digits"),
         ("", "\n".join(f"x{k} = [1]" for k in range(20_000)), "and 19950 more"),
-        ("", '"lambda_s.max" = [' + ", ".join(f'"1 q{chr(97 + k % 26)}x"' for k in range(20_000)) + "]",
-         "and 19950 more"),
-        ("report = [" + ", ".join(f'"x{k}"' for k in range(20_000)) + "]", "mu = [0.1]", "20000 expressions; accepted: up to 1000"),
-        ('method = "sobol"\nrows = 10000000', "\n".join(f"{n} = {{ min = 0.1, max = 0.2 }}" for n in
-         ("mu", "chi_H", "zeta_H", "zeta_B", "Fr.min")), "from 1 to 8000000"),
+        (
+            "",
+            '"lambda_s.max" = [' + ", ".join(f'"1 q{chr(97 + k % 26)}x"' for k in range(20_000)) + "]",
+            "and 19950 more",
+        ),
+        (
+            "report = [" + ", ".join(f'"x{k}"' for k in range(20_000)) + "]",
+            "mu = [0.1]",
+            "20000 expressions; accepted: up to 1000",
+        ),
+        (
+            'method = "sobol"\nrows = 10000000',
+            "\n".join(f"{n} = {{ min = 0.1, max = 0.2 }}" for n in ("mu", "chi_H", "zeta_H", "zeta_B", "Fr.min")),
+            "from 1 to 8000000",
+        ),
     ],
     ids=["rows", "points", "number", "names", "units", "report", "numbers"],
-)  # fmt: skip
+)
 def test_a_study_larger_than_studies_are(folder, study, vary, words):
     path = folder / "s.toml"
     path.write_text(STUDY.format(study=study, vary=vary), encoding="utf-8")

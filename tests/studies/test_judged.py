@@ -63,12 +63,17 @@ def constant() -> Study:
 
 
 STUDIES = {
-    "EP4 as built": lambda: built(60), "very near EP4": lambda: built(40, 1e-6), "wheels": whipple, "limits": limited,
-    "constants": constant, "own": own, "own, stable": lambda: own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}),
+    "EP4 as built": lambda: built(60),
+    "very near EP4": lambda: built(40, 1e-6),
+    "wheels": whipple,
+    "limits": limited,
+    "constants": constant,
+    "own": own,
+    "own, stable": lambda: own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}),
     "own, another objective": lambda: own(maximize="damping_ratio**2 + sin(a)/3 - exp(-b)"),
     "own, one of two has no value": lambda: own(maximize="max(log(k - 0.8), abscissa)"),
     "own, nothing asked": lambda: own({"size": "a*b/k <= 30"}, minimize=None),
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow
@@ -97,9 +102,14 @@ def test_rows_do_not_depend_on_others() -> None:
 def test_what_is_searched_or_listed_is_not_judged_at_once() -> None:
     study = built(2)
     for problem in (
-        replace(study.problem, scenarios={"mu": (0.1, 0.2)}, fixed={n: x for n, x in study.problem.fixed.items() if n != "mu"}),
-        replace(study.problem, tolerances={"mu": 0.01}), replace(study.problem, minimize=None, maximize="radius"),
-    ):  # fmt: skip
+        replace(
+            study.problem,
+            scenarios={"mu": (0.1, 0.2)},
+            fixed={n: x for n, x in study.problem.fixed.items() if n != "mu"},
+        ),
+        replace(study.problem, tolerances={"mu": 0.01}),
+        replace(study.problem, minimize=None, maximize="radius"),
+    ):
         assert not judge.applies(Study(problem, {"Fr": [2.0, 2.1]}))
     assert verdicts(study.problem, {"Fr": np.array([2.0])}) is not None
 
@@ -202,9 +212,12 @@ def test_what_is_judged_is_called_feasible_and_not_optimal(study: Study) -> None
     assert row.row.status == "optimal"
     assert row.solution is not None
     told = [
-        study_table(study, results.summary, results.rows), row_lines(study, row.row), design_report(row.solution),
-        repr(results), repr(row.solution),
-    ]  # fmt: skip
+        study_table(study, results.summary, results.rows),
+        row_lines(study, row.row),
+        design_report(row.solution),
+        repr(results),
+        repr(row.solution),
+    ]
     if study.method != "monte_carlo":
         told.append(draw_histogram(results).get_title())
     assert not any(word in text for text in told for word in ("optimal", "minimize"))

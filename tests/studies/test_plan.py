@@ -147,11 +147,17 @@ def test_row_that_cannot_be_posed_says_why(columns, words):
 @pytest.mark.parametrize(
     ("text", "number"),
     [
-        ("nu_H >= 0.02", 0.02), ("abscissa<=-0.8", -0.8), ("abscissa <= - 0.8", -0.8), ("1e-3 <= nu_H", 1e-3),
-        ("(chi_B - 1)*2 >= +.5", 0.5), ("chi_B >= chi_H", None), ("chi_B - 1 >= 2*3", None), ("nu_H >= pi", None),
+        ("nu_H >= 0.02", 0.02),
+        ("abscissa<=-0.8", -0.8),
+        ("abscissa <= - 0.8", -0.8),
+        ("1e-3 <= nu_H", 1e-3),
+        ("(chi_B - 1)*2 >= +.5", 0.5),
+        ("chi_B >= chi_H", None),
+        ("chi_B - 1 >= 2*3", None),
+        ("nu_H >= pi", None),
         ("(0.2) <= (nu_H - 1)", 0.2),
     ],
-)  # fmt: skip
+)
 def test_number_that_a_constraint_compares_with(text, number):
     assert limit_of(text) == number
     if number is None:
@@ -238,36 +244,40 @@ WIDER = tmsopt.Problem(
     minimize="Fr",
     start=PROBLEM.start,
 )
-CHANGED = {
-    "seed": replace(BASE, seed=1),
-    "starts": replace(BASE, starts=3),
-    "warm": replace(BASE, warm=True),
-    "report": replace(BASE, report=["nu_H"]),
-    "one value": Study(PROBLEM, {"mu": [0.1, np.nextafter(0.2, 1)]}),
-    "another row": Study(PROBLEM, {"mu": [0.1, 0.2, 0.3]}),
-    "another column": Study(PROBLEM, {"chi_H": [0.1, 0.2]}),
-    "order of rows": Study(PROBLEM, {"mu": [0.2, 0.1]}),
-    "order of free parameters": replace(BASE, problem=WIDER),
-} | {
-    f"problem, {key}": replace(BASE, problem=replace(PROBLEM, **{key: value}))
-    for key, value in {
-        "fixed": {**PROBLEM.fixed, "zeta_B": np.nextafter(-0.4, 0)},
-        "free": {**PROBLEM.free, "Fr": (0.1, 6.0)},
-        "constraints": {**PROBLEM.constraints, "arm": "nu_H >= 0.03"},
-        "minimize": "Fr + 0",
-        "locate": "EP4",
-        "start": {"Fr": 3.0},
-        "scenarios": {"chi_H": [0.9, 1.0]},
-        "tolerances": {"zeta_B": 0.01},
-        "weights": {"Fr": 1.0},
-    }.items()
-} | {
-    "problem, maximize": replace(BASE, problem=replace(PROBLEM, minimize=None, maximize="Fr")),
-    "problem, band": replace(BASE, problem=replace(PROBLEM, scenarios={"chi_H": {"min": 0.9, "max": 1.0}})),
-    "problem, points": replace(
-        BASE, problem=replace(PROBLEM, scenarios={"chi_H": {"min": 0.9, "max": 1.0, "points": 3}})
-    ),
-}  # fmt: skip
+CHANGED = (
+    {
+        "seed": replace(BASE, seed=1),
+        "starts": replace(BASE, starts=3),
+        "warm": replace(BASE, warm=True),
+        "report": replace(BASE, report=["nu_H"]),
+        "one value": Study(PROBLEM, {"mu": [0.1, np.nextafter(0.2, 1)]}),
+        "another row": Study(PROBLEM, {"mu": [0.1, 0.2, 0.3]}),
+        "another column": Study(PROBLEM, {"chi_H": [0.1, 0.2]}),
+        "order of rows": Study(PROBLEM, {"mu": [0.2, 0.1]}),
+        "order of free parameters": replace(BASE, problem=WIDER),
+    }
+    | {
+        f"problem, {key}": replace(BASE, problem=replace(PROBLEM, **{key: value}))
+        for key, value in {
+            "fixed": {**PROBLEM.fixed, "zeta_B": np.nextafter(-0.4, 0)},
+            "free": {**PROBLEM.free, "Fr": (0.1, 6.0)},
+            "constraints": {**PROBLEM.constraints, "arm": "nu_H >= 0.03"},
+            "minimize": "Fr + 0",
+            "locate": "EP4",
+            "start": {"Fr": 3.0},
+            "scenarios": {"chi_H": [0.9, 1.0]},
+            "tolerances": {"zeta_B": 0.01},
+            "weights": {"Fr": 1.0},
+        }.items()
+    }
+    | {
+        "problem, maximize": replace(BASE, problem=replace(PROBLEM, minimize=None, maximize="Fr")),
+        "problem, band": replace(BASE, problem=replace(PROBLEM, scenarios={"chi_H": {"min": 0.9, "max": 1.0}})),
+        "problem, points": replace(
+            BASE, problem=replace(PROBLEM, scenarios={"chi_H": {"min": 0.9, "max": 1.0, "points": 3}})
+        ),
+    }
+)
 
 
 def test_definition_changes_with_everything_that_a_row_follows_from():
@@ -325,7 +335,7 @@ def test_column_cannot_be_changed():
         ({"problem": replace(PROBLEM, minimize=None, pareto=["Fr", "abscissa"])}, ["asks for a front"]),
         ({"problem": replace(PROBLEM, scenarios={"mu": [0.1, 0.2]})}, ["mu has a scenario"]),
     ],
-)  # fmt: skip
+)
 def test_faults_of_a_study(options, words):
     text = faults(Study, **({"problem": PROBLEM, "columns": ABOUT} | options))
     assert all(word in text for word in words), text
@@ -448,7 +458,11 @@ BAD = {
     "unknown key": (changed("warm", "wram"), 7, ["wram", "did you mean 'warm'"]),
     "a constraint here": (FILE + "[constraints]\na = 'Fr >= 1'\n", 15, ["[problem.constraints]"]),
     "no problem": (changed('problem = "least.toml"', ""), 1, ["missing problem"]),
-    "problem not there": (changed("least.toml", "last.toml"), 2, ["last.toml", "did you mean 'least.toml'", "relative"]),
+    "problem not there": (
+        changed("least.toml", "last.toml"),
+        2,
+        ["last.toml", "did you mean 'least.toml'", "relative"],
+    ),
     "problem is a number": (changed('"least.toml"', "3"), 2, ["3", "problem file"]),
     "seed is a text": (changed("seed = 3", 'seed = "3"'), 5, ["'3'", "a whole number, 0 or more"]),
     "no starts": (changed("starts = 5", "starts = 0"), 6, ["0", "from 1 to"]),
@@ -456,7 +470,7 @@ BAD = {
     "report is a text": (changed('["nu_H", "2*Fr_c"]', '"nu_H"'), 8, ["nu_H", "a list of expressions"]),
     "report is unknown": (changed("2*Fr_c", "2*Frc"), 8, ["Frc", "did you mean"]),
     "unknown method": (changed("seed = 3", 'method = "gird"'), 5, ["gird", "did you mean 'grid'"]),
-    "rows of a grid": (changed("seed = 3", "rows = 3"), 5, ["rows does not go with method = \"grid\""]),
+    "rows of a grid": (changed("seed = 3", "rows = 3"), 5, ['rows does not go with method = "grid"']),
     "csv of a grid": (changed("seed = 3", 'csv = "r.csv"'), 5, ["it is for csv"]),
     "tolerances of a grid": (FILE + "[tolerances]\nmu = 0.01\n", 15, ["monte_carlo"]),
     "nothing varies": (FILE[: FILE.index("mu =")], 10, ["nothing varies", "mu = "]),
@@ -480,7 +494,9 @@ BAD = {
     "no rows": (SAMPLE.replace("rows = 8\n", "") + "mu = { min = 1, max = 2 }\n", 3, ["missing rows", "1024"]),
     "rows is 0": (SAMPLE.replace("rows = 8", "rows = 0") + "mu = { min = 1, max = 2 }\n", 4, ["0", "from 1"]),
     "lists of two lengths": (
-        'problem = "least.toml"\n[study]\nmethod = "list"\n[vary]\nmu = [1, 2]\nFr.max = [3]\n', 4, ["Fr.max has 1"]
+        'problem = "least.toml"\n[study]\nmethod = "list"\n[vary]\nmu = [1, 2]\nFr.max = [3]\n',
+        4,
+        ["Fr.max has 1"],
     ),
     "no tolerance": (DRAWN, 5, ["no tolerances"]),
     "tolerance of nothing": (DRAWN + "chi_b = 1\n", 6, ["chi_b", "did you mean 'chi_B'"]),
@@ -489,10 +505,14 @@ BAD = {
     "distribution": (DRAWN.replace("rows = 8", 'rows = 8\ndistribution = "gauss"'), 5, ["gauss", "uniform normal"]),
     "warm monte_carlo": (DRAWN.replace("rows = 8", "rows = 8\nwarm = true"), 5, ["nothing is free"]),
     "vary of monte_carlo": (DRAWN + "mu = 0.1\n[vary]\nmu = [1]\n", 7, ["[vary] does not go with"]),
-    "csv that is not there": ('problem = "least.toml"\n[study]\nmethod = "csv"\ncsv = "r.csv"\n', 4, ["r.csv", "no such"]),
+    "csv that is not there": (
+        'problem = "least.toml"\n[study]\nmethod = "csv"\ncsv = "r.csv"\n',
+        4,
+        ["r.csv", "no such"],
+    ),
     "no csv": ('problem = "least.toml"\n[study]\nmethod = "csv"\n', 3, ["missing csv"]),
     "not TOML": (changed("seed = 3", "seed = = 3"), 5, ["not TOML"]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", BAD)
@@ -719,8 +739,10 @@ def test_what_study_built_promises():
 @pytest.mark.slow
 def test_what_study_sway_promises():
     study = load_study(hunt.PROBLEMS / "study_sway.toml")
-    at = {(round(study.varied(k)["little_sway.limit"], 9), round(math.degrees(study.varied(k)["lambda_s.max"]))): k
-          for k in range(len(study))}  # fmt: skip
+    at = {
+        (round(study.varied(k)["little_sway.limit"], 9), round(math.degrees(study.varied(k)["lambda_s.max"]))): k
+        for k in range(len(study))
+    }
     value = {
         place: tmsopt.solve(study.row_problem(at[place])).value
         for place in ((0.1, 10), (0.7, 10), (0.9, 20), (0.9, 30))

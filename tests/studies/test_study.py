@@ -43,7 +43,7 @@ from tmsopt.studies import (
     solve_row,
     stored,
     summary,
-)  # fmt: skip
+)
 
 EP4 = load("problems/ep4.toml")
 HEIGHTS = {"zeta_B": [-0.4, -0.8], "zeta_H": [-0.2, -0.3, -0.35]}

@@ -19,9 +19,13 @@ BLOCK = 2**14
 """Elements of a block: 128 kB an array."""
 
 _POWERS: Mapping[float, Callable[[Any], Any]] = {
-    -1.0: lambda x: np.divide(1.0, x), 0.5: np.sqrt, 1.0: lambda x: x, 2.0: lambda x: x * x, 3.0: lambda x: x * x * x,
+    -1.0: lambda x: np.divide(1.0, x),
+    0.5: np.sqrt,
+    1.0: lambda x: x,
+    2.0: lambda x: x * x,
+    3.0: lambda x: x * x * x,
     4.0: lambda x: (square := x * x) * square,
-}  # fmt: skip
+}
 
 
 def _power(base: Any, exponent: Any) -> Any:

@@ -71,13 +71,28 @@ def _function(name: str) -> Callable[[Any], Any]:
 
 
 BALLS: Arithmetic = {
-    ca.OP_CONST: elementary.printed, ca.OP_ADD: lambda a, b: a + b, ca.OP_SUB: lambda a, b: a - b,
-    ca.OP_MUL: lambda a, b: a * b, ca.OP_DIV: elementary.quotient, ca.OP_NEG: lambda a: -a, ca.OP_SQ: lambda a: a * a,
-    ca.OP_TWICE: lambda a: 2 * a, ca.OP_INV: lambda a: elementary.quotient(elementary.exact(1), a),
-    ca.OP_POW: elementary.power, ca.OP_CONSTPOW: elementary.power, ca.OP_SQRT: elementary.sqrt,
-    ca.OP_FABS: elementary.magnitude, ca.OP_FMIN: elementary.lesser, ca.OP_FMAX: elementary.greater,
-    ca.OP_EXP: _function("exp"), ca.OP_LOG: _function("log"), ca.OP_SIN: _function("sin"), ca.OP_COS: _function("cos"),
-    ca.OP_TAN: _function("tan"), ca.OP_ASIN: _function("asin"), ca.OP_ACOS: _function("acos"),
+    ca.OP_CONST: elementary.printed,
+    ca.OP_ADD: lambda a, b: a + b,
+    ca.OP_SUB: lambda a, b: a - b,
+    ca.OP_MUL: lambda a, b: a * b,
+    ca.OP_DIV: elementary.quotient,
+    ca.OP_NEG: lambda a: -a,
+    ca.OP_SQ: lambda a: a * a,
+    ca.OP_TWICE: lambda a: 2 * a,
+    ca.OP_INV: lambda a: elementary.quotient(elementary.exact(1), a),
+    ca.OP_POW: elementary.power,
+    ca.OP_CONSTPOW: elementary.power,
+    ca.OP_SQRT: elementary.sqrt,
+    ca.OP_FABS: elementary.magnitude,
+    ca.OP_FMIN: elementary.lesser,
+    ca.OP_FMAX: elementary.greater,
+    ca.OP_EXP: _function("exp"),
+    ca.OP_LOG: _function("log"),
+    ca.OP_SIN: _function("sin"),
+    ca.OP_COS: _function("cos"),
+    ca.OP_TAN: _function("tan"),
+    ca.OP_ASIN: _function("asin"),
+    ca.OP_ACOS: _function("acos"),
     ca.OP_ATAN: _function("atan"),
-}  # fmt: skip
+}
 """Operations on balls, exact fractions and series of them among these: a number is the decimal that prints it."""

@@ -16,9 +16,11 @@ class NotAccepted(ValueError):
 
 
 def walk(
-    function: ca.Function, arguments: Sequence[Any], arithmetic: Arithmetic,
+    function: ca.Function,
+    arguments: Sequence[Any],
+    arithmetic: Arithmetic,
     shared: Callable[[Any], Any] = lambda value: value,
-) -> list[list[Any]]:  # fmt: skip
+) -> list[list[Any]]:
     """The outputs of a function of one vector, whose entries are given; each output as the list of its entries.
 
     Args:

@@ -106,9 +106,12 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
 
 
 def diagnosed(
-    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure,
+    model: Model,
+    of: ParameterSet,
+    design: Mapping[str, float],
+    structure: Structure,
     free: Mapping[str, tuple[float, float]] | None = None,
-) -> tuple[Diagnosis, ...]:  # fmt: skip
+) -> tuple[Diagnosis, ...]:
     """The same for any design of a model whose roots have a structure; free = ranges beside which it may be 0."""
     if all(root.multiplicity == 1 for root in structure.roots):
         return ()
@@ -121,9 +124,13 @@ def diagnosed(
 
 
 def _diagnosis(
-    model: Model, of: ParameterSet, design: Mapping[str, float], distance: float, root: Root,
+    model: Model,
+    of: ParameterSet,
+    design: Mapping[str, float],
+    distance: float,
+    root: Root,
     widths: Mapping[str, float],
-) -> Diagnosis:  # fmt: skip
+) -> Diagnosis:
     k = root.multiplicity
     stored = met(model, of, design, widths, complex(root.re, root.im), k)
     ranks = _ranks(model, of, stored, distance)

@@ -93,8 +93,9 @@ def levers(solution: Solution, resolve: bool = True, progress: Counts | None = N
     """One lever per limit that binds at an optimum, the most valuable step first."""
     if solution.status != "optimal":
         return ()
-    found = [_of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name)
-             for name in solution.active]  # fmt: skip
+    found = [
+        _of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name) for name in solution.active
+    ]
     again = LimitResolver(solution, {lever.name: lever.step for lever in found if lever.step})
     checked = []
     for lever in found:

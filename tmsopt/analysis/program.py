@@ -103,10 +103,13 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
     point = dict(zip(problem.free, variables_of(problem, solution.parameters), strict=True))
     names = [*problem.free, *nlp.variables[len(problem.free) :]]
     known = {
-        n: point[n] if n in point else solution.abscissa / nlp.unit if n == "abscissa"
+        n: point[n]
+        if n in point
+        else solution.abscissa / nlp.unit
+        if n == "abscissa"
         else _value(values, n) / (nlp.unit if n == ANGULAR_FREQUENCY else 1)
         for n in names
-    }  # fmt: skip
+    }
     at = ca.Function("rows", [symbols], [g])
     reached = np.array(at([known[n] if np.isfinite(known[n]) else 0.0 for n in names])).ravel()
     steady = [i for i, name in enumerate(names) if _steady(nlp, name, reached)]
@@ -130,8 +133,10 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
     if "abscissa" not in needed or not ca.depends_on(ca.vertcat(f, *build.rows), symbols[names.index("abscissa")]):
         raise NotCovered("the abscissa does not bind, so the roots have no part in this optimum")
     line, rest = on_the_line(solution)
-    design = {n: ca.atan(s) if problem.parameter_set[n].tangent else s
-              for n, s in zip(problem.free, ca.vertsplit(symbols), strict=False)}  # fmt: skip
+    design = {
+        n: ca.atan(s) if problem.parameter_set[n].tangent else s
+        for n, s in zip(problem.free, ca.vertsplit(symbols), strict=False)
+    }
     gamma = nlp.unit * symbols[names.index("abscissa")]
     a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
     factored = _factored(build, a, float(values.coefficients[0]), gamma, line, rest)
@@ -145,9 +150,14 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
                 bound = symbols[k] - known[names[k]]
                 build.one(Held(f"{names[k]}.{end}", True), bound if end == "min" else -bound)
     size = max(np.hypot(r.re, r.im) for r in solution.of_polynomial.roots)
-    widths = [_natural_size(problem, names[k], known[names[k]]) if names[k] in problem.free
-              else size / nlp.unit if names[k] == "abscissa"
-              else max(abs(known[names[k]]), 1e-3) for k in kept]  # fmt: skip
+    widths = [
+        _natural_size(problem, names[k], known[names[k]])
+        if names[k] in problem.free
+        else size / nlp.unit
+        if names[k] == "abscissa"
+        else max(abs(known[names[k]]), 1e-3)
+        for k in kept
+    ]
     x = ca.vertcat(*(symbols[k] for k in kept), *factored.unknowns)
     return LocalProgram(
         problem=problem,
@@ -177,9 +187,11 @@ def _rows_of(nlp: NLP, name: str) -> list[int]:
 
 def _steady(nlp: NLP, name: str, reached: Array) -> bool:
     """Whether a quantity that is the greatest of several is the constant one of them here."""
-    return name in nlp.rows and all(
-        nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in _rows_of(nlp, name)
-    ) and name not in _ROOT_ROWS  # fmt: skip
+    return (
+        name in nlp.rows
+        and all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in _rows_of(nlp, name))
+        and name not in _ROOT_ROWS
+    )
 
 
 class _Rows:

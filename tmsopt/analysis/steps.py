@@ -35,9 +35,7 @@ def natural_step(unit: Unit, kept: str, size: float) -> LimitStep:
     return next(_steps(unit, kept, size))
 
 
-def step_within(
-    unit: Unit, kept: str, size: float, limit: float, direction: float, allowed: Range
-) -> LimitStep | None:  # fmt: skip
+def step_within(unit: Unit, kept: str, size: float, limit: float, direction: float, allowed: Range) -> LimitStep | None:
     """The largest natural step that keeps a moved limit physically possible; None at a physical end."""
     return next((step for step in _steps(unit, kept, size) if limit + direction * step.size in allowed), None)
 

@@ -40,9 +40,13 @@ def edges_at(problem: Problem, parameters: Mapping[str, float]) -> tuple[str, ..
 
 
 def stands_on(
-    problem: Problem, parameters: Mapping[str, float], structure: Structure, optimal: bool, abscissa: float,
+    problem: Problem,
+    parameters: Mapping[str, float],
+    structure: Structure,
+    optimal: bool,
+    abscissa: float,
     meetings: Sequence[MultipleRoot],
-) -> tuple[tuple[str, ...], bool]:  # fmt: skip
+) -> tuple[tuple[str, ...], bool]:
     """The boundaries of stability that a design stands on, and whether that and its growth are certain.
 
     Certain are simple roots that a located pattern ties to the axis, and what fractions show.

@@ -112,7 +112,7 @@ class _Pencil:
 
 def curvature(
     model: Model, of: ParameterSet, weights: tuple[str, ...], edge: Edge, operations: int
-) -> Curvature | None:  # fmt: skip
+) -> Curvature | None:
     """The Hessian of nearest points of an edge; None where an expression is quicker, or where the edge is no sum."""
     if model.pencil is None or operations * len(weights) < _WORTH:
         return None

@@ -135,9 +135,13 @@ class Robustness(Printable):
 
 
 def nearest(
-    design: Given, pattern: str, *, parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None, progress: Listener | None = None,
-) -> Nearest:  # fmt: skip
+    design: Given,
+    pattern: str,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    weights: Mapping[str, float] | None = None,
+    progress: Listener | None = None,
+) -> Nearest:
     """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
 
     The distance is √Σ ((x − x0)/weight)² over the parameters that have a weight; the others stay. Parameters stay
@@ -171,9 +175,12 @@ def nearest(
 
 
 def robustness(
-    design: Given, *, parameters: Mapping[str, float] | None = None, weights: Mapping[str, float] | None = None,
+    design: Given,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    weights: Mapping[str, float] | None = None,
     progress: Listener | None = None,
-) -> Robustness:  # fmt: skip
+) -> Robustness:
     """The nearest points of all boundaries, and the radius within which a design stays stable.
 
     Arguments, distances and exceptions are those of `nearest`.
@@ -220,9 +227,10 @@ def _zeros(place: WeightedDesign) -> tuple[str, ...]:
     """Parameters at 0 each of which makes a design stable alone: the edge is where what they stand for is not there."""
     at = [n for n, weight in place.weights.items() if abs(place.parameters[n]) <= _NOTHING * weight]
     return tuple(
-        n for n in at
+        n
+        for n in at
         if any(exactly_stable(place.problem, {**place.parameters, n: s * _SHIFT * place.weights[n]}) for s in (1, -1))
-    )  # fmt: skip
+    )
 
 
 def _place(

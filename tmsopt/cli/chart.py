@@ -82,9 +82,13 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Write the arrays (npz, nc, chart).")
 @click.option("--layers", help=f"Arrays of --output, among {','.join(_LAYERS)}. [default: all but margin]")
 @click.option(
-    "--quantity", "quantities", multiple=True, callback=_named, metavar="NAME=EXPRESSION",
+    "--quantity",
+    "quantities",
+    multiple=True,
+    callback=_named,
+    metavar="NAME=EXPRESSION",
     help="Also compute an expression; may be given several times.",
-)  # fmt: skip
+)
 @click.option("--single", is_flag=True, help="Write numbers in single precision.")
 @click.option("--fresh", is_flag=True, help="Move a folder of --output aside instead of going on with it.")
 @click.option("--engine", hidden=True)
@@ -92,19 +96,37 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 @plot_option("Draw the chart")
 @report_option
 @click.option(
-    "--layer", default="kind", show_default=True,
+    "--layer",
+    default="kind",
+    show_default=True,
     help="What --plot shows: kind, abscissa, damping_ratio, real_roots or a quantity.",
-)  # fmt: skip
+)
 @click.option(
-    "--slice", "cut", callback=lambda c, o, v: _named(c, o, (v,)) if v else {}, metavar="NAME=VALUE",
+    "--slice",
+    "cut",
+    callback=lambda c, o, v: _named(c, o, (v,)) if v else {},
+    metavar="NAME=VALUE",
     help="Of three parameters, the one that --plot holds, e.g. lambda_s=0.4.",
-)  # fmt: skip
+)
 @click.option("--boundaries/--no-boundaries", default=True, show_default=True, help="Trace the exact boundary curves.")
 def chart(
-    file: Path, points: tuple[int, ...] | None, axes: str | None, as_json: bool, output: Path | None,
-    layers: str | None, quantities: dict[str, str], single: bool, fresh: bool, engine: str | None, workers: int,
-    plot: Path | None, report: Path | None, layer: str, cut: dict[str, str], boundaries: bool,
-) -> None:  # fmt: skip
+    file: Path,
+    points: tuple[int, ...] | None,
+    axes: str | None,
+    as_json: bool,
+    output: Path | None,
+    layers: str | None,
+    quantities: dict[str, str],
+    single: bool,
+    fresh: bool,
+    engine: str | None,
+    workers: int,
+    plot: Path | None,
+    report: Path | None,
+    layer: str,
+    cut: dict[str, str],
+    boundaries: bool,
+) -> None:
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
     if engine is not None:
         click.echo(no_longer_needed("--engine"), err=True)
@@ -127,9 +149,17 @@ def chart(
             _check_memory(sizes, output)
         with _moved_aside(folder):
             found = tmsopt.chart(
-                problem, names, folder=folder, points=sizes, layers=(*_LAYERS, *kept) if whole else kept, **how,
-                workers=workers, fresh=fresh, boundaries=boundaries and whole, progress=shown(),
-            )  # fmt: skip
+                problem,
+                names,
+                folder=folder,
+                points=sizes,
+                layers=(*_LAYERS, *kept) if whole else kept,
+                **how,
+                workers=workers,
+                fresh=fresh,
+                boundaries=boundaries and whole,
+                progress=shown(),
+            )
         if output is not None and folder is None:
             with saving("--output", output):
                 found.save(output, (*dict.fromkeys(kept), *quantities))

@@ -92,9 +92,13 @@ def _unknown(word: str) -> bool:
 @click.group("tmsopt", cls=_Commands, epilog=STATUS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--version", is_flag=True, expose_value=False, callback=_version, help="Show the version and exit.")
 @click.option(
-    "--json", is_flag=True, expose_value=False, is_eager=True, callback=_version_as_json,
+    "--json",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_version_as_json,
     help="With --version: also those of Python and the libraries, for a report of a bug.",
-)  # fmt: skip
+)
 def every() -> None:
     """Design self-stable bicycles under your own constraints, and localise exceptional points.
 

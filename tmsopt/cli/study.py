@@ -67,21 +67,34 @@ Exit status: 0 done, failed rows included; 2 bad input.
 @click.option("--fresh", is_flag=True, help="Move a store that is there aside, and start anew.")
 @click.option("--row", type=click.IntRange(min=0), default=None, help="Solve this row alone and show it; no store.")
 @click.option(
-    "--workers", type=click.IntRange(min=1), default=None,
+    "--workers",
+    type=click.IntRange(min=1),
+    default=None,
     help="Processes of this machine. [default: as many as cores; 1 for few rows]",
-)  # fmt: skip
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, in place of workers.")
 @click.option(
-    "--export", "exports", type=click.Path(path_type=Path), multiple=True,
+    "--export",
+    "exports",
+    type=click.Path(path_type=Path),
+    multiple=True,
     help="Write all rows; the ending says how, as in rows.csv, rows.parquet, rows.nc. May be given again.",
-)  # fmt: skip
+)
 @plot_option("Draw how the rows are distributed, or the objective over what varies")
 @report_option
 @json_option
 def study(
-    file: Path, store: Path | None, fresh: bool, row: int | None, workers: int | None, scheduler: str | None,
-    exports: tuple[Path, ...], plot: Path | None, report: Path | None, as_json: bool,
-) -> None:  # fmt: skip
+    file: Path,
+    store: Path | None,
+    fresh: bool,
+    row: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    exports: tuple[Path, ...],
+    plot: Path | None,
+    report: Path | None,
+    as_json: bool,
+) -> None:
     """Solve the problem of the study FILE for every row of what varies in it."""
     with bad_input():
         from tmsopt.studies import check_unchanged, load_study

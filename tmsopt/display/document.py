@@ -25,18 +25,27 @@ ENDINGS = ("html", "htm")
 """Of the name of a document."""
 
 _PARTS: Mapping[str, Callable[[Any], Iterator[Chapter]]] = {
-    "Chart": parts.of_chart, "Trace": parts.of_trace, "Front": parts.of_front, "Results": parts.of_results,
-}  # fmt: skip
+    "Chart": parts.of_chart,
+    "Trace": parts.of_trace,
+    "Front": parts.of_front,
+    "Results": parts.of_results,
+}
 _PACKAGES = ("tmsopt", "CasADi", "NumPy")
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 """Nothing is asked of any server, whatever the page holds."""
 
 
 def save_report(
-    result: Any, path: str | PathLike[str], *, command: str = "", files: Mapping[str, str] | None = None,
-    seed: int | None = None, full: bool = False, design: "Solution | None" = None,
+    result: Any,
+    path: str | PathLike[str],
+    *,
+    command: str = "",
+    files: Mapping[str, str] | None = None,
+    seed: int | None = None,
+    full: bool = False,
+    design: "Solution | None" = None,
     progress: Listener | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write a result as one page: the answer, pictures, tables, the explorer, the report as text, and where it is from.
 
     Args:
@@ -72,9 +81,14 @@ def save_report(
 
 
 def _document(
-    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None",
+    result: Any,
+    command: str,
+    files: Mapping[str, str],
+    seed: int | None,
+    full: bool,
+    design: "Solution | None",
     progress: Counts | None,
-) -> str:  # fmt: skip
+) -> str:
     """The whole page."""
     name, title = type(result).__name__, words(title_of(result) or "untitled")
     sections = []
@@ -115,7 +129,7 @@ def _document(
 
 def _sections(
     result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
-) -> Iterator[Chapter]:  # fmt: skip
+) -> Iterator[Chapter]:
     match type(result).__name__:
         case "Solution":
             yield from parts.of_solution(result, full)
@@ -152,9 +166,14 @@ def _origin(result: Any, command: str, files: Mapping[str, str], seed: int | Non
     listed = [(name, found or "") for name, found in installed(_PACKAGES).items()]
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     system = f"{platform.system()} {platform.machine()}".strip()
-    about = facts((
-        *listed, ("Python", platform.python_version()), ("system", system), ("date", when),
-        ("seed", "" if seed is None else str(seed)),
-    ))  # fmt: skip
+    about = facts(
+        (
+            *listed,
+            ("Python", platform.python_version()),
+            ("system", system),
+            ("date", when),
+            ("seed", "" if seed is None else str(seed)),
+        )
+    )
     texts = {"command": command} | dict(files)
     return about + "\n".join(f"<h3>{words(n)}</h3>\n{verbatim(text, n)}" for n, text in texts.items() if text)

@@ -112,6 +112,10 @@ _ENDS = ("end", "constraint")
 """Events at which a branch only meets a limit."""
 
 _DESIGNS: Mapping[str, Callable[[Any], Iterator[Named]]] = {
-    "Chart": _of_chart, "Every": _of_every, "Front": _of_front, "Proof": _of_proof, "Results": _of_results,
+    "Chart": _of_chart,
+    "Every": _of_every,
+    "Front": _of_front,
+    "Proof": _of_proof,
+    "Results": _of_results,
     "Trace": _of_trace,
-}  # fmt: skip
+}

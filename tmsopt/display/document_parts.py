@@ -43,8 +43,11 @@ def of_solution(solution: "Solution", full: bool) -> Chapters:
     si = texts.si_parameters(solution)
     parts = {part.name: part for part in texts.design_parts(solution, found, si)}
     first = parts.get("answer") or parts["conflict"]
-    told = [(n, "; ".join(line.removeprefix(f"{n}: ").removeprefix("warning: ") for line in (p.lines or p.rest)))
-            for n in _TOLD if (p := parts.get(n))]  # fmt: skip
+    told = [
+        (n, "; ".join(line.removeprefix(f"{n}: ").removeprefix("warning: ") for line in (p.lines or p.rest)))
+        for n in _TOLD
+        if (p := parts.get(n))
+    ]
     yield Chapter("answer", "Answer", _lead(first.lines) + facts((n, said.removeprefix(f"{n}: ")) for n, said in told))
     yield from _looks(solution)
     yield Chapter("parameters", "Parameters", table("Parameters of the design", _parameter_rows(solution, si)), "wide")
@@ -85,10 +88,15 @@ def of_chart(chart: "Chart") -> Chapters:
     corners = [("corner",)] if chart.domain is None else texts.corner_rows(chart.domain, chart.problem)
     yield Chapter("classes", "Classes", table("Share of each class", shares) + table("Corners of the domains", corners))
     plain = spread(untitled(chart), _POINTS)
-    yield Chapter("picture", "Chart", _pictures(
-        (lambda: plots.chart_figure(plain), f"Stability over {' and '.join(chart.axes)}"),
-        (lambda: plots.chart_figure(plain, "abscissa"), f"Spectral abscissa over {' and '.join(chart.axes)}"),
-    ), "wide")  # fmt: skip
+    yield Chapter(
+        "picture",
+        "Chart",
+        _pictures(
+            (lambda: plots.chart_figure(plain), f"Stability over {' and '.join(chart.axes)}"),
+            (lambda: plots.chart_figure(plain, "abscissa"), f"Spectral abscissa over {' and '.join(chart.axes)}"),
+        ),
+        "wide",
+    )
     yield _asked(chart.problem)
     rows, note = chart_rows(chart)
     yield Chapter("rows", "Designs", note + table("Designs of the grid", rows), "whole")
@@ -185,8 +193,10 @@ def _limits(solution: "Solution", found: "texts.Findings") -> str:
     held = table("Limits, and how they stand", limit_rows(solution))
     levers = found.explanation.levers if found.explanation else ()
     rows = [("limit", "stands at", "a move of it", "buys, to first order")]
-    rows += [(name.rstrip(":"), at, by.removeprefix("by "), buys.removeprefix("buys "))
-             for name, at, by, buys in (texts.lever_cells(solution, v) for v in levers)]  # fmt: skip
+    rows += [
+        (name.rstrip(":"), at, by.removeprefix("by "), buys.removeprefix("buys "))
+        for name, at, by, buys in (texts.lever_cells(solution, v) for v in levers)
+    ]
     worth = table("What the limits that bind are worth", rows)
     again = [lever.sentence for lever in levers if math.isfinite(lever.resolved)]
     return (f'<div class="beside">\n{held}\n{worth}\n</div>' if held or worth else "") + paragraphs(again)
@@ -200,11 +210,16 @@ def _bound(solution: "Solution") -> str:
         return ""
     searched = f"{bound.solver}, {bound.nodes} nodes, {bound.seconds:.1f} s" if bound.solver else ""
     value, gap = (unit.show(x, n) if math.isfinite(x) else "" for x, n in ((bound.value, 12), (bound.gap, 2)))
-    return facts((
-        ("proved", "yes" if bound.proven else "no"), ("bound", value), ("gap", gap), ("method", bound.method),
-        ("branch and bound", searched),
-        ("feasibility tolerance", f"{bound.tolerance:.0e}" if bound.tolerance else ""),
-    ))  # fmt: skip
+    return facts(
+        (
+            ("proved", "yes" if bound.proven else "no"),
+            ("bound", value),
+            ("gap", gap),
+            ("method", bound.method),
+            ("branch and bound", searched),
+            ("feasibility tolerance", f"{bound.tolerance:.0e}" if bound.tolerance else ""),
+        )
+    )
 
 
 def _parameter_rows(solution: "Solution", si: Mapping[str, float]) -> Rows:

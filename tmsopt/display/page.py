@@ -19,10 +19,18 @@ _ROWS, _COLUMNS = 12, 12  # of a table shown
 _BADGE = "border:1px solid currentColor;border-radius:.7em;padding:0 .6em;margin-right:.4em;white-space:nowrap"
 _GOOD, _BAD = "rgba(0,158,115,.35)", "rgba(213,94,0,.45)"
 _MARKS = {
-    "optimal": _GOOD, "feasible": _GOOD, "proved": _GOOD, "stable": _GOOD, "strict minimum": _GOOD,
+    "optimal": _GOOD,
+    "feasible": _GOOD,
+    "proved": _GOOD,
+    "stable": _GOOD,
+    "strict minimum": _GOOD,
     "proved to be all": _GOOD,
-    "infeasible": _BAD, "not converged": _BAD, "not proved": _BAD, "not stable": _BAD, "not minimal": _BAD,
-}  # fmt: skip
+    "infeasible": _BAD,
+    "not converged": _BAD,
+    "not proved": _BAD,
+    "not stable": _BAD,
+    "not minimal": _BAD,
+}
 
 
 def page(result: Any) -> str:

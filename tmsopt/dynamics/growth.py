@@ -166,9 +166,20 @@ def growth(
             replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in followed
         )
     return Growth(
-        of[name], values, found, critical, at, design.structure, stable, heavily_damped, design.problem, followed,
-        events, rate, tuple(r for r in design.roots if r.multiplicity > 1),
-    )  # fmt: skip
+        of[name],
+        values,
+        found,
+        critical,
+        at,
+        design.structure,
+        stable,
+        heavily_damped,
+        design.problem,
+        followed,
+        events,
+        rate,
+        tuple(r for r in design.roots if r.multiplicity > 1),
+    )
 
 
 def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:

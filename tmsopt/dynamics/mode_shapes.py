@@ -118,6 +118,9 @@ def _amplitudes(vector: Complex) -> tuple[list[float], list[float]]:
     sizes = np.abs(vector) / np.abs(vector).max()
     moving = sizes > _NOTHING
     turned = vector / vector[int(np.argmax(moving))]
-    phases = np.where(moving, np.degrees(np.angle(np.where(np.abs(turned.imag) > _NOTHING * np.abs(turned),
-                                                           turned, turned.real))), np.nan)  # fmt: skip
+    phases = np.where(
+        moving,
+        np.degrees(np.angle(np.where(np.abs(turned.imag) > _NOTHING * np.abs(turned), turned, turned.real))),
+        np.nan,
+    )
     return np.where(moving, sizes, 0.0).tolist(), np.where(phases == -180, 180.0, phases).tolist()

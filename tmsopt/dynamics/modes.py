@@ -32,9 +32,14 @@ class _Piece:
 
 
 def modes(
-    values: Array, found: Complex, design: float, crowds: Sequence[float] = (), *, bicycle: bool = False,
+    values: Array,
+    found: Complex,
+    design: float,
+    crowds: Sequence[float] = (),
+    *,
+    bicycle: bool = False,
     speed: bool = False,
-) -> tuple[Mode, ...]:  # fmt: skip
+) -> tuple[Mode, ...]:
     """Every root between meetings, with the name of its mode.
 
     A root that has no part in a meeting keeps its name. Of a bicycle the names begin where one pair and two real

@@ -105,18 +105,28 @@ class Simulation(Tabular):
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         return {
-            **self.problem.heading, **plain(self, "parameters stable structure disturbance units"),
+            **self.problem.heading,
+            **plain(self, "parameters stable structure disturbance units"),
             "measures": {m.name: {n: x for n, x in m.to_json().items() if n != "name"} for m in self.measures},
             **plain(self, "deviations modes columns"),
-        }  # fmt: skip
+        }
 
 
 def simulate(
-    design: Given, *, lean: float | str | None = None, steer: float | str | None = None, push: float | None = None,
-    lean_push: float | None = None, start: Mapping[str, float] | None = None, noise: float | None = None,
-    seed: int = 0, seconds: float | None = None, points: int = 1001, at: Mapping[str, float] | None = None,
+    design: Given,
+    *,
+    lean: float | str | None = None,
+    steer: float | str | None = None,
+    push: float | None = None,
+    lean_push: float | None = None,
+    start: Mapping[str, float] | None = None,
+    noise: float | None = None,
+    seed: int = 0,
+    seconds: float | None = None,
+    points: int = 1001,
+    at: Mapping[str, float] | None = None,
     progress: Listener | None = None,
-) -> Simulation:  # fmt: skip
+) -> Simulation:
     """What a design does after a lean, a push of its handlebar or in noise, exactly, also where its roots meet.
 
     The motion is x(t) = e^(At) x(0) of the linear equations of the design as stored, at evenly spaced times; at a
@@ -168,9 +178,17 @@ def simulate(
     start_steps(progress, "following the motion")
     system = system_of(asked, own)
     disturbance = asked_for(
-        system, lean=lean, steer=steer, push=push, lean_push=lean_push, start=start, noise=noise, seed=seed,
-        seconds=seconds, points=points,
-    )  # fmt: skip
+        system,
+        lean=lean,
+        steer=steer,
+        push=push,
+        lean_push=lean_push,
+        start=start,
+        noise=noise,
+        seed=seed,
+        seconds=seconds,
+        points=points,
+    )
     found = asked.values(own)["structure"]
     assert isinstance(found, Structure)
     structure = user_structure(asked.model, found)
@@ -197,9 +215,18 @@ def simulate(
     deviations = _deviations(system, force) if noise and stable else Table[float]()
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
-        asked, Table(own), disturbance, Table(columns), units, measures, deviations, modes, structure.name, stable,
+        asked,
+        Table(own),
+        disturbance,
+        Table(columns),
+        units,
+        measures,
+        deviations,
+        modes,
+        structure.name,
+        stable,
         (*rest, *(("x",) if rest else ())),
-    )  # fmt: skip
+    )
 
 
 def _dies_out(problem: Problem, found: Structure) -> bool:
@@ -212,7 +239,7 @@ def _dies_out(problem: Problem, found: Structure) -> bool:
 
 def _watched(
     system: System, x: Array, structure: Structure, stable: bool, rate: float, seconds: float | None, noisy: bool
-) -> tuple[bool, float, Watched]:  # fmt: skip
+) -> tuple[bool, float, Watched]:
     """Whether the motion dies out while it is measured, how long it is shown, and the motion that is measured.
 
     Raises:

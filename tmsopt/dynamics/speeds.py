@@ -96,9 +96,13 @@ class Speeds(Tabular):
 
 
 def speeds(
-    design: Given | Mapping[str, float], parameter: str | None = None, *, between: Stretch | None = None,
-    problem: Given | None = None, progress: Listener | None = None,
-) -> Speeds:  # fmt: skip
+    design: Given | Mapping[str, float],
+    parameter: str | None = None,
+    *,
+    between: Stretch | None = None,
+    problem: Given | None = None,
+    progress: Listener | None = None,
+) -> Speeds:
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
 
     The coefficients are polynomials in the speed, so these speeds are the roots of polynomials too, and none is missed.

@@ -156,6 +156,9 @@ def _units(si: bool) -> Table[str]:
     """Of time, angles, rates, torques and lengths."""
     time, rate, torque, length = ("s", "rad/s", "N m", "m") if si else ("√(w/g)", "rad √(g/w)", "m_B g w", "w")
     return Table(
-        {"t": time} | dict.fromkeys((*ANGLES, "psi"), "rad") | dict.fromkeys(RATES, rate)
-        | dict.fromkeys(TORQUES, torque) | dict.fromkeys(("x", "y_rear", "y_front"), length)
-    )  # fmt: skip
+        {"t": time}
+        | dict.fromkeys((*ANGLES, "psi"), "rad")
+        | dict.fromkeys(RATES, rate)
+        | dict.fromkeys(TORQUES, torque)
+        | dict.fromkeys(("x", "y_rear", "y_front"), length)
+    )

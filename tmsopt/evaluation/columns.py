@@ -116,10 +116,18 @@ def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[st
         certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
     said = _laws(wide, plain, coefficients, feasible, settled) if model is tms else {}
     return Verdicts(
-        certain, objective, doubles["abscissa"], doubles["damping_ratio"], found.oscillates, violations, bound,
-        np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf), related, said,
+        certain,
+        objective,
+        doubles["abscissa"],
+        doubles["damping_ratio"],
+        found.oscillates,
+        violations,
+        bound,
+        np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf),
+        related,
+        said,
         {text: _column(problem.read(text)(plain), m) for text in reports},
-    )  # fmt: skip
+    )
 
 
 def _spread(number: Any, m: int) -> Bounded:

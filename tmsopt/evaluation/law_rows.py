@@ -14,9 +14,23 @@ from tmsopt.roots import is_stable
 
 _CLOSED = "a1a3, a2, w0"  # equations that give several parameters
 LAWS = (
-    "w0", "4poly", "chib", "a2", "a1a3 a2 w0 Fr", "a1a3 a2 w0 mu", "a1a3 a2 w0 tan(lambda_s)", "lscf", "flus", "Frc1",
-    "frm", "w01", "chib1", "tls", "frep4", "epset",
-)  # fmt: skip
+    "w0",
+    "4poly",
+    "chib",
+    "a2",
+    "a1a3 a2 w0 Fr",
+    "a1a3 a2 w0 mu",
+    "a1a3 a2 w0 tan(lambda_s)",
+    "lscf",
+    "flus",
+    "Frc1",
+    "frm",
+    "w01",
+    "chib1",
+    "tls",
+    "frep4",
+    "epset",
+)
 """Names of all laws, in the order of `law_rows`."""
 
 SAME_LAW = 1e-9

@@ -231,9 +231,12 @@ class _Look:
 
 
 def _look(
-    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None,
+    problem: Problem,
+    parameters: Mapping[str, float],
+    cases: Sequence[Case],
+    around: Robustness | None = None,
     stored: bool = False,
-) -> _Look:  # fmt: skip
+) -> _Look:
     """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
     listed = [case for case in cases if not case.direction]
     designs = [case.applied(parameters) for case in listed] or [dict(parameters)]

@@ -196,9 +196,13 @@ def _widths(problem: Problem, parameters: Mapping[str, float], names: Sequence[s
 
 
 def _solved(
-    problem: Problem, parameters: Mapping[str, float], clusters: Sequence[_Cluster], names: Sequence[str],
-    target: Array, size: Array,
-) -> tuple[dict[str, Any], list[Any], Array]:  # fmt: skip
+    problem: Problem,
+    parameters: Mapping[str, float],
+    clusters: Sequence[_Cluster],
+    names: Sequence[str],
+    target: Array,
+    size: Array,
+) -> tuple[dict[str, Any], list[Any], Array]:
     """A design after some steps of Newton's method with the first slopes, what is off there, and those slopes."""
     widths = _widths(problem, parameters, names)
     at = {n: flint.arb(x) for n, x in parameters.items()}

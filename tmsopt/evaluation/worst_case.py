@@ -105,9 +105,13 @@ def _value(values: Values, what: Expression | str, shared: Mapping[str, float | 
 
 
 def _peaks(
-    problem: Problem, designs: Mapping[str, float | Array], count: int, sign: float, what: Expression | str,
+    problem: Problem,
+    designs: Mapping[str, float | Array],
+    count: int,
+    sign: float,
+    what: Expression | str,
     shared: Mapping[str, float | Array],
-) -> list[list[Worst]]:  # fmt: skip
+) -> list[list[Worst]]:
     """Of each of several designs, the worst few cases of every choice of separate scenario values; worse is greater."""
     each = [space.peaks(problem, designs, count, sign, what, shared) for space in _spaces(problem)]
     return [[peak for found in each for peak in found[k]] for k in range(count)]
@@ -128,9 +132,14 @@ class _Space:
         return Case(Table({**self.at, **values}), Table(moves))
 
     def peaks(
-        self, problem: Problem, designs: Mapping[str, float | Array], count: int, sign: float, what: Expression | str,
+        self,
+        problem: Problem,
+        designs: Mapping[str, float | Array],
+        count: int,
+        sign: float,
+        what: Expression | str,
         shared: Mapping[str, float | Array],
-    ) -> list[list[Worst]]:  # fmt: skip
+    ) -> list[list[Worst]]:
         """Of each design, the worst few points of a grid, each moved to where it is locally worst."""
         size = len(self.bands) + len(self.tolerances)
         if size == 0:
@@ -180,9 +189,13 @@ def _spaces(problem: Problem) -> Iterator[_Space]:
 
 
 def _evaluated(
-    problem: Problem, parameters: Mapping[str, Any], offset: Mapping[str, Array], count: int, what: Expression | str,
+    problem: Problem,
+    parameters: Mapping[str, Any],
+    offset: Mapping[str, Array],
+    count: int,
+    what: Expression | str,
     shared: Mapping[str, float | Array],
-) -> Array:  # fmt: skip
+) -> Array:
     varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
     columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}
     values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)

@@ -129,27 +129,68 @@ AND, OR = Spelling("{0}&&{1}", 3, (3, 4), True, (0, 1)), Spelling("{0}||{1}", 2,
 NOT, CHOOSE = Spelling("!{0}", 8, (9,), True, (0,)), Spelling("{0}?{1}:{2}", 1, (2, 1, 1), truths=(0,))
 
 _POWERS = {
-    -1.0: Spelling("1/{0}", 7, (8,)), 0.5: call("sqrt"), 1.0: Spelling("{0}", 1, (1,)),
-    2.0: Spelling("{0}*{0}", 7, (8,)), 3.0: Spelling("{0}*{0}*{0}", 7, (8,)),
+    -1.0: Spelling("1/{0}", 7, (8,)),
+    0.5: call("sqrt"),
+    1.0: Spelling("{0}", 1, (1,)),
+    2.0: Spelling("{0}*{0}", 7, (8,)),
+    3.0: Spelling("{0}*{0}*{0}", 7, (8,)),
     4.0: Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
-}  # fmt: skip
+}
 """Small powers, as `tmsopt.algebra.arrays` has them."""
 
 _OPERATIONS: Mapping[int, Spelling] = {
-    ca.OP_ASSIGN: _POWERS[1.0], ca.OP_ADD: ADD, ca.OP_SUB: SUBTRACT, ca.OP_MUL: MULTIPLY, ca.OP_DIV: DIVIDE,
-    ca.OP_NEG: NEGATE, ca.OP_SQ: _POWERS[2.0], ca.OP_TWICE: Spelling("2*{0}", 7, (8,)), ca.OP_INV: _POWERS[-1.0],
-    ca.OP_LT: LESS, ca.OP_LE: AT_MOST, ca.OP_EQ: EQUAL, ca.OP_NE: UNEQUAL, ca.OP_NOT: NOT, ca.OP_AND: AND,
-    ca.OP_OR: OR, ca.OP_IF_ELSE_ZERO: Spelling("{0}?{1}:0", 1, (2, 1), truths=(0,)),
-    ca.OP_FMIN: call("min", 2), ca.OP_FMAX: call("max", 2),  # NaN where either is, as in `ARRAYS`
-    ca.OP_FABS: call("abs"), ca.OP_POW: call("pow", 2), ca.OP_CONSTPOW: call("pow", 2), ca.OP_ATAN2: call("atan2", 2),
-    ca.OP_HYPOT: call("hypot", 2), ca.OP_FMOD: Spelling("{0}%{1}", 7, (7, 8)),
+    ca.OP_ASSIGN: _POWERS[1.0],
+    ca.OP_ADD: ADD,
+    ca.OP_SUB: SUBTRACT,
+    ca.OP_MUL: MULTIPLY,
+    ca.OP_DIV: DIVIDE,
+    ca.OP_NEG: NEGATE,
+    ca.OP_SQ: _POWERS[2.0],
+    ca.OP_TWICE: Spelling("2*{0}", 7, (8,)),
+    ca.OP_INV: _POWERS[-1.0],
+    ca.OP_LT: LESS,
+    ca.OP_LE: AT_MOST,
+    ca.OP_EQ: EQUAL,
+    ca.OP_NE: UNEQUAL,
+    ca.OP_NOT: NOT,
+    ca.OP_AND: AND,
+    ca.OP_OR: OR,
+    ca.OP_IF_ELSE_ZERO: Spelling("{0}?{1}:0", 1, (2, 1), truths=(0,)),
+    ca.OP_FMIN: call("min", 2),
+    ca.OP_FMAX: call("max", 2),  # NaN where either is, as in `ARRAYS`
+    ca.OP_FABS: call("abs"),
+    ca.OP_POW: call("pow", 2),
+    ca.OP_CONSTPOW: call("pow", 2),
+    ca.OP_ATAN2: call("atan2", 2),
+    ca.OP_HYPOT: call("hypot", 2),
+    ca.OP_FMOD: Spelling("{0}%{1}", 7, (7, 8)),
     ca.OP_COPYSIGN: Spelling("Math.abs({0})*((1/{1}||{1})<0?-1:1)", 7, (0, 9)),
     **{
         getattr(ca, f"OP_{name.upper()}"): call(name)
-        for name in ("sqrt", "sign", "floor", "ceil", "exp", "log", "log1p", "expm1", "sin", "cos", "tan", "asin",
-                     "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
+        for name in (
+            "sqrt",
+            "sign",
+            "floor",
+            "ceil",
+            "exp",
+            "log",
+            "log1p",
+            "expm1",
+            "sin",
+            "cos",
+            "tan",
+            "asin",
+            "acos",
+            "atan",
+            "sinh",
+            "cosh",
+            "tanh",
+            "asinh",
+            "acosh",
+            "atanh",
+        )
     },
-}  # fmt: skip
+}
 
 _QUANTITY, _CONSTRAINT = "quantity ", "constraint "
 """Before the names of outputs, which users choose."""

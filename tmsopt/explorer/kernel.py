@@ -39,10 +39,12 @@ def kernel_script(degree: int) -> str:
         rules = f"good: {degenerate.GOOD}, accepted: {degenerate.ACCEPTED}, steps: {degenerate.STEPS}"
         b = ["b1", "b2", "b3", "b4", "p1", "q1", "p2", "q2"]
         parts += [
-            f"const QUARTIC = {{{rules}}};", _traced("stableBySigns", a, lambda *c: [_OF.stable(*c)]),
-            _traced("quarticClass", a, _packed), _traced("quarticStart", a, _started, "f"),
+            f"const QUARTIC = {{{rules}}};",
+            _traced("stableBySigns", a, lambda *c: [_OF.stable(*c)]),
+            _traced("quarticClass", a, _packed),
+            _traced("quarticStart", a, _started, "f"),
             _traced("quarticStep", b, _stepped, "g"),
-        ]  # fmt: skip
+        ]
     return "\n".join(parts) + "\n"
 
 
@@ -78,9 +80,13 @@ def _reflected(spelling: Spelling) -> Any:
 
 
 _FUNCTIONS = {
-    np.sqrt: js.call("sqrt"), np.abs: js.call("abs"), np.absolute: js.call("abs"), np.maximum: js.call("max", 2),
-    np.minimum: js.call("min", 2), np.cbrt: js.call("cbrt"),
-}  # fmt: skip
+    np.sqrt: js.call("sqrt"),
+    np.abs: js.call("abs"),
+    np.absolute: js.call("abs"),
+    np.maximum: js.call("max", 2),
+    np.minimum: js.call("min", 2),
+    np.cbrt: js.call("cbrt"),
+}
 
 
 @dataclass(frozen=True, eq=False)

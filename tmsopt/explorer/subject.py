@@ -49,12 +49,16 @@ def subject(
     plane, quantities = _plane(problem), {q.name: q for q in (*problem.model.quantities, *of.quantities)}
     asked = problem.minimize or problem.maximize or problem.locate or ""
     return {
-        "title": problem.title, "model": problem.model.name,
+        "title": problem.title,
+        "model": problem.model.name,
         "modelTitle": ": ".join(filter(None, (problem.model.title, problem.model.omits))),
         "bicycle": problem.model.name if is_bicycle(problem) else None,
         "impulseUnit": _IMPULSE if of.torque is None else "N·m·s",
-        "words": dict(words_of(problem.model)), "rootUnit": unit_of(problem, "abscissa").text,
-        "carrier": problem.model.carrier, "onAxis": ON_AXIS, "smallest": SMALLEST,
+        "words": dict(words_of(problem.model)),
+        "rootUnit": unit_of(problem, "abscissa").text,
+        "carrier": problem.model.carrier,
+        "onAxis": ON_AXIS,
+        "smallest": SMALLEST,
         "parameters": [_parameter(problem, p, start[p.name]) for p in of.parameters],
         "quantities": [
             {"name": n, "meaning": quantities[n].meaning, "share": quantities[n].share, **_unit(problem, n)}
@@ -64,13 +68,14 @@ def subject(
         "objective": f"{problem.sense} {' '.join(asked.split())}" if asked else "",
         "designs": [_design(problem, k) for k in designs],
         "start": [start[n] for n in of.names],
-        "plane": [of.names.index(n) for n in plane], "over": of.names.index(_over(problem)),
+        "plane": [of.names.index(n) for n in plane],
+        "over": of.names.index(_over(problem)),
         "curves": list(_curves(problem, plane, start)) if trace_curves else [],
         "toml": around(problem, model),
         "others": [n for n in problem.conditions if n not in script.constraints],
         "nominal": problem.nominal is not problem,
         "shown": [_MIDDLE] if problem.free and not solved else [],
-    }  # fmt: skip
+    }
 
 
 def _middle(problem: Problem) -> dict[str, float]:
@@ -87,10 +92,15 @@ def _parameter(problem: Problem, parameter: Parameter, value: float) -> dict[str
     room = parameter.range
     ends = {"least": room.lower, "most": room.upper, "open": not room.closed}
     return {
-        "name": parameter.name, "meaning": parameter.meaning, **_unit(problem, parameter.name),
-        "free": parameter.name in problem.free, "low": low, "high": high, "value": value,
+        "name": parameter.name,
+        "meaning": parameter.meaning,
+        **_unit(problem, parameter.name),
+        "free": parameter.name in problem.free,
+        "low": low,
+        "high": high,
+        "value": value,
         "text": exact_value(value, unit_of(problem, parameter.name).text, parameter.unit),
-    } | {n: end for n, end in ends.items() if end is not False and math.isfinite(end)}  # fmt: skip
+    } | {n: end for n, end in ends.items() if end is not False and math.isfinite(end)}
 
 
 def _reach(parameter: Parameter, value: float) -> tuple[float, float]:
@@ -110,21 +120,29 @@ def _constraint(problem: Problem, name: str) -> dict[str, Any]:
     condition = problem.conditions[name]
     size = max(1.0, abs(limit_of(problem.constraints[name]) or 0.0))  # of the sides where they are equal
     return {
-        "name": name, "text": problem.constraints[name], **_unit(problem, name), "equality": condition.equality,
+        "name": name,
+        "text": problem.constraints[name],
+        **_unit(problem, name),
+        "equality": condition.equality,
         "tolerance": FEASIBLE * size,
-    }  # fmt: skip
+    }
 
 
 def _design(problem: Problem, known: Known) -> dict[str, Any]:
     structure = known.structure
     roots = list(_drawn(problem, structure))
     return {
-        "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
+        "name": known.name,
+        "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
         "structure": structure_line(problem, structure.name, structure.abscissa, known.meetings)
-        if structure.roots else "",
-        "abscissa": max((root[0] for root in roots), default=math.nan), "roots": roots,
-        "facts": list(known.facts), "proved": known.proved, **known.verdict,
-    }  # fmt: skip
+        if structure.roots
+        else "",
+        "abscissa": max((root[0] for root in roots), default=math.nan),
+        "roots": roots,
+        "facts": list(known.facts),
+        "proved": known.proved,
+        **known.verdict,
+    }
 
 
 def _drawn(problem: Problem, found: Structure) -> Iterator[list[float]]:
@@ -146,8 +164,10 @@ def _plane(problem: Problem) -> list[str]:
 
 def _over(problem: Problem) -> str:
     """The speed of a bicycle, or else what comes first."""
-    return next((n for n in problem.parameter_set.names if n in _SPEEDS and problem.model.statement is None),
-                _by_interest(problem)[0])  # fmt: skip
+    return next(
+        (n for n in problem.parameter_set.names if n in _SPEEDS and problem.model.statement is None),
+        _by_interest(problem)[0],
+    )
 
 
 def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) -> Iterator[dict[str, Any]]:

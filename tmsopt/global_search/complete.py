@@ -356,10 +356,12 @@ def _places(problem: Problem, left: Iterable[tuple[Sheet, Box, str]]) -> list[tu
 def _ranges(problem: Problem, box: Box) -> Table[Ends]:
     """A box in the parameters themselves, angles in radians."""
     of = problem.parameter_set
-    return Table({
-        n: (math.atan(lo), math.atan(hi)) if of[n].tangent else (lo, hi)
-        for n, (lo, hi) in zip(problem.free, box, strict=True)
-    })  # fmt: skip
+    return Table(
+        {
+            n: (math.atan(lo), math.atan(hi)) if of[n].tangent else (lo, hi)
+            for n, (lo, hi) in zip(problem.free, box, strict=True)
+        }
+    )
 
 
 def _numbers(problem: Problem, at: Mapping[str, Any]) -> dict[str, Any]:

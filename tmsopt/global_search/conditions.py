@@ -45,9 +45,12 @@ class Piece:
     def ranges(self) -> tuple[Ends, ...]:
         """Of each unknown, where no root is larger than 1."""
         return {
-            "root": ((-1.0, 1.0),), "pair": ((-2.0, 2.0), (0.0, 1.0)), "meeting": ((-2.0, 2.0), (-1.0, 1.0)),
-            "axis": ((0.0, 1.0),), "zero": (),
-        }[self.kind]  # fmt: skip
+            "root": ((-1.0, 1.0),),
+            "pair": ((-2.0, 2.0), (0.0, 1.0)),
+            "meeting": ((-2.0, 2.0), (-1.0, 1.0)),
+            "axis": ((0.0, 1.0),),
+            "zero": (),
+        }[self.kind]
 
     def own(self, unknowns: Sequence[Any]) -> Sequence[Any]:
         """Its unknowns among all."""

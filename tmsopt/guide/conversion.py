@@ -20,12 +20,22 @@ _INSIDE = 0.9
 """Of the range of an inertia that an equality ties to a mass: the ends of the mass bind first."""
 
 _WORDS = {
-    "Fr": "(v/sqrt(g*w))", "mu": "(m_H/m_B)", "chi_B": "(x_B/w)", "chi_H": "(x_H/w)", "zeta_B": "(z_B/w)",
-    "zeta_H": "(z_H/w)", "nu_H": "(u_H/w)", "chi_T": "(x_T/w)", "omega0": "(omega0/sqrt(g/w))",
-    "abscissa": "(abscissa/sqrt(g/w))", "angular_frequency": "(angular_frequency/sqrt(g/w))",
-    "ballast_rear": "(m_ballast_rear/m_B)", "v_c": "v_weave", "Fr_c": "(v_weave/sqrt(g*w))",
+    "Fr": "(v/sqrt(g*w))",
+    "mu": "(m_H/m_B)",
+    "chi_B": "(x_B/w)",
+    "chi_H": "(x_H/w)",
+    "zeta_B": "(z_B/w)",
+    "zeta_H": "(z_H/w)",
+    "nu_H": "(u_H/w)",
+    "chi_T": "(x_T/w)",
+    "omega0": "(omega0/sqrt(g/w))",
+    "abscissa": "(abscissa/sqrt(g/w))",
+    "angular_frequency": "(angular_frequency/sqrt(g/w))",
+    "ballast_rear": "(m_ballast_rear/m_B)",
+    "v_c": "v_weave",
+    "Fr_c": "(v_weave/sqrt(g*w))",
     **{n: n for n in ("damping_ratio", "radius", "load_front", "load_rear", *FUNCTIONS, *CONSTANTS)},
-}  # fmt: skip
+}
 """Word of an expression about point masses → the same in Whipple's model; those in SI alone are the same."""
 
 _SIZE = re.compile(r"\s*([\d.]+)\s*[x×]\s*([\d.]+)\s*[x×]\s*([\d.]+)\s*(\D+)")
@@ -34,9 +44,12 @@ Size = tuple[float, float, float]
 
 
 def convert(
-    given: Given, to: str = "whipple", inertia: str = "boxes", body: str | Size | None = None,
+    given: Given,
+    to: str = "whipple",
+    inertia: str = "boxes",
+    body: str | Size | None = None,
     front: str | Size | None = None,
-) -> Problem:  # fmt: skip
+) -> Problem:
     """A problem of point masses on skates, in SI, as the same problem for a model whose bodies have inertia.
 
     Parameters, ranges, limits, cases and the objective are kept; there are no wheels and there is no trail. Where a
@@ -79,18 +92,31 @@ def convert(
             else:
                 fixed[name] = _rounded(share * problem.fixed[mass])
     return Problem(
-        model=whipple, fixed=fixed, free=free, constraints=limits, start=problem.start, title=problem.title,
-        minimize=_objective(problem, problem.minimize), maximize=_objective(problem, problem.maximize),
-        locate=problem.locate, pareto=tuple(str(_objective(problem, text)) for text in problem.pareto),
-        scenarios=problem.scenarios, tolerances=problem.tolerances, weights=problem.weights, units=problem.units,
+        model=whipple,
+        fixed=fixed,
+        free=free,
+        constraints=limits,
+        start=problem.start,
+        title=problem.title,
+        minimize=_objective(problem, problem.minimize),
+        maximize=_objective(problem, problem.maximize),
+        locate=problem.locate,
+        pareto=tuple(str(_objective(problem, text)) for text in problem.pareto),
+        scenarios=problem.scenarios,
+        tolerances=problem.tolerances,
+        weights=problem.weights,
+        units=problem.units,
         written=problem.written,
-    )  # fmt: skip
+    )
 
 
 def converted_file(
-    given: Given, to: str = "whipple", inertia: str = "boxes", body: str | Size | None = None,
+    given: Given,
+    to: str = "whipple",
+    inertia: str = "boxes",
+    body: str | Size | None = None,
     front: str | Size | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """The text of a converted problem file, with what was assumed in comments; arguments as of `convert`."""
     problem = as_problem(given)
     converted = convert(problem, to, inertia, body, front)
@@ -102,9 +128,13 @@ def converted_file(
     if inertia == "boxes":
         lines.append("I_xx = m (width^2 + height^2)/12, I_zz = m (length^2 + width^2)/12, in kg m^2, and I_xz = 0.")
     radius = 0.125 * _middle(problem, "w")
-    lines += ["A wheel of 1 kg, a solid disc, under [parameters]; likewise at the rear with R for F:",
-              f"  r_F = {radius:.4g}", "  m_F = 1", f"  I_Fxx = {radius**2 / 4:.4g}    # m r^2/4 about a diameter",
-              f"  I_Fyy = {radius**2 / 2:.4g}    # m r^2/2 about its axle"]  # fmt: skip
+    lines += [
+        "A wheel of 1 kg, a solid disc, under [parameters]; likewise at the rear with R for F:",
+        f"  r_F = {radius:.4g}",
+        "  m_F = 1",
+        f"  I_Fxx = {radius**2 / 4:.4g}    # m r^2/4 about a diameter",
+        f"  I_Fyy = {radius**2 / 2:.4g}    # m r^2/2 about its axle",
+    ]
     return toml_problem(converted, lines)
 
 

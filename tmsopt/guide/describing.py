@@ -73,22 +73,30 @@ def _with_models(error: InputError, given: str | PathLike[str]) -> InputError:
 def _described(model: Model, problem: Problem | None, typed: Typed) -> Description:
     size = model.degree if model.carrier is None else model.degree // 2
     return Description(
-        model=model.name, meaning=model.title, degree=size, title=problem.title if problem else "",
+        model=model.name,
+        meaning=model.title,
+        degree=size,
+        title=problem.title if problem else "",
         sets=tuple(_words(model, of, problem, typed) for of in ([problem.parameter_set] if problem else model.sets)),
         feedback=() if problem else tuple(_gains(model)),
         patterns=Table({name: pattern_of(model, name).meaning for name in patterns_of(model)}),
-        functions=(*FUNCTIONS, *CONSTANTS), omits=model.omits, conventions=model.conventions, sketch=model.sketch,
-        matrices=Table(dict(_matrices(model, typed))), asked=Table(_asked(problem, typed) if problem else {}),
-    )  # fmt: skip
+        functions=(*FUNCTIONS, *CONSTANTS),
+        omits=model.omits,
+        conventions=model.conventions,
+        sketch=model.sketch,
+        matrices=Table(dict(_matrices(model, typed))),
+        asked=Table(_asked(problem, typed) if problem else {}),
+    )
 
 
 def _words(model: Model, of: ParameterSet, problem: Problem | None, typed: Typed) -> Words:
     written = _written(typed).get("quantities", (model.statement or {}).get("quantities", {}))
     quantities = [s for n, s in vocabulary(model, of).items() if n not in of.names]
     return Words(
-        of.name, tuple(_parameter(p, problem, model.statement is not None) for p in of.parameters),
+        of.name,
+        tuple(_parameter(p, problem, model.statement is not None) for p in of.parameters),
         tuple(_quantity(q, written.get(q.name, "")) for q in quantities),
-    )  # fmt: skip
+    )
 
 
 def _gains(model: Model) -> Iterator[Words]:
@@ -98,8 +106,7 @@ def _gains(model: Model) -> Iterator[Words]:
     for of, more in zip(model.sets, controlled(model, gain_names(model.name)).sets, strict=True):
         added = [_parameter(p, None, False) for p in more.parameters if p not in of.parameters]
         known = {q.name for q in of.quantities}
-        yield Words(of.name, tuple(added),
-                    tuple(_quantity(q, "") for q in more.quantities if q.name not in known))  # fmt: skip
+        yield Words(of.name, tuple(added), tuple(_quantity(q, "") for q in more.quantities if q.name not in known))
 
 
 def _quantity(q: Parameter | Quantity, formula: str) -> Word:

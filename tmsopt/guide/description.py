@@ -86,14 +86,21 @@ class Description(Printable):
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
         return {
-            "schema": SCHEMA, "title": self.title, "model": self.model, "meaning": self.meaning, "degree": self.degree,
+            "schema": SCHEMA,
+            "title": self.title,
+            "model": self.model,
+            "meaning": self.meaning,
+            "degree": self.degree,
             "omits": self.omits,
-            "sets": [of.to_json() for of in self.sets], "patterns": dict(self.patterns),
-            "functions": list(self.functions), "conventions": list(self.conventions), "sketch": self.sketch,
+            "sets": [of.to_json() for of in self.sets],
+            "patterns": dict(self.patterns),
+            "functions": list(self.functions),
+            "conventions": list(self.conventions),
+            "sketch": self.sketch,
             "matrices": {name: [list(row) for row in rows] for name, rows in self.matrices.items()},
             "asked": {section: dict(keys) for section, keys in self.asked.items()},
             "feedback": [of.to_json() for of in self.feedback],
-        }  # fmt: skip
+        }
 
 
 def description_text(found: Description) -> str:

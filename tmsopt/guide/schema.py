@@ -51,11 +51,16 @@ def schema() -> Schema:
         defs[f"parameters_{name}"] = _table(f"Parameters of {name}.", [of.parameters for of in sets])
         defs[f"parameters_{name}"]["properties"] |= {n: _ref(f"feedback_{name}/properties/{n}") for n in sorted(gains)}
     return {
-        "$schema": DRAFT, "title": "tmsopt", "description": "A problem file or a study file of tmsopt.",
-        "type": "object", **_shown(_ref("problem"), _ref("study_file")),
-        "if": _OF_STUDY, "then": _ref("study_file"), "else": _ref("problem"),
+        "$schema": DRAFT,
+        "title": "tmsopt",
+        "description": "A problem file or a study file of tmsopt.",
+        "type": "object",
+        **_shown(_ref("problem"), _ref("study_file")),
+        "if": _OF_STUDY,
+        "then": _ref("study_file"),
+        "else": _ref("problem"),
         "$defs": {**defs, "problem": problem, "study_file": study},
-    }  # fmt: skip
+    }
 
 
 def _ref(name: str) -> Schema:
@@ -113,10 +118,13 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
     keys["constraints"]["additionalProperties"] = {"type": "string", "pattern": _COMPARISON}
     titles = "; ".join(f"{model.name}: {model.title}" for model in MODELS.values())
     keys["model"] = {
-        "description": f"{keys['model']['description']} {titles}.", "default": "tms",
-        **_shown({"enum": list(MODELS)}), "if": {"type": "string"}, "then": {"enum": list(MODELS)},
+        "description": f"{keys['model']['description']} {titles}.",
+        "default": "tms",
+        **_shown({"enum": list(MODELS)}),
+        "if": {"type": "string"},
+        "then": {"enum": list(MODELS)},
         "else": _model_table(),
-    }  # fmt: skip
+    }
     tables = [*(_ref(f"parameters_{name}") for name in MODELS), _ref("parameters_own")]
     described = keys["parameters"]["description"]
     keys["parameters"] = {"description": described, "type": "object", **_shown(*tables)}
@@ -133,9 +141,11 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
 def _by_model(names: list[str]) -> Schema:
     """Which names and values a file may use, by its model; tms where it names none."""
     if not names:
-        return {"if": {"properties": {"model": {"type": "object"}}, "required": ["model"]},
-                "then": {"properties": {"parameters": _ref("parameters_own"), "feedback": {"maxProperties": 0}}},
-                "else": _with_names("tms")}  # fmt: skip
+        return {
+            "if": {"properties": {"model": {"type": "object"}}, "required": ["model"]},
+            "then": {"properties": {"parameters": _ref("parameters_own"), "feedback": {"maxProperties": 0}}},
+            "else": _with_names("tms"),
+        }
     named = {"properties": {"model": {"const": names[0]}}, "required": ["model"]}
     return {"if": named, "then": _with_names(names[0]), "else": _by_model(names[1:])}
 
@@ -176,8 +186,9 @@ def _parameter(p: Parameter) -> Schema:
     value = _value(p)
     free = {
         "properties": {end: {"description": f"The {what}.", **value} for end, what in _ENDS.items()},
-        "required": ["min", "max"], "additionalProperties": False,
-    }  # fmt: skip
+        "required": ["min", "max"],
+        "additionalProperties": False,
+    }
     return {"description": f"{p.meaning}{unit}.{left_out}", **value, "type": [*value["type"], "object"], **free}
 
 
@@ -198,9 +209,11 @@ def _value(p: Parameter) -> Schema:
 def _own(free: Schema) -> Schema:
     """Parameters of a system of one's own: any names, numbers without unit."""
     return {
-        "description": "Parameters of a system of your own: the names in its expressions.", "type": "object",
-        "propertyNames": {"pattern": _NAME}, "additionalProperties": _either({"type": "number"}, free),
-    }  # fmt: skip
+        "description": "Parameters of a system of your own: the names in its expressions.",
+        "type": "object",
+        "propertyNames": {"pattern": _NAME},
+        "additionalProperties": _either({"type": "number"}, free),
+    }
 
 
 def _model_table() -> Schema:
@@ -208,9 +221,10 @@ def _model_table() -> Schema:
     entry = {"type": ["number", "string"]}
     rows = {"type": "array", "items": {"type": "array", "items": entry, "minItems": 1}, "minItems": 1}
     shapes: dict[str, Schema] = {
-        "name": {"type": "string"}, "coefficients": {"type": "array", "items": entry, "minItems": 2},
+        "name": {"type": "string"},
+        "coefficients": {"type": "array", "items": entry, "minItems": 2},
         "quantities": {"type": "object", "additionalProperties": {"type": "string"}},
-    }  # fmt: skip
+    }
     properties = {key: {"description": text, **shapes.get(key, rows)} for key, text in KEYS.items()}
     return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
 
@@ -224,19 +238,24 @@ def _refine_study(study: Schema, defs: dict[str, Schema]) -> None:
         options["properties"][key]["minimum"] = least
     keys["study"] = {"description": keys["study"]["description"], **options}
     keys["problem"] = {
-        "description": keys["problem"]["description"], **_shown(_ref("problem")), "if": {"type": "object"},
-        "then": _ref("problem"), "else": {"type": "string"},
-    }  # fmt: skip
+        "description": keys["problem"]["description"],
+        **_shown(_ref("problem")),
+        "if": {"type": "object"},
+        "then": _ref("problem"),
+        "else": {"type": "string"},
+    }
     number: Schema = {"type": ["number", "string"]}
     axis = {
-        "type": "object", "required": ["min", "max"], "additionalProperties": False,
+        "type": "object",
+        "required": ["min", "max"],
+        "additionalProperties": False,
         "properties": {
             "min": {"description": "The least value.", **number},
             "max": {"description": "The greatest value.", **number},
             "points": {"description": "How many values, of a grid.", "type": "integer", "minimum": 2},
             "log": {"description": "Whether steps are equal factors.", "type": "boolean"},
         },
-    }  # fmt: skip
+    }
     values = _either({"type": "array", "items": number}, axis)
     inner = {"type": "object", "propertyNames": {"enum": ["min", "max", "limit"]}, "additionalProperties": values}
     keys["vary"]["additionalProperties"] = {"anyOf": [values, inner]}  # lambda_s.max without quotes is a table

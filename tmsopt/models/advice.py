@@ -7,16 +7,47 @@ from tmsopt.models.names import MEANT
 
 _NUMBER = r"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)"
 _UNITS = {
-    "mm": 1e-3, "cm": 0.01, "km/h": 5 / 18, "km": 1e3, "m/s": 1, "m": 1, "kg": 1, "ms": 1e-3, "s": 1, "kN": 1e3, "N": 1,
+    "mm": 1e-3,
+    "cm": 0.01,
+    "km/h": 5 / 18,
+    "km": 1e3,
+    "m/s": 1,
+    "m": 1,
+    "kg": 1,
+    "ms": 1e-3,
+    "s": 1,
+    "kN": 1e3,
+    "N": 1,
     "Hz": 1,
-}  # fmt: skip
+}
 """What others write behind a number → what one of it is in an expression; a g may be the gravity."""
 
 _SIGNS = {
-    "=>": ">=", "=<": "<=", "≤": "<=", "≥": ">=", "≈": "==", "−": "-", "–": "-", "×": "*", "·": "*", "÷": "/",
-    "²": "**2", "³": "**3", "^": "**", "√": "sqrt", "π": "pi", "λ": "lambda_s", "ζ": "zeta", "χ": "chi", "ν": "nu",
-    "μ": "mu", "µ": "mu", "ω": "omega", "omega_0": "omega0", "lambda_s_s": "lambda_s",
-}  # fmt: skip
+    "=>": ">=",
+    "=<": "<=",
+    "≤": "<=",
+    "≥": ">=",
+    "≈": "==",
+    "−": "-",
+    "–": "-",
+    "×": "*",
+    "·": "*",
+    "÷": "/",
+    "²": "**2",
+    "³": "**3",
+    "^": "**",
+    "√": "sqrt",
+    "π": "pi",
+    "λ": "lambda_s",
+    "ζ": "zeta",
+    "χ": "chi",
+    "ν": "nu",
+    "μ": "mu",
+    "µ": "mu",
+    "ω": "omega",
+    "omega_0": "omega0",
+    "lambda_s_s": "lambda_s",
+}
 
 _CALLS = {
     "ln": "log(x)",

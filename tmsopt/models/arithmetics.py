@@ -49,28 +49,38 @@ def _fraction(value: Any, text: str) -> Any:
 
 
 BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
     ast.Pow: operator.pow,
-}  # fmt: skip
+}
 SYMBOLIC = Arithmetic(
-    {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax}, _as_array,
+    {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax},
+    _as_array,
     BINARY,
-)  # fmt: skip
+)
 NUMERIC = Arithmetic(
     {
         **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
         **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "min": np.minimum, "max": np.maximum},
     },
-    _as_array, BINARY,
-)  # fmt: skip
+    _as_array,
+    BINARY,
+)
 BALLS = Arithmetic(
     {
         **{name: _method(name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log")},
-        "sqrt": elementary.sqrt, "abs": elementary.magnitude, "min": elementary.lesser, "max": elementary.greater,
+        "sqrt": elementary.sqrt,
+        "abs": elementary.magnitude,
+        "min": elementary.lesser,
+        "max": elementary.greater,
     },
-    elementary.exact, {**BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power}, flint.arb.pi,
+    elementary.exact,
+    {**BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power},
+    flint.arb.pi,
     _fraction,
-)  # fmt: skip
+)
 DEGREES = Arithmetic(
     {
         name: applied(same if name in ("sqrt", "abs", "min", "max") else alone, compute)

@@ -204,9 +204,11 @@ class Tilt:
 
 
 def written(
-    of: ParameterSet, parameters: Mapping[str, float], stated: Mapping[str, Any] | None = None,
+    of: ParameterSet,
+    parameters: Mapping[str, float],
+    stated: Mapping[str, Any] | None = None,
     typed: Mapping[str, str] = MappingProxyType({}),
-) -> Written:  # fmt: skip
+) -> Written:
     """A design's doubles as decimals, save those for which an exact number is given.
 
     Args:

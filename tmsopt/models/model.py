@@ -312,9 +312,14 @@ class Values(Mapping[str, Any]):
     """
 
     def __init__(
-        self, model: Model, of: ParameterSet, parameters: Mapping[str, Any], extra: Iterable[Quantity] = (),
-        lift: Callable[[Quantity, "Values"], Any] | None = None, ranges: Mapping[str, float] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        model: Model,
+        of: ParameterSet,
+        parameters: Mapping[str, Any],
+        extra: Iterable[Quantity] = (),
+        lift: Callable[[Quantity, "Values"], Any] | None = None,
+        ranges: Mapping[str, float] | None = None,
+    ) -> None:
         native = of.native(parameters)
         self.model, self.coefficients = model, model.polynomial(**model.algebraic(native))
         self.given, self._ranges = (model, of, dict(parameters)), dict(ranges or {})

@@ -79,10 +79,14 @@ def experiment(lambda_s: float = TILT, mass_ratios: tuple[float, ...] = MASS_RAT
     ratio = np.linspace(1.0, 3.0, _POINTS)
     curves = [_critical(1.0, np.nan, lambda_s), *(_critical(p["chi_H"], mu, lambda_s) for mu in mass_ratios)]
     return Experiment(
-        ratio=ratio, law=np.asarray(laws.chib1(-ratio, np.full_like(ratio, -1.0))),
-        points=tuple(_point(bicycle) for bicycle in (built, benchmark(), optimised())), chi_B=p["chi_B"],
-        lambda_s=lambda_s, least_tilt=float(np.arctan((p["chi_H"] - 1) / p["zeta_H"])), critical=tuple(curves),
-    )  # fmt: skip
+        ratio=ratio,
+        law=np.asarray(laws.chib1(-ratio, np.full_like(ratio, -1.0))),
+        points=tuple(_point(bicycle) for bicycle in (built, benchmark(), optimised())),
+        chi_B=p["chi_B"],
+        lambda_s=lambda_s,
+        least_tilt=float(np.arctan((p["chi_H"] - 1) / p["zeta_H"])),
+        critical=tuple(curves),
+    )
 
 
 def _point(bicycle: ReferenceBicycle) -> ExperimentPoint:
@@ -114,10 +118,15 @@ def _critical(chi_H: float, mu: float, lambda_s: float, slack: float = 0.01) -> 
     stable = bool(np.isfinite(level(float(least.x))))
     best = float(least.x) if stable else np.nan
     return CriticalSpeed(
-        chi_B=chi_B, Fr_c=value(chi_B), chi_H=chi_H, mu=mu, best=(best, level(best)), own=level(p["chi_B"]),
+        chi_B=chi_B,
+        Fr_c=value(chi_B),
+        chi_H=chi_H,
+        mu=mu,
+        best=(best, level(best)),
+        own=level(p["chi_B"]),
         flat=_flat(square, best, (low + margin, high - margin), (1 + slack) ** 2) if stable else (np.nan, np.nan),
         slack=slack,
-    )  # fmt: skip
+    )
 
 
 def _flat(

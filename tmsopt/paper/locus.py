@@ -72,9 +72,14 @@ class LocusRow:
 
 
 def locus(
-    model: Model, of: ParameterSet, parameters: Mapping[str, float], sweep: str, ends: tuple[float, float],
-    resolution: float = 0.02, title: str = "",
-) -> Locus:  # fmt: skip
+    model: Model,
+    of: ParameterSet,
+    parameters: Mapping[str, float],
+    sweep: str,
+    ends: tuple[float, float],
+    resolution: float = 0.02,
+    title: str = "",
+) -> Locus:
     """Roots of a degree-4 model over `sweep` between two ends; no root moves further than `resolution` in a step.
 
     Raises:
@@ -108,9 +113,13 @@ def locus(
         if "EP" not in e.name and e.A[0] * e.A[2] > 0  # a pair on the axis: σ² = −A3/A1
     ]
     return Locus(
-        title, values, found, tuple(_tracks(values, found)), tuple(sorted(marks, key=lambda m: m.value)),
+        title,
+        values,
+        found,
+        tuple(_tracks(values, found)),
+        tuple(sorted(marks, key=lambda m: m.value)),
         tuple(crossings),
-    )  # fmt: skip
+    )
 
 
 def table_1_loci(Fr_max: float = 5.0) -> tuple[LocusRow, LocusRow, LocusRow]:
@@ -126,11 +135,15 @@ def _row(name: str, Fr_max: float) -> LocusRow:
     shifts = {r"\sqrt{2}": 0.0, rf"\sqrt{{2}} - {offset:g}": -offset, rf"\sqrt{{2}} + {offset:g}": offset}
     law, below, above = (
         locus(
-            bicycle_model, bicycle_model.sets[0], {**bicycle.parameters, "chi_B": chi_B + shift}, "Fr", (0.0, Fr_max),
+            bicycle_model,
+            bicycle_model.sets[0],
+            {**bicycle.parameters, "chi_B": chi_B + shift},
+            "Fr",
+            (0.0, Fr_max),
             title=text,
         )
         for text, shift in shifts.items()
-    )  # fmt: skip
+    )
     return LocusRow(name, bicycle.parameters["lambda_s"], bicycle.omega0, chi_B, offset, (law, below, above))
 
 

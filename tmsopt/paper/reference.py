@@ -44,9 +44,14 @@ def optimised() -> ReferenceBicycle:
     chi_H = laws.bench["x_H"] / laws.bench["w"]
     point = laws.ep4(-1.0, ZETA_B, ZETA_H, chi_H)[0]
     parameters = {
-        "Fr": float(point.Fr), "mu": float(point.mu), "chi_B": float(point.chi_B), "chi_H": chi_H,
-        "zeta_B": ZETA_B, "zeta_H": ZETA_H, "lambda_s": float(point.lambda_s),
-    }  # fmt: skip
+        "Fr": float(point.Fr),
+        "mu": float(point.mu),
+        "chi_B": float(point.chi_B),
+        "chi_H": chi_H,
+        "zeta_B": ZETA_B,
+        "zeta_H": ZETA_H,
+        "lambda_s": float(point.lambda_s),
+    }
     return ReferenceBicycle("optimised benchmark", Table(parameters), -1.0)
 
 
@@ -63,9 +68,14 @@ def on_ep_set(name: str, tilt_offset: float) -> ReferenceBicycle:
     # at EP4 both are the same number; the form for EP4 has no pole to cancel
     Fr = float(laws.epset(ZETA_B, ZETA_H, tilt)) if tilt_offset else float(point.Fr)
     parameters = {
-        "Fr": Fr, "mu": MU, "chi_B": float(point.chi_B), "chi_H": 1.0,
-        "zeta_B": ZETA_B, "zeta_H": ZETA_H, "lambda_s": tilt,
-    }  # fmt: skip
+        "Fr": Fr,
+        "mu": MU,
+        "chi_B": float(point.chi_B),
+        "chi_H": 1.0,
+        "zeta_B": ZETA_B,
+        "zeta_H": ZETA_H,
+        "lambda_s": tilt,
+    }
     return ReferenceBicycle(name, Table(parameters), float(point.omega0))
 
 

@@ -46,6 +46,12 @@ def sketch(parameters: Mapping[str, float]) -> Sketch:
     forward = np.array([-axis[1], axis[0]])
     foot = front + np.dot(H - front, axis) * axis
     return Sketch(
-        parameters=Table(p), rear=np.zeros(2), front=front, B=np.array([p["chi_B"], p["zeta_B"]]), H=H, axis=axis,
-        foot=foot, nu_H=float(np.dot(H - foot, forward)),
-    )  # fmt: skip
+        parameters=Table(p),
+        rear=np.zeros(2),
+        front=front,
+        B=np.array([p["chi_B"], p["zeta_B"]]),
+        H=H,
+        axis=axis,
+        foot=foot,
+        nu_H=float(np.dot(H - foot, forward)),
+    )

@@ -110,11 +110,15 @@ def table_1_paths(Fr_max: float = 5.0) -> tuple[UniversalPath, ...]:
     names = {"EP4": r"\mathrm{EP}_4", "2EP2": r"2\mathrm{EP}_2", "CEP2": r"\mathrm{CEP}_2"}
     return tuple(
         universal_path(
-            tms, tms.sets[0], bicycle.parameters, "Fr", values,
+            tms,
+            tms.sets[0],
+            bicycle.parameters,
+            "Fr",
+            values,
             rf"${names[bicycle.name]}$ of Table 1, $\lambda_s = {bicycle.parameters['lambda_s']:.4f}$",
         )
         for bicycle in table_1()
-    )  # fmt: skip
+    )
 
 
 def ep_set(A1: ArrayLike) -> Array:
@@ -163,9 +167,10 @@ def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
         return spire(v * low * m(u), v * low * t(u))
 
     return (
-        face(np.ones_like, lambda a: 2 * a), face(lambda a: -np.ones_like(a), lambda a: 2 * a),
+        face(np.ones_like, lambda a: 2 * a),
+        face(lambda a: -np.ones_like(a), lambda a: 2 * a),
         face(lambda a: 2 * a - 1, lambda a: 2 * np.ones_like(a)),
-    )  # fmt: skip
+    )
 
 
 def _events(chart: Sweep, grid: Array, A: Array) -> list[PathEvent]:

@@ -78,20 +78,33 @@ def draw_distance(data: Sketch, ax: Axes | None = None) -> Axes:
     ax.text(data.H[0] + 0.11 * half, data.H[1], "$H$", fontsize=11, verticalalignment="center")
     label = (data.H + data.foot) / 2
     ax.annotate(
-        rf"$u_H = \nu_H w$" "\n" rf"$\nu_H = {data.nu_H:.4f}$", (label[0], label[1]),
+        rf"$u_H = \nu_H w$" "\n" rf"$\nu_H = {data.nu_H:.4f}$",
+        (label[0], label[1]),
         xytext=(middle[0] + 0.58 * half, middle[1] - 0.1 * half),
-        fontsize=9, horizontalalignment="center", verticalalignment="center",
-        arrowprops={"arrowstyle": "-", "linewidth": 0.6, "shrinkB": 2}, bbox=_BOX,
-    )  # fmt: skip
+        fontsize=9,
+        horizontalalignment="center",
+        verticalalignment="center",
+        arrowprops={"arrowstyle": "-", "linewidth": 0.6, "shrinkB": 2},
+        bbox=_BOX,
+    )
     steer = data.on_axis(0.35 * half)
     ax.text(
-        steer[0] - 0.08 * half, steer[1], "steer axis", color=FRONT_FRAME, fontsize=8.5, horizontalalignment="right",
+        steer[0] - 0.08 * half,
+        steer[1],
+        "steer axis",
+        color=FRONT_FRAME,
+        fontsize=8.5,
+        horizontalalignment="right",
         verticalalignment="center",
-    )  # fmt: skip
+    )
     ax.text(
-        data.front[0] - 0.08 * half, 0.13 * half, "front contact", fontsize=8.5, horizontalalignment="right",
+        data.front[0] - 0.08 * half,
+        0.13 * half,
+        "front contact",
+        fontsize=8.5,
+        horizontalalignment="right",
         verticalalignment="center",
-    )  # fmt: skip
+    )
     ax.set_aspect("equal")
     ax.set_xlim(middle[0] - half, middle[0] + half)
     ax.set_ylim(middle[1] + half, middle[1] - half)
@@ -163,8 +176,13 @@ def _masses(ax: Axes, data: Sketch, radius: float) -> None:
             )
         )
         ax.text(
-            at[0] + 0.055, at[1] - 0.02, rf"$m_{name}$", fontsize=11, zorder=7, verticalalignment="bottom",
-        )  # fmt: skip
+            at[0] + 0.055,
+            at[1] - 0.02,
+            rf"$m_{name}$",
+            fontsize=11,
+            zorder=7,
+            verticalalignment="bottom",
+        )
 
 
 def _dimensions(ax: Axes, data: Sketch) -> None:
@@ -188,9 +206,11 @@ def _dimensions(ax: Axes, data: Sketch) -> None:
 
 def _dimension(ax: Axes, start: Array, end: Array, name: str) -> None:
     ax.annotate(
-        "", tuple(end), tuple(start),
+        "",
+        tuple(end),
+        tuple(start),
         arrowprops={"arrowstyle": "<|-|>,head_width=0.15,head_length=0.35", "shrinkA": 0, "shrinkB": 0, **_THIN},
-    )  # fmt: skip
+    )
     middle = (start + end) / 2
     ax.text(
         middle[0], middle[1], name, fontsize=11, horizontalalignment="center", verticalalignment="center", bbox=_BOX
@@ -212,8 +232,9 @@ def _motion(ax: Axes, data: Sketch, reach: float) -> None:
     big = "-|>,head_width=0.3,head_length=0.6"
     start, level = max(1.0, float(data.B[0]), float(data.H[0])) + 0.08, -reach + 0.03
     for end, begin, colour in (
-        ((start + 0.3, level), (start, level), REAL), ((-0.2, -reach + 0.3), (-0.2, -reach + 0.06), "0.3"),
-    ):  # fmt: skip
+        ((start + 0.3, level), (start, level), REAL),
+        ((-0.2, -reach + 0.3), (-0.2, -reach + 0.06), "0.3"),
+    ):
         ax.annotate("", end, begin, arrowprops={"arrowstyle": big, "linewidth": 1.5, "color": colour})
     ax.text(start + 0.15, level - 0.035, "$v$", fontsize=12, horizontalalignment="center", color=REAL)
     ax.text(-0.17, -reach + 0.17, "$g$", fontsize=12, color="0.3")
@@ -229,10 +250,17 @@ def _turn(ax: Axes, centre: Array, about: Array, name: str, offset: Array) -> No
     path = centre + 0.075 * np.sin(angle)[:, None] * across + 0.028 * np.cos(angle)[:, None] * about
     ax.plot(*path.T, color=HEAVY, linewidth=1.8, zorder=7)
     ax.annotate(
-        "", tuple(path[-1]), tuple(path[-6]), zorder=8,
+        "",
+        tuple(path[-1]),
+        tuple(path[-6]),
+        zorder=8,
         arrowprops={"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": HEAVY, "shrinkA": 0, "shrinkB": 0},
-    )  # fmt: skip
+    )
     ax.text(
-        centre[0] + offset[0], centre[1] + offset[1], name, fontsize=12, horizontalalignment="center",
+        centre[0] + offset[0],
+        centre[1] + offset[1],
+        name,
+        fontsize=12,
+        horizontalalignment="center",
         verticalalignment="center",
-    )  # fmt: skip
+    )

@@ -84,9 +84,12 @@ def domain_curves(ax: Axes, domain: Domain, plane: Plane) -> list[Name]:
         for arc in arcs:
             style, _ = _KINDS.get(arc.kind, _OTHER)
             ax.plot(
-                *(scale.of(arc.points[scale.name]) for scale in plane), color=colour, linewidth=width, linestyle=style,
+                *(scale.of(arc.points[scale.name]) for scale in plane),
+                color=colour,
+                linewidth=width,
+                linestyle=style,
                 path_effects=[withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)],
-            )  # fmt: skip
+            )
     names = [Name(c.name, *(float(s.of(c.parameters[s.name])) for s in plane)) for c in domain.corners]
     for name in names:
         ax.plot([name.x], [name.y], "o", color=MARK, markersize=4, zorder=5)
@@ -123,9 +126,12 @@ def plane_of(chart: Chart) -> Plane:
 
 
 def draw_domain(
-    data: Domain, ax: Axes | None = None, horizontal: str | None = None, vertical: str | None = None,
+    data: Domain,
+    ax: Axes | None = None,
+    horizontal: str | None = None,
+    vertical: str | None = None,
     problem: Problem | None = None,
-) -> Axes:  # fmt: skip
+) -> Axes:
     """Boundaries of stability and of heavy damping, with their corners.
 
     The Axes show a plane of two parameters, by default the first two that vary along the boundaries; in the units of a
@@ -155,7 +161,7 @@ def _in_words(names: list[Name], problem: Problem | None) -> list[Name]:
 
 def draw_chart(
     data: Chart, ax: Axes | None = None, layer: str = "kind", design: Solution | None = None, optimum: bool = True
-) -> Axes:  # fmt: skip
+) -> Axes:
     """A chart with its exact boundaries on top, hatched where a constraint is violated.
 
     The Axes show the plane in the units of the file. Of the abscissa, blue decays and red grows, white is 0, contours
@@ -286,7 +292,15 @@ def _mark(ax: Axes, x: float, y: float, marker: str, label: str) -> list[Artist]
     size = 12 if marker == "*" else 6
     return [
         *ax.plot(
-            [x], [y], marker, color="#F0E442", markeredgecolor=LINE, markersize=size, zorder=6, label=label,
-            linestyle="none", clip_on=False,
+            [x],
+            [y],
+            marker,
+            color="#F0E442",
+            markeredgecolor=LINE,
+            markersize=size,
+            zorder=6,
+            label=label,
+            linestyle="none",
+            clip_on=False,
         )
-    ]  # fmt: skip
+    ]

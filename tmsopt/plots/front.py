@@ -21,13 +21,20 @@ from tmsopt.plots.style import (
     STABLE,
     figure_of,
     on_axes,
-)  # fmt: skip
+)
 from tmsopt.records import Array
 
 _STYLES = {
-    "EP4": (MARK, "D"), "EP3": (MARK, "^"), "2EP2": (REAL, "s"), "EP2": (REAL, "v"), "CEP2": (COMPLEX, "s"),
-    "pair+real": (CRITICAL, "o"), "two pairs": (STABLE, "o"), "pair": (HEAVY, "o"), "real": (CAPSIZE, "o"),
-}  # fmt: skip
+    "EP4": (MARK, "D"),
+    "EP3": (MARK, "^"),
+    "2EP2": (REAL, "s"),
+    "EP2": (REAL, "v"),
+    "CEP2": (COMPLEX, "s"),
+    "pair+real": (CRITICAL, "o"),
+    "two pairs": (STABLE, "o"),
+    "pair": (HEAVY, "o"),
+    "real": (CAPSIZE, "o"),
+}
 """Colour and marker of each structure; others are black crosses."""
 
 
@@ -110,9 +117,15 @@ def _ring_unstable(ax: Axes, front: Front, values: Array) -> None:
     rings = values[[not p.stable for p in front.points], :2]
     if len(rings):
         ax.plot(
-            *rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable",
+            *rings.T,
+            "o",
+            color=LINE,
+            markerfacecolor="none",
+            markersize=8,
+            zorder=2.5,
+            label="not stable",
             linestyle="none",
-        )  # fmt: skip
+        )
 
 
 def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:

@@ -23,23 +23,32 @@ from tmsopt.plots.style import (
     legend_below,
     new_figure,
     on_axes,
-)  # fmt: skip
+)
 from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
 
 _DASHED, _DOTTED = (0, (6, 2)), (0, (4, 2, 1, 2))
 _STYLES: Mapping[str, tuple[str, LineStyleType]] = {
-    "weave": (CRITICAL, "-"), "capsize": (MARK, _DASHED), "castering": (REAL, _DOTTED),
-    "capsize + castering": (COMPLEX, "-"), "second pair": (COMPLEX, _DASHED),
-}  # fmt: skip
+    "weave": (CRITICAL, "-"),
+    "capsize": (MARK, _DASHED),
+    "castering": (REAL, _DOTTED),
+    "capsize + castering": (COMPLEX, "-"),
+    "second pair": (COMPLEX, _DASHED),
+}
 _OTHERS: Sequence[tuple[str, LineStyleType]] = (
-    (CRITICAL, "-"), (MARK, _DASHED), (REAL, _DOTTED), (COMPLEX, "-"), (LINE, _DASHED),
-)  # fmt: skip
+    (CRITICAL, "-"),
+    (MARK, _DASHED),
+    (REAL, _DOTTED),
+    (COMPLEX, "-"),
+    (LINE, _DASHED),
+)
 """Colours and lines of modes: of a bicycle by name, of others in their order at the design."""
 
 _EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
-    "weave": (CRITICAL, "--"), "capsize": (MARK, "-."), "infinity": (CAPSIZE, (0, (1, 1))),
-}  # fmt: skip
+    "weave": (CRITICAL, "--"),
+    "capsize": (MARK, "-."),
+    "infinity": (CAPSIZE, (0, (1, 1))),
+}
 
 _NOTHING = 1e-12  # of the range: less is 0 but for rounding
 
@@ -118,8 +127,9 @@ def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     """Everything but the legend; the names of the modes, to place."""
     scale = scale_over(data.problem, data.over)
     for bands, colour, alpha, words in (
-        (data.stable, STABLE, 0.18, "stable"), (data.heavily_damped, HEAVY, 0.35, "heavily damped"),
-    ):  # fmt: skip
+        (data.stable, STABLE, 0.18, "stable"),
+        (data.heavily_damped, HEAVY, 0.35, "heavily damped"),
+    ):
         for k, ends in enumerate(bands):
             ax.axvspan(*scale.of(ends), color=colour, alpha=alpha, linewidth=0, label=words if k == 0 else None)
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _reached(m, data.design))))
@@ -180,10 +190,16 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     if met:
         places, roots = zip(*met, strict=True)
         ax.plot(
-            scale.of(places), _heights(data, places, roots, part), linestyle="none", marker="o", markersize=4.5,
-            color=LINE, markerfacecolor="white", zorder=4,
+            scale.of(places),
+            _heights(data, places, roots, part),
+            linestyle="none",
+            marker="o",
+            markersize=4.5,
+            color=LINE,
+            markerfacecolor="white",
+            zorder=4,
             label=f"{'eigenfrequencies' if _of_H(data) else 'roots'} meet",
-        )  # fmt: skip
+        )
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
 

@@ -137,11 +137,20 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
     with settled(figure_of(ax)):
         curves = [xy for line in ax.get_lines() for xy in _seen(ax, line.get_xydata())]
         textalloc.allocate(
-            ax, places[:, 0], places[:, 1], [", ".join(words) for _, words in merged], x_scatter=places[:, 0],
-            y_scatter=places[:, 1], x_lines=[xy[:, 0] for xy in curves], y_lines=[xy[:, 1] for xy in curves],
-            textsize=_SIZE, linecolor="0.4", linewidth=0.6, zorder=7,
+            ax,
+            places[:, 0],
+            places[:, 1],
+            [", ".join(words) for _, words in merged],
+            x_scatter=places[:, 0],
+            y_scatter=places[:, 1],
+            x_lines=[xy[:, 0] for xy in curves],
+            y_lines=[xy[:, 1] for xy in curves],
+            textsize=_SIZE,
+            linecolor="0.4",
+            linewidth=0.6,
+            zorder=7,
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
-        )  # fmt: skip
+        )
 
 
 def place_all(found: Sequence[tuple[Axes, Sequence[Name]]]) -> None:

@@ -165,16 +165,24 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
 
 
 def _bars(
-    ax: Axes, names: Sequence[str], lengths: Sequence[float], second: Sequence[bool] | None = None,
+    ax: Axes,
+    names: Sequence[str],
+    lengths: Sequence[float],
+    second: Sequence[bool] | None = None,
     words: tuple[str, str] = ("", ""),
-) -> None:  # fmt: skip
+) -> None:
     """Horizontal bars by name, the first one uppermost; of a second kind hatched, with words for each kind."""
     for kind, (colour, hatch) in enumerate(((CRITICAL, ""), (STABLE, "//"))):
         chosen = [k for k in range(len(names)) if (second[k] if second else False) is bool(kind)]
         if chosen:
             ax.barh(
-                chosen, [lengths[k] for k in chosen], color=colour, hatch=hatch, edgecolor="white", height=0.7,
+                chosen,
+                [lengths[k] for k in chosen],
+                color=colour,
+                hatch=hatch,
+                edgecolor="white",
+                height=0.7,
                 label=words[kind] or None,
-            )  # fmt: skip
+            )
     ax.set_yticks(range(len(names)), names, fontsize=8)
     ax.invert_yaxis()

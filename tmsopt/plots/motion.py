@@ -84,8 +84,14 @@ def _contacts(motion: Simulation) -> Iterator[tuple[str, str]]:
 def _lines(motion: Simulation, ax: Axes, names: list[str], scale: float) -> None:
     for k, name in enumerate(names):
         label = _LATEX.get(name, name)
-        ax.plot(np.asarray(motion["t"]), scale * np.asarray(motion[name]), color=_COLOURS[k % 6], linewidth=1.2,
-                linestyle="-" if k < 6 else "--", label=label)  # fmt: skip
+        ax.plot(
+            np.asarray(motion["t"]),
+            scale * np.asarray(motion[name]),
+            color=_COLOURS[k % 6],
+            linewidth=1.2,
+            linestyle="-" if k < 6 else "--",
+            label=label,
+        )
     ax.axhline(0, color="0.6", linewidth=0.6, zorder=0, label="_0")
     ax.set_xlim(0, motion["t"][-1])
     unit = motion.units.get("t", "")

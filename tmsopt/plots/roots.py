@@ -119,9 +119,15 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
             eps = np.geomspace(1e-16, reach, 2)
             label = rf"{response.parameter}: $\varepsilon^{{{law.branches.exponent}}}$"
             ax.loglog(
-                eps, law.branches.size * eps ** float(law.branches.exponent), color=_COLOURS[k % 5], label=label,
-                linestyle=_STYLES[k % 4], marker="o", markevery=[1], markersize=4,
-            )  # fmt: skip
+                eps,
+                law.branches.size * eps ** float(law.branches.exponent),
+                color=_COLOURS[k % 5],
+                label=label,
+                linestyle=_STYLES[k % 4],
+                marker="o",
+                markevery=[1],
+                markersize=4,
+            )
     farthest = "root" if omega is None else "eigenfrequency"
     ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {farthest}")
     return finished(ax, own)

@@ -43,9 +43,15 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
         text = f"{words.get(event.kind, event.kind)} {x:.4g}"
         left = event.at < (data.lower + high) / 2
         ax.annotate(
-            text, (x, height), xytext=(3 if left else -3, 0), textcoords="offset points", fontsize=8, color=LINE,
-            horizontalalignment="left" if left else "right", verticalalignment="top",
-        )  # fmt: skip
+            text,
+            (x, height),
+            xytext=(3 if left else -3, 0),
+            textcoords="offset points",
+            fontsize=8,
+            color=LINE,
+            horizontalalignment="left" if left else "right",
+            verticalalignment="top",
+        )
     if data.parameter in data.parameters:
         label = f"design at {scale.unit.show(at, 4)}"
         ax.plot([scale.of(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False)

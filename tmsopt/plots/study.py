@@ -55,8 +55,9 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     nominal = solve(problem, throw=False, interruptible=False)
     edges = _edges(values[known])
     for chosen, colour, hatch, label in (
-        (stable & known, STABLE, "", "stable"), (~stable & known, MARK, "//", "not stable"),
-    ):  # fmt: skip
+        (stable & known, STABLE, "", "stable"),
+        (~stable & known, MARK, "//", "not stable"),
+    ):
         if chosen.any():
             ax.hist(
                 values[chosen], edges.tolist(), color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label

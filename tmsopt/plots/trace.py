@@ -13,9 +13,15 @@ from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, fig
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
 COLOURS = {
-    "EP4": MARK, "EP3": MARK, "2EP2": REAL, "CEP2": COMPLEX, "EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE,
+    "EP4": MARK,
+    "EP3": MARK,
+    "2EP2": REAL,
+    "CEP2": COMPLEX,
+    "EP2": LINE,
+    "weave": CRITICAL,
+    "capsize": CAPSIZE,
     "resonance": COMPLEX,
-}  # fmt: skip
+}
 """Colour of each pattern; complex ones are dashed besides."""
 
 _UNLABELLED = ("fold", "constraint", "end")
@@ -23,9 +29,7 @@ _BANDS = {True: 6.0, False: 2.5}
 """Width of the coloured band along what is stable, and what is not."""
 
 
-def draw_trace(
-    data: Trace, ax: Axes | None = None, horizontal: str | None = None, vertical: str | None = None
-) -> Axes:  # fmt: skip
+def draw_trace(data: Trace, ax: Axes | None = None, horizontal: str | None = None, vertical: str | None = None) -> Axes:
     """Branches in a plane of two parameters, by default the first two that vary along them.
 
     The Axes show each branch as a line by its pattern (complex ones dashed, dotted where a constraint is violated) on a
@@ -54,9 +58,13 @@ def draw_trace(
 
 
 def draw_branch(
-    ax: Axes, branch: Branch, plane: tuple[AxisScale, AxisScale], width: float = 1.4, tint: str | None = None,
+    ax: Axes,
+    branch: Branch,
+    plane: tuple[AxisScale, AxisScale],
+    width: float = 1.4,
+    tint: str | None = None,
     model: Model = tms,
-) -> None:  # fmt: skip
+) -> None:
     """One branch as lines, cut where its pattern, its stability or a constraint changes; pale where unstable.
 
     Args:
@@ -71,10 +79,14 @@ def draw_branch(
         first = start - 1 if start and start - 1 in events else start
         end = stop if stop - 1 in events else stop + 1  # no gap: an event belongs to both of its sides
         ax.plot(
-            x[first:end], y[first:end], color=tint or colour(kind), linewidth=width if satisfied else width / 2,
-            linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":", alpha=1.0 if stable else 0.35,
+            x[first:end],
+            y[first:end],
+            color=tint or colour(kind),
+            linewidth=width if satisfied else width / 2,
+            linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":",
+            alpha=1.0 if stable else 0.35,
             label=_label(ax, ", ".join([in_words_of(model, kind), *["unstable"] * (not stable), *said[satisfied]])),
-        )  # fmt: skip
+        )
         start = stop
 
 

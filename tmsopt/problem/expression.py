@@ -16,9 +16,15 @@ from tmsopt.models.expression import (
 from tmsopt.problem.units import dimensions
 
 __all__ = [
-    "COMPARISONS", "Expression", "ExpressionError", "UnknownName", "dimension", "parse_comparison", "parse_value",
+    "COMPARISONS",
+    "Expression",
+    "ExpressionError",
+    "UnknownName",
+    "dimension",
+    "parse_comparison",
+    "parse_value",
     "written_sides",
-]  # fmt: skip
+]
 
 _DIMENSIONS = Arithmetic(dimensions.FUNCTIONS, lambda x: x, {**BINARY, ast.Pow: dimensions.power}, dimensions.Dimension)
 

@@ -198,9 +198,12 @@ def problem_from_tables(data: Mapping[str, Any], title: str) -> tuple[list[Fault
                 tables["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
         try:
             problem = Problem(
-                model=model, constraints=parsed.constraints, title=parsed.title.strip() or title, **tables,
+                model=model,
+                constraints=parsed.constraints,
+                title=parsed.title.strip() or title,
+                **tables,
                 **vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()},
-            )  # fmt: skip
+            )
         except InputError as error:
             reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
             reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
@@ -291,8 +294,7 @@ def _tables(written: _File) -> dict[str, Any]:
         "fixed": {n: v for n, v in written.parameters.items() if n not in free},
         "free": {n: (v.min, v.max) for n, v in free.items()},
         "start": {n: v.start for n, v in free.items() if v.start is not None},
-        "scenarios": {
-            n: Band(*ends(s), s.points) if isinstance(s, _Band) else s for n, s in written.scenarios.items()
-        },
-        "tolerances": written.tolerances, "weights": written.weights,
-    }  # fmt: skip
+        "scenarios": {n: Band(*ends(s), s.points) if isinstance(s, _Band) else s for n, s in written.scenarios.items()},
+        "tolerances": written.tolerances,
+        "weights": written.weights,
+    }

@@ -13,8 +13,10 @@ from tmsopt.models.stated.user_defined import square
 
 _MATRICES = ("M", "D", "K", "A", "B", "C", "G", "H")
 KEYS = {
-    "name": "One line for reports.", "M": "Rows of the mass matrix of M q″ + D q′ + K q = 0, numbers or expressions.",
-    "D": "Rows of its damping matrix; left out, it is 0.", "K": "Rows of its stiffness matrix.",
+    "name": "One line for reports.",
+    "M": "Rows of the mass matrix of M q″ + D q′ + K q = 0, numbers or expressions.",
+    "D": "Rows of its damping matrix; left out, it is 0.",
+    "K": "Rows of its stiffness matrix.",
     "A": "Rows of the matrix of x′ = A x, in place of M, D and K.",
     "B": "Rows of the matrix of a controller's inputs u, of M q″ + D q′ + K q = B u or x′ = A x + B u.",
     "C": "Rows of what it measures, y = C x of the states, or of q and then q′; left out, all of them.",
@@ -22,7 +24,7 @@ KEYS = {
     "H": "Rows of the complex matrix of i psi' = H psi, such as 'w - 1j*g', in place of M, D, K and A.",
     "coefficients": "Of the characteristic polynomial, descending, in place of matrices.",
     "quantities": "Names for more expressions, to be used in objectives and constraints.",
-}  # fmt: skip
+}
 """Keys of the table → meaning."""
 
 _DESCENDING = "accepted: expressions in brackets, by descending powers of s, such as ['1', 'c', 'k']"

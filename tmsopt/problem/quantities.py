@@ -168,12 +168,15 @@ def _array_frequency(values: Mapping[str, Any]) -> Array:
 
 
 _ARRAY_FORMULAS = (
-    lambda values: _array_motion(values)[0], lambda values: _array_motion(values)[1], _array_frequency,
-)  # fmt: skip
+    lambda values: _array_motion(values)[0],
+    lambda values: _array_motion(values)[1],
+    _array_frequency,
+)
 
 ARRAY_ROOT_QUANTITIES = (
-    *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)), NO_RADIUS,
-)  # fmt: skip
+    *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)),
+    NO_RADIUS,
+)
 """The same for arrays of designs, by numeric roots."""
 
 

@@ -232,25 +232,34 @@ class Solution(Printable):
         text = problem.minimize or problem.maximize or problem.locate or "abscissa"
         cases = {"worst_case": self.worst, "least_damped_case": self.least_damped, "fastest_case": self.fastest}
         optional = {
-            **{name: case and plain(case, "at offset") for name, case in cases.items()}, **plain(self, "cover"),
-            "sides": plain(self.sides, digits=SIDE_DIGITS), **plain(self, "relaxation need interrupted si"),
-        }  # fmt: skip
+            **{name: case and plain(case, "at offset") for name, case in cases.items()},
+            **plain(self, "cover"),
+            "sides": plain(self.sides, digits=SIDE_DIGITS),
+            **plain(self, "relaxation need interrupted si"),
+        }
         return {
-            **problem.heading, "status": self.status,
-            "objective": {"sense": problem.sense, "expression": text, **plain(self, "value")} | (
-                {"locate": problem.locate} if problem.locate else {}
-            ),
-            "parameters": plain(self.parameters), "units": self.units,
-            **plain(self, "abscissa abscissa_realised stable any_stable"), **self.stability.to_json(),
+            **problem.heading,
+            "status": self.status,
+            "objective": {"sense": problem.sense, "expression": text, **plain(self, "value")}
+            | ({"locate": problem.locate} if problem.locate else {}),
+            "parameters": plain(self.parameters),
+            "units": self.units,
+            **plain(self, "abscissa abscissa_realised stable any_stable"),
+            **self.stability.to_json(),
             **({"verdict_is_exact": self.edge_is_exact} if self.stability.on_edge else {}),
             **({"multiplicity_is_exact": False} if self.multiple_as_rounded else {}),
-            **joined(self), **plain(self, "structure"),
-            "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
+            **joined(self),
+            **plain(self, "structure"),
+            "active": plain(self.active, digits=GAIN_DIGITS),
+            "violations": plain(self.violations, digits=GAIN_DIGITS),
             **({"missed_as_stored": plain(self.missed, digits=GAIN_DIGITS)} if self.missed else {}),
-            **plain(self, "bound"), "starts": plain(self.starts, "tried converged at_best expected_unseen"),
-            "looked": self.starts.looked, "seconds": round(self.seconds, 4),
+            **plain(self, "bound"),
+            "starts": plain(self.starts, "tried converged at_best expected_unseen"),
+            "looked": self.starts.looked,
+            "seconds": round(self.seconds, 4),
             **plain(self, "quantities dimensionless formulation"),
-            "freedom": plain(self.freedom, "free conditions count kind"), **plain(self, "branches notes"),
+            "freedom": plain(self.freedom, "free conditions count kind"),
+            **plain(self, "branches notes"),
             **{name: value for name, value in optional.items() if value},
             **(plain(self, "inertia_margin") if self.problem.model.omits and self.problem.parameter_set.rate else {}),
-        }  # fmt: skip
+        }

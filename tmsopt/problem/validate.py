@@ -38,10 +38,16 @@ def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
 
 
 _TABLES = {
-    "fixed": "{'mu': 0.1}", "free": "{'Fr': (0.1, 5)}", "constraints": "{'trail': 'nu_H >= 0.02'}",
-    "start": "{'Fr': 2}", "scenarios": "{'v': Band(2, 6)}", "tolerances": "{'lambda_s': 0.01}", "weights": "{'v': 1}",
-    "units": "{'v': 'km/h'}", "written": "{'v': {2.6666666666666665: '8/3'}}",
-}  # fmt: skip
+    "fixed": "{'mu': 0.1}",
+    "free": "{'Fr': (0.1, 5)}",
+    "constraints": "{'trail': 'nu_H >= 0.02'}",
+    "start": "{'Fr': 2}",
+    "scenarios": "{'v': Band(2, 6)}",
+    "tolerances": "{'lambda_s': 0.01}",
+    "weights": "{'v': 1}",
+    "units": "{'v': 'km/h'}",
+    "written": "{'v': {2.6666666666666665: '8/3'}}",
+}
 """Arguments that are tables, each with an example."""
 
 

@@ -48,9 +48,14 @@ def _displacement(weights: Mapping[str, float], names: Sequence[str], own: Value
 
 
 def lift_feet(
-    build: Rows, radius: Any, feet: Feet, edges: Mapping[int, str], given: Any,
-    known: Callable[[Values], list[float]], weights: Mapping[str, float],
-) -> AddedVariable:  # fmt: skip
+    build: Rows,
+    radius: Any,
+    feet: Feet,
+    edges: Mapping[int, str],
+    given: Any,
+    known: Callable[[Values], list[float]],
+    weights: Mapping[str, float],
+) -> AddedVariable:
     """The conditions of a foot in some cases, and radius² ≤ u·u.
 
     Args:
@@ -81,9 +86,12 @@ def _on_edge(edge: str, a: Sequence[Any], w: Any = None) -> list[Any]:
 
 
 def _guess(
-    feet: Sequence[_Foot], known: Callable[[Values], list[float]], weights: Mapping[str, float],
-    values: Sequence[Values], z: Sequence[Roots],
-) -> list[list[float]]:  # fmt: skip
+    feet: Sequence[_Foot],
+    known: Callable[[Values], list[float]],
+    weights: Mapping[str, float],
+    values: Sequence[Values],
+    z: Sequence[Roots],
+) -> list[list[float]]:
     """√w of the pair next to the axis, and multipliers by least squares."""
     found: list[float] = []
     for foot in feet:

@@ -46,9 +46,13 @@ _LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 
 def formulate(
-    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
-    settings: Mapping[str, Any] | None = None, lead: int = 0,
-) -> NLP:  # fmt: skip
+    problem: Problem,
+    cases: Sequence[Case] = (),
+    elastic: bool = False,
+    damping_ratio: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+    lead: int = 0,
+) -> NLP:
     """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``; its kinks as variables.
 
     Args:
@@ -68,9 +72,13 @@ def formulate(
 
 
 def abscissa(
-    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
-    settings: Mapping[str, Any] | None = None, lead: int = 0,
-) -> NLP:  # fmt: skip
+    problem: Problem,
+    cases: Sequence[Case] = (),
+    elastic: bool = False,
+    damping_ratio: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+    lead: int = 0,
+) -> NLP:
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
     build = Builder(problem, cases, settings=settings, lead=lead)
     if damping_ratio == 1 or (damping_ratio is None and not elastic and demands_heavy_damping(problem)):
@@ -137,9 +145,13 @@ class Builder:
     """
 
     def __init__(
-        self, problem: Problem, cases: Sequence[Case], lifts: Mapping[str, Lifting] | None = None,
-        settings: Mapping[str, Any] | None = None, lead: int = 0,
-    ) -> None:  # fmt: skip
+        self,
+        problem: Problem,
+        cases: Sequence[Case],
+        lifts: Mapping[str, Lifting] | None = None,
+        settings: Mapping[str, Any] | None = None,
+        lead: int = 0,
+    ) -> None:
         self.problem, self.lead = problem, lead
         self.settings = dict(settings or {})
         self.lifting = _LIFTED if lifts is None else lifts
@@ -343,8 +355,10 @@ class Builder:
 
 
 _LIFTED: Mapping[str, Lifting] = {
-    "abscissa": lift_abscissa, "damping_ratio": lift_damping_ratio, ANGULAR_FREQUENCY: lift_angular_frequency,
-}  # fmt: skip
+    "abscissa": lift_abscissa,
+    "damping_ratio": lift_damping_ratio,
+    ANGULAR_FREQUENCY: lift_angular_frequency,
+}
 
 
 def _known(problem: Problem, settings: Sequence[str], values: Values) -> list[float]:

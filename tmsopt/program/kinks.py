@@ -152,11 +152,15 @@ class _Unfolding:
 
 
 _POLES: Mapping[int, Callable[..., tuple[Any, Any]]] = {
-    ca.OP_DIV: lambda a, b: (a, b), ca.OP_INV: lambda b: (ca.SX(1), b), ca.OP_TAN: lambda e: (ca.sin(e), ca.cos(e)),
-}  # fmt: skip
+    ca.OP_DIV: lambda a, b: (a, b),
+    ca.OP_INV: lambda b: (ca.SX(1), b),
+    ca.OP_TAN: lambda e: (ca.sin(e), ca.cos(e)),
+}
 _PIECES: Mapping[int, Callable[..., Sequence[Any]]] = {
-    ca.OP_FABS: lambda e: (e, -e), ca.OP_FMAX: lambda a, b: (a, b), ca.OP_FMIN: lambda a, b: (-a, -b),
-}  # fmt: skip
+    ca.OP_FABS: lambda e: (e, -e),
+    ca.OP_FMAX: lambda a, b: (a, b),
+    ca.OP_FMIN: lambda a, b: (-a, -b),
+}
 _OPERATIONS = {getattr(ca, name) for name in dir(ca) if name.startswith("OP_")}
 
 

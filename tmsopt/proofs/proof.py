@@ -182,9 +182,14 @@ def prove(
 
 
 def prove_design(
-    problem: Problem, parameters: Mapping[str, float], structure: str, digits: int = DIGITS,
-    exact: Mapping[str, Any] | None = None, case: Case | None = None, roots: Sequence[Root] = (),
-) -> Proof:  # fmt: skip
+    problem: Problem,
+    parameters: Mapping[str, float],
+    structure: str,
+    digits: int = DIGITS,
+    exact: Mapping[str, Any] | None = None,
+    case: Case | None = None,
+    roots: Sequence[Root] = (),
+) -> Proof:
     """Prove that the pattern which a problem locates, or which a design's roots show, exists; and what follows.
 
     Args:
@@ -218,9 +223,13 @@ def _asked(problem: Problem, case: Case | None) -> Problem:
 
 
 def _proved(
-    problem: Problem, design: Written, varied: Mapping[str, float], structure: str, patterns: Sequence[Pattern],
+    problem: Problem,
+    design: Written,
+    varied: Mapping[str, float],
+    structure: str,
+    patterns: Sequence[Pattern],
     digits: int,
-) -> Proof:  # fmt: skip
+) -> Proof:
     """The first proof that succeeds, or why none does with what holds for the design as stored."""
     reasons: list[str] = []
     for pattern in patterns or ([] if structure in _SIMPLE else _decided(problem, design)):
@@ -282,9 +291,15 @@ def _of_simple(problem: Problem, structure: str, found: Existing) -> list[str]:
 
 
 def _assembled(
-    problem: Problem, design: Written, name: str, pattern: Pattern | None, found: Existing, digits: int,
-    reasons: Sequence[str] = (), stored: bool = False,
-) -> Proof:  # fmt: skip
+    problem: Problem,
+    design: Written,
+    name: str,
+    pattern: Pattern | None,
+    found: Existing,
+    digits: int,
+    reasons: Sequence[str] = (),
+    stored: bool = False,
+) -> Proof:
     numbers = {
         n: number(ball, digits)
         if n in (*found.moved, *design.tangents) or (known := design.values[n].fraction) is None

@@ -47,8 +47,11 @@ def _cause(motion: "Simulation") -> str:
     asked, time = motion.disturbance, motion.units.get("t", "")
     torque = "N m" if time == "s" else "m_B g w"
     said = [f"{_named(name)} = {_with(motion, name, value)}" for name, value in asked.start.items()]
-    said += [f"an impulse of {n} torque of {x:.6g} {torque} {time}" for n, x in
-             (("steer", asked.push), ("lean", asked.lean_push)) if x]  # fmt: skip
+    said += [
+        f"an impulse of {n} torque of {x:.6g} {torque} {time}"
+        for n, x in (("steer", asked.push), ("lean", asked.lean_push))
+        if x
+    ]
     said = [f"from {' and '.join(said)}"] if said else ["from rest"]
     if asked.noise:
         root = "√s" if time == "s" else "(w/g)^(1/4)"

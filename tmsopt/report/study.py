@@ -105,13 +105,16 @@ def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) ->
 
     found = (row.parameters, row.reports) if known else ({}, {})
     return (
-        str(row.number), yes_no(row.stable) if known else "", *(shown(n, row.varied) for n in study.columns),
+        str(row.number),
+        yes_no(row.stable) if known else "",
+        *(shown(n, row.varied) for n in study.columns),
         status_text(problem, row.status),
         *(shown(n, {n: row.objective} if known else {}) for n in asked),
         shown("abscissa", {"abscissa": row.abscissa} if known else {}),
         row.structure if known else "",
-        *(shown(n, found[0]) for n in free), *(shown(n, found[1]) for n in _reports(study)),
-    )  # fmt: skip
+        *(shown(n, found[0]) for n in free),
+        *(shown(n, found[1]) for n in _reports(study)),
+    )
 
 
 def _facts(study: Study, found: Summary) -> list[str]:

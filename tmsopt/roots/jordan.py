@@ -91,8 +91,12 @@ def _nullity(values: Array, least: int, most: int, threshold: float) -> int:
 
 
 def _partial(
-    blocks: Sequence[Complex], n: int, multiplicity: int, geometric: int, threshold: float,
-) -> tuple[int, ...]:  # fmt: skip
+    blocks: Sequence[Complex],
+    n: int,
+    multiplicity: int,
+    geometric: int,
+    threshold: float,
+) -> tuple[int, ...]:
     """Lengths of the chains, from how many are at least 1, 2 … long."""
     if geometric == 1:
         return (multiplicity,)

@@ -114,9 +114,7 @@ class Every(Tabular):
         for solution, proved in zip(found["solutions"], self._known(), strict=True):
             solution["proved"] = proved
         known = self.completeness
-        return found | {
-            "complete": self.complete, "undecided": len(known.undecided) if known else None
-        }  # fmt: skip
+        return found | {"complete": self.complete, "undecided": len(known.undecided) if known else None}
 
 
 @documents_options(Asked, _DEFAULTS)

@@ -89,10 +89,14 @@ def solve(
 
 
 def solve_any_status(
-    design: Given, options: Options = DEFAULTS, family: Family | None = None,
-    extra_starts: Sequence[Mapping[str, float]] = (), without_sample: bool = False, without: Collection[str] = (),
+    design: Given,
+    options: Options = DEFAULTS,
+    family: Family | None = None,
+    extra_starts: Sequence[Mapping[str, float]] = (),
+    without_sample: bool = False,
+    without: Collection[str] = (),
     bound: bool = True,
-) -> Solution:  # fmt: skip
+) -> Solution:
     """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status.
 
     Args:
@@ -228,7 +232,7 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
 
 def _led(
     solution: Solution, design: Mapping[str, float], words: str, options: Options, family: Family | None
-) -> Solution:  # fmt: skip
+) -> Solution:
     """Where a design leads that the search has missed, if that is better."""
     problem = solution.problem
     few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
@@ -289,9 +293,13 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Outcome
 
 
 def _assembled(
-    problem: Problem, finding: Outcome, notes: tuple[str, ...], sides: dict[str, float], began: float,
+    problem: Problem,
+    finding: Outcome,
+    notes: tuple[str, ...],
+    sides: dict[str, float],
+    began: float,
     bound: bool = True,
-) -> Solution:  # fmt: skip
+) -> Solution:
     parameters, checked, lost = held(problem, finding.parameters, finding.checked, finding.cases)
     finding = replace(finding, parameters=parameters, checked=checked)
     numbers = certified_numbers(problem, finding.parameters, checked, finding.cases)

@@ -50,9 +50,12 @@ class Family:
     """
 
     def __init__(
-        self, varied: Collection[str] = (), known: SampleCache | None = None, name: Hashable = None,
+        self,
+        varied: Collection[str] = (),
+        known: SampleCache | None = None,
+        name: Hashable = None,
         box: Mapping[str, tuple[float, float]] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.varied, self._known, self._name, self._box = tuple(varied), known, name, box
         self._memories: OrderedDict[Hashable, Remembered] = OrderedDict()
         self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
@@ -228,9 +231,12 @@ class Workspace:
 
 
 def workspace(
-    problem: Problem, options: Options = DEFAULTS, family: Family | None = None,
-    extra_starts: Sequence[Mapping[str, float]] = (), without_sample: bool = False,
-) -> Workspace:  # fmt: skip
+    problem: Problem,
+    options: Options = DEFAULTS,
+    family: Family | None = None,
+    extra_starts: Sequence[Mapping[str, float]] = (),
+    without_sample: bool = False,
+) -> Workspace:
     """The workspace of a problem in its whole box."""
     return Workspace(
         problem, problem, options, family or Family(), extra_starts=tuple(extra_starts), without_sample=without_sample

@@ -316,12 +316,18 @@ _OWN = {"rows": ("latin_hypercube", "sobol", "monte_carlo"), "csv": ("csv",), "d
 _ACCEPTED = {
     "title": "a text in quotes",
     "problem": "the name of a problem file in quotes, or a table [problem] with [problem.parameters] and so on",
-    "study": "a table", "vary": "a table", "tolerances": "a number, or a text with a unit such as '5 mm'",
-    "method": f"one of {' '.join(METHODS)}", "rows": "a whole number", "csv": "the name of a CSV file in quotes",
-    "distribution": f"one of {' '.join(DISTRIBUTIONS)}", "seed": "a whole number, 0 or more",
-    "starts": "a whole number, 1 or more", "warm": "true or false",
+    "study": "a table",
+    "vary": "a table",
+    "tolerances": "a number, or a text with a unit such as '5 mm'",
+    "method": f"one of {' '.join(METHODS)}",
+    "rows": "a whole number",
+    "csv": "the name of a CSV file in quotes",
+    "distribution": f"one of {' '.join(DISTRIBUTIONS)}",
+    "seed": "a whole number, 0 or more",
+    "starts": "a whole number, 1 or more",
+    "warm": "true or false",
     "report": "a list of expressions, such as ['nu_H', '2*Fr_c']",
-}  # fmt: skip
+}
 
 
 class _Options(Section):
@@ -426,10 +432,17 @@ def _study(page: Page, written: _StudyFile, problem: Problem, title: str, faults
         raise page.error(faults)
     try:
         return Study(
-            problem=problem, columns=found.columns, title=title, seed=options.seed, starts=options.starts,
-            warm=options.warm, report=options.report, grid_shape=found.grid_shape, method=options.method,
+            problem=problem,
+            columns=found.columns,
+            title=title,
+            seed=options.seed,
+            starts=options.starts,
+            warm=options.warm,
+            report=options.report,
+            grid_shape=found.grid_shape,
+            method=options.method,
             notes=found.notes,
-        )  # fmt: skip
+        )
     except InputError as error:
         columns = {f.key[:1]: ("vary", *f.key[1:]) for f in error.faults if f.key[:1] == ("columns",)}
         raise page.error([replace(f, key=columns.get(f.key[:1], f.key)) for f in error.faults]) from None
@@ -533,10 +546,15 @@ def _sampling(page: Page, written: _StudyFile, problem: Problem, title: str, fau
         raise page.error(faults)
     try:
         return Sampling(
-            problem=problem, rows=options.rows or 0, seed=options.seed,
-            distribution=options.distribution or DISTRIBUTIONS[0], tolerances=tolerances, title=title,
-            starts=options.starts, report=options.report,
-        )  # fmt: skip
+            problem=problem,
+            rows=options.rows or 0,
+            seed=options.seed,
+            distribution=options.distribution or DISTRIBUTIONS[0],
+            tolerances=tolerances,
+            title=title,
+            starts=options.starts,
+            report=options.report,
+        )
     except InputError as error:
         raise page.error(error.faults) from None
 

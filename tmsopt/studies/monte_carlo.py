@@ -65,8 +65,9 @@ class Sampling:
         object.__setattr__(self, "problem", problem)
         found = [*question_faults(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
         found += [
-            *common_faults(problem, self.seed, self.starts, self.report), *_draw_faults(self.rows, self.distribution),
-        ]  # fmt: skip
+            *common_faults(problem, self.seed, self.starts, self.report),
+            *_draw_faults(self.rows, self.distribution),
+        ]
         found += text_faults(self.title, "title")
         if found:
             raise InputError(found)
@@ -85,16 +86,27 @@ def planned(asked: Study | Sampling, progress: Listener | None = None) -> Study:
         return asked
     design = solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False)
     return monte_carlo(
-        design, asked.rows, asked.seed, asked.distribution, asked.tolerances or None, title=asked.title,
+        design,
+        asked.rows,
+        asked.seed,
+        asked.distribution,
+        asked.tolerances or None,
+        title=asked.title,
         report=asked.report,
-    )  # fmt: skip
+    )
 
 
 def monte_carlo(
-    design: Given, rows: int, seed: int = 0, distribution: str = "uniform",
-    tolerances: Mapping[str, float] | None = None, *, title: str = "", report: Sequence[str] = (),
+    design: Given,
+    rows: int,
+    seed: int = 0,
+    distribution: str = "uniform",
+    tolerances: Mapping[str, float] | None = None,
+    *,
+    title: str = "",
+    report: Sequence[str] = (),
     progress: Listener | None = None,
-) -> Study:  # fmt: skip
+) -> Study:
     """The study of `rows` designs drawn around one, in which nothing is free.
 
     Each parameter with a tolerance is drawn on its own; the others stay as they are. Inequalities and scenarios stay,
@@ -127,9 +139,15 @@ def monte_carlo(
 
 
 def around(
-    problem: Problem, design: Mapping[str, float], rows: int, seed: int, distribution: str,
-    stated: Mapping[str, float], title: str, report: Sequence[str],
-) -> Study:  # fmt: skip
+    problem: Problem,
+    design: Mapping[str, float],
+    rows: int,
+    seed: int,
+    distribution: str,
+    stated: Mapping[str, float],
+    title: str,
+    report: Sequence[str],
+) -> Study:
     """The same around any design of a problem.
 
     Raises:
@@ -145,9 +163,14 @@ def around(
         for (name, tolerance), error in zip(stated.items(), errors, strict=True)
     }
     return Study(
-        problem=drawn, columns=columns, title=title or problem.title, seed=seed, report=report,
-        method="monte_carlo", notes=notes,
-    )  # fmt: skip
+        problem=drawn,
+        columns=columns,
+        title=title or problem.title,
+        seed=seed,
+        report=report,
+        method="monte_carlo",
+        notes=notes,
+    )
 
 
 def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None:
@@ -181,9 +204,14 @@ def _as_built(problem: Problem, design: Mapping[str, float]) -> tuple[Problem, t
     left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
     fixed = replace(
-        problem, fixed=dict(design), free={}, start={}, tolerances={}, locate=None,
+        problem,
+        fixed=dict(design),
+        free={},
+        start={},
+        tolerances={},
+        locate=None,
         constraints={n: text for n, text in problem.constraints.items() if n not in equal},
-    )  # fmt: skip
+    )
     return fixed, notes
 
 

@@ -73,11 +73,14 @@ def _part(data: bytes) -> Part:
         wrong |= name.startswith("violation.") & ~np.isnan(at[name])
     method = np.where(np.isfinite(at["bound"]), 1 + (at.pop("by_relation") > 0), 0)
     plain = {
-        "number": np.frombuffer(rest, "<i8", count), "status": np.where(wrong, "infeasible", "optimal").astype(object),
-        "abscissa_realised": at["abscissa"], "structure": _STRUCTURES[at.pop("oscillates").astype(int)],
-        "method": _METHODS[method], "seconds": np.full(count, float(head["seconds"])),
+        "number": np.frombuffer(rest, "<i8", count),
+        "status": np.where(wrong, "infeasible", "optimal").astype(object),
+        "abscissa_realised": at["abscissa"],
+        "structure": _STRUCTURES[at.pop("oscillates").astype(int)],
+        "method": _METHODS[method],
+        "seconds": np.full(count, float(head["seconds"])),
         "host": np.full(count, head["host"], dtype=object),
-    }  # fmt: skip
+    }
     some = {name: values for name, values in at.items() if not name.startswith("varied.")}
     part = {name: full(values) for name, values in (some | plain).items()}
     return part | {n: PartialColumn(v, ~np.isnan(v)) for n, v in some.items() if n.startswith(("law.", "violation."))}

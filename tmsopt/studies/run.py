@@ -123,10 +123,15 @@ class Results(Printable):
 
 
 def run_study(
-    study: Study | Sampling | str | PathLike[str], store: str | PathLike[str] | None = None, *,
-    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, progress: Listener | None = None,
+    study: Study | Sampling | str | PathLike[str],
+    store: str | PathLike[str] | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    fresh: bool = False,
+    progress: Listener | None = None,
     note: Note = silent,
-) -> Results:  # fmt: skip
+) -> Results:
     """Solve every row of a study that its store does not have yet.
 
     The rows are the same whoever solves them and in whatever order.
@@ -218,18 +223,28 @@ def _faults(study: object, workers: object, progress: object) -> Iterator[Fault]
 
 
 def fill(
-    study: Study, store: Store, *, workers: int | None = None, scheduler: str | None = None,
-    progress: Listener | None = None, note: Note = silent,
-) -> tuple[int, float, str]:  # fmt: skip
+    study: Study,
+    store: Store,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Listener | None = None,
+    note: Note = silent,
+) -> tuple[int, float, str]:
     """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
     made, seconds, engine = _carried_out(study, _held(study, store), workers, scheduler, note, progress, store)
     return _count(made), seconds, engine
 
 
 def _carried_out(
-    study: Study, there: Sequence[Part], workers: int | None, scheduler: str | None, note: Note,
-    progress: Listener | None, store: Store | None = None,
-) -> tuple[list[Part], float, str]:  # fmt: skip
+    study: Study,
+    there: Sequence[Part],
+    workers: int | None,
+    scheduler: str | None,
+    note: Note,
+    progress: Listener | None,
+    store: Store | None = None,
+) -> tuple[list[Part], float, str]:
     """The rows that are not there, in how many seconds, and by which engine; kept in a store as they come."""
     began, made, engine, steps = time.perf_counter(), list[Part](), "", start_steps(progress, _WHAT, "row")
     lacks = np.ones(len(study), dtype=bool)

@@ -137,23 +137,42 @@ class Solver:
 
     def _unsolved(self, number: int, status: str, cause: str, began: float | None = None) -> Row:
         return Row(
-            number=number, seed=self.study.seed_of(number), varied=self.study.varied(number), status=status,
-            cause=cause, seconds=0.0 if began is None else time.perf_counter() - began, host=platform.node(),
-        )  # fmt: skip
+            number=number,
+            seed=self.study.seed_of(number),
+            varied=self.study.varied(number),
+            status=status,
+            cause=cause,
+            seconds=0.0 if began is None else time.perf_counter() - began,
+            host=platform.node(),
+        )
 
     def _solved(self, number: int, solution: Solution, warm: bool) -> Row:
         problem, bound = solution.problem, solution.bound
         values = problem.values(solution.parameters)
         reports = {text: float(problem.read(text)(values)) for text in self.study.report}
         return Row(
-            number=number, seed=self.study.seed_of(number), varied=self.study.varied(number), status=solution.status,
-            cause=_cause(solution), objective=solution.value, abscissa=solution.abscissa,
-            abscissa_realised=solution.abscissa_realised, damping_ratio=solution.quantities["damping_ratio"],
+            number=number,
+            seed=self.study.seed_of(number),
+            varied=self.study.varied(number),
+            status=solution.status,
+            cause=_cause(solution),
+            objective=solution.value,
+            abscissa=solution.abscissa,
+            abscissa_realised=solution.abscissa_realised,
+            damping_ratio=solution.quantities["damping_ratio"],
             structure=solution.structure,
-            parameters=solution.parameters, reports=Table(reports), bound=bound.value, gap=bound.gap,
-            proven=bound.proven, method=bound.method, laws=Table(_laws(solution)), violations=solution.violations,
-            starts=solution.starts.tried, warm=warm, host=platform.node(),
-        )  # fmt: skip
+            parameters=solution.parameters,
+            reports=Table(reports),
+            bound=bound.value,
+            gap=bound.gap,
+            proven=bound.proven,
+            method=bound.method,
+            laws=Table(_laws(solution)),
+            violations=solution.violations,
+            starts=solution.starts.tried,
+            warm=warm,
+            host=platform.node(),
+        )
 
 
 @cache
@@ -178,9 +197,10 @@ def _cause(solution: Solution) -> str:
     violated = amounts_text(solution.problem, solution.violations)
     conflict = solution.relaxation.conflict if solution.relaxation else ()
     parts = [
-        f"violated: {violated}" if violated else "", f"in conflict: {', '.join(conflict)}" if conflict else "",
+        f"violated: {violated}" if violated else "",
+        f"in conflict: {', '.join(conflict)}" if conflict else "",
         *solution.notes,
-    ]  # fmt: skip
+    ]
     return "; ".join(part for part in parts if part)
 
 
@@ -232,11 +252,17 @@ def _part(numbers: NDArray[np.int64], found: Verdicts, seconds: float) -> Part:
     bound, abscissa = found.bound[certain], full(found.abscissa[certain])
     method = np.where(np.isfinite(bound), 1 + found.by_relation[certain], 0)
     plain = {
-        "number": numbers, "status": _STATUS[wrong.astype(int)], "objective": found.objective[certain],
-        "damping_ratio": found.damping_ratio[certain], "structure": _STRUCTURES[found.oscillates[certain].astype(int)],
-        "bound": bound, "gap": found.gap[certain], "method": _METHODS[method], "seconds": np.full(count, seconds),
+        "number": numbers,
+        "status": _STATUS[wrong.astype(int)],
+        "objective": found.objective[certain],
+        "damping_ratio": found.damping_ratio[certain],
+        "structure": _STRUCTURES[found.oscillates[certain].astype(int)],
+        "bound": bound,
+        "gap": found.gap[certain],
+        "method": _METHODS[method],
+        "seconds": np.full(count, seconds),
         "host": np.full(count, platform.node(), dtype=object),
-    }  # fmt: skip
+    }
     part = {name: full(values) for name, values in plain.items()} | {
         "abscissa": abscissa,
         "abscissa_realised": abscissa,

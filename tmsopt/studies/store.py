@@ -340,9 +340,13 @@ def _opened(path: Path, study: Study, fresh: bool, schema: int, lock: FileLock) 
     if not schema:
         plain, kept = _definition_of(study)
         about = {
-            "definition": json.dumps(plain), "seed": json.dumps(plain.get("seed")), "created": _now(),
-            "host": platform.node(), "platform": platform.platform(), "versions": json.dumps(today),
-        }  # fmt: skip
+            "definition": json.dumps(plain),
+            "seed": json.dumps(plain.get("seed")),
+            "created": _now(),
+            "host": platform.node(),
+            "platform": platform.platform(),
+            "versions": json.dumps(today),
+        }
         if len(about["definition"]) > files.LARGEST_JSON:
             message = f"takes more than {files.LARGEST_JSON} characters to define; give the values in a CSV file"
             raise InputError([Fault(message, ("study",))])

@@ -134,9 +134,15 @@ class Study:
 
 
 def over_grid(
-    problem: Given, axes: Mapping[str, Sequence[float]], *, title: str = "", seed: int = 0, starts: int = STARTS,
-    warm: bool = False, report: Sequence[str] = (),
-) -> Study:  # fmt: skip
+    problem: Given,
+    axes: Mapping[str, Sequence[float]],
+    *,
+    title: str = "",
+    seed: int = 0,
+    starts: int = STARTS,
+    warm: bool = False,
+    report: Sequence[str] = (),
+) -> Study:
     """The study of every combination of the axes' values, the last axis fastest.
 
     Raises:
@@ -152,9 +158,16 @@ def over_grid(
     if wrong := table_faults("axes", axes, "{'mu': [0.1, 0.2]}"):
         raise InputError(wrong)
     return Study(
-        problem=as_problem(problem), columns=grid(axes), title=title, seed=seed, starts=starts, warm=warm,
-        report=report, grid_shape={name: len(values) for name, values in axes.items()}, method="grid",
-    )  # fmt: skip
+        problem=as_problem(problem),
+        columns=grid(axes),
+        title=title,
+        seed=seed,
+        starts=starts,
+        warm=warm,
+        report=report,
+        grid_shape={name: len(values) for name, values in axes.items()},
+        method="grid",
+    )
 
 
 def names_of(study: Study) -> dict[str, tuple[str, ...]]:
@@ -162,10 +175,12 @@ def names_of(study: Study) -> dict[str, tuple[str, ...]]:
     problem = study.problem
     pattern = (problem.pattern.name,) if problem.pattern else ()
     return {
-        "varied": tuple(study.columns), "parameters": problem.parameter_set.names, "reports": tuple(study.report),
+        "varied": tuple(study.columns),
+        "parameters": problem.parameter_set.names,
+        "reports": tuple(study.report),
         "laws": LAWS if problem.model is tms else (),
         "violations": (*problem.constraints, *pattern, "a0", "coefficients"),
-    }  # fmt: skip
+    }
 
 
 def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
@@ -178,9 +193,13 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
         column: what is made of a column that is no axis of a grid; lists take four times the memory.
     """
     return {
-        "problem": _problem(study.problem), **_columns(study, column), "seed": int(study.seed),
-        "starts": int(study.starts), "warm": study.warm, "report": list(study.report),
-    }  # fmt: skip
+        "problem": _problem(study.problem),
+        **_columns(study, column),
+        "seed": int(study.seed),
+        "starts": int(study.starts),
+        "warm": study.warm,
+        "report": list(study.report),
+    }
 
 
 def _columns(study: Study, column: Callable[[Sequence[float]], Any]) -> dict[str, Any]:
@@ -196,14 +215,17 @@ def _problem(problem: Problem) -> dict[str, Any]:
         "free": {name: [float(low), float(high)] for name, (low, high) in problem.free.items()},
         "constraints": dict(problem.constraints),
         "scenarios": {name: _scenario(s) for name, s in problem.variations.items()},
-        "tolerances": _floats(problem.tolerances), "weights": _floats(problem.weights), "start": _floats(problem.start),
-    }  # fmt: skip
+        "tolerances": _floats(problem.tolerances),
+        "weights": _floats(problem.weights),
+        "start": _floats(problem.start),
+    }
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
         "parameters": problem.parameter_set.name,
-        "objective": {sense: text for sense, text in asked.items() if text is not None}, **tables,
+        "objective": {sense: text for sense, text in asked.items() if text is not None},
+        **tables,
         "order": {name: list(table) for name, table in tables.items() if len(table) > 1 and name != "fixed"},
-    }  # fmt: skip
+    }
 
 
 def _floats(table: Any) -> dict[str, float]:

@@ -108,8 +108,9 @@ class Summary:
         spread = {n: dict(zip(("min", "median", "max"), ends, strict=True)) for n, ends in self.spread.items()}
         return {
             **(plain(self, "rows counts best causes spread stable structures proven warm laws") | {"spread": spread}),
-            "row_seconds": round(self.seconds, 4), **({"monte_carlo": self.product.to_json()} if self.product else {}),
-        }  # fmt: skip
+            "row_seconds": round(self.seconds, 4),
+            **({"monte_carlo": self.product.to_json()} if self.product else {}),
+        }
 
 
 def summary(study: Study, rows: Iterable[Row]) -> Summary:
@@ -129,18 +130,24 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
     in_seconds |= {"quantiles": tuple(_quantiles(clocked["abscissa"][answered]))} if quantiles else {}
     laws = {
         name.removeprefix(LAW): float(np.fmax.reduce(np.abs(column.values[column.present]), initial=0.0))
-        for name, column in table.items() if name.startswith(LAW)
-    }  # fmt: skip
+        for name, column in table.items()
+        if name.startswith(LAW)
+    }
     return Summary(
-        rows=len(study), counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
+        rows=len(study),
+        counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
         best=None if best is None else known[int(best)],
         causes=_causes(known),
         spread=Table({n: ends for n in ("objective", "abscissa") if (ends := _ends(values[n][optimal]))}),
-        stable=int(_stable(table).sum()), structures=_ranked(values["structure"][optimal].tolist()),
-        proven=int(values["proven"].sum()), warm=int(values["warm"].sum()), laws=Table(laws),
+        stable=int(_stable(table).sum()),
+        structures=_ranked(values["structure"][optimal].tolist()),
+        proven=int(values["proven"].sum()),
+        warm=int(values["warm"].sum()),
+        laws=Table(laws),
         seconds=float(table["seconds"].values.sum()),
-        product=yield_of(known) if study.method == "monte_carlo" else None, clocked=Table(in_seconds),
-    )  # fmt: skip
+        product=yield_of(known) if study.method == "monte_carlo" else None,
+        clocked=Table(in_seconds),
+    )
 
 
 def _clocked(study: Study, table: Mapping[str, PartialColumn], values: Mapping[str, Array]) -> dict[str, Array]:

@@ -181,11 +181,13 @@ class Trace(Tabular):
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt trace`."""
         return {
-            **self.problem.heading, "pattern": self.pattern, "free": list(self.problem.free),
+            **self.problem.heading,
+            "pattern": self.pattern,
+            "free": list(self.problem.free),
             "units": units_of(self.problem),
             **plain(self, "branches starts points seconds"),
             "seconds_per_point": self.seconds_walking / max(self.points, 1),
-        }  # fmt: skip
+        }
 
 
 def kinds_along(branch: Branch) -> list[str]:

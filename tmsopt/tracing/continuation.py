@@ -107,9 +107,12 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
         *sizes, ca.dot(t, tangent), reach, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
     )
     return Curve(
-        scale=scale, lower=lower / scale, upper=upper / scale, evaluate=ca.Function("evaluate", [y], list(scaled(y))),
+        scale=scale,
+        lower=lower / scale,
+        upper=upper / scale,
+        evaluate=ca.Function("evaluate", [y], list(scaled(y))),
         advance=ca.Function("advance", [y, t, s, origin], [z, tangent, checks]),
-    )  # fmt: skip
+    )
 
 
 def tangent_at(on: Curve, y: Array) -> Array:

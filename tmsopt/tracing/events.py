@@ -62,16 +62,21 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
     each = zip(named, at, strict=True)
     events = [Event(name, detail, place, row, float(met[row])) for (name, detail, row), place in each]
     return Branch(
-        pattern=str(problem.locate), parameters=columns, unknowns=dict(zip(pattern.unknowns, u, strict=True)),
+        pattern=str(problem.locate),
+        parameters=columns,
+        unknowns=dict(zip(pattern.unknowns, u, strict=True)),
         tangent=dict(zip(free, _natural_tangent(problem, on, x, t).T, strict=True)),
-        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(width, axis=1))]), kinds=kinds,
+        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(width, axis=1))]),
+        kinds=kinds,
         stable=stability(pattern.remaining(u), len(x)),
         heavily_damped=all_real(pattern.remaining(u), len(x)) & ("W" not in pattern.unknowns),
-        satisfied=satisfied(problem, values, len(x)), abscissa=np.broadcast_to(values["abscissa"], len(x)),
-        events=tuple(sorted(events, key=lambda e: e.index)), closed=walked.closed,
+        satisfied=satisfied(problem, values, len(x)),
+        abscissa=np.broadcast_to(values["abscissa"], len(x)),
+        events=tuple(sorted(events, key=lambda e: e.index)),
+        closed=walked.closed,
         residual=float(np.max(met)),
         eigenfrequency=_eigenfrequency(problem, pattern, u),
-    )  # fmt: skip
+    )
 
 
 def _eigenfrequency(problem: Problem, pattern: Pattern, u: list[Array]) -> dict[str, Array] | None:

@@ -62,9 +62,10 @@ def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], 
         return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
 
     formulas = {
-        "abscissa": lambda _: np.asarray(factor_roots().real.max(axis=-1)), "damping_ratio": damping_ratio,
+        "abscissa": lambda _: np.asarray(factor_roots().real.max(axis=-1)),
+        "damping_ratio": damping_ratio,
         ANGULAR_FREQUENCY: lambda _: np.asarray(factor_roots().imag.max(axis=-1)),
-    }  # fmt: skip
+    }
     extra = [*(replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS]
     return Values(problem.model, problem.parameter_set, columns, extra=extra)
 

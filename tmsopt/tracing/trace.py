@@ -39,9 +39,16 @@ MOST = 200_000
 
 
 def trace(
-    problem: Given, pattern: str | None = None, *, step: float = STEP, starts: int = STARTS, seed: int = 0,
-    most: int = MOST, through: Sequence[Mapping[str, float]] = (), progress: Listener | None = None,
-) -> Trace:  # fmt: skip
+    problem: Given,
+    pattern: str | None = None,
+    *,
+    step: float = STEP,
+    starts: int = STARTS,
+    seed: int = 0,
+    most: int = MOST,
+    through: Sequence[Mapping[str, float]] = (),
+    progress: Listener | None = None,
+) -> Trace:
     """Every branch of a pattern in the box of the free parameters, one more of which is free than the pattern ties.
 
     Args:
@@ -153,9 +160,14 @@ def _asked(problem: Problem, name: str | None) -> Problem:
 
 
 def _check(
-    problem: Problem, step: float, starts: int, seed: int, most: int, through: Sequence[Mapping[str, float]],
+    problem: Problem,
+    step: float,
+    starts: int,
+    seed: int,
+    most: int,
+    through: Sequence[Mapping[str, float]],
     progress: Listener | None,
-) -> None:  # fmt: skip
+) -> None:
     faults = [*count_faults("starts", starts, 0, MOST_STARTS), *count_faults("seed", seed, 0)]
     faults += count_faults("most", most, _FEWEST)
     faults += [*call_faults("progress", progress), *list_faults("through", through, "[{'Fr': 1.2, 'mu': 0.1}]")]

@@ -57,11 +57,16 @@ def ride(name: str, problem: Problem, starts: int = STARTS) -> Ride:
     cover = solution.cover
     proved, pieces = abscissa_below(*speeds, solution.abscissa + MARGIN)
     return Ride(
-        name=name, solution=solution, per_start=seconds / solution.starts.tried,
-        single=quantile(run.seconds for run in runs), excess=highest_abscissa(*speeds, CHECKED) - solution.abscissa,
-        proved=proved, stable=abscissa_below(*speeds, 0.0)[0], pieces=pieces,
+        name=name,
+        solution=solution,
+        per_start=seconds / solution.starts.tried,
+        single=quantile(run.seconds for run in runs),
+        excess=highest_abscissa(*speeds, CHECKED) - solution.abscissa,
+        proved=proved,
+        stable=abscissa_below(*speeds, 0.0)[0],
+        pieces=pieces,
         own="–" if cover is None else f"{'yes' if cover.proven else 'no'}, {cover.boxes} boxes",
-    )  # fmt: skip
+    )
 
 
 def report(asked: Asked) -> str:
@@ -70,16 +75,32 @@ def report(asked: Asked) -> str:
     starts = 4 if asked.quick else STARTS
     rides = [ride(name, problem, starts) for name, problem in tqdm(boxes, desc="bands of speeds")]
     rows = [
-        (r.name, r.solution.status, f"{r.solution.abscissa:.9f}",
-         share(k < r.solution.starts.converged for k in range(r.solution.starts.tried)), duration(r.single),
-         duration(r.per_start), f"{r.excess:.0e}", f"{'yes' if r.proved else 'no'}, {r.pieces} pieces",
-         "yes" if r.stable else "no", r.own)
+        (
+            r.name,
+            r.solution.status,
+            f"{r.solution.abscissa:.9f}",
+            share(k < r.solution.starts.converged for k in range(r.solution.starts.tried)),
+            duration(r.single),
+            duration(r.per_start),
+            f"{r.excess:.0e}",
+            f"{'yes' if r.proved else 'no'}, {r.pieces} pieces",
+            "yes" if r.stable else "no",
+            r.own,
+        )
         for r in rides
-    ]  # fmt: skip
+    ]
     header = (
-        "box", "status", "abscissa", "starts feasible", "median start", "solve / starts",
-        f"excess at {CHECKED} speeds", "proved between them", "stable in all of it", "own proof",
-    )  # fmt: skip
+        "box",
+        "status",
+        "abscissa",
+        "starts feasible",
+        "median start",
+        "solve / starts",
+        f"excess at {CHECKED} speeds",
+        "proved between them",
+        "stable in all of it",
+        "own proof",
+    )
     note = (
         f"Six free parameters, Fr from {SPEEDS.min} to {SPEEDS.max} in {SPEEDS.points} scenarios, the worst abscissa "
         f"is minimised; {starts} starts (each sign of the tilt apart), none spared. A start's time is that of a run of "

@@ -74,10 +74,14 @@ def check(conflict: Conflict) -> Relaxed:
     amounts, design = dict(relaxation.amounts), relaxation.parameters
     less = moved(problem, amounts, LESS)
     return Relaxed(
-        conflict=conflict, status=solution.status, amounts=amounts,
+        conflict=conflict,
+        status=solution.status,
+        amounts=amounts,
         violation=verdict(moved(problem, amounts), design).violation,
-        less=solve(less, throw=False).status, evolved=least_violation(less).violation, seconds=solution.seconds,
-    )  # fmt: skip
+        less=solve(less, throw=False).status,
+        evolved=least_violation(less).violation,
+        seconds=solution.seconds,
+    )
 
 
 def report(asked: Asked) -> str:
@@ -92,8 +96,13 @@ def report(asked: Asked) -> str:
         enough, needed = sum(c.enough for c in group), sum(c.needed for c in group)
         rows.append((kind, len(group), said, enough, needed, median(c.seconds for c in group)))
     header = (
-        "conflict", "problems", "said infeasible", "relaxation is enough", f"{LESS:.0%} of it is not", "median time",
-    )  # fmt: skip
+        "conflict",
+        "problems",
+        "said infeasible",
+        "relaxation is enough",
+        f"{LESS:.0%} of it is not",
+        "median time",
+    )
     failed = [(k, c.conflict.kind, c.cause, dict(c.amounts)) for k, c in enumerate(checks) if c.cause]
     return page(
         "Conflicts",

@@ -68,8 +68,14 @@ def judged(index: int, seed: int, target: Target) -> Verdict:
         why = f"{type(error).__name__}: {error}"[:200]
         return replace(nothing, why=why, seconds=time.process_time() - began)
     design = {n: float(solution.parameters[n]) for n in problem.free}
-    own = replace(nothing, status=solution.status, value=float(solution.value), design=design,
-                  seconds=time.process_time() - began, notes=tuple(solution.notes))  # fmt: skip
+    own = replace(
+        nothing,
+        status=solution.status,
+        value=float(solution.value),
+        design=design,
+        seconds=time.process_time() - began,
+        notes=tuple(solution.notes),
+    )
     match solution.status:
         case "optimal":
             return _optimal(problem, own)
@@ -182,9 +188,18 @@ def parts(verdicts: Sequence[Verdict]) -> Iterator[str]:
     yield table(("family", "problems", *LABELS, "median time"), rows)
     yield "### Failures"
     failures = [
-        (v.index, v.family, v.label, f"{v.value:.10g}", f"{v.target.value:.10g}", v.why, f"{v.seconds:.2g} s",
-         ", ".join(f"{n}={x:.6g}" for n, x in v.target.design.items()))
-        for v in verdicts if v.label != RIGHT
-    ]  # fmt: skip
+        (
+            v.index,
+            v.family,
+            v.label,
+            f"{v.value:.10g}",
+            f"{v.target.value:.10g}",
+            v.why,
+            f"{v.seconds:.2g} s",
+            ", ".join(f"{n}={x:.6g}" for n, x in v.target.design.items()),
+        )
+        for v in verdicts
+        if v.label != RIGHT
+    ]
     header = ("problem", "family", "label", "value", "best known", "why", "time", "design of the reference")
     yield table(header, failures, "None.")

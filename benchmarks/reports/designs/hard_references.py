@@ -52,8 +52,11 @@ def searched(indices: Sequence[int], seed: int, workers: int, command: str, sear
 
 def report(asked: Asked) -> str:
     """What is missing in the file, computed; who reached the values."""
-    found = [t for i, t in run(range(asked.of(HARD_COUNT, 3)), asked.seed, asked.workers, asked.command).items()
-             if i < asked.of(HARD_COUNT, 3)]  # fmt: skip
+    found = [
+        t
+        for i, t in run(range(asked.of(HARD_COUNT, 3)), asked.seed, asked.workers, asked.command).items()
+        if i < asked.of(HARD_COUNT, 3)
+    ]
     families = dict.fromkeys(t.family for t in found)
     rows = [
         (name, len(some), sum(t.solvable for t in some), f"{sum(t.seconds for t in some) / len(some):.1f} s")

@@ -75,8 +75,9 @@ def parts(answers: list[Answer]) -> Iterator[str]:
         false = [a for a in some if a.false]
         no = sum(a.status != "optimal" for a in some)
         better = sum(a.excess < -BEATEN for a in some)
-        rows.append((family, len(some), len(false), sum(a.honest for a in false), no, better,
-                     median(a.seconds for a in some)))  # fmt: skip
+        rows.append(
+            (family, len(some), len(false), sum(a.honest for a in false), no, better, median(a.seconds for a in some))
+        )
     yield facts([("problems", len(answers)), ("**false optima**", sum(a.false for a in answers))])
     yield (
         "*Gains*: two gains in boxes 50 to 80 wide, three roots meet where one is within 0.3 of zero. *Plateaus*: the "
@@ -90,5 +91,6 @@ def parts(answers: list[Answer]) -> Iterator[str]:
     )
     yield table(
         ("problem", "value", "best known", "its starts"),
-        [(a.name, f"{a.value:.8g}", f"{a.known:.8g}", a.sure) for a in answers if a.false], "No false optimum.",
-    )  # fmt: skip
+        [(a.name, f"{a.value:.8g}", f"{a.known:.8g}", a.sure) for a in answers if a.false],
+        "No false optimum.",
+    )

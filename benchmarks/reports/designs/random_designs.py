@@ -207,8 +207,16 @@ def _row(name: str, ends: Sequence[tuple[float, float]]) -> tuple[object, ...]:
 
 def _failures(records: Sequence[Record]) -> str:
     rows = [
-        (r.index, len(r.problem.free), r.default.status, f"{r.default.value:.10g}", f"{r.best:.10g}", f"{r.error:.1e}",
-         ", ".join(r.by))
-        for r in records if (r.solvable and not r.solved) or r.contradicted or r.unsettled
-    ]  # fmt: skip
+        (
+            r.index,
+            len(r.problem.free),
+            r.default.status,
+            f"{r.default.value:.10g}",
+            f"{r.best:.10g}",
+            f"{r.error:.1e}",
+            ", ".join(r.by),
+        )
+        for r in records
+        if (r.solvable and not r.solved) or r.contradicted or r.unsettled
+    ]
     return table(("problem", "free", "status", "value", "best known", "error", "reached by"), rows, "None.")

@@ -81,11 +81,15 @@ def best_of(
         best = min((*solved, *evolved), key=lambda r: r.violation)
     known = {s: min(r.value for r in feasible if r.source == s) for s in dict.fromkeys(r.source for r in feasible)}
     return Reference(
-        index=index, solvable=bool(feasible), value=best.value if feasible else math.nan,
+        index=index,
+        solvable=bool(feasible),
+        value=best.value if feasible else math.nan,
         realised=realised_abscissa(problem, problem.ordered(best.parameters)) if feasible else math.nan,
-        violation=best.violation, parameters=problem.ordered(best.parameters), known=known,
+        violation=best.violation,
+        parameters=problem.ordered(best.parameters),
+        known=known,
         doubtful=tuple(sorted(doubtful)),
-    )  # fmt: skip
+    )
 
 
 def _ended(problem: Problem, end: Mapping[str, float]) -> _Reached:
@@ -106,9 +110,12 @@ def run(count: int, settings: Settings, workers: int, path: Path, command: str) 
     found = references(path)
     missing = [i for i in range(count) if i not in found]
     for one in tqdm(
-        over_processes(partial(reference, settings=settings), missing, workers), "references", count, unit="problem",
+        over_processes(partial(reference, settings=settings), missing, workers),
+        "references",
+        count,
+        unit="problem",
         initial=count - len(missing),
-    ):  # fmt: skip
+    ):
         found[one.index] = one
         write(path, {"origin": origin(command), "settings": asdict(settings)}, "problems", found.values())
     return found

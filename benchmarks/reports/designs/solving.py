@@ -26,12 +26,15 @@ def problems(quick: bool = False) -> Iterator[tuple[str, Problem, float]]:
         model=models.tms,
         fixed={"chi_H": 1.0, "mu": 0.1},
         free={
-            "Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.02, 1.4),
-            "zeta_B": (-1.2, -0.3), "zeta_H": (-1.0, -0.1),
+            "Fr": (0.01, 10),
+            "chi_B": (1.01, 5),
+            "lambda_s": (0.02, 1.4),
+            "zeta_B": (-1.2, -0.3),
+            "zeta_H": (-1.0, -0.1),
         },
         constraints={"axis": "nu_H >= 0.02", "layout": "chi_B - chi_H >= 0.1"},
         minimize="abscissa",
-    )  # fmt: skip
+    )
     if quick:
         return
     yield "EP4, heights free too", five, -((0.3 * 0.1) ** -0.25)  # ω0 is lowest where both masses are
@@ -93,10 +96,16 @@ def overview(heats: Sequence[Heat]) -> str:
 
 def _problems(heats: Sequence[Heat]) -> str:
     rows = [
-        (h.title, len(h.problem.free), len(h.problem.conditions), f"{h.optimum:.12g}", h.proof,
-         duration(h.runs[0].seconds))
+        (
+            h.title,
+            len(h.problem.free),
+            len(h.problem.conditions),
+            f"{h.optimum:.12g}",
+            h.proof,
+            duration(h.runs[0].seconds),
+        )
         for h in heats
-    ]  # fmt: skip
+    ]
     return table(("problem", "free", "constraints", "least abscissa", "known by", OWN), rows)
 
 

@@ -167,10 +167,17 @@ def _asked(trial: Trial) -> str:
 def _failures(trials: Sequence[Trial]) -> str:
     rows = [
         (
-            t.index, len(t.problem.free), ", ".join(n for n in ("scenarios", "tolerances") if getattr(t.problem, n)),
-            _asked(t), t.cause, f"{t.default.value:.9g}", f"{t.best:.9g}", ", ".join(t.by),
+            t.index,
+            len(t.problem.free),
+            ", ".join(n for n in ("scenarios", "tolerances") if getattr(t.problem, n)),
+            _asked(t),
+            t.cause,
+            f"{t.default.value:.9g}",
+            f"{t.best:.9g}",
+            ", ".join(t.by),
         )
-        for t in trials if t.cause
-    ]  # fmt: skip
+        for t in trials
+        if t.cause
+    ]
     header = ("problem", "free", "with", "objective", "cause", "value", "best known", "reached by")
     return table(header, sorted(rows, key=lambda row: str(row[4])), "None.")

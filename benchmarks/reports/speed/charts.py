@@ -86,11 +86,16 @@ def report(asked: Asked) -> str:
     base = next(e for e, m in zip(each, every, strict=True) if m.name == STACKED)
     rows = [
         (
-            m.name, m.gives, m.points, duration(e), f"{1 / e:.3g}", times(base / e),
+            m.name,
+            m.gives,
+            m.points,
+            duration(e),
+            f"{1 / e:.3g}",
+            times(base / e),
             f"{m.width / e / 1e6:.3g} MB/s, {100 * m.width / e / copied:.2g} %" if m.width else "–",
         )
         for m, e in zip(every, each, strict=True)
-    ]  # fmt: skip
+    ]
     header = ("method", "gives", "designs", "time a design", "designs a second", f"rate, {STACKED} = 1", "of copying")
     return page(
         "Charts",

@@ -72,10 +72,16 @@ def _solves(what: str, rows: Sequence[tuple[int, Sequence[Attempt]]]) -> str:
     whole = [quantile(s.seconds for s in solved) for _, solved in rows]
     each = [quantile(s.per_start for s in solved) for _, solved in rows]
     lines = [
-        (size, f"{sum(s.optimal for s in solved)} of {len(solved)}", duration(w), times(w / whole[0]), duration(e),
-         times(e / each[0]))
+        (
+            size,
+            f"{sum(s.optimal for s in solved)} of {len(solved)}",
+            duration(w),
+            times(w / whole[0]),
+            duration(e),
+            times(e / each[0]),
+        )
         for (size, solved), w, e in zip(rows, whole, each, strict=True)
-    ]  # fmt: skip
+    ]
     found = table((what, "optimal", "solve", "ratio", "a start", "ratio"), lines)
     laws = f"{what}^{exponent(sizes, whole):.2f}, of a start ~ {what}^{exponent(sizes, each):.2f}"
     return f"{found}\n\nTime of a solve ~ {laws}."

@@ -104,16 +104,24 @@ def _overheads(studies: Sequence[Study], rounds: int) -> str:
         n = len(study)
         rows.append(
             (
-                study.title, n, *(f"{n / seconds[each]:.3g}" for each in ("study", "solves", "ipopt")),
+                study.title,
+                n,
+                *(f"{n / seconds[each]:.3g}" for each in ("study", "solves", "ipopt")),
                 f"{100 * (seconds['study'] / seconds['solves'] - 1):.1f} %",
                 f"{100 * (seconds['study'] / seconds['ipopt'] - 1):.0f} %",
                 f"{seconds['runs'] / n:.3g}",
             )
-        )  # fmt: skip
+        )
     head = (
-        "study", "rows", "rows a second, study", "solves in a loop", "IPOPT alone", "cost over the solves",
-        "over IPOPT alone", "runs of IPOPT a row",
-    )  # fmt: skip
+        "study",
+        "rows",
+        "rows a second, study",
+        "solves in a loop",
+        "IPOPT alone",
+        "cost over the solves",
+        "over IPOPT alone",
+        "runs of IPOPT a row",
+    )
     return table(head, rows)
 
 

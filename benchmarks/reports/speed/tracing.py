@@ -92,10 +92,14 @@ def report(asked: Asked) -> str:
     repeats = 1 if asked.quick else 5
     results = ep_set(repeats)
     rows = [
-        (r.name, r.points, f"{r.error:.1e}" if np.isfinite(r.error) else "–",
-         *((f"{r.microseconds:.0f}", f"{1e6 / r.microseconds:.0f}") if r.points else "––"))
+        (
+            r.name,
+            r.points,
+            f"{r.error:.1e}" if np.isfinite(r.error) else "–",
+            *((f"{r.microseconds:.0f}", f"{1e6 / r.microseconds:.0f}") if r.points else "––"),
+        )
         for r in results
-    ]  # fmt: skip
+    ]
     ratio = results[1].microseconds / results[0].microseconds
     return page(
         "Tracing",

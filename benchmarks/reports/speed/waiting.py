@@ -155,7 +155,7 @@ def _run(tree: Path, *words: str) -> str:
     environment = {**os.environ, "PYTHONPATH": str(tree)}
     return subprocess.run(
         [sys.executable, *words], cwd=tree, env=environment, check=True, capture_output=True, text=True
-    ).stdout  # fmt: skip
+    ).stdout
 
 
 def report(asked: Asked) -> str:

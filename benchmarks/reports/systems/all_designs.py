@@ -11,9 +11,17 @@ from tmsopt import Every, Problem, solve_all
 from tmsopt.models import from_coefficients
 
 _ASKED = (
-    (3, "EP3"), (4, "EP3"), (4, "CEP2"), (4, "2EP2"), (5, "EP3"), (5, "CEP2"), (6, "EP3"), (7, "EP3"), (8, "EP3"),
+    (3, "EP3"),
+    (4, "EP3"),
+    (4, "CEP2"),
+    (4, "2EP2"),
+    (5, "EP3"),
+    (5, "CEP2"),
+    (6, "EP3"),
+    (7, "EP3"),
+    (8, "EP3"),
     (4, "EP4"),
-)  # fmt: skip
+)
 """Degree and pattern, with as many parameters as it has conditions."""
 
 _SECONDS, _SHORT = 60.0, 5.0
@@ -58,9 +66,15 @@ def _cells(row: _Row) -> list[object]:
     assert proof is not None
     all_of_them = len(proof.designs) if proof.complete else f"{len(proof.designs)} and more, if any: {proof.reason}"
     return [
-        row.degree, row.pattern, len(row.search.solutions), found.starts, duration(row.searching), all_of_them,
-        proof.boxes, duration(proof.seconds),
-    ]  # fmt: skip
+        row.degree,
+        row.pattern,
+        len(row.search.solutions),
+        found.starts,
+        duration(row.searching),
+        all_of_them,
+        proof.boxes,
+        duration(proof.seconds),
+    ]
 
 
 def report(asked: Asked) -> str:

@@ -46,10 +46,12 @@ def _rows(problem: Problem, design: Solution, repeats: int) -> Iterator[tuple[ob
     told = control.impulse_response(system, at).outputs[:, 0].T
     said = [
         ("`control.acker`", f"`locate` EP4, within {np.abs(gains - control.acker(A, b, four)).max():.0e}"),
-        (f"`control.lqr`, Q = I, R = 1: norm {norm:.4g}, {np.linalg.eigvals(A - b @ regulated).real.max():.5g} 1/s",
-         f"of that norm at most: {bounded.abscissa:.5g} 1/s"),
+        (
+            f"`control.lqr`, Q = I, R = 1: norm {norm:.4g}, {np.linalg.eigvals(A - b @ regulated).real.max():.5g} 1/s",
+            f"of that norm at most: {bounded.abscissa:.5g} 1/s",
+        ),
         ("`control.impulse_response`", f"`expm`, within {np.abs(np.array(motion)[..., 0] - told).max():.0e}"),
-    ]  # fmt: skip
+    ]
     for name, (theirs, ours) in zip(every, said, strict=True):
         one, other = took[f"{name} 0"], took[f"{name} 1"]
         yield name, theirs, duration(one), ours, duration(other), times(other / one)
@@ -89,5 +91,11 @@ def report(asked: Asked) -> str:
         "the motion for 3 s after a push of 1 N m s on the handlebar. LQR asks for the least cost and not for decay. "
         "Theirs are formulas, ours searches that take limits as well; the best of five whole calls."
     )
-    return page("Beyond the passive bicycle", asked, "### A controller", about, rows,
-                _searched(problem, design.abscissa, asked.of(20, 2)))  # fmt: skip
+    return page(
+        "Beyond the passive bicycle",
+        asked,
+        "### A controller",
+        about,
+        rows,
+        _searched(problem, design.abscissa, asked.of(20, 2)),
+    )

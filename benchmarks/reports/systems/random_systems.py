@@ -127,12 +127,15 @@ def _by_degree(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
     groups = {n: [one for one in own if one.system.degree == n] for n in sorted({one.system.degree for one in own})}
     rows = [
         (
-            n, share(one.error(of) <= SAME for one in group), median(one.per_start for one in group),
-            duration(max(one.per_start for one in group)), median(one.seconds for one in group),
+            n,
+            share(one.error(of) <= SAME for one in group),
+            median(one.per_start for one in group),
+            duration(max(one.per_start for one in group)),
+            median(one.seconds for one in group),
             f"{quantile(one.starts for one in group):.0f}",
         )
         for n, group in groups.items()
-    ]  # fmt: skip
+    ]
     degrees = [one.system.degree for one in own]
     laws = (
         f"Time of a start ~ degree^{exponent(degrees, [one.per_start for one in own]):.1f}, "
@@ -199,11 +202,18 @@ def _race(evolved: Sequence[tuple[Solved, Followed]]) -> str:
 def _failures(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
     rows = [
         (
-            one.system.index, one.system.kind, one.system.degree, len(one.system.free), _asked(one.system), one.said,
-            f"{one.value:.10g}", f"{of[one.system.index].value:.10g}" if one.system.index in of else "–",
+            one.system.index,
+            one.system.kind,
+            one.system.degree,
+            len(one.system.free),
+            _asked(one.system),
+            one.said,
+            f"{one.value:.10g}",
+            f"{of[one.system.index].value:.10g}" if one.system.index in of else "–",
             f"{one.error(of):.1e}",
         )
-        for one in own if not one.error(of) <= SAME
-    ]  # fmt: skip
+        for one in own
+        if not one.error(of) <= SAME
+    ]
     header = ("system", "kind", "degree", "free", "asked", "status", "value", "best known", "error")
     return table(header, rows, "None.")

@@ -79,9 +79,15 @@ def report(asked: Asked) -> str:
         _row(name, found) for name, found in ends(load(PROBLEMS / "two_mass_spring.toml"), asked.of(_STARTS, _QUICK))
     ]
     header = (
-        "method", "starts", *(f"parameters and root within {w:.0e}" for w in _WITHIN), "parameters, median error",
-        "root, median error", "root, least error", "abscissa as stored, median error", "median time",
-    )  # fmt: skip
+        "method",
+        "starts",
+        *(f"parameters and root within {w:.0e}" for w in _WITHIN),
+        "parameters, median error",
+        "root, median error",
+        "root, least error",
+        "abscissa as stored, median error",
+        "median time",
+    )
     note = (
         "`problems/two_mass_spring.toml`: five parameters in ±20, nothing said of the pattern (`minimize` = abscissa). "
         "Uniform starts are in the box; normal ones of standard deviation 1 are what HANSO and PyGRANSO take by "

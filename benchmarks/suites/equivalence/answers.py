@@ -20,9 +20,13 @@ _LIMIT, _TOGETHER = 180.0, 10  # s for a process; cases that share one
 
 
 def answer_all(
-    cases: Sequence[Case], checkout: Path = ROOT, seed: int = 0, workers: int = 2,
-    environment: dict[str, str] | None = None, listener: Callable[[int, int], None] = lambda done, most: None,
-) -> dict[str, Any]:  # fmt: skip
+    cases: Sequence[Case],
+    checkout: Path = ROOT,
+    seed: int = 0,
+    workers: int = 2,
+    environment: dict[str, str] | None = None,
+    listener: Callable[[int, int], None] = lambda done, most: None,
+) -> dict[str, Any]:
     """Name → answer, plain data; ``"no answer"`` where a process crashed or took more than three minutes.
 
     Args:
@@ -55,9 +59,14 @@ def _run(case: Case, env: dict[str, str], seed: int) -> dict[str, Any]:
         words = [*case.command, *(["--seed", str(seed)] if case.seeded else [])] or ["--help"]
         try:
             done = subprocess.run(
-                [sys.executable, "-m", "tmsopt", *words], capture_output=True, text=True, timeout=_LIMIT, cwd=folder,
-                env=env, check=False,
-            )  # fmt: skip
+                [sys.executable, "-m", "tmsopt", *words],
+                capture_output=True,
+                text=True,
+                timeout=_LIMIT,
+                cwd=folder,
+                env=env,
+                check=False,
+            )
         except subprocess.TimeoutExpired:
             return {case.name: "no answer"}
     answer: dict[str, Any] = {"exit": done.returncode, "errors": done.stderr.replace(folder, "")}

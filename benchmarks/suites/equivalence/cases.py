@@ -60,9 +60,24 @@ _ON_FILES: dict[str, tuple[tuple[str, ...], bool]] = {
 """Name → command, and whether it takes a seed; what a file is not made for is refused, and how is a case too."""
 
 _COMMANDS = (
-    "chart", "compare", "convert", "describe", "example", "explore", "figure", "import", "new", "prove", "schema",
-    "simulate", "solve", "speeds", "study", "trace", "verify",
-)  # fmt: skip
+    "chart",
+    "compare",
+    "convert",
+    "describe",
+    "example",
+    "explore",
+    "figure",
+    "import",
+    "new",
+    "prove",
+    "schema",
+    "simulate",
+    "solve",
+    "speeds",
+    "study",
+    "trace",
+    "verify",
+)
 
 
 def _commands() -> list[Case]:

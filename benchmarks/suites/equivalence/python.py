@@ -107,18 +107,35 @@ def _calls() -> dict[str, Callable[[], object]]:
     """Wrong calls of the public verbs, as text."""
     names = ("problem", "solved", "path")
     texts = [
-        "tmsopt.solve(path, starts=0)", "tmsopt.solve(path, seed=-1)", "tmsopt.solve(path, near={'bogus': 1.0})",
-        "tmsopt.solve(3)", "tmsopt.solve('nowhere.toml')", "tmsopt.prove(path, digits=0)", "tmsopt.compare(None)",
-        "tmsopt.trace(path, 'EP99')", "tmsopt.trace(path, 'EP2', step=0)", "tmsopt.chart(path, points=(1, 1))",
-        "tmsopt.chart(path, axes=('Fr', 'bogus'))", "tmsopt.speeds(path, parameter='bogus')",
-        "tmsopt.simulate(solved, lean='much')", "tmsopt.robustness([])", "tmsopt.run_study(path, workers=0)",
-        "tmsopt.over_grid(problem, {'bogus': [1.0]})", "tmsopt.over_grid(problem, {'mu': []})",
+        "tmsopt.solve(path, starts=0)",
+        "tmsopt.solve(path, seed=-1)",
+        "tmsopt.solve(path, near={'bogus': 1.0})",
+        "tmsopt.solve(3)",
+        "tmsopt.solve('nowhere.toml')",
+        "tmsopt.prove(path, digits=0)",
+        "tmsopt.compare(None)",
+        "tmsopt.trace(path, 'EP99')",
+        "tmsopt.trace(path, 'EP2', step=0)",
+        "tmsopt.chart(path, points=(1, 1))",
+        "tmsopt.chart(path, axes=('Fr', 'bogus'))",
+        "tmsopt.speeds(path, parameter='bogus')",
+        "tmsopt.simulate(solved, lean='much')",
+        "tmsopt.robustness([])",
+        "tmsopt.run_study(path, workers=0)",
+        "tmsopt.over_grid(problem, {'bogus': [1.0]})",
+        "tmsopt.over_grid(problem, {'mu': []})",
         "tmsopt.Problem(tmsopt.models.tms, fixed={'Fr': 'fast'})",
         "tmsopt.Problem(tmsopt.models.tms, free={'Fr': (2, 1)})",
-        "tmsopt.Problem(tmsopt.models.tms)", "tmsopt.models.from_matrices(A=[[1, 2]])", "tmsopt.models.from_matrices()",
-        "tmsopt.models.from_polynomial(['b', 1])", "tmsopt.load_study(path)", "tmsopt.open_chart(path)",
-        "tmsopt.read_bicycle(path)", "solved.plot(ax=3)", "tmsopt.certify(solved, seconds=-1)",
-    ]  # fmt: skip
+        "tmsopt.Problem(tmsopt.models.tms)",
+        "tmsopt.models.from_matrices(A=[[1, 2]])",
+        "tmsopt.models.from_matrices()",
+        "tmsopt.models.from_polynomial(['b', 1])",
+        "tmsopt.load_study(path)",
+        "tmsopt.open_chart(path)",
+        "tmsopt.read_bicycle(path)",
+        "solved.plot(ax=3)",
+        "tmsopt.certify(solved, seconds=-1)",
+    ]
     path = str(PROBLEMS / "ep4.toml")
     known = dict(zip(names, (tmsopt.load(path), tmsopt.solve(path), path), strict=True)) | {"tmsopt": tmsopt}
     return {text: lambda text=text: eval(text, known) for text in texts}  # type: ignore[misc]

@@ -32,10 +32,30 @@ SI = (
 """Quantities of the skates in SI, each from those before it."""
 
 BENCHMARK = {
-    "w": 1.02, "c": 0.08, "v": 4.6, "r_R": 0.3, "m_R": 2, "I_Rxx": 0.0603, "I_Ryy": 0.12, "x_B": 0.3, "z_B": -0.9,
-    "m_B": 85, "I_Bxx": 9.2, "I_Bzz": 2.8, "I_Bxz": 2.4, "x_H": 0.9, "z_H": -0.7, "m_H": 4, "I_Hxx": 0.05892,
-    "I_Hzz": 0.00708, "I_Hxz": -0.00756, "r_F": 0.35, "m_F": 3, "I_Fxx": 0.1405, "I_Fyy": 0.28,
-}  # fmt: skip
+    "w": 1.02,
+    "c": 0.08,
+    "v": 4.6,
+    "r_R": 0.3,
+    "m_R": 2,
+    "I_Rxx": 0.0603,
+    "I_Ryy": 0.12,
+    "x_B": 0.3,
+    "z_B": -0.9,
+    "m_B": 85,
+    "I_Bxx": 9.2,
+    "I_Bzz": 2.8,
+    "I_Bxz": 2.4,
+    "x_H": 0.9,
+    "z_H": -0.7,
+    "m_H": 4,
+    "I_Hxx": 0.05892,
+    "I_Hzz": 0.00708,
+    "I_Hxz": -0.00756,
+    "r_F": 0.35,
+    "m_F": 3,
+    "I_Fxx": 0.1405,
+    "I_Fyy": 0.28,
+}
 """Table 1 of Meijaard and others (2007), but for the tilt, which is 18 degrees."""
 
 Matrix = list[list[Any]]

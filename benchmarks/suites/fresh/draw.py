@@ -89,9 +89,17 @@ def made(name: str, parts: Parts, **known: Any) -> Problem:
         text += ["[constraints]", *(f'{n} = "{t}"' for n, t in parts.limits.items())]
     free = {n: (float(low), float(high)) for n, (low, high) in parts.free.items()}
     return Problem(
-        name, "\n".join(text) + "\n", parts.system, free, dict(parts.fixed), parts.sense, parts.objective,
-        dict(parts.limits), cases, **known,
-    )  # fmt: skip
+        name,
+        "\n".join(text) + "\n",
+        parts.system,
+        free,
+        dict(parts.fixed),
+        parts.sense,
+        parts.objective,
+        dict(parts.limits),
+        cases,
+        **known,
+    )
 
 
 def rows(matrix: Table) -> str:

@@ -119,10 +119,12 @@ def _judge_design(problem: Problem, best: Reference, data: Mapping[str, Any], te
         apart = max(min(real.objective, upper) - claimed, claimed - max(real.objective, upper))
         realised = data.get("abscissa_realised")
         told_both = (  # the abscissa of a multiple root, and that of the doubles beside it
-            problem.objective == "abscissa" and realised is not None
-            and abs(realised - upper) <= BEATEN * scale and abs(realised - claimed) <= SCATTER * scale
+            problem.objective == "abscissa"
+            and realised is not None
+            and abs(realised - upper) <= BEATEN * scale
+            and abs(realised - claimed) <= SCATTER * scale
             and any(root["multiplicity"] > 1 for root in data["roots"])
-        )  # fmt: skip
+        )
         if apart > BEATEN * scale and not told_both and not _matches(stated, data):
             false["value"] = f"{claimed!r} is said, the design has {real.objective!r}"
         if stated is problem and realised is not None:

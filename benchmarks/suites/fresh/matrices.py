@@ -55,9 +55,13 @@ def gyroscopes(number: int) -> Problem:
     """Two degrees of freedom with gyroscopic and circulatory forces."""
     draw = Draw("gyroscopes", number)
     values = {
-        "d1": (0.0, 0.1, 0.5, 2.0), "d2": (0.0, 0.1, 0.5, 2.0), "gy": (-2.0, 0.0, 0.5, 4.0),
-        "ci": (-1.0, -0.1, 0.1, 1.0), "k1": (0.2, 0.8, 1.0, 3.0), "k2": (0.2, 0.8, 1.0, 3.0),
-    }  # fmt: skip
+        "d1": (0.0, 0.1, 0.5, 2.0),
+        "d2": (0.0, 0.1, 0.5, 2.0),
+        "gy": (-2.0, 0.0, 0.5, 4.0),
+        "ci": (-1.0, -0.1, 0.1, 1.0),
+        "k1": (0.2, 0.8, 1.0, 3.0),
+        "k2": (0.2, 0.8, 1.0, 3.0),
+    }
     chosen = draw.some(list(values), 2, 4)
     free = {n: (draw.number(*values[n][:2]), draw.number(*values[n][2:])) for n in chosen}
     fixed = {n: draw.number(values[n][1], values[n][2]) for n in values if n not in chosen}
@@ -109,9 +113,15 @@ def polynomials(number: int) -> Problem:
     names = ["a", "b", "c"][: int(draw.rng.integers(2, 4))]
     free = {x: (draw.number(-2, -0.3), draw.number(0.5, 2)) for x in names}
     forms = (
-        "{k}*{x}*{y}", "{k}*sqrt(1 + {x}**2)", "{k}*exp(-{x})", "{k}*{x}", "{k}*{x}**3", "{k}*sin(2*{x} + {y})",
-        "{k}*exp(-40*({x} - 0.3)**2)", "{k}*{x}/(1.5 + {y}**2)",
-    )  # fmt: skip
+        "{k}*{x}*{y}",
+        "{k}*sqrt(1 + {x}**2)",
+        "{k}*exp(-{x})",
+        "{k}*{x}",
+        "{k}*{x}**3",
+        "{k}*sin(2*{x} + {y})",
+        "{k}*exp(-40*({x} - 0.3)**2)",
+        "{k}*{x}/(1.5 + {y}**2)",
+    )
     row = ["1"]
     for k in range(1, n + 1):
         text = base[k]
@@ -160,5 +170,9 @@ def modes(number: int) -> Problem:
 
 
 MATRICES: dict[str, Callable[[int], Problem]] = {
-    "chains": chains, "gyroscopes": gyroscopes, "gains": gains, "polynomials": polynomials, "modes": modes,
-}  # fmt: skip
+    "chains": chains,
+    "gyroscopes": gyroscopes,
+    "gains": gains,
+    "polynomials": polynomials,
+    "modes": modes,
+}

@@ -265,9 +265,14 @@ def _lift(problem: Problem, x: Floats) -> Floats:
         constraints.append({"type": "ineq", "fun": lambda z: both(z)[0][1 + n :], "jac": lambda z: both(z)[1][1 + n :]})
     try:
         ended = optimize.minimize(
-            lambda z: both(z)[0][0], start, jac=lambda z: both(z)[1][0], method="SLSQP", constraints=constraints,
-            bounds=[(0, 1)] * p + [(None, None)] + [(0, None)] * n, options={"maxiter": 150, "ftol": 1e-13},
-        )  # fmt: skip
+            lambda z: both(z)[0][0],
+            start,
+            jac=lambda z: both(z)[1][0],
+            method="SLSQP",
+            constraints=constraints,
+            bounds=[(0, 1)] * p + [(None, None)] + [(0, None)] * n,
+            options={"maxiter": 150, "ftol": 1e-13},
+        )
     except (np.linalg.LinAlgError, ValueError, optimize.OptimizeWarning):
         return x
     y = np.clip(ended.x[:p], 0, 1)

@@ -6,13 +6,25 @@ from collections.abc import Callable, Mapping
 from benchmarks.suites.statements.case import Answer, Case
 
 _SKATES = {
-    "w": "80 cm", "v": "4 m/s", "m_B": 20, "m_H": 2, "x_B": {"min": "20 cm", "max": "100 cm"}, "z_B": -0.4,
-    "x_H": 0.8, "z_H": -0.25, "lambda_s": {"min": "2 deg", "max": "35 deg"},
-}  # fmt: skip
+    "w": "80 cm",
+    "v": "4 m/s",
+    "m_B": 20,
+    "m_H": 2,
+    "x_B": {"min": "20 cm", "max": "100 cm"},
+    "z_B": -0.4,
+    "x_H": 0.8,
+    "z_H": -0.25,
+    "lambda_s": {"min": "2 deg", "max": "35 deg"},
+}
 _COMPACT = {
-    "chi_H": 1.0, "zeta_H": -0.2, "zeta_B": -0.4, "mu": 0.1, "chi_B": {"min": 1.01, "max": 5},
-    "Fr": {"min": 0.01, "max": 10}, "lambda_s": {"min": "1 deg", "max": "80 deg"},
-}  # fmt: skip
+    "chi_H": 1.0,
+    "zeta_H": -0.2,
+    "zeta_B": -0.4,
+    "mu": 0.1,
+    "chi_B": {"min": 1.01, "max": 5},
+    "Fr": {"min": 0.01, "max": 10},
+    "lambda_s": {"min": "1 deg", "max": "80 deg"},
+}
 
 OBEY = """
 import re, subprocess, sys, tomllib
@@ -132,8 +144,11 @@ def _cases() -> list[Case]:
         for name in ("I_Bxx", "I_Hzz", "r_F", "m_R")
     ]
     senses = (
-        ("minimize", "decay_rate"), ("maximize", "decay_time"), ("maximize", "abscissa"), ("minimize", "damping_ratio"),
-    )  # fmt: skip
+        ("minimize", "decay_rate"),
+        ("maximize", "decay_time"),
+        ("maximize", "abscissa"),
+        ("minimize", "damping_ratio"),
+    )
     for sense, name in senses:
         other = "maximize" if sense == "minimize" else "minimize"
         judge = _says(rf'{other} = "{name}"')

@@ -66,9 +66,14 @@ def verdict(case: Case, checkout: Path) -> str:
         environment = {**os.environ, "PYTHONPATH": str(checkout), "MPLBACKEND": "agg"}
         try:
             ran = subprocess.run(
-                [sys.executable, *own], cwd=folder, env=environment, capture_output=True, text=True,
-                timeout=SECONDS, check=False,
-            )  # fmt: skip
+                [sys.executable, *own],
+                cwd=folder,
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=SECONDS,
+                check=False,
+            )
             answer = Answer(ran.returncode, ran.stdout, ran.stderr, Path(folder))
         except subprocess.TimeoutExpired:
             answer = Answer(None, "", "", Path(folder))

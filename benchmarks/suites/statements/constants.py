@@ -86,22 +86,40 @@ def _cubic(constant: str, value: Callable[[], Any]) -> Case:
     """s³ + c s² + d s + K has a triple root where c³ = 27 K and d = c²/3."""
     truth: Truth = {"c": lambda: 3 * mp.cbrt(value()), "d": lambda: 3 * mp.cbrt(value()) ** 2}
     free = "c = { min = 0.001, max = 9 }\nd = { min = 0.001, max = 9 }"
-    return _case(f"triple root, K = {constant}", f'coefficients = [1, "c", "d", {constant}]', free, "EP3", truth,
-                 "(s + K^(1/3))³")  # fmt: skip
+    return _case(
+        f"triple root, K = {constant}",
+        f'coefficients = [1, "c", "d", {constant}]',
+        free,
+        "EP3",
+        truth,
+        "(s + K^(1/3))³",
+    )
 
 
 def _machine(mass: str, stiffness: str, m: Callable[[], Any], k: Callable[[], Any]) -> Case:
     """m q″ + c q′ + k q = 0 is critically damped at c = 2√(m k)."""
     model = f'M = [[{mass}]]\nD = [["c"]]\nK = [[{stiffness}]]'
-    return _case(f"m = {mass}, k = {stiffness}", model, "c = { min = 0.001, max = 20 }", "EP2",
-                 {"c": lambda: 2 * mp.sqrt(m() * k())}, "c = 2√(m k)")  # fmt: skip
+    return _case(
+        f"m = {mass}, k = {stiffness}",
+        model,
+        "c = { min = 0.001, max = 20 }",
+        "EP2",
+        {"c": lambda: 2 * mp.sqrt(m() * k())},
+        "c = 2√(m k)",
+    )
 
 
 def _states(a: str, value: Callable[[], Any]) -> Case:
     """The eigenvalues of [[0, 1], [−a/3, −c]] meet at c = 2√(a/3)."""
     model = f'A = [[0, 1], ["-({a})/3", "-c"]]'
-    return _case(f"A with ({a})/3", model, "c = { min = 0.001, max = 9 }", "EP2",
-                 {"c": lambda: 2 * mp.sqrt(value() / 3)}, "c = 2√(a/3)")  # fmt: skip
+    return _case(
+        f"A with ({a})/3",
+        model,
+        "c = { min = 0.001, max = 9 }",
+        "EP2",
+        {"c": lambda: 2 * mp.sqrt(value() / 3)},
+        "c = 2√(a/3)",
+    )
 
 
 def _dimer(g1: str, g2: str, truth: Callable[[], Any]) -> Case:
@@ -162,8 +180,22 @@ CASES = (
     _skates("-0.55", "-0.1"),
     _skates("-1.3", "-0.9"),
     _skates("-0.31", "-0.07"),
-    _case("all, K = 8/3", 'coefficients = [1, "c", "8/3"]', "c = { min = 0.001, max = 9 }", "EP2",
-          {"c": lambda: 2 * mp.sqrt(mp.mpf(8) / 3)}, "c = 2√K", True),
-    _case("all, K = pi", 'coefficients = [1, "c", "pi"]', "c = { min = 0.001, max = 9 }", "EP2",
-          {"c": lambda: 2 * mp.sqrt(mp.pi)}, "c = 2√K", True),
-)  # fmt: skip
+    _case(
+        "all, K = 8/3",
+        'coefficients = [1, "c", "8/3"]',
+        "c = { min = 0.001, max = 9 }",
+        "EP2",
+        {"c": lambda: 2 * mp.sqrt(mp.mpf(8) / 3)},
+        "c = 2√K",
+        True,
+    ),
+    _case(
+        "all, K = pi",
+        'coefficients = [1, "c", "pi"]',
+        "c = { min = 0.001, max = 9 }",
+        "EP2",
+        {"c": lambda: 2 * mp.sqrt(mp.pi)},
+        "c = 2√K",
+        True,
+    ),
+)

@@ -125,48 +125,59 @@ _PENCIL = (
     {"x": (-3, 3), "y": (-3, 3)},
 )
 _SYSTEMS = {
-    "trimer": _file(
-        'H = [["d + 1j*g", 1, 0], [1, 0, 1], [0, 1, "-1j*g"]]', {"g": (0.5, 2), "d": 0}, 'locate = "EP3"'
-    ),
+    "trimer": _file('H = [["d + 1j*g", 1, 0], [1, 0, 1], [0, 1, "-1j*g"]]', {"g": (0.5, 2), "d": 0}, 'locate = "EP3"'),
     "spin chain": _file(
         'H = [["1.5j*g", "sqrt(3)/2", 0, 0], ["sqrt(3)/2", "0.5j*g", 1, 0], [0, 1, "-0.5j*g", "sqrt(3)/2"], '
-        '[0, 0, "sqrt(3)/2", "-1.5j*g"]]', {"g": (0.5, 1.5)}, 'locate = "EP4"',
+        '[0, 0, "sqrt(3)/2", "-1.5j*g"]]',
+        {"g": (0.5, 1.5)},
+        'locate = "EP4"',
     ),
     "one-way pair": _file('H = [["a + 1j*b", 1], [0, 0]]', {"a": (-1, 1), "b": (-1, 1)}, 'locate = "EP2"'),
     "oscillators with gain and loss": _file(
-        'M = [[1, 0], [0, 1]]\nD = [["g", 0], [0, "-g"]]\nK = [[1, "k"], ["k", 1]]', {"g": (0.3, 0.9), "k": 0.6},
+        'M = [[1, 0], [0, 1]]\nD = [["g", 0], [0, "-g"]]\nK = [[1, "k"], ["k", 1]]',
+        {"g": (0.3, 0.9), "k": 0.6},
         'locate = "CEP2"',
     ),
     "dimer": _file(
         'H = [["d - 1j*a", "k"], ["k", "-1j*b"]]', {"d": (-1, 1), "k": (0.05, 2), "a": 1.3, "b": 0.1}, 'locate = "EP2"'
     ),
-}  # fmt: skip
+}
 _NASTY = {
-    "tiny coefficients": (_file(
-        'coefficients = [1, "1e-200*c", "1e-300*k"]', {"c": (0, 2), "k": (0, 2)}, 'minimize = "abscissa"'
-    ), ("solve", "--full")),
-    "a power beyond doubles": (_file(
-        'coefficients = [1, "c", "x**200"]', {"c": (0, 2), "x": (0, 100)}, 'minimize = "abscissa"'
-    ), ("chart", "--points", "40x30")),
-    "growth over a pole": (_file(
-        'A = [["a", 1, 0], ["b", -1, 1], [0, "1/a", -2]]', {"a": (-1, 1), "b": (-3, 3)}, 'minimize = "abscissa"'
-    ), ("solve", "--plot", "growth.png")),
-    "growth over an arc": (_file(
-        'coefficients = [1, "acos(x)", 1]', {"x": (-2, 2)}, 'maximize = "damping_ratio"'
-    ), ("solve", "--plot", "growth.png")),
-    "growth over a logarithm": (_file(
-        'coefficients = [1, "log(x)", 1]', {"x": (-1, 30)}, 'maximize = "damping_ratio"'
-    ), ("solve", "--plot", "growth.png")),
-    "a chart beside a pole": (_file(
-        'coefficients = [1, "a", "b", "a*b/(a-b)"]', {"a": (0, 3), "b": (0, 3)}, 'maximize = "damping_ratio"'
-    ), ("chart", "--points", "40x30")),
-}  # fmt: skip
+    "tiny coefficients": (
+        _file('coefficients = [1, "1e-200*c", "1e-300*k"]', {"c": (0, 2), "k": (0, 2)}, 'minimize = "abscissa"'),
+        ("solve", "--full"),
+    ),
+    "a power beyond doubles": (
+        _file('coefficients = [1, "c", "x**200"]', {"c": (0, 2), "x": (0, 100)}, 'minimize = "abscissa"'),
+        ("chart", "--points", "40x30"),
+    ),
+    "growth over a pole": (
+        _file('A = [["a", 1, 0], ["b", -1, 1], [0, "1/a", -2]]', {"a": (-1, 1), "b": (-3, 3)}, 'minimize = "abscissa"'),
+        ("solve", "--plot", "growth.png"),
+    ),
+    "growth over an arc": (
+        _file('coefficients = [1, "acos(x)", 1]', {"x": (-2, 2)}, 'maximize = "damping_ratio"'),
+        ("solve", "--plot", "growth.png"),
+    ),
+    "growth over a logarithm": (
+        _file('coefficients = [1, "log(x)", 1]', {"x": (-1, 30)}, 'maximize = "damping_ratio"'),
+        ("solve", "--plot", "growth.png"),
+    ),
+    "a chart beside a pole": (
+        _file('coefficients = [1, "a", "b", "a*b/(a-b)"]', {"a": (0, 3), "b": (0, 3)}, 'maximize = "damping_ratio"'),
+        ("chart", "--points", "40x30"),
+    ),
+}
 
 CASES: tuple[Case, ...] = (
     *(
         _case(
-            f"all of s² + c s + {k}", _file(f'coefficients = [1, "c", "{k}"]', {"c": _RANGE}, 'locate = "EP2"'),
-            partial(_of_all, partial(_dampings, k)), "(s ± √k)²", "solve", "--all",
+            f"all of s² + c s + {k}",
+            _file(f'coefficients = [1, "c", "{k}"]', {"c": _RANGE}, 'locate = "EP2"'),
+            partial(_of_all, partial(_dampings, k)),
+            "(s ± √k)²",
+            "solve",
+            "--all",
         )
         for k in ("2", "0.1", "1e-6")
     ),
@@ -174,39 +185,63 @@ CASES: tuple[Case, ...] = (
         _case(
             f"all of s² + c s + {k}, by a search",
             _file(f'coefficients = [1, "c", "{k}"]', {"c": _RANGE}, 'locate = "EP2"'),
-            partial(_of_all, partial(_dampings, k)), "(s ± √k)²", "solve", "--all", "--seconds", "0.01",
+            partial(_of_all, partial(_dampings, k)),
+            "(s ± √k)²",
+            "solve",
+            "--all",
+            "--seconds",
+            "0.01",
         )
         for k in ("3", "0.7")
     ),
     _case(
         "all of a cubic, by a search",
         _file('coefficients = [1, "c", "d", 5]', {"c": _RANGE, "d": _RANGE}, 'locate = "EP3"'),
-        partial(_of_all, partial(_triple, "5")), "(s + r)³", "solve", "--all", "--seconds", "0.01",
+        partial(_of_all, partial(_triple, "5")),
+        "(s + r)³",
+        "solve",
+        "--all",
+        "--seconds",
+        "0.01",
     ),
     _case(
         "all of a dimer, by a search",
         _file(
-            'H = [["d - 1j*a", "k"], ["k", "-1j*b"]]', {"d": (-1, 1), "k": (-2, 2), "a": 1.3, "b": 0.1},
+            'H = [["d - 1j*a", "k"], ["k", "-1j*b"]]',
+            {"d": (-1, 1), "k": (-2, 2), "a": 1.3, "b": 0.1},
             'locate = "EP2"',
         ),
-        partial(_of_all, partial(_dimer, "1.3", "0.1")), "k = ±(a − b)/2", "solve", "--all", "--seconds", "0.01",
+        partial(_of_all, partial(_dimer, "1.3", "0.1")),
+        "k = ±(a − b)/2",
+        "solve",
+        "--all",
+        "--seconds",
+        "0.01",
     ),
     _case(
-        "all of a pencil, by a search", _file(*_PENCIL, 'locate = "EP2"'), partial(_of_all, _pencil),
-        "discriminant at 50 digits", "solve", "--all", "--seconds", "0.01",
+        "all of a pencil, by a search",
+        _file(*_PENCIL, 'locate = "EP2"'),
+        partial(_of_all, _pencil),
+        "discriminant at 50 digits",
+        "solve",
+        "--all",
+        "--seconds",
+        "0.01",
     ),
     *(_case(f"zeros of a {n}", text, _zeros, "0 by symmetry", "solve", "--full") for n, text in _SYSTEMS.items()),
     *(
         _case(
             f"names in a proof of an EP3 of degree {n}",
-            _file(f'coefficients = {[1, *"abefh"[: n - 1], 1]!s}'.replace("'", '"'),
-                  dict.fromkeys("abefh"[:n - 1], (0, 9)), 'locate = "EP3"'),
-            _names, "roots are listed instead", "prove",
+            _file(
+                f"coefficients = {[1, *'abefh'[: n - 1], 1]!s}".replace("'", '"'),
+                dict.fromkeys("abefh"[: n - 1], (0, 9)),
+                'locate = "EP3"',
+            ),
+            _names,
+            "roots are listed instead",
+            "prove",
         )
         for n in (5, 6)
     ),
-    *(
-        _case(name, text, _silent, "no warning, no traceback", *command)
-        for name, (text, command) in _NASTY.items()
-    ),
-)  # fmt: skip
+    *(_case(name, text, _silent, "no warning, no traceback", *command) for name, (text, command) in _NASTY.items()),
+)

@@ -58,15 +58,28 @@ _SYSTEMS = (
     ("coefficients of (s^2 + 1)^2", 'coefficients = [1, 0, "2*w", 0, "w*w"]', "w = 1", 2),
     ("coefficients of s^3", 'coefficients = [1, 0, 0, "k"]', "k = 0", 3),
     ("coefficients of s^2 + 4", 'coefficients = [1, 0, "k"]', "k = 4", 1),
-    ("double imaginary pair with one vector",
-     'A = [[0, "w", 1, 0], ["-w", 0, 0, 1], [0, 0, 0, "w"], [0, 0, "-w", 0]]', "w = 2", 2),
-    ("three equal oscillators", 'M = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n'
-     'K = [["k", 0, 0], [0, "k", 0], [0, 0, "k"]]', "k = 1", 1),
+    (
+        "double imaginary pair with one vector",
+        'A = [[0, "w", 1, 0], ["-w", 0, 0, 1], [0, 0, 0, "w"], [0, 0, "-w", 0]]',
+        "w = 2",
+        2,
+    ),
+    (
+        "three equal oscillators",
+        'M = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nK = [["k", 0, 0], [0, "k", 0], [0, 0, "k"]]',
+        "k = 1",
+        1,
+    ),
     ("onset of flutter", 'M = [[1, 0], [0, 1]]\nK = [[1, "p"], ["-p", 2]]', "p = 0.5", 2),
     ("block of two beside a loss", 'H = [[1, 1, 0], [0, 1, 0], [0, 0, "-1j*g"]]', "g = 0.3", 2),
-    ("two equal pairs beside a damped one", 'M = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n'
-     'D = [[0, 0, 0], [0, 0, 0], [0, 0, "c"]]\nK = [[2, 0, 0], [0, 2, 0], [0, 0, 1]]', "c = 0.5", 1),
-)  # fmt: skip
+    (
+        "two equal pairs beside a damped one",
+        "M = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
+        'D = [[0, 0, 0], [0, 0, 0], [0, 0, "c"]]\nK = [[2, 0, 0], [0, 2, 0], [0, 0, 1]]',
+        "c = 0.5",
+        1,
+    ),
+)
 """Name, model, parameters, size of the largest Jordan block on the axis."""
 
 CASES: tuple[Case, ...] = tuple(

@@ -44,18 +44,25 @@ def _margin(answer: Answer) -> str:
 
 
 def _file(design: Mapping[str, float], units: Mapping[str, tuple[float, str]], gains: Mapping[str, float]) -> str:
-    rows = [f'{n} = "{x * units[n][0]:.9g} {units[n][1]}"' if n in units else f"{n} = {x:.9g}"
-            for n, x in design.items()]  # fmt: skip
+    rows = [
+        f'{n} = "{x * units[n][0]:.9g} {units[n][1]}"' if n in units else f"{n} = {x:.9g}" for n, x in design.items()
+    ]
     return "\n".join(["[parameters]", *rows, "[feedback]", *(f"{n} = {x:.9g}" for n, x in gains.items()), ""])
 
 
 def _design(rng: np.random.Generator) -> dict[str, float]:
     w = rng.uniform(0.3, 2.5)
     return {
-        "w": w, "v": rng.uniform(0.5, 4) * np.sqrt(9.81 * w), "lambda_s": rng.uniform(-1, 1),
-        "m_B": 10 ** rng.uniform(0, 2), "x_B": rng.uniform(0.1, 2) * w, "z_B": -rng.uniform(0.1, 1) * w,
-        "m_H": 10 ** rng.uniform(-1, 1), "x_H": rng.uniform(0.7, 1.3) * w, "z_H": -rng.uniform(0.1, 1) * w,
-    }  # fmt: skip
+        "w": w,
+        "v": rng.uniform(0.5, 4) * np.sqrt(9.81 * w),
+        "lambda_s": rng.uniform(-1, 1),
+        "m_B": 10 ** rng.uniform(0, 2),
+        "x_B": rng.uniform(0.1, 2) * w,
+        "z_B": -rng.uniform(0.1, 1) * w,
+        "m_H": 10 ** rng.uniform(-1, 1),
+        "x_H": rng.uniform(0.7, 1.3) * w,
+        "z_H": -rng.uniform(0.1, 1) * w,
+    }
 
 
 def _gains(rng: np.random.Generator, of: Mapping[str, float], lag: bool) -> dict[str, float]:

@@ -110,12 +110,16 @@ _UPPER, _MIDDLE = "0.435437", "0.377177"
 _MEETINGS = [
     (f"{row} row, χ_B = {chi_B}", tilt, chi_B, speeds)
     for row, tilt, chi_B, speeds in (
-        ("upper", _UPPER, "1.404214", ("2.2", "2.3")), ("upper", _UPPER, "1.424214", ("2.2", "2.3")),
-        ("upper", _UPPER, "1.4", ("2.1", "2.4")), ("upper", _UPPER, "1.43", ("2.1", "2.4")),
-        ("middle", _MIDDLE, "1.404214", ("2.2", "2.221")), ("middle", _MIDDLE, "1.404214", ("2.221", "2.4")),
-        ("middle", _MIDDLE, "1.424214", ("2.2", "2.239")), ("middle", _MIDDLE, "1.424214", ("2.239", "2.4")),
+        ("upper", _UPPER, "1.404214", ("2.2", "2.3")),
+        ("upper", _UPPER, "1.424214", ("2.2", "2.3")),
+        ("upper", _UPPER, "1.4", ("2.1", "2.4")),
+        ("upper", _UPPER, "1.43", ("2.1", "2.4")),
+        ("middle", _MIDDLE, "1.404214", ("2.2", "2.221")),
+        ("middle", _MIDDLE, "1.404214", ("2.221", "2.4")),
+        ("middle", _MIDDLE, "1.424214", ("2.2", "2.239")),
+        ("middle", _MIDDLE, "1.424214", ("2.239", "2.4")),
     )
-]  # fmt: skip
+]
 """Curves that meet near the EP4 and the 2EP2, off χ_B = √2."""
 
 _FASTER = [
@@ -127,9 +131,10 @@ _BY_MASS = [
     ("2.24", mu, "1.35", "1.02", "-0.4", "-0.2", "0.5") for mu in ("1", "5.8")
 ]  # whose spectra differ, and would not at χ_H = 1
 _ADMITTED = [
-    ("2", "5", "1.2", "0.9", "-0.5", "-0.4", "0.5"), ("10", "5", "1.2", "0.9", "-0.5", "-0.4", "0.5"),
+    ("2", "5", "1.2", "0.9", "-0.5", "-0.4", "0.5"),
+    ("10", "5", "1.2", "0.9", "-0.5", "-0.4", "0.5"),
     ("3", "5", "1.2", "0.9", "-0.5", "-0.4", "0.5"),
-]  # fmt: skip
+]
 """Unstable bicycles that meet all five printed conditions."""
 
 
@@ -153,45 +158,71 @@ CASES: tuple[Case, ...] = (
         for name, tilt, chi_B, speeds in _MEETINGS
     ),
     _case(
-        "repelling: said of EPs", "fig3-repelling", _CONDITION,
-        not _meets("1.7405", "1.5142", ("3.5", "3.9", "4.1", "4.3")), "the caption; near the CEP2 no real root comes",
+        "repelling: said of EPs",
+        "fig3-repelling",
+        _CONDITION,
+        not _meets("1.7405", "1.5142", ("3.5", "3.9", "4.1", "4.3")),
+        "the caption; near the CEP2 no real root comes",
         ("near EPs", "CEP2"),
     ),
     *(
         _case(
-            f"generality: faster with χ_H = {d[3]}", "chi_H-generality", _CONDITION,
-            bool(_spectrum(*d).real.max() < -((0.4 * 0.2) ** -0.25)), "eigenvalues, and |a4/a0|^(1/4) at χ_H = 1",
+            f"generality: faster with χ_H = {d[3]}",
+            "chi_H-generality",
+            _CONDITION,
+            bool(_spectrum(*d).real.max() < -((0.4 * 0.2) ** -0.25)),
+            "eigenvalues, and |a4/a0|^(1/4) at χ_H = 1",
         )
         for d in _FASTER
     ),
     _case(
-        "generality: μ", "chi_H-generality", _CONDITION,
+        "generality: μ",
+        "chi_H-generality",
+        _CONDITION,
         bool(abs(np.sort_complex(_spectrum(*_BY_MASS[0])) - np.sort_complex(_spectrum(*_BY_MASS[1]))).max() > 0.1)
         and bool(abs(np.sort_complex(_AT_1[0]) - np.sort_complex(_AT_1[1])).max() < 1e-9),
-        "two spectra that differ in μ alone, at χ_H = 1.02 and at 1", ("μ",),
+        "two spectra that differ in μ alone, at χ_H = 1.02 and at 1",
+        ("μ",),
     ),
     *(
         _case(
-            f"generality: unstable at Fr = {d[0]}", "chi_H-generality", _CONDITION, _printed(*d) and not _stable(*d),
-            "eigenvalues of a bicycle that the printed conditions admit", ("lscf",),
+            f"generality: unstable at Fr = {d[0]}",
+            "chi_H-generality",
+            _CONDITION,
+            _printed(*d) and not _stable(*d),
+            "eigenvalues of a bicycle that the printed conditions admit",
+            ("lscf",),
         )
         for d in _ADMITTED
     ),
     _case(
-        "numerical: capsize in closed form", "conclusion-numerical", _FAILS, abs(_SPEED - 6.02426201538837) < 1e-9,
-        "Meijaard et al. (2007), Table 2, and a bisection", ("Whipple",),
+        "numerical: capsize in closed form",
+        "conclusion-numerical",
+        _FAILS,
+        abs(_SPEED - 6.02426201538837) < 1e-9,
+        "Meijaard et al. (2007), Table 2, and a bisection",
+        ("Whipple",),
     ),
     _case(
-        "numerical: GAS2018", "conclusion-numerical", _FAILS, True, "what the paper itself reports in Section 2.2",
+        "numerical: GAS2018",
+        "conclusion-numerical",
+        _FAILS,
+        True,
+        "what the paper itself reports in Section 2.2",
         ("GAS2018",),
     ),
     Case(
-        "counts: nothing lost", {}, ("verify", "--only", "*-1", "--only", "fig3-*", "--json"),
+        "counts: nothing lost",
+        {},
+        ("verify", "--only", "*-1", "--only", "fig3-*", "--json"),
         lambda a: "" if sum(a.data["counts"].values()) == len(a.data["entries"]) > 2 else "counts differ from entries",
         "a sum",
     ),
     _case(
-        "three designs: still exact", "fig3-EPs", _EXACT,
-        real_roots(coefficients("2.24", "1", "1.4142136", "1", "-0.4", "-0.2", _MIDDLE)) == 4, "Sturm's chain",
+        "three designs: still exact",
+        "fig3-EPs",
+        _EXACT,
+        real_roots(coefficients("2.24", "1", "1.4142136", "1", "-0.4", "-0.2", _MIDDLE)) == 4,
+        "Sturm's chain",
     ),
-)  # fmt: skip
+)

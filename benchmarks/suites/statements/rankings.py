@@ -105,9 +105,11 @@ def _over(name: str, values: list[float], tilt: float) -> Case:
     study = f'problem = "p.toml"\n[study]\nstarts = 8\n[vary]\n{name} = {values}\n'
     return Case(
         f"best over {name}, {len(values)} rows, {tilt:g} deg",
-        {"p.toml": _file(own, _FREE_SPEED), "s.toml": study}, ("study", "s.toml", "--export", "rows.csv"), _best_row,
+        {"p.toml": _file(own, _FREE_SPEED), "s.toml": study},
+        ("study", "s.toml", "--export", "rows.csv"),
+        _best_row,
         "eigenvalues of each row times √(g/w)",
-    )  # fmt: skip
+    )
 
 
 def _sizes(scales: list[float], tilts: list[float]) -> Case:
@@ -118,9 +120,12 @@ def _sizes(scales: list[float], tilts: list[float]) -> Case:
     own = {"g": 9.81, "w": 1.0, **_FIXED, "lambda_s": 0.2}
     study = f'problem = "p.toml"\n[study]\nmethod = "list"\nstarts = 8\n[vary]\n{varied}\n'
     return Case(
-        f"best of {len(scales)} sizes, from {min(scales):g} m", {"p.toml": _file(own, _FREE_SPEED), "s.toml": study},
-        ("study", "s.toml", "--export", "rows.csv"), _best_row, "eigenvalues of each row times √(g/w)",
-    )  # fmt: skip
+        f"best of {len(scales)} sizes, from {min(scales):g} m",
+        {"p.toml": _file(own, _FREE_SPEED), "s.toml": study},
+        ("study", "s.toml", "--export", "rows.csv"),
+        _best_row,
+        "eigenvalues of each row times √(g/w)",
+    )
 
 
 def _drawn(tolerances: Mapping[str, float], speed: float) -> Case:
@@ -128,9 +133,12 @@ def _drawn(tolerances: Mapping[str, float], speed: float) -> Case:
     allowed = "\n".join(f"{n} = {x}" for n, x in tolerances.items())
     study = f'problem = "p.toml"\n[study]\nmethod = "monte_carlo"\nrows = 101\n[tolerances]\n{allowed}\n'
     return Case(
-        f"median of products off in {', '.join(tolerances)}", {"p.toml": _file(own), "s.toml": study},
-        ("study", "s.toml", "--export", "rows.csv"), _median, "eigenvalues of each row times √(g/w)",
-    )  # fmt: skip
+        f"median of products off in {', '.join(tolerances)}",
+        {"p.toml": _file(own), "s.toml": study},
+        ("study", "s.toml", "--export", "rows.csv"),
+        _median,
+        "eigenvalues of each row times √(g/w)",
+    )
 
 
 def _design(**changes: float) -> dict[str, float]:
@@ -139,8 +147,12 @@ def _design(**changes: float) -> dict[str, float]:
 
 
 _DESIGNS = (
-    _design(), _design(g=1.62), _design(w=1.02, v=3.5), _design(g=24.8, v=6.0), _design(lambda_s=0.1, v=5.0),
-)  # fmt: skip
+    _design(),
+    _design(g=1.62),
+    _design(w=1.02, v=3.5),
+    _design(g=24.8, v=6.0),
+    _design(lambda_s=0.1, v=5.0),
+)
 _BAND = """[parameters]
 w = 1.0
 m_B = 10
@@ -173,26 +185,42 @@ def _slowest(answer: Answer) -> str:
 
 
 CASES: tuple[Case, ...] = (
-    _over("g", [1.62, 3.71, 9.81], 15.0), _over("g", [9.81, 1.62], 10.0), _over("g", [3.7, 8.87, 9.8, 11.15], 12.0),
-    _over("g", [24.79, 9.81, 3.71], 20.0), _over("g", [0.5, 1.0, 2.0, 4.0], 15.0),
-    _sizes([2.0, 1.0, 0.5], [15.0, 14.0, 13.0]), _sizes([1.2, 0.4], [16.0, 15.0]),
-    _sizes([0.3, 0.6, 1.2, 2.4], [11.0, 12.0, 13.0, 14.0]), _sizes([1.0, 0.8], [15.0, 14.8]),
-    _drawn({"w": 0.005}, 4.0), _drawn({"g": 1.0}, 4.0), _drawn({"x_B": 0.05}, 5.0),
+    _over("g", [1.62, 3.71, 9.81], 15.0),
+    _over("g", [9.81, 1.62], 10.0),
+    _over("g", [3.7, 8.87, 9.8, 11.15], 12.0),
+    _over("g", [24.79, 9.81, 3.71], 20.0),
+    _over("g", [0.5, 1.0, 2.0, 4.0], 15.0),
+    _sizes([2.0, 1.0, 0.5], [15.0, 14.0, 13.0]),
+    _sizes([1.2, 0.4], [16.0, 15.0]),
+    _sizes([0.3, 0.6, 1.2, 2.4], [11.0, 12.0, 13.0, 14.0]),
+    _sizes([1.0, 0.8], [15.0, 14.8]),
+    _drawn({"w": 0.005}, 4.0),
+    _drawn({"g": 1.0}, 4.0),
+    _drawn({"x_B": 0.05}, 5.0),
     *(
         Case(
-            f"a design at g = {p['g']:g}, v = {p['v']:g}", {"p.toml": _file(p)}, ("solve", "p.toml"), _given(p),
+            f"a design at g = {p['g']:g}, v = {p['v']:g}",
+            {"p.toml": _file(p)},
+            ("solve", "p.toml"),
+            _given(p),
             "eigenvalues times √(g/w)",
         )
         for p in _DESIGNS
     ),
     Case(
-        "root at the weave speed", {"p.toml": _file(_design())}, ("speeds", "p.toml"), _weave(_design()),
+        "root at the weave speed",
+        {"p.toml": _file(_design())},
+        ("speeds", "p.toml"),
+        _weave(_design()),
         "eigenvalues at that speed",
     ),
     Case(
-        "root at the weave speed on the moon", {"p.toml": _file(_design(g=1.62))}, ("speeds", "p.toml"),
-        _weave(_design(g=1.62)), "eigenvalues at that speed",
+        "root at the weave speed on the moon",
+        {"p.toml": _file(_design(g=1.62))},
+        ("speeds", "p.toml"),
+        _weave(_design(g=1.62)),
+        "eigenvalues at that speed",
     ),
     Case("peaks and their speed", {"p.toml": _file(_design())}, ("simulate", "p.toml"), _says("at v = 4 m/s"), "file"),
     Case("a band's decay time and its speed", {"p.toml": _BAND}, ("solve", "p.toml"), _slowest, "eigenvalues there"),
-)  # fmt: skip
+)

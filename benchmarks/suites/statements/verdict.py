@@ -75,26 +75,69 @@ def _axis(name: str, model: str, parameters: str, arguments: tuple[str, ...], wa
 _SCRIPT = "import tmsopt\nprint(repr(tmsopt.solve('problem.toml')))\n"
 
 CASES: tuple[Case, ...] = (
-    *(_one_way(*box) for box in (
-        ((-1, 1), (-1, 1), 1, 0, False), ((-2, 3), (-1, 2), 1, 0, False), ((-0.7, 1.1), (-0.4, 1.3), 1, 1, True),
-        ((-1, 2), (-2, 1), 1, 3, False), ((-5, 3), (-3, 4), 1, 2, False), ((-2, 1), (-3, 2), 2, 0, True),
-        ((-1, 3), (-2, 5), 0.5, 1, False), ((-4, 1), (-1, 3), 1, 4, True),
-    )),
-    *(_towards(*what) for what in (
-        (2, 1, 0, False), (2, 1, -0.1, False), (5, 2, 0, False), (1, 1, 0, False), (3, 0.5, 0, False),
-        (2, 1, 0.01, True), (5, 2, 0.05, True), (3, 1, 1e-6, True),
-    )),
-    _axis("an oscillator, solve", "M = [[1]]\nK = [[\"k\"]]", "k = 3", _SOLVE, "marginally stable", "not stable"),
-    _axis("an oscillator, simulate", "M = [[1]]\nK = [[\"k\"]]", "k = 3", ("simulate", "problem.toml"),
-          "marginally stable", "not stable"),
-    _axis("a real eigenfrequency, simulate", 'H = [["w", 0], [0, "2*w - 1j"]]', "w = 1", ("simulate", "problem.toml"),
-          "marginally stable", "not stable"),
-    _axis("a charge that drifts", 'M = [[1, 0], [0, 1]]\nD = [[0, "g"], ["-g", 0]]\nK = [[0, 0], [0, 0]]', "g = 2",
-          _SOLVE, "marginally stable", "(EP2)\n"),
-    Case("the line of a notebook", {"problem.toml": '[model]\nM = [[1]]\nK = [["k"]]\n[parameters]\nk = 3\n',
-                                    "show.py": _SCRIPT},
-         ("python", "show.py"), partial(_words, wanted="marginally stable", unwanted="not stable"), "s = ±i√3"),
-    Case("the line of a notebook, growing", {"problem.toml": '[model]\nM = [[1]]\nK = [["k"]]\n[parameters]\nk = 0\n',
-                                             "show.py": _SCRIPT},
-         ("python", "show.py"), partial(_words, wanted="growing as t", unwanted="marginally"), "x = a + b t"),
-)  # fmt: skip
+    *(
+        _one_way(*box)
+        for box in (
+            ((-1, 1), (-1, 1), 1, 0, False),
+            ((-2, 3), (-1, 2), 1, 0, False),
+            ((-0.7, 1.1), (-0.4, 1.3), 1, 1, True),
+            ((-1, 2), (-2, 1), 1, 3, False),
+            ((-5, 3), (-3, 4), 1, 2, False),
+            ((-2, 1), (-3, 2), 2, 0, True),
+            ((-1, 3), (-2, 5), 0.5, 1, False),
+            ((-4, 1), (-1, 3), 1, 4, True),
+        )
+    ),
+    *(
+        _towards(*what)
+        for what in (
+            (2, 1, 0, False),
+            (2, 1, -0.1, False),
+            (5, 2, 0, False),
+            (1, 1, 0, False),
+            (3, 0.5, 0, False),
+            (2, 1, 0.01, True),
+            (5, 2, 0.05, True),
+            (3, 1, 1e-6, True),
+        )
+    ),
+    _axis("an oscillator, solve", 'M = [[1]]\nK = [["k"]]', "k = 3", _SOLVE, "marginally stable", "not stable"),
+    _axis(
+        "an oscillator, simulate",
+        'M = [[1]]\nK = [["k"]]',
+        "k = 3",
+        ("simulate", "problem.toml"),
+        "marginally stable",
+        "not stable",
+    ),
+    _axis(
+        "a real eigenfrequency, simulate",
+        'H = [["w", 0], [0, "2*w - 1j"]]',
+        "w = 1",
+        ("simulate", "problem.toml"),
+        "marginally stable",
+        "not stable",
+    ),
+    _axis(
+        "a charge that drifts",
+        'M = [[1, 0], [0, 1]]\nD = [[0, "g"], ["-g", 0]]\nK = [[0, 0], [0, 0]]',
+        "g = 2",
+        _SOLVE,
+        "marginally stable",
+        "(EP2)\n",
+    ),
+    Case(
+        "the line of a notebook",
+        {"problem.toml": '[model]\nM = [[1]]\nK = [["k"]]\n[parameters]\nk = 3\n', "show.py": _SCRIPT},
+        ("python", "show.py"),
+        partial(_words, wanted="marginally stable", unwanted="not stable"),
+        "s = ±i√3",
+    ),
+    Case(
+        "the line of a notebook, growing",
+        {"problem.toml": '[model]\nM = [[1]]\nK = [["k"]]\n[parameters]\nk = 0\n', "show.py": _SCRIPT},
+        ("python", "show.py"),
+        partial(_words, wanted="growing as t", unwanted="marginally"),
+        "x = a + b t",
+    ),
+)

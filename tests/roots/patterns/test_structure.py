@@ -48,7 +48,7 @@ EXAMPLES = {
         [[1, -1], [1, 2], [1, 2], [1, 5]],
         [[1, 0], [1, 1], [1, 2], [1, 3]],
     ],
-}  # fmt: skip
+}
 EVERY = [(name, factors) for name, examples in EXAMPLES.items() for factors in examples]
 
 
@@ -61,9 +61,15 @@ def named_by(roots: Sequence[tuple[complex, int]]) -> str:
     real = sum(m for z, m in roots if z.real == right and z.imag == 0)
     pairs = sum(m for z, m in roots if z.real == right and z.imag > 0)
     names = {
-        (4, 0): "EP4", (3, 0): "EP3", (2, 1): "EP2+pair", (2, 0): "EP2", (1, 1): "pair+real", (0, 2): "two pairs",
-        (0, 1): "pair", (1, 0): "real",
-    }  # fmt: skip
+        (4, 0): "EP4",
+        (3, 0): "EP3",
+        (2, 1): "EP2+pair",
+        (2, 0): "EP2",
+        (1, 1): "pair+real",
+        (0, 2): "two pairs",
+        (0, 1): "pair",
+        (1, 0): "real",
+    }
     return names[real, pairs]
 
 

@@ -99,9 +99,14 @@ def ep4_of_the_model(rng: np.random.Generator, n: int) -> np.ndarray:
     Fr = laws.frep4(zeta_B, zeta_H)[0]
     tilt = np.arctan(laws.tls(zeta_B, zeta_H))
     design = {
-        "Fr": Fr, "mu": np.full(n, 0.1), "chi_B": laws.chib1(zeta_B, zeta_H), "chi_H": np.ones(n),
-        "zeta_B": zeta_B, "zeta_H": zeta_H, "lambda_s": tilt,
-    }  # fmt: skip
+        "Fr": Fr,
+        "mu": np.full(n, 0.1),
+        "chi_B": laws.chib1(zeta_B, zeta_H),
+        "chi_H": np.ones(n),
+        "zeta_B": zeta_B,
+        "zeta_H": zeta_H,
+        "lambda_s": tilt,
+    }
     return np.stack(tms.coefficients(design), axis=-1)
 
 

@@ -64,9 +64,16 @@ Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
 @plot_option("Draw the motion")
 @report_option
 def simulate(
-    file: Path, as_json: bool, csv_file: Path | None, whole: bool, plot: Path | None, report: Path | None,
-    start: tuple[str, ...], at: tuple[str, ...], **asked: Any,
-) -> None:  # fmt: skip
+    file: Path,
+    as_json: bool,
+    csv_file: Path | None,
+    whole: bool,
+    plot: Path | None,
+    report: Path | None,
+    start: tuple[str, ...],
+    at: tuple[str, ...],
+    **asked: Any,
+) -> None:
     """Show what the design of FILE does after a lean, a push of the handlebar, or in noise."""
     if whole and csv_file is None:
         raise refusal("says what --csv writes; add --csv FILE", "--path")

@@ -57,15 +57,36 @@ def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
     """
     decay = f"-(abscissa*{written})"
     return (
-        Quantity("decay_rate", "1/s", "how fast the slowest part of a disturbance dies out", r"-\alpha",
-            lambda v: -_of_roots(v, "abscissa") * rate(v), aside=True, stands_for=f"({decay})"),
-        Quantity("decay_time", "s", "in which the slowest part of a disturbance falls to 1/e", r"\tau",
+        Quantity(
+            "decay_rate",
+            "1/s",
+            "how fast the slowest part of a disturbance dies out",
+            r"-\alpha",
+            lambda v: -_of_roots(v, "abscissa") * rate(v),
+            aside=True,
+            stands_for=f"({decay})",
+        ),
+        Quantity(
+            "decay_time",
+            "s",
+            "in which the slowest part of a disturbance falls to 1/e",
+            r"\tau",
             lambda v: quotient(1.0, -a * rate(v)) if (a := _of_roots(v, "abscissa")) < 0 else math.nan,
-            range=Range(lower=0.0), aside=True, stands_for=f"(1/max({decay}, 0))"),
-        Quantity("frequency", "Hz", "of the fastest oscillation, 0 where nothing oscillates", "f",
-            lambda v: _of_roots(v, "angular_frequency") * rate(v) / (2 * math.pi), range=Range(lower=0.0), aside=True,
-            stands_for=f"(angular_frequency*{written}/(2*pi))"),
-    )  # fmt: skip
+            range=Range(lower=0.0),
+            aside=True,
+            stands_for=f"(1/max({decay}, 0))",
+        ),
+        Quantity(
+            "frequency",
+            "Hz",
+            "of the fastest oscillation, 0 where nothing oscillates",
+            "f",
+            lambda v: _of_roots(v, "angular_frequency") * rate(v) / (2 * math.pi),
+            range=Range(lower=0.0),
+            aside=True,
+            stands_for=f"(angular_frequency*{written}/(2*pi))",
+        ),
+    )
 
 
 def _of_roots(v: Mapping[str, Any], name: str) -> Any:

@@ -139,11 +139,20 @@ def with_feedback(of: Steered, names: tuple[str, ...]) -> Model:
     every = (*base.quantities, *(q for s in base.sets for q in s.quantities))
     absent = {q.name: _ABSENT for q in every if q.name in lost} | ({"push_torque": _LATE} if lagged else {})
     return replace(
-        base, title=f"{base.title} with a controller", degree=4 + len(driven) * lagged, sets=sets, algebraic=algebraic,
-        polynomial=polynomial, compact=None, pencil=pencil, feedback=feedback, natural=False,
+        base,
+        title=f"{base.title} with a controller",
+        degree=4 + len(driven) * lagged,
+        sets=sets,
+        algebraic=algebraic,
+        polynomial=polynomial,
+        compact=None,
+        pencil=pencil,
+        feedback=feedback,
+        natural=False,
         quantities=tuple(q for q in base.quantities if q.name not in lost),
-        conventions=(*base.conventions, _SAID), absent=kept | absent,
-    )  # fmt: skip
+        conventions=(*base.conventions, _SAID),
+        absent=kept | absent,
+    )
 
 
 def _sum(A: Matrix, B: Matrix) -> Matrix:
@@ -247,6 +256,11 @@ def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: 
 def _sized(name: str, unit: str, meaning: str, latex: str, signed: Formula) -> Quantity:
     """The size of a quantity of either sign."""
     return Quantity(
-        name, unit, meaning, latex, lambda v: magnitude(signed(v)), range=Range(lower=0.0),
+        name,
+        unit,
+        meaning,
+        latex,
+        lambda v: magnitude(signed(v)),
+        range=Range(lower=0.0),
         pieces=(signed, lambda v: -signed(v)),
-    )  # fmt: skip
+    )

@@ -38,14 +38,15 @@ _NATIVE = ParameterSet(
         Parameter("Fr", "1", "Froude number v/√(g w)", r"\mathrm{Fr}", _NOT_NEGATIVE),
         Parameter("mu", "1", "mass ratio m_H/m_B", r"\mu", _NOT_NEGATIVE, multiple_of="kg"),
         Parameter("chi_B", "1", "rear frame centre of mass, forward of the rear contact", r"\chi_B", multiple_of="m"),
-        Parameter("chi_H", "1", "front assembly centre of mass, forward of the rear contact", r"\chi_H",
-            multiple_of="m"),
+        Parameter(
+            "chi_H", "1", "front assembly centre of mass, forward of the rear contact", r"\chi_H", multiple_of="m"
+        ),
         Parameter("zeta_B", "1", "rear frame centre of mass, downward", r"\zeta_B", _NOT_POSITIVE, multiple_of="m"),
         Parameter("zeta_H", "1", "front assembly centre of mass, downward", r"\zeta_H", _NOT_POSITIVE, multiple_of="m"),
         LAMBDA_S,
     ),
     native=dict,
-)  # fmt: skip
+)
 
 
 def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
@@ -59,9 +60,14 @@ def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
     More: docs/how_to/units.md
     """
     return {
-        "Fr": p["v"] / sqrt(p["g"] * p["w"]), "mu": p["m_H"] / p["m_B"], "chi_B": p["x_B"] / p["w"],
-        "chi_H": p["x_H"] / p["w"], "zeta_B": p["z_B"] / p["w"], "zeta_H": p["z_H"] / p["w"], "lambda_s": p["lambda_s"],
-    }  # fmt: skip
+        "Fr": p["v"] / sqrt(p["g"] * p["w"]),
+        "mu": p["m_H"] / p["m_B"],
+        "chi_B": p["x_B"] / p["w"],
+        "chi_H": p["x_H"] / p["w"],
+        "zeta_B": p["z_B"] / p["w"],
+        "zeta_H": p["z_H"] / p["w"],
+        "lambda_s": p["lambda_s"],
+    }
 
 
 def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict[str, Any]:
@@ -77,9 +83,17 @@ def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) 
     More: docs/how_to/units.md
     """
     own = {
-        "w": w, "v": p["Fr"] * sqrt(g * w), "g": g, "lambda_s": p["lambda_s"], "m_B": m_B, "x_B": p["chi_B"] * w,
-        "z_B": p["zeta_B"] * w, "m_H": p["mu"] * m_B, "x_H": p["chi_H"] * w, "z_H": p["zeta_H"] * w,
-    }  # fmt: skip
+        "w": w,
+        "v": p["Fr"] * sqrt(g * w),
+        "g": g,
+        "lambda_s": p["lambda_s"],
+        "m_B": m_B,
+        "x_B": p["chi_B"] * w,
+        "z_B": p["zeta_B"] * w,
+        "m_H": p["mu"] * m_B,
+        "x_H": p["chi_H"] * w,
+        "z_H": p["zeta_H"] * w,
+    }
     return {**own, **{n: p[native_name(n)] * size(n, own, _rate, _torque) for n in FEEDBACK if native_name(n) in p}}
 
 
@@ -106,7 +120,8 @@ _SI = ParameterSet(
     (
         Parameter("w", "m", "wheelbase", "w", _POSITIVE),
         Parameter("v", "m/s", "forward speed", "v", _NOT_NEGATIVE, counterpart="Fr"),
-        Parameter("g", "m/s^2", "gravity", "g", _POSITIVE, default=GRAVITY), LAMBDA_S,
+        Parameter("g", "m/s^2", "gravity", "g", _POSITIVE, default=GRAVITY),
+        LAMBDA_S,
         Parameter("m_B", "kg", "mass of the rear frame", "m_B", _POSITIVE),
         Parameter("x_B", "m", "rear frame centre of mass, forward of the rear contact", "x_B", counterpart="chi_B"),
         Parameter("z_B", "m", "rear frame centre of mass, downward", "z_B", _NOT_POSITIVE, counterpart="zeta_B"),
@@ -114,21 +129,35 @@ _SI = ParameterSet(
         Parameter("x_H", "m", "front assembly centre of mass, forward of the rear contact", "x_H", counterpart="chi_H"),
         Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE, counterpart="zeta_H"),
     ),
-    native=from_si, quantities=(*SI_QUANTITIES, *times(_rate, "sqrt(g/w)")), rate=_rate, root_unit="√(g/w)",
+    native=from_si,
+    quantities=(*SI_QUANTITIES, *times(_rate, "sqrt(g/w)")),
+    rate=_rate,
+    root_unit="√(g/w)",
     torque=_torque,
-)  # fmt: skip
+)
 
 _ABSENT = {
     "trail": "skates have no trail; the front mass stands off the steer axis by nu_H, in SI by u_H: write "
     "'nu_H >= 0.02' or 'u_H >= 0.02'; wheels and a trail, c, are those of model = \"whipple\"",
-}  # fmt: skip
+}
 
 tms = Model(
-    name="tms", title="two-mass-skate bicycle", degree=4, sets=(_NATIVE, _SI), algebraic=_algebraic, polynomial=copo,
-    quantities=NATIVE_QUANTITIES, compact=compact_copo, pencil=_pencil, natural=True,
-    words=WORDS, omits="two point masses on skates, without wheels, rotational inertia or trail",
-    conventions=CONVENTIONS, sketch=TMS, absent=_ABSENT | UNCONTROLLED,
-)  # fmt: skip
+    name="tms",
+    title="two-mass-skate bicycle",
+    degree=4,
+    sets=(_NATIVE, _SI),
+    algebraic=_algebraic,
+    polynomial=copo,
+    quantities=NATIVE_QUANTITIES,
+    compact=compact_copo,
+    pencil=_pencil,
+    natural=True,
+    words=WORDS,
+    omits="two point masses on skates, without wheels, rotational inertia or trail",
+    conventions=CONVENTIONS,
+    sketch=TMS,
+    absent=_ABSENT | UNCONTROLLED,
+)
 """The two-mass-skate bicycle."""
 
 

@@ -17,10 +17,12 @@ def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: 
     More: docs/explanation/paper.md
     """
     return [
-        (chi_H - 1 - zeta_H * T) * zeta_B * zeta_B, Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
+        (chi_H - 1 - zeta_H * T) * zeta_B * zeta_B,
+        Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
         Fr * Fr * (zeta_B - zeta_H) * zeta_B - zeta_B * (zeta_B + zeta_H) * T - (chi_H - 1) * (mu * zeta_H - zeta_B),
-        Fr * (chi_H - chi_B) * zeta_B, -zeta_B * T - mu * (chi_H - 1),
-    ]  # fmt: skip
+        Fr * (chi_H - chi_B) * zeta_B,
+        -zeta_B * T - mu * (chi_H - 1),
+    ]
 
 
 def compact_copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
@@ -29,9 +31,12 @@ def compact_copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: 
     lever, arm = Fr * (chi_H - chi_B), Fr * below
     gravity = T + mu * behind / zeta_B
     return [
-        zeta_B * (zeta_H * T - behind), -zeta_H * lever - chi_H * arm,
-        zeta_H * gravity + zeta_B * T - behind - Fr * arm, -lever, gravity,
-    ]  # fmt: skip
+        zeta_B * (zeta_H * T - behind),
+        -zeta_H * lever - chi_H * arm,
+        zeta_H * gravity + zeta_B * T - behind - Fr * arm,
+        -lever,
+        gravity,
+    ]
 
 
 def matrices(

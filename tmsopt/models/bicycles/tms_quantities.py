@@ -33,9 +33,10 @@ def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
     mu, chi_B, chi_H, zeta_B, zeta_H = (v[name] for name in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H"))
     lever, moment, k = chi_B - chi_H, zeta_B * chi_H - zeta_H * chi_B, chi_H - 1
     numerator = [
-        zeta_B * (zeta_B - zeta_H) * chi_B * chi_H * tan(v["lambda_s"]), k * chi_H * mu * moment,
+        zeta_B * (zeta_B - zeta_H) * chi_B * chi_H * tan(v["lambda_s"]),
+        k * chi_H * mu * moment,
         -k * chi_B * zeta_B * lever,
-    ]  # fmt: skip
+    ]
     return numerator, lever * moment * zeta_B
 
 
@@ -85,42 +86,134 @@ def _weight(v: Mapping[str, Any]) -> Any:
 
 SI_QUANTITIES = (
     Quantity("v_c", "m/s", "speed at the weave boundary", "v_c", lambda v: v["Fr_c"] * sqrt(v["g"] * v["w"])),
-    Quantity("u_H", "m", "distance of the front centre of mass from the steer axis, positive ahead of it", "u_H",
-        lambda v: v["nu_H"] * v["w"]),
-    Quantity("N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F",
-        lambda v: v["load_front"] * _weight(v)),
-    Quantity("N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R",
-        lambda v: v["load_rear"] * _weight(v)),
-    Quantity("m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", "m_R",
-        lambda v: v["ballast_rear"] * v["m_B"], range=_NOT_NEGATIVE, aside=True),
-    Quantity("m_ballast_front", "kg", "mass at the front contact that keeps the front wheel down", "m_F",
-        lambda v: v["ballast_front"] * v["m_B"], range=_NOT_NEGATIVE, aside=True),
-)  # fmt: skip
+    Quantity(
+        "u_H",
+        "m",
+        "distance of the front centre of mass from the steer axis, positive ahead of it",
+        "u_H",
+        lambda v: v["nu_H"] * v["w"],
+    ),
+    Quantity(
+        "N_F",
+        "N",
+        "load on the front wheel at rest, negative where it lifts",
+        "N_F",
+        lambda v: v["load_front"] * _weight(v),
+    ),
+    Quantity(
+        "N_R",
+        "N",
+        "load on the rear wheel at rest, negative where it lifts",
+        "N_R",
+        lambda v: v["load_rear"] * _weight(v),
+    ),
+    Quantity(
+        "m_ballast_rear",
+        "kg",
+        "mass at the rear contact that keeps the rear wheel down",
+        "m_R",
+        lambda v: v["ballast_rear"] * v["m_B"],
+        range=_NOT_NEGATIVE,
+        aside=True,
+    ),
+    Quantity(
+        "m_ballast_front",
+        "kg",
+        "mass at the front contact that keeps the front wheel down",
+        "m_F",
+        lambda v: v["ballast_front"] * v["m_B"],
+        range=_NOT_NEGATIVE,
+        aside=True,
+    ),
+)
 """Quantities that need lengths, masses and gravity."""
 
 _SI = {q.name: q for q in SI_QUANTITIES}
 
 NATIVE_QUANTITIES = (
-    Quantity("nu_H", "1", "distance of the front centre of mass from the steer axis, positive ahead of it", r"\nu_H",
-        _nu_H, counterpart=_SI["u_H"]),
-    Quantity("omega0", "1", "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)", r"\omega_0", omega0,
-        equation=omega0_equation, range=_NOT_POSITIVE, aside=True),
-    Quantity("Fr_c", "1", "Froude number at the weave boundary (equation flus)", r"\mathrm{Fr}_c", _Fr_c,
-        equation=_Fr_c_equation, range=_NOT_NEGATIVE, counterpart=_SI["v_c"]),
-    Quantity("chi_T", "1", "centre of mass of the whole bicycle, forward of the rear contact", r"\chi_T", _chi_T,
-        counterpart=Quantity("x_T", "m", "centre of mass of the whole bicycle", "x_T", lambda v: v["chi_T"] * v["w"])),
-    Quantity("load_front", "1", "share of the weight on the front wheel, negative where it lifts", r"N_F/(N_F + N_R)",
-        _chi_T, counterpart=_SI["N_F"], share=True),
-    Quantity("load_rear", "1", "share of the weight on the rear wheel, negative where it lifts", r"N_R/(N_F + N_R)",
-        _load_rear, counterpart=_SI["N_R"], share=True),
-    Quantity("ballast_rear", "1", "mass at the rear contact that keeps the rear wheel down, per mass of the rear frame",
-        r"m_R/m_B", lambda v: positive_part(_rear_lift(v)), range=_NOT_NEGATIVE, pieces=(nothing, _rear_lift),
-        counterpart=_SI["m_ballast_rear"], aside=True),
-    Quantity("ballast_front", "1",
-        "mass at the front contact that keeps the front wheel down, per mass of the rear frame", r"m_F/m_B",
-        lambda v: positive_part(_front_lift(v)), range=_NOT_NEGATIVE, pieces=(nothing, _front_lift),
-        counterpart=_SI["m_ballast_front"], aside=True),
-    Quantity("mass_margin", "1", "smallest eigenvalue of the mass matrix, 0 where it is singular (equation matrices)",
-        r"\min\sigma(M)", _mass_margin, range=_NOT_NEGATIVE),
-)  # fmt: skip
+    Quantity(
+        "nu_H",
+        "1",
+        "distance of the front centre of mass from the steer axis, positive ahead of it",
+        r"\nu_H",
+        _nu_H,
+        counterpart=_SI["u_H"],
+    ),
+    Quantity(
+        "omega0",
+        "1",
+        "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)",
+        r"\omega_0",
+        omega0,
+        equation=omega0_equation,
+        range=_NOT_POSITIVE,
+        aside=True,
+    ),
+    Quantity(
+        "Fr_c",
+        "1",
+        "Froude number at the weave boundary (equation flus)",
+        r"\mathrm{Fr}_c",
+        _Fr_c,
+        equation=_Fr_c_equation,
+        range=_NOT_NEGATIVE,
+        counterpart=_SI["v_c"],
+    ),
+    Quantity(
+        "chi_T",
+        "1",
+        "centre of mass of the whole bicycle, forward of the rear contact",
+        r"\chi_T",
+        _chi_T,
+        counterpart=Quantity("x_T", "m", "centre of mass of the whole bicycle", "x_T", lambda v: v["chi_T"] * v["w"]),
+    ),
+    Quantity(
+        "load_front",
+        "1",
+        "share of the weight on the front wheel, negative where it lifts",
+        r"N_F/(N_F + N_R)",
+        _chi_T,
+        counterpart=_SI["N_F"],
+        share=True,
+    ),
+    Quantity(
+        "load_rear",
+        "1",
+        "share of the weight on the rear wheel, negative where it lifts",
+        r"N_R/(N_F + N_R)",
+        _load_rear,
+        counterpart=_SI["N_R"],
+        share=True,
+    ),
+    Quantity(
+        "ballast_rear",
+        "1",
+        "mass at the rear contact that keeps the rear wheel down, per mass of the rear frame",
+        r"m_R/m_B",
+        lambda v: positive_part(_rear_lift(v)),
+        range=_NOT_NEGATIVE,
+        pieces=(nothing, _rear_lift),
+        counterpart=_SI["m_ballast_rear"],
+        aside=True,
+    ),
+    Quantity(
+        "ballast_front",
+        "1",
+        "mass at the front contact that keeps the front wheel down, per mass of the rear frame",
+        r"m_F/m_B",
+        lambda v: positive_part(_front_lift(v)),
+        range=_NOT_NEGATIVE,
+        pieces=(nothing, _front_lift),
+        counterpart=_SI["m_ballast_front"],
+        aside=True,
+    ),
+    Quantity(
+        "mass_margin",
+        "1",
+        "smallest eigenvalue of the mass matrix, 0 where it is singular (equation matrices)",
+        r"\min\sigma(M)",
+        _mass_margin,
+        range=_NOT_NEGATIVE,
+    ),
+)
 """Quantities of a dimensionless design. A mass at a wheel contact has no part in the lateral motion."""

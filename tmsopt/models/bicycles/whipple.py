@@ -67,10 +67,13 @@ _SI = ParameterSet(
         _inertia("I_Fxx", "moment of inertia of the front wheel about a diameter"),
         _inertia("I_Fyy", "moment of inertia of the front wheel about its axle"),
     ),
-    native=dict, quantities=(*QUANTITIES, *times(lambda p: 1, "1")), rate=lambda p: 1, root_unit="1/s",
+    native=dict,
+    quantities=(*QUANTITIES, *times(lambda p: 1, "1")),
+    rate=lambda p: 1,
+    root_unit="1/s",
     torque=lambda p: 1,
     needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
-)  # fmt: skip
+)
 
 
 def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
@@ -84,10 +87,18 @@ def _at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> 
 
 
 whipple = Model(
-    name="whipple", title="Carvallo–Whipple bicycle", degree=4, sets=(_SI,), algebraic=algebraic,
-    polynomial=carvallo_whipple, pencil=_pencil, words=WORDS, conventions=CONVENTIONS,
-    sketch=WHIPPLE, absent=UNCONTROLLED,
-)  # fmt: skip
+    name="whipple",
+    title="Carvallo–Whipple bicycle",
+    degree=4,
+    sets=(_SI,),
+    algebraic=algebraic,
+    polynomial=carvallo_whipple,
+    pencil=_pencil,
+    words=WORDS,
+    conventions=CONVENTIONS,
+    sketch=WHIPPLE,
+    absent=UNCONTROLLED,
+)
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""
 
 

@@ -13,10 +13,32 @@ Matrix = Sequence[Sequence[Any]]
 
 
 def matrices(
-    w: Any, c: Any, r_R: Any, m_R: Any, I_Rxx: Any, S_R: Any, x_B: Any, z_B: Any, m_B: Any, I_Bxx: Any, I_Bzz: Any,
-    I_Bxz: Any, x_H: Any, z_H: Any, m_H: Any, I_Hxx: Any, I_Hzz: Any, I_Hxz: Any, r_F: Any, m_F: Any, I_Fxx: Any,
-    S_F: Any, sine: Any, cosine: Any, turn: Any,
-) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:  # fmt: skip
+    w: Any,
+    c: Any,
+    r_R: Any,
+    m_R: Any,
+    I_Rxx: Any,
+    S_R: Any,
+    x_B: Any,
+    z_B: Any,
+    m_B: Any,
+    I_Bxx: Any,
+    I_Bzz: Any,
+    I_Bxz: Any,
+    x_H: Any,
+    z_H: Any,
+    m_H: Any,
+    I_Hxx: Any,
+    I_Hzz: Any,
+    I_Hxz: Any,
+    r_F: Any,
+    m_F: Any,
+    I_Fxx: Any,
+    S_F: Any,
+    sine: Any,
+    cosine: Any,
+    turn: Any,
+) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
     """M, C1, K0, K2 of M q″ + v C1 q′ + (g K0 + v² K2) q = 0, q = (lean, steer); nested lists, any numbers.
 
     Args:
@@ -65,28 +87,77 @@ def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any,
     lean has neither damping nor stiffness from the speed, so no higher power appears.
     """
     return (
-        M[0][0] * M[1][1] - M[0][1] * M[1][0], _mixed(M, C1), _mixed(M, K0), _mixed(M, K2) - C1[0][1] * C1[1][0],
-        _mixed(C1, K0), -C1[1][0] * K2[0][1], K0[0][0] * K0[1][1] - K0[0][1] * K0[1][0],
+        M[0][0] * M[1][1] - M[0][1] * M[1][0],
+        _mixed(M, C1),
+        _mixed(M, K0),
+        _mixed(M, K2) - C1[0][1] * C1[1][0],
+        _mixed(C1, K0),
+        -C1[1][0] * K2[0][1],
+        K0[0][0] * K0[1][1] - K0[0][1] * K0[1][0],
         K0[0][0] * K2[1][1] - K0[1][0] * K2[0][1],
-    )  # fmt: skip
+    )
 
 
 def carvallo_whipple(
-    v: Any, g: Any, T: Any, w: Any, c: Any, r_R: Any, m_R: Any, I_Rxx: Any, S_R: Any, x_B: Any, z_B: Any, m_B: Any,
-    I_Bxx: Any, I_Bzz: Any, I_Bxz: Any, x_H: Any, z_H: Any, m_H: Any, I_Hxx: Any, I_Hzz: Any, I_Hxz: Any, r_F: Any,
-    m_F: Any, I_Fxx: Any, S_F: Any,
-) -> list[Any]:  # fmt: skip
+    v: Any,
+    g: Any,
+    T: Any,
+    w: Any,
+    c: Any,
+    r_R: Any,
+    m_R: Any,
+    I_Rxx: Any,
+    S_R: Any,
+    x_B: Any,
+    z_B: Any,
+    m_B: Any,
+    I_Bxx: Any,
+    I_Bzz: Any,
+    I_Bxz: Any,
+    x_H: Any,
+    z_H: Any,
+    m_H: Any,
+    I_Hxx: Any,
+    I_Hzz: Any,
+    I_Hxz: Any,
+    r_F: Any,
+    m_F: Any,
+    I_Fxx: Any,
+    S_F: Any,
+) -> list[Any]:
     """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` alone.
 
     The factor is that of a steer angle in units of cos λ/w, in which the equations are polynomials in T and w.
     """
     b = powers_of_speed(
         *matrices(
-            w=w, c=c, r_R=r_R, m_R=m_R, I_Rxx=I_Rxx, S_R=S_R, x_B=x_B, z_B=z_B, m_B=m_B, I_Bxx=I_Bxx, I_Bzz=I_Bzz,
-            I_Bxz=I_Bxz, x_H=x_H, z_H=z_H, m_H=m_H, I_Hxx=I_Hxx, I_Hzz=I_Hzz, I_Hxz=I_Hxz, r_F=r_F, m_F=m_F,
-            I_Fxx=I_Fxx, S_F=S_F, sine=w * T, cosine=w, turn=1,
+            w=w,
+            c=c,
+            r_R=r_R,
+            m_R=m_R,
+            I_Rxx=I_Rxx,
+            S_R=S_R,
+            x_B=x_B,
+            z_B=z_B,
+            m_B=m_B,
+            I_Bxx=I_Bxx,
+            I_Bzz=I_Bzz,
+            I_Bxz=I_Bxz,
+            x_H=x_H,
+            z_H=z_H,
+            m_H=m_H,
+            I_Hxx=I_Hxx,
+            I_Hzz=I_Hzz,
+            I_Hxz=I_Hxz,
+            r_F=r_F,
+            m_F=m_F,
+            I_Fxx=I_Fxx,
+            S_F=S_F,
+            sine=w * T,
+            cosine=w,
+            turn=1,
         )
-    )  # fmt: skip
+    )
     v2 = v * v
     return [b[0], v * b[1], g * b[2] + v2 * b[3], v * (g * b[4] + v2 * b[5]), g * (g * b[6] + v2 * b[7])]
 

@@ -18,9 +18,27 @@ _NOT_POSITIVE = Range(upper=0.0)
 _TINY = 1e-300  # keeps 0/0 away for an optimiser, and changes nothing else
 
 _IN_MATRICES = (
-    "w", "c", "r_R", "m_R", "I_Rxx", "x_B", "z_B", "m_B", "I_Bxx", "I_Bzz", "I_Bxz", "x_H", "z_H", "m_H", "I_Hxx",
-    "I_Hzz", "I_Hxz", "r_F", "m_F", "I_Fxx",
-)  # fmt: skip
+    "w",
+    "c",
+    "r_R",
+    "m_R",
+    "I_Rxx",
+    "x_B",
+    "z_B",
+    "m_B",
+    "I_Bxx",
+    "I_Bzz",
+    "I_Bxz",
+    "x_H",
+    "z_H",
+    "m_H",
+    "I_Hxx",
+    "I_Hzz",
+    "I_Hxz",
+    "r_F",
+    "m_F",
+    "I_Fxx",
+)
 
 
 def spin(I_yy: Any, r: Any) -> Any:
@@ -50,9 +68,11 @@ def _vanishes(x: Any) -> bool:
 def algebraic(p: Design) -> dict[str, Any]:
     """The numbers in which the coefficients are polynomials: T = tan λ_s and the spins instead of I_yy."""
     return {
-        **{name: p[name] for name in ("v", "g", *_IN_MATRICES)}, "T": tan(p["lambda_s"]),
-        "S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"]),
-    }  # fmt: skip
+        **{name: p[name] for name in ("v", "g", *_IN_MATRICES)},
+        "T": tan(p["lambda_s"]),
+        "S_R": spin(p["I_Ryy"], p["r_R"]),
+        "S_F": spin(p["I_Fyy"], p["r_F"]),
+    }
 
 
 def canonical(p: Design) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
@@ -167,35 +187,100 @@ def _mass_margin(v: Design) -> Any:
 
 
 QUANTITIES = (
-    Quantity("omega0", "1/s", "−(a4/a0)^(1/4), the mean decay of the roots", r"\omega_0", omega0,
-        equation=omega0_equation, range=_NOT_POSITIVE),
+    Quantity(
+        "omega0",
+        "1/s",
+        "−(a4/a0)^(1/4), the mean decay of the roots",
+        r"\omega_0",
+        omega0,
+        equation=omega0_equation,
+        range=_NOT_POSITIVE,
+    ),
     Quantity("v_weave", "m/s", "least speed at which a pair of roots is imaginary", r"v_\mathrm{w}", _v_weave),
-    Quantity("v_capsize", "m/s", "speed at which a root is 0", r"v_\mathrm{c}", _v_capsize,
-        equation=_v_capsize_equation, range=_NOT_NEGATIVE),
-    Quantity("mechanical_trail", "m", "distance of the front contact from the steer axis", r"c_m",
-        lambda v: v["c"] * _sine_cosine(v)[1]),
+    Quantity(
+        "v_capsize",
+        "m/s",
+        "speed at which a root is 0",
+        r"v_\mathrm{c}",
+        _v_capsize,
+        equation=_v_capsize_equation,
+        range=_NOT_NEGATIVE,
+    ),
+    Quantity(
+        "mechanical_trail",
+        "m",
+        "distance of the front contact from the steer axis",
+        r"c_m",
+        lambda v: v["c"] * _sine_cosine(v)[1],
+    ),
     Quantity("fork_offset", "m", "distance of the front wheel centre from the steer axis", r"o_F", _fork_offset),
-    Quantity("u_H", "m", "distance of the handlebar's centre of mass from the steer axis, positive ahead of it", "u_H",
-        _u_H),
-    Quantity("u_A", "m", "distance of the centre of mass of the front assembly from the steer axis", "u_A",
-        lambda v: quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"])),
+    Quantity(
+        "u_H", "m", "distance of the handlebar's centre of mass from the steer axis, positive ahead of it", "u_H", _u_H
+    ),
+    Quantity(
+        "u_A",
+        "m",
+        "distance of the centre of mass of the front assembly from the steer axis",
+        "u_A",
+        lambda v: quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"]),
+    ),
     Quantity("m_T", "kg", "mass of the whole bicycle", "m_T", lambda v: v["m_R"] + v["m_B"] + v["m_H"] + v["m_F"]),
-    Quantity("x_T", "m", "centre of mass of the whole bicycle, forward of the rear contact", "x_T",
-        lambda v: (v["m_B"] * v["x_B"] + v["m_H"] * v["x_H"] + v["m_F"] * v["w"]) / v["m_T"]),
+    Quantity(
+        "x_T",
+        "m",
+        "centre of mass of the whole bicycle, forward of the rear contact",
+        "x_T",
+        lambda v: (v["m_B"] * v["x_B"] + v["m_H"] * v["x_H"] + v["m_F"] * v["w"]) / v["m_T"],
+    ),
     Quantity("z_T", "m", "centre of mass of the whole bicycle, downward", "z_T", _z_T),
-    Quantity("load_front", "1", "share of the weight on the front wheel, negative where it lifts", r"N_F/(N_F + N_R)",
-        lambda v: v["x_T"] / v["w"], share=True),
-    Quantity("load_rear", "1", "share of the weight on the rear wheel, negative where it lifts", r"N_R/(N_F + N_R)",
-        _load_rear, share=True),
-    Quantity("N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F",
-        lambda v: v["load_front"] * v["m_T"] * v["g"]),
-    Quantity("N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R",
-        lambda v: v["load_rear"] * v["m_T"] * v["g"]),
-    Quantity("m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", r"m_\mathrm{ballast}",
-        lambda v: positive_part(_rear_lift(v)), range=_NOT_NEGATIVE, pieces=(nothing, _rear_lift)),
+    Quantity(
+        "load_front",
+        "1",
+        "share of the weight on the front wheel, negative where it lifts",
+        r"N_F/(N_F + N_R)",
+        lambda v: v["x_T"] / v["w"],
+        share=True,
+    ),
+    Quantity(
+        "load_rear",
+        "1",
+        "share of the weight on the rear wheel, negative where it lifts",
+        r"N_R/(N_F + N_R)",
+        _load_rear,
+        share=True,
+    ),
+    Quantity(
+        "N_F",
+        "N",
+        "load on the front wheel at rest, negative where it lifts",
+        "N_F",
+        lambda v: v["load_front"] * v["m_T"] * v["g"],
+    ),
+    Quantity(
+        "N_R",
+        "N",
+        "load on the rear wheel at rest, negative where it lifts",
+        "N_R",
+        lambda v: v["load_rear"] * v["m_T"] * v["g"],
+    ),
+    Quantity(
+        "m_ballast_rear",
+        "kg",
+        "mass at the rear contact that keeps the rear wheel down",
+        r"m_\mathrm{ballast}",
+        lambda v: positive_part(_rear_lift(v)),
+        range=_NOT_NEGATIVE,
+        pieces=(nothing, _rear_lift),
+    ),
     Quantity("S_R", "kg m", "spin of the rear wheel, I_Ryy/r_R", "S_R", lambda v: spin(v["I_Ryy"], v["r_R"])),
     Quantity("S_F", "kg m", "spin of the front wheel, I_Fyy/r_F", "S_F", lambda v: spin(v["I_Fyy"], v["r_F"])),
-    Quantity("mass_margin", "kg m^2", "smallest eigenvalue of the mass matrix, 0 where it is singular",
-        r"\min\sigma(M)", _mass_margin, range=_NOT_NEGATIVE),
-)  # fmt: skip
+    Quantity(
+        "mass_margin",
+        "kg m^2",
+        "smallest eigenvalue of the mass matrix, 0 where it is singular",
+        r"\min\sigma(M)",
+        _mass_margin,
+        range=_NOT_NEGATIVE,
+    ),
+)
 """Quantities of a design. A mass at the rear contact has no part in the lateral motion."""

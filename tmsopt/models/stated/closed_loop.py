@@ -37,8 +37,11 @@ def check_loop(shapes: Mapping[str, tuple[int, int]]) -> None:
         raise Unfit("C", f"has {columns} columns; accepted: {states}, {what}")
     if shapes["G"] != (inputs, measured):
         found = " × ".join(map(str, shapes["G"]))
-        raise Unfit("G", f"is {found}; accepted: {inputs} × {measured}, a row per column of B and a column per "
-                    + ("row of C" if "C" in shapes else "state"))  # fmt: skip
+        raise Unfit(
+            "G",
+            f"is {found}; accepted: {inputs} × {measured}, a row per column of B and a column per "
+            + ("row of C" if "C" in shapes else "state"),
+        )
 
 
 def closed(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
@@ -53,9 +56,7 @@ def closed(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
         return {"A": _sum(own["A"], [[-x for x in row] for row in gain])}
     n = len(own["M"])
     still = own.get("D") or [[0] * n for _ in range(n)]
-    return {
-        "M": own["M"], "D": _sum(still, [row[n:] for row in gain]), "K": _sum(own["K"], [row[:n] for row in gain])
-    }  # fmt: skip
+    return {"M": own["M"], "D": _sum(still, [row[n:] for row in gain]), "K": _sum(own["K"], [row[:n] for row in gain])}
 
 
 def _product(A: Matrix, B: Matrix) -> Matrix:

@@ -109,12 +109,16 @@ def alone(*operands: Degree) -> Degree:
 
 
 OPERATIONS: Mapping[int, Callable[..., Degree]] = {
-    ca.OP_ADD: operator.add, ca.OP_SUB: operator.add, ca.OP_MUL: operator.mul,
-    ca.OP_DIV: operator.truediv, ca.OP_INV: lambda a: constant(1) / a, ca.OP_SQ: lambda a: a * a,
+    ca.OP_ADD: operator.add,
+    ca.OP_SUB: operator.add,
+    ca.OP_MUL: operator.mul,
+    ca.OP_DIV: operator.truediv,
+    ca.OP_INV: lambda a: constant(1) / a,
+    ca.OP_SQ: lambda a: a * a,
     **dict.fromkeys((ca.OP_POW, ca.OP_CONSTPOW), operator.pow),
     **dict.fromkeys((ca.OP_NEG, ca.OP_TWICE, ca.OP_SQRT, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX), same),
     **dict.fromkeys((ca.OP_EXP, ca.OP_LOG, ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN), alone),
-}  # fmt: skip
+}
 """CasADi's, those that balls have."""
 
 

@@ -118,9 +118,11 @@ def _exp(x: Any) -> Pair:
 
 
 PAIRS = Arithmetic(
-    {**{name: _real(name, SYMBOLIC.functions[name]) for name in FUNCTIONS}, "exp": _exp}, pair,
-    {sign: partial(_joined, join) for sign, join in BINARY.items()}, constant=lambda text: Pair(number_symbol(text)),
-)  # fmt: skip
+    {**{name: _real(name, SYMBOLIC.functions[name]) for name in FUNCTIONS}, "exp": _exp},
+    pair,
+    {sign: partial(_joined, join) for sign, join in BINARY.items()},
+    constant=lambda text: Pair(number_symbol(text)),
+)
 """Of CasADi's expressions."""
 
 BESIDE: Mapping[str, Any] = {UNIT: Pair(0, 1.0)}

@@ -47,9 +47,12 @@ CONVENTIONS = (
 
 
 def complex_model(
-    made: Model, carrier: float, bounds: Callable[[Mapping[str, Interval]], tuple[float, float]],
-    carried: Callable[[float], Model], double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]],
-) -> Model:  # fmt: skip
+    made: Model,
+    carrier: float,
+    bounds: Callable[[Mapping[str, Interval]], tuple[float, float]],
+    carried: Callable[[float], Model],
+    double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]],
+) -> Model:
     """The model of a complex H, of its double with a carrier.
 
     Args:

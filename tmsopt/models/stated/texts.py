@@ -60,10 +60,13 @@ class Texts:
     """
 
     def __init__(
-        self, fault: Callable[..., None], symbols: Mapping[str, Any] | None = None,
-        known: Mapping[str, Any] | None = None, arithmetic: Arithmetic = _SYMBOLIC,
+        self,
+        fault: Callable[..., None],
+        symbols: Mapping[str, Any] | None = None,
+        known: Mapping[str, Any] | None = None,
+        arithmetic: Arithmetic = _SYMBOLIC,
         beside: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.fault = fault
         self.arithmetic, self.beside = arithmetic, beside
         self.symbols = dict(symbols or {})

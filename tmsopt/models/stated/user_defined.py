@@ -41,9 +41,17 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def from_matrices(
-    M: Any = None, D: Any = None, K: Any = None, *, A: Any = None, B: Any = None, C: Any = None, G: Any = None,
-    name: str = "stated", quantities: Mapping[str, Any] | None = None,
-) -> Model:  # fmt: skip
+    M: Any = None,
+    D: Any = None,
+    K: Any = None,
+    *,
+    A: Any = None,
+    B: Any = None,
+    C: Any = None,
+    G: Any = None,
+    name: str = "stated",
+    quantities: Mapping[str, Any] | None = None,
+) -> Model:
     """A model of M q″ + D q′ + K q = B u, or of x′ = A x + B u, from expressions in text or of CasADi.
 
     Args:
@@ -194,9 +202,15 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
 
 @lru_cache(maxsize=64)
 def _rebuilt(
-    kind: str, name: str, names: tuple[str, ...], shapes: tuple[tuple[str, int, int], ...], derived: tuple[str, ...],
-    serialized: str, texts: tuple[str, ...], carrier: float = 0.0,
-) -> Model:  # fmt: skip
+    kind: str,
+    name: str,
+    names: tuple[str, ...],
+    shapes: tuple[tuple[str, int, int], ...],
+    derived: tuple[str, ...],
+    serialized: str,
+    texts: tuple[str, ...],
+    carrier: float = 0.0,
+) -> Model:
     """A model from plain data; in each process there is one of each."""
     entry = rebuilt(names, texts, ca.Function.deserialize(serialized))
     count = sum(rows * columns for _, rows, columns in shapes)
@@ -260,15 +274,20 @@ def _rebuilt(
     plain = (kind, name, names, shapes, derived, serialized, texts)
     decimals = dict.fromkeys(step.constant for step in steps(entry.exact) if step.operation == ca.OP_CONST)
     made = replace(
-        made, origin=(_rebuilt, (*plain, carrier) if carrier else plain), statement=_statement(entry, shapes, derived),
+        made,
+        origin=(_rebuilt, (*plain, carrier) if carrier else plain),
+        statement=_statement(entry, shapes, derived),
         numbers=(*(n for n in texts if not n.lstrip("-").isdigit()), *(repr(x) for x in decimals if x % 1)),
-    )  # fmt: skip
+    )
     if kind != "hamiltonian":
         return made
     return complex_model(
-        made, carrier, carriers(entry(symbols)[:count]), lambda c: _rebuilt(*plain, *([c] if c else [])),
+        made,
+        carrier,
+        carriers(entry(symbols)[:count]),
+        lambda c: _rebuilt(*plain, *([c] if c else [])),
         lambda values: pencil(blocks(entry(values))),
-    )  # fmt: skip
+    )
 
 
 def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:

@@ -19,26 +19,45 @@ def draw_law(ax: Axes, data: Experiment) -> None:
     ax.plot(data.ratio, data.law, color=LINE, label=r"$\chi_B = \sqrt{\zeta_B/\zeta_H}$, the law for $\chi_H = 1$")
     for point, marker, colour, size, offset in zip(data.points, _MARKERS, _COLOURS, _SIZES, _OFFSETS, strict=True):
         ax.plot(
-            [point.ratio], [point.chi_B], linestyle="none", marker=marker, color=colour, markersize=size, zorder=4,
-            markeredgecolor="black", markeredgewidth=0.6,
-        )  # fmt: skip
+            [point.ratio],
+            [point.chi_B],
+            linestyle="none",
+            marker=marker,
+            color=colour,
+            markersize=size,
+            zorder=4,
+            markeredgecolor="black",
+            markeredgewidth=0.6,
+        )
         text = f"{point.name}\n" + rf"$\chi_B = {point.chi_B:.4g}$, $\chi_H = {point.chi_H:.4g}$"
         if np.isfinite(point.omega0):
             text += "\n" + rf"on the law for any $\chi_H$, $\omega_0 = {point.omega0:g}$"
         ax.annotate(
-            text, (point.ratio, point.chi_B), xytext=offset, textcoords="offset points", fontsize=8,
+            text,
+            (point.ratio, point.chi_B),
+            xytext=offset,
+            textcoords="offset points",
+            fontsize=8,
             verticalalignment="top" if offset[1] < 0 else "bottom",
-        )  # fmt: skip
+        )
     built = data.points[0]
     law = float(np.interp(built.ratio, data.ratio, data.law))
     ax.annotate(
-        "", (built.ratio, law), (built.ratio, built.chi_B), zorder=3,
+        "",
+        (built.ratio, law),
+        (built.ratio, built.chi_B),
+        zorder=3,
         arrowprops={"arrowstyle": "-", "color": MARK, "linewidth": 1.2},
-    )  # fmt: skip
+    )
     ax.annotate(
-        f"{100 * (built.chi_B / law - 1):.1f} % above the law", (built.ratio, built.chi_B), xytext=(-8, 8),
-        textcoords="offset points", fontsize=8, color=MARK, horizontalalignment="right",
-    )  # fmt: skip
+        f"{100 * (built.chi_B / law - 1):.1f} % above the law",
+        (built.ratio, built.chi_B),
+        xytext=(-8, 8),
+        textcoords="offset points",
+        fontsize=8,
+        color=MARK,
+        horizontalalignment="right",
+    )
     ax.set_xlim(1, 3)
     ax.set_ylim(1, 1.8)
     ax.set_xlabel(r"$\zeta_B/\zeta_H$")
@@ -50,22 +69,39 @@ def draw_critical_speeds(ax: Axes, data: Experiment) -> None:
     """Fr_c over χ_B for the geometry of the experimental bicycle, with the minima and the χ_B that was built."""
     law = data.critical[0]
     ax.axvspan(
-        *law.flat, color=STABLE, alpha=0.25, linewidth=0,
+        *law.flat,
+        color=STABLE,
+        alpha=0.25,
+        linewidth=0,
         label=rf"within {100 * law.slack:.0f} % of the minimum, $\chi_H = 1$",
-    )  # fmt: skip
+    )
     for curve, (colour, style) in zip(data.critical, _CURVES, strict=False):
         ax.plot(curve.chi_B, curve.Fr_c, color=colour, linestyle=style, linewidth=1.4, label=_name(curve))
         ax.plot(
-            [curve.best[0]], [curve.best[1]], linestyle="none", marker="v", markersize=7, color=colour, zorder=4,
-            markeredgecolor="white", markeredgewidth=0.6,
-        )  # fmt: skip
+            [curve.best[0]],
+            [curve.best[1]],
+            linestyle="none",
+            marker="v",
+            markersize=7,
+            color=colour,
+            zorder=4,
+            markeredgecolor="white",
+            markeredgewidth=0.6,
+        )
     ax.plot([], [], linestyle="none", marker="v", markersize=7, color="0.3", label=r"minimum over $\chi_B$")
     ax.axvline(data.chi_B, color=MARK, linewidth=1.1)
     ax.plot(
-        [data.chi_B] * len(data.critical), [curve.own for curve in data.critical], linestyle="none", marker="*",
-        markersize=10, color=MARK, markeredgecolor="black", markeredgewidth=0.5, zorder=5,
+        [data.chi_B] * len(data.critical),
+        [curve.own for curve in data.critical],
+        linestyle="none",
+        marker="*",
+        markersize=10,
+        color=MARK,
+        markeredgecolor="black",
+        markeredgewidth=0.5,
+        zorder=5,
         label=rf"as built, $\chi_B = {data.chi_B:g}$",
-    )  # fmt: skip
+    )
     least = float(np.nanmin([curve.best[1] for curve in data.critical]))
     ax.set_xlim(1, 2.05)
     ax.set_ylim(0.93 * least, 1.9 * least)

@@ -78,9 +78,15 @@ def _growth() -> "Figure":
         draw_growth_rates(ax, growth(design, end=4.0))
         ax.axhline(design.abscissa, color="0.5", linewidth=0.8, linestyle=":")
         ax.plot(
-            [design.dimensionless["Fr"]], [design.abscissa], linestyle="none", marker="o", markersize=6, zorder=5,
-            color=REAL if "EP" in design.structure else "white", markeredgecolor="black",
-        )  # fmt: skip
+            [design.dimensionless["Fr"]],
+            [design.abscissa],
+            linestyle="none",
+            marker="o",
+            markersize=6,
+            zorder=5,
+            color=REAL if "EP" in design.structure else "white",
+            markeredgecolor="black",
+        )
         if design.structure == "EP4":
             at = (design.dimensionless["Fr"], design.abscissa)
             ax.annotate(r"$\mathrm{EP}_4$", at, xytext=(9, 5), textcoords="offset points", fontsize=10)
@@ -154,59 +160,68 @@ def _universal() -> "Figure":
 
 _ITEMS = (
     Item(
-        "bicycle", "figTMS",
+        "bicycle",
+        "figTMS",
         "The two-mass-skate bicycle with its parameters, drawn to scale for the benchmark.",
         _bicycle,
     ),
     Item(
-        "growth", "fig0",
+        "growth",
+        "fig0",
         "Growth rates over the Froude number: the benchmark, with the speed of its least abscissa, and the optimised "
         "bicycle with the quadruple root s = -1 (EP4).",
         _growth,
     ),
     Item(
-        "swallowtail", "fig00",
+        "swallowtail",
+        "fig00",
         "The discriminant surface for chi_H = 1, zeta_H = -0.2, zeta_B = -0.4 with its cuspidal edges (EP3) and "
         "self-intersection (2EP2) meeting in EP4, and its sections at the Fr of EP4, 0.1 below and 0.5 above.",
         _swallowtail,
     ),
     Item(
-        "ep-set", "fig1",
+        "ep-set",
+        "fig1",
         "Stability and heavy damping over (Fr, lambda_s) at chi_B = sqrt(2) with the EP set, and over (Fr, chi_B) at "
         "the steer axis tilt of EP4; every boundary is traced.",
         _ep_set,
     ),
     Item(
-        "off-law", "fig2",
+        "off-law",
+        "fig2",
         "The same beside the laws: chi_B = sqrt(2) - 0.1, and 0.18 rad below the steer axis tilt of EP4, with EP3 "
         "cusps and the 2EP2 crossing.",
         _off_law,
     ),
     Item(
-        "root-locus", "fig3",
+        "root-locus",
+        "fig3",
         "Roots as Fr increases from 0 to 5 for chi_H = 1, zeta_H = -0.2, zeta_B = -0.4 at the three steer axis tilts "
         "of Table 1, with chi_B = sqrt(2) and beside it; enlarged around EP4, 2EP2 and CEP2.",
         _root_locus,
     ),
     Item(
-        "experiment", "fige",
+        "experiment",
+        "fige",
         "The experimental bicycle beside the law chi_B = sqrt(zeta_B/zeta_H), which is for chi_H = 1 while it has "
         "0.921, and its critical Froude number over chi_B at an assumed tilt of 20 deg and assumed mass ratios.",
         _experiment,
     ),
     Item(
-        "abscissa", "",
+        "abscissa",
+        "",
         "Spectral abscissa over the planes of Fig. fig1 with the laws drawn in; its contours have corners at the "
         "exceptional points, and its least value is at EP4.",
         _abscissa,
     ),
     Item(
-        "universal", "",
+        "universal",
+        "",
         "Every quartic with a4/a0 > 0 as a point (A1, A2, A3), with stability, heavy damping and the EP set; the "
         "designs of Table 1 swept over Fr from 0 to 5.",
         _universal,
     ),
-)  # fmt: skip
+)
 
 GALLERY = Table({item.name: item for item in _ITEMS})
 """Figures by name, in the order of the list."""

@@ -10,8 +10,9 @@ from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, STABLE
 def draw_growth_rates(ax: Axes, data: Growth) -> None:
     """Growth rates Re s, with bands of stability and heavy damping, the critical value and the design marked."""
     for bands, colour, alpha, words in (
-        (data.stable, STABLE, 0.18, "stable"), (data.heavily_damped, HEAVY, 0.35, "heavily damped"),
-    ):  # fmt: skip
+        (data.stable, STABLE, 0.18, "stable"),
+        (data.heavily_damped, HEAVY, 0.35, "heavily damped"),
+    ):
         for k, (low, high) in enumerate(bands):
             ax.axvspan(low, high, color=colour, alpha=alpha, linewidth=0, label=words if k == 0 else None)
     for column in np.sort(data.roots.real, axis=1).T:

@@ -38,15 +38,30 @@ def draw_marks(ax: Axes, data: Locus, omega0: float) -> None:
     for mark in data.marks:
         colour = COMPLEX if mark.name == "CEP2" else REAL
         ax.plot(
-            mark.s.real, mark.s.imag, linestyle="none", marker="o", markersize=6, color=colour, zorder=5,
-            markeredgecolor="black", markeredgewidth=0.6, gid=mark.name,
-        )  # fmt: skip
+            mark.s.real,
+            mark.s.imag,
+            linestyle="none",
+            marker="o",
+            markersize=6,
+            color=colour,
+            zorder=5,
+            markeredgecolor="black",
+            markeredgewidth=0.6,
+            gid=mark.name,
+        )
         _name(ax, mark, omega0)
     for _, frequency in data.crossings:
         ax.plot(
-            [0, 0], [frequency, -frequency], linestyle="none", marker="D", markersize=4.5, markerfacecolor="white",
-            markeredgecolor=LINE, zorder=5, gid="crossing",
-        )  # fmt: skip
+            [0, 0],
+            [frequency, -frequency],
+            linestyle="none",
+            marker="D",
+            markersize=4.5,
+            markerfacecolor="white",
+            markeredgecolor=LINE,
+            zorder=5,
+            gid="crossing",
+        )
 
 
 def draw_row(ax: Axes, row: LocusRow, window: Window, zoom: bool) -> None:
@@ -56,9 +71,14 @@ def draw_row(ax: Axes, row: LocusRow, window: Window, zoom: bool) -> None:
     ax.axhline(0, color="0.75", linewidth=0.6, zorder=0)
     ax.axvline(0, color="0.4", linewidth=0.8, zorder=0)
     ax.plot(
-        radius * np.cos(angle), radius * np.sin(angle), color="0.55", linewidth=3.5, alpha=0.45, zorder=0.5,
+        radius * np.cos(angle),
+        radius * np.sin(angle),
+        color="0.55",
+        linewidth=3.5,
+        alpha=0.45,
+        zorder=0.5,
         gid="circle",
-    )  # fmt: skip
+    )
     ax.set(xlim=window[:2], ylim=window[2:])
     ax.set_aspect("equal")
     for locus, colour, width in reversed(list(zip(row.loci, COLOURS, _WIDTHS, strict=True))):
@@ -75,9 +95,13 @@ def locus_figure(rows: tuple[LocusRow, ...]) -> Figure:
         draw_row(left, row, full_window(row), zoom=False)
         draw_row(right, row, near, zoom=True)
         left.plot(
-            [near[0], near[1], near[1], near[0], near[0]], [near[2], near[2], near[3], near[3], near[2]],
-            color="0.4", linewidth=0.7, linestyle=":", zorder=4,
-        )  # fmt: skip
+            [near[0], near[1], near[1], near[0], near[0]],
+            [near[2], near[2], near[3], near[3], near[2]],
+            color="0.4",
+            linewidth=0.7,
+            linestyle=":",
+            zorder=4,
+        )
         left.set_title(rf"({letter}) {_tilt_text(row)}", fontsize=9)
         exceptional = next(m for m in row.loci[0].marks if m.name != "EP2")
         right.set_title(
@@ -85,9 +109,15 @@ def locus_figure(rows: tuple[LocusRow, ...]) -> Figure:
         )
         left.set_ylabel(r"$\mathrm{Im}\,s$")
         left.legend(
-            handles=_legend(row), loc="upper right", title=r"$\chi_B$", fontsize=6.5, title_fontsize=7.5,
-            labelspacing=0.25, handlelength=1.4, borderpad=0.3,
-        )  # fmt: skip
+            handles=_legend(row),
+            loc="upper right",
+            title=r"$\chi_B$",
+            fontsize=6.5,
+            title_fontsize=7.5,
+            labelspacing=0.25,
+            handlelength=1.4,
+            borderpad=0.3,
+        )
     for ax in axes[-1]:
         ax.set_xlabel(r"$\mathrm{Re}\,s$")
     figure.legend(handles=_key(rows[0]), loc="outside lower center", ncols=3, fontsize=8, frameon=False)
@@ -133,13 +163,19 @@ def _key(row: LocusRow) -> list[Line2D]:
         Line2D([], [], color=REAL, label=r"real multiple root, $\chi_B = \sqrt{2}$", **dot),
         Line2D([], [], color=COMPLEX, label=r"complex double root, $\chi_B = \sqrt{2}$", **dot),
         Line2D(
-            [], [], linestyle="none", marker="D", markersize=4.5, markerfacecolor="white", markeredgecolor=LINE,
+            [],
+            [],
+            linestyle="none",
+            marker="D",
+            markersize=4.5,
+            markerfacecolor="white",
+            markeredgecolor=LINE,
             label=r"$\mathrm{Fr} = \mathrm{Fr}_c$, $\chi_B = \sqrt{2}$",
         ),
         Line2D(
             [], [], color=LINE, marker=">", markersize=5, label=rf"$\mathrm{{Fr}}$ increases from {first:g} to {last:g}"
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _name(ax: Axes, mark: DoubleRoots, omega0: float) -> None:
@@ -152,12 +188,18 @@ def _name(ax: Axes, mark: DoubleRoots, omega0: float) -> None:
         if mark.name == "EP2" and abs(abs(s.real) - abs(omega0)) < 1e-6:
             text = r"$-\omega_0$" if s.real > 0 else r"$\omega_0$"
         ax.annotate(
-            text, (s.real, s.imag), xytext=(dx, dy), textcoords="offset points", fontsize=8.5, zorder=6,
+            text,
+            (s.real, s.imag),
+            xytext=(dx, dy),
+            textcoords="offset points",
+            fontsize=8.5,
+            zorder=6,
             horizontalalignment="left" if dx > 0 else "right",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
             arrowprops={"arrowstyle": "-", "linewidth": 0.5, "color": "0.3", "shrinkA": 0, "shrinkB": 3}
-            if np.hypot(dx, dy) > 20 else None,
-        )  # fmt: skip
+            if np.hypot(dx, dy) > 20
+            else None,
+        )
 
 
 def _arrows(ax: Axes, track: Track, colour: str, count: int) -> None:
@@ -176,7 +218,15 @@ def _arrows(ax: Axes, track: Track, colour: str, count: int) -> None:
         k = int(np.searchsorted(length, fraction * length[-1]))
         start, end = s[max(k - 1, 0)], s[min(k + 1, len(s) - 1)]
         ax.annotate(
-            "", xy=(end.real, end.imag), xytext=(start.real, start.imag), zorder=4,
-            arrowprops={"arrowstyle": "-|>,head_width=0.22,head_length=0.45", "color": colour, "linewidth": 0.8,
-                        "shrinkA": 0, "shrinkB": 0},
-        )  # fmt: skip
+            "",
+            xy=(end.real, end.imag),
+            xytext=(start.real, start.imag),
+            zorder=4,
+            arrowprops={
+                "arrowstyle": "-|>,head_width=0.22,head_length=0.45",
+                "color": colour,
+                "linewidth": 0.8,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
+        )

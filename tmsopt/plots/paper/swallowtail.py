@@ -60,9 +60,12 @@ def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
             ax.text(place[0], place[1], place[2] + 0.05 * width[2], "EP4", fontsize=9, zorder=11)
     of = data.problem.parameter_set
     for name, (low, high), limit, label in zip(
-        data.axes, ranges, (ax.set_xlim, ax.set_ylim, ax.set_zlim), (ax.set_xlabel, ax.set_ylabel, ax.set_zlabel),
+        data.axes,
+        ranges,
+        (ax.set_xlim, ax.set_ylim, ax.set_zlim),
+        (ax.set_xlabel, ax.set_ylabel, ax.set_zlabel),
         strict=True,
-    ):  # fmt: skip
+    ):
         limit(low, high)
         label(f"${of[name].latex}$")
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):

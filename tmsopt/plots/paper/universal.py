@@ -57,9 +57,17 @@ def draw_box(ax: Axes3D, paths: Sequence[UniversalPath], faces: Sequence[Array])
             x, z, y = event.A
             marker, fill = _EVENTS[event.name]
             ax.plot(
-                [x], [y], [z], linestyle="none", marker=marker, markerfacecolor=fill, markeredgecolor=colour,
-                markersize=5.5, zorder=6, gid=event.name,
-            )  # fmt: skip
+                [x],
+                [y],
+                [z],
+                linestyle="none",
+                marker=marker,
+                markerfacecolor=fill,
+                markeredgecolor=colour,
+                markersize=5.5,
+                zorder=6,
+                gid=event.name,
+            )
     ax.set(xlim=(low, high), ylim=(low, high), zlim=(bottom, top), zticks=range(0, 16, 5))
     ax.set_xlabel("$A_1$", labelpad=-2)
     ax.set_ylabel("$A_3$", labelpad=-2)
@@ -87,9 +95,17 @@ def draw_section(ax: Axes, paths: Sequence[UniversalPath]) -> None:
         for event in path.events:
             marker, fill = _EVENTS[event.name]
             ax.plot(
-                [(event.A[0] + event.A[2]) / 2], [event.A[1]], linestyle="none", marker=marker, markersize=6.5,
-                markerfacecolor=fill, markeredgecolor=colour, markeredgewidth=1.2, zorder=5, gid=event.name,
-            )  # fmt: skip
+                [(event.A[0] + event.A[2]) / 2],
+                [event.A[1]],
+                linestyle="none",
+                marker=marker,
+                markersize=6.5,
+                markerfacecolor=fill,
+                markeredgecolor=colour,
+                markeredgewidth=1.2,
+                zorder=5,
+                gid=event.name,
+            )
     ax.set(xlim=(low, high), ylim=(bottom, top), yticks=range(0, 16, 5))
     ax.set_xlabel("$A_1 = A_3$")
     ax.set_ylabel("$A_2$")
@@ -116,9 +132,12 @@ def universal_figure(paths: Sequence[UniversalPath], faces: Sequence[Array], swe
     projected = any(np.nanmax(np.abs(path.A[:, 0] - path.A[:, 2]), initial=0.0) > 1e-6 for path in paths)
     right.set_title("(b) section $A_1 = A_3$" + (", paths projected on it" if projected else ""), fontsize=9.5)
     figure.legend(
-        handles=[*_path_handles(paths), *_key(swept, paths)], loc="outside lower center",
-        ncols=3 if len(paths) > 3 else 4, fontsize=8, frameon=False,
-    )  # fmt: skip
+        handles=[*_path_handles(paths), *_key(swept, paths)],
+        loc="outside lower center",
+        ncols=3 if len(paths) > 3 else 4,
+        fontsize=8,
+        frameon=False,
+    )
     return figure
 
 
@@ -163,10 +182,17 @@ def _section_arrows(ax: Axes, x: Array, y: Array, colour: str) -> None:
         k = int(np.searchsorted(length, fraction * length[-1]))
         i, j = shown[k], shown[k + 1]
         ax.annotate(
-            "", (x[j], y[j]), (x[i], y[i]), zorder=4,
-            arrowprops={"arrowstyle": "-|>,head_width=0.25,head_length=0.5", "color": colour, "shrinkA": 0,
-                        "shrinkB": 0},
-        )  # fmt: skip
+            "",
+            (x[j], y[j]),
+            (x[i], y[i]),
+            zorder=4,
+            arrowprops={
+                "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
+                "color": colour,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
+        )
 
 
 def _path_handles(paths: Sequence[UniversalPath]) -> list[Line2D]:

@@ -17,14 +17,17 @@ _SENSE = "minimize or maximize"
 _KEYS = {
     "objective": {
         **dict.fromkeys(("optimise", "optimize", "goal", "objective", "target", "function"), _SENSE),
-        **dict.fromkeys(("pattern", "find"), "locate"), "min": "minimize", "max": "maximize",
+        **dict.fromkeys(("pattern", "find"), "locate"),
+        "min": "minimize",
+        "max": "maximize",
     },
     "": {
         **dict.fromkeys(("goal", "goals", "target", "optimise", "optimize", "minimise", "maximise"), "objective"),
         **dict.fromkeys(("minimize", "maximize", "locate", "pareto"), "objective"),
-        **dict.fromkeys(("limits", "bounds"), "constraints"), **dict.fromkeys(("variables", "params"), "parameters"),
+        **dict.fromkeys(("limits", "bounds"), "constraints"),
+        **dict.fromkeys(("variables", "params"), "parameters"),
     },
-}  # fmt: skip
+}
 """Section → word that others use for one of its keys → that key."""
 
 

@@ -94,9 +94,11 @@ def _none(_: Any) -> Dimension:
 
 
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    **dict.fromkeys(("sin", "cos", "tan", "exp", "log"), _none), **dict.fromkeys(("asin", "acos", "atan"), _angle),
-    **dict.fromkeys(("abs", "min", "max"), _same), "sqrt": lambda x: power(x if isinstance(x, Dimension) else 1.0, 0.5),
-}  # fmt: skip
+    **dict.fromkeys(("sin", "cos", "tan", "exp", "log"), _none),
+    **dict.fromkeys(("asin", "acos", "atan"), _angle),
+    **dict.fromkeys(("abs", "min", "max"), _same),
+    "sqrt": lambda x: power(x if isinstance(x, Dimension) else 1.0, 0.5),
+}
 """What the functions of an expression make of dimensions."""
 
 

@@ -59,9 +59,13 @@ def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any
 
 
 def readings(
-    of: ParameterSet, parameters: Mapping[str, Any], quantities: Mapping[str, Any], abscissa: Any, roots: Iterable[Any],
+    of: ParameterSet,
+    parameters: Mapping[str, Any],
+    quantities: Mapping[str, Any],
+    abscissa: Any,
+    roots: Iterable[Any],
     pi: Any = math.pi,
-) -> Iterator[tuple[str, Any, int]]:  # fmt: skip
+) -> Iterator[tuple[str, Any, int]]:
     """Times, frequencies, and everything with a unit, by names that end in the unit: ``v_kmh``, ``x_B_mm``.
 
     Numbers of any kind, each with the decimal digits to round it to, 0 for none. Nothing for a set that has no unit of

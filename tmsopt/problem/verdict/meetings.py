@@ -81,9 +81,7 @@ def _beside(one: MultipleRoot, other: MultipleRoot) -> bool:
     return abs(complex(one.re - other.re, one.im - other.im)) <= _NEAR * (size or 1.0)
 
 
-def nearest_crossing(
-    problem: Problem, pattern: Pattern, parameters: Mapping[str, float]
-) -> dict[str, float]:  # fmt: skip
+def nearest_crossing(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
     """The parameters at which located roots cross beside a design: sharper than coefficients see them."""
     roots = _located(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
@@ -93,7 +91,7 @@ def nearest_crossing(
 
 def _meeting(
     problem: Problem, parameters: Mapping[str, float], root: Root, told: Root, roots: Sequence[Root]
-) -> MultipleRoot:  # fmt: skip
+) -> MultipleRoot:
     k, pencil = root.multiplicity, problem.model.pencil
     if pencil is None:
         return MultipleRoot(told.re, told.im, k, None, k)
@@ -151,9 +149,14 @@ def _matrices(problem: Problem, parameters: Mapping[str, float]) -> Sequence[Any
 
 
 def _step(
-    weighed: Callable[[Array, complex], Complex], x: Array, widths: Array, z: complex, unit: float, left: Complex,
+    weighed: Callable[[Array, complex], Complex],
+    x: Array,
+    widths: Array,
+    z: complex,
+    unit: float,
+    left: Complex,
     right: Complex,
-) -> Array:  # fmt: skip
+) -> Array:
     """Gauss and Newton for a block of L that shall vanish, in shares of the box and of the unit of the root."""
 
     def block(at: Array, root: complex) -> Array:

@@ -89,9 +89,7 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def design_parts(
-    solution: Solution, found: Findings, si: Mapping[str, float], beside: bool = False
-) -> Iterator[Block]:  # fmt: skip
+def design_parts(solution: Solution, found: Findings, si: Mapping[str, float], beside: bool = False) -> Iterator[Block]:
     """The parts of a report, in its order.
 
     Args:
@@ -114,8 +112,13 @@ def design_parts(
         yield Block("conflict", [*conflict, f"nearest design: {asked}", *notes], rest, least=3)
     else:
         yield Block("answer", [told, asked, *helps, *notes], least=2)
-    yield Block("design", _design(solution, si if beside else None), tuple(columns(parameter_rows(solution, si))),
-               replaces=True, least=3)  # fmt: skip
+    yield Block(
+        "design",
+        _design(solution, si if beside else None),
+        tuple(columns(parameter_rows(solution, si))),
+        replaces=True,
+        least=3,
+    )
     yield Block(
         "motion", _motion(solution, found), (*_stored(solution), *columns(quantity_rows(solution, si) or [("",)]))
     )
@@ -126,13 +129,20 @@ def design_parts(
     explained = found.explanation
     if explained is not None and explained.levers:
         head = "limits that bind, and what a small move of each buys (to first order; --full solves again):"
-        yield Block("limits", [head, *columns([lever_cells(solution, lever) for lever in explained.levers])],
-                   tuple(lever.sentence for lever in explained.levers), least=3)  # fmt: skip
+        yield Block(
+            "limits",
+            [head, *columns([lever_cells(solution, lever) for lever in explained.levers])],
+            tuple(lever.sentence for lever in explained.levers),
+            least=3,
+        )
     if explained is not None:
         yield Block("warnings", [f"warning: {text}" for text in explained.warnings])
     if found.robustness is not None:
-        yield Block("robustness", [f"robustness: {robustness_line(found.robustness, solution.stability.on_edge)}"],
-                   tuple(robustness_table(found.robustness).splitlines()[2:]))  # fmt: skip
+        yield Block(
+            "robustness",
+            [f"robustness: {robustness_line(found.robustness, solution.stability.on_edge)}"],
+            tuple(robustness_table(found.robustness).splitlines()[2:]),
+        )
     if explained is not None and explained.precision:
         yield Block("rounding", [f"rounding: {rounding_line(explained)}"], tuple(columns(rounding_rows(explained))))
     local = () if explained is None else optimality_lines(explained.optimality)
@@ -182,9 +192,10 @@ def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
         else []
     )
     rest = [
-        f"{p.name} = {shown[p.name]}".replace(" ", KEPT) for p in of.parameters
+        f"{p.name} = {shown[p.name]}".replace(" ", KEPT)
+        for p in of.parameters
         if role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
-    ]  # fmt: skip
+    ]
     most = 14
     more = f", and {len(rest) - most} more" if len(rest) > most else ""
     return rows + ([f"fixed: {', '.join(rest[:most])}{more}"] if rest else [])
@@ -202,9 +213,12 @@ def _more(solution: Solution, found: Findings) -> str:
     """How to see more, and the commands that have something to say of the same file."""
     problem, solved = solution.problem, solution.status == "optimal"
     commands = {
-        "prove": solved, "compare": problem.model is tms, "speeds": found.stable is not None,
-        "chart": len(problem.free) in (2, 3), "trace": bool(problem.locate) and solution.freedom.count == 1,
-    }  # fmt: skip
+        "prove": solved,
+        "compare": problem.model is tms,
+        "speeds": found.stable is not None,
+        "chart": len(problem.free) in (2, 3),
+        "trace": bool(problem.locate) and solution.freedom.count == 1,
+    }
     named = ", ".join(name for name, answers in commands.items() if answers)
     return f"more: --full; then tmsopt {named} with the same file" if named else "more: --full"
 

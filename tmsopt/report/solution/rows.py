@@ -197,8 +197,12 @@ def loads(solution: Solution) -> str:
     """What each wheel carries."""
     found, problem = solution.quantities, solution.problem
     named = [("front", "load_front", "N_F"), ("rear", "load_rear", "N_R")]
-    at_rest = {n: x if abs(found[share]) > FEASIBLE else 0.0 for _, share, of in named for n in (share, of)
-               if (x := found.get(n, math.nan)) == x}  # fmt: skip
+    at_rest = {
+        n: x if abs(found[share]) > FEASIBLE else 0.0
+        for _, share, of in named
+        for n in (share, of)
+        if (x := found.get(n, math.nan)) == x
+    }
     shares = {wheel: f"{100 * at_rest[share]:.4g} %" for wheel, share, _ in named}
     newtons = {w: unit_of(problem, n).show(at_rest[n], 4) for w, _, n in named if n in at_rest}
     return ", ".join(f"{w} wheel {newtons[w]} ({s})" if w in newtons else f"{w} wheel {s}" for w, s in shares.items())

@@ -100,13 +100,19 @@ def _composed(name: str, groups: tuple[Part, ...], degree: int) -> Pattern:
     alone = groups[0] if len(groups) == 1 else None
     whole = alone if not others else None
     return Pattern(
-        name=name, meaning=" and ".join(g.meaning for g in groups) + (" beside other roots" if others else ""),
-        unknowns=(*names, *rest), factors=factors, guesses=partial(_guesses, groups, others),
+        name=name,
+        meaning=" and ".join(g.meaning for g in groups) + (" beside other roots" if others else ""),
+        unknowns=(*names, *rest),
+        factors=factors,
+        guesses=partial(_guesses, groups, others),
         nonnegative=lambda u: [x for g, s in zip(groups, slices, strict=True) for x in g.nonnegative(u[s])],
-        abscissa=_abscissa(whole), rest=off_axis if any(g.kind in AXIS for g in groups) else None, test=_test(alone),
+        abscissa=_abscissa(whole),
+        rest=off_axis if any(g.kind in AXIS for g in groups) else None,
+        test=_test(alone),
         marks=_marks(groups, slices, others),
-        ends={u: ENDS[g.kind] for g in groups for u in g.unknowns if u == "W"} if "W" in names else {}, degree=degree,
-    )  # fmt: skip
+        ends={u: ENDS[g.kind] for g in groups for u in g.unknowns if u == "W"} if "W" in names else {},
+        degree=degree,
+    )
 
 
 def _abscissa(whole: Part | None) -> Any:

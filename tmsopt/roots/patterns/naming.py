@@ -48,10 +48,13 @@ def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     tied, others = ([g for g in shape.groups if g.tied is on] for on in (True, False))
     return Pattern(
         name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
-        meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""), unknowns=_unknowns(shape),
-        factors=partial(_factors, shape), guesses=lambda z: [[float(x) for x in start]], nonnegative=shape.gaps,
+        meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""),
+        unknowns=_unknowns(shape),
+        factors=partial(_factors, shape),
+        guesses=lambda z: [[float(x) for x in start]],
+        nonnegative=shape.gaps,
         degree=shape.degree,
-    )  # fmt: skip
+    )
 
 
 def implies(roots: Sequence[Root], name: str) -> bool:

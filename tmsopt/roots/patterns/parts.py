@@ -18,9 +18,10 @@ AXIS = {"weave": 2, "resonance": 4, "capsize": 1}
 """Patterns of the imaginary axis → roots that they take."""
 
 _WORDS = {
-    "weave": "a pair on the imaginary axis", "resonance": "a double imaginary pair (1:1 resonance)",
+    "weave": "a pair on the imaginary axis",
+    "resonance": "a double imaginary pair (1:1 resonance)",
     "capsize": "a root at 0",
-}  # fmt: skip
+}
 
 ENDS = {"weave": "the pair meets in a double root 0", "resonance": "both pairs meet in a 4-fold root 0"}
 """What happens where W of s² + W reaches 0."""

@@ -149,63 +149,85 @@ def _pair_test(a: Sequence[Any]) -> Any:
     return np.where(a[1] * a[3] > 0, hurwitz_minors(a)[2], np.nan)
 
 
-QUARTIC: Mapping[str, Mapping[str, Any]] = MappingProxyType({
-    "EP4": {"meaning": "4-fold real root", "guesses": lambda z: [[float(z.mean().real)]]},
-    "EP3": {
-        "meaning": "3-fold real root and a simple one", "unknowns": ("r", "t"),
-        "factors": lambda u: [[1, -u[0]]] * 3 + [[1, -u[1]]],
-        "guesses": _triple_guesses, "marks": {"EP4": lambda u: u[0] - u[1]},
-    },
-    "2EP2": {"meaning": "two real double roots", "guesses": _double_quadratic_guess},
-    "CEP2": {"meaning": "a complex double pair", "guesses": _double_quadratic_guess},
-    "EP2": {
-        "meaning": "a real double root: the discriminant surface", "unknowns": ("r", "b", "c"),
-        "guesses": lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
-        "marks": {
-            "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2], "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
-            "double zero": lambda u: u[0], "capsize": lambda u: u[2],
+QUARTIC: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "EP4": {"meaning": "4-fold real root", "guesses": lambda z: [[float(z.mean().real)]]},
+        "EP3": {
+            "meaning": "3-fold real root and a simple one",
+            "unknowns": ("r", "t"),
+            "factors": lambda u: [[1, -u[0]]] * 3 + [[1, -u[1]]],
+            "guesses": _triple_guesses,
+            "marks": {"EP4": lambda u: u[0] - u[1]},
         },
-    },
-    "weave": {
-        "meaning": "a pair on the imaginary axis", "unknowns": ("W", "b", "c"),
-        "guesses": lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)], "test": _pair_test,
-    },
-    "capsize": {
-        "meaning": "a root at 0", "unknowns": ("b", "c", "d"),
-        "guesses": lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
-    },
-    "resonance": {"guesses": lambda z: [[float(np.abs(z).mean()) ** 2]]},
-})  # fmt: skip
+        "2EP2": {"meaning": "two real double roots", "guesses": _double_quadratic_guess},
+        "CEP2": {"meaning": "a complex double pair", "guesses": _double_quadratic_guess},
+        "EP2": {
+            "meaning": "a real double root: the discriminant surface",
+            "unknowns": ("r", "b", "c"),
+            "guesses": lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
+            "marks": {
+                "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2],
+                "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
+                "double zero": lambda u: u[0],
+                "capsize": lambda u: u[2],
+            },
+        },
+        "weave": {
+            "meaning": "a pair on the imaginary axis",
+            "unknowns": ("W", "b", "c"),
+            "guesses": lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)],
+            "test": _pair_test,
+        },
+        "capsize": {
+            "meaning": "a root at 0",
+            "unknowns": ("b", "c", "d"),
+            "guesses": lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
+        },
+        "resonance": {"guesses": lambda z: [[float(np.abs(z).mean()) ** 2]]},
+    }
+)
 """Patterns of a quartic that are not made up of others: what they have of their own, guesses without a choice of roots
 and shorter words and names, beside what their parts make them."""
 
 
-LINES: Mapping[str, Pattern] = MappingProxyType({
-    p.name: p
-    for p in (
-        Pattern(
-            "EP2+pair", "a double real root and a pair on one vertical line", ("g", "W"),
-            lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[0]]],
-            lambda z: [[float(z.mean().real), float(np.abs(z.imag).max() ** 2)]], lambda u: [u[1]],
-        ),
-        Pattern(
-            "pair+real", "a pair and a real root on one vertical line", ("g", "W", "t"),
-            lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[2]]],
-            lambda z: [
-                [float(a.mean().real), float(np.abs(a.imag).max() ** 2), float(t.real)]
-                for a, b in _two(z) for t in b if a.imag.any() and not b.imag.any()
-            ],
-            lambda u: [u[1]],
-        ),
-        Pattern(
-            "two pairs", "two pairs on one vertical line", ("g", "W", "X"),
-            lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -2 * u[0], u[0] * u[0] + u[2]]],
-            lambda z: [
-                [float(z.mean().real), float(a.imag[0] ** 2), float(b.imag[0] ** 2)]
-                for a, b in _two(z) if a.imag.all() and b.imag.all()
-            ],
-            lambda u: [u[1], u[2]],
-        ),
-    )
-})  # fmt: skip
+LINES: Mapping[str, Pattern] = MappingProxyType(
+    {
+        p.name: p
+        for p in (
+            Pattern(
+                "EP2+pair",
+                "a double real root and a pair on one vertical line",
+                ("g", "W"),
+                lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[0]]],
+                lambda z: [[float(z.mean().real), float(np.abs(z.imag).max() ** 2)]],
+                lambda u: [u[1]],
+            ),
+            Pattern(
+                "pair+real",
+                "a pair and a real root on one vertical line",
+                ("g", "W", "t"),
+                lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[2]]],
+                lambda z: [
+                    [float(a.mean().real), float(np.abs(a.imag).max() ** 2), float(t.real)]
+                    for a, b in _two(z)
+                    for t in b
+                    if a.imag.any() and not b.imag.any()
+                ],
+                lambda u: [u[1]],
+            ),
+            Pattern(
+                "two pairs",
+                "two pairs on one vertical line",
+                ("g", "W", "X"),
+                lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -2 * u[0], u[0] * u[0] + u[2]]],
+                lambda z: [
+                    [float(z.mean().real), float(a.imag[0] ** 2), float(b.imag[0] ** 2)]
+                    for a, b in _two(z)
+                    if a.imag.all() and b.imag.all()
+                ],
+                lambda u: [u[1], u[2]],
+            ),
+        )
+    }
+)
 """Ties of the rightmost line: patterns that a structure may show, beside those that can be located."""

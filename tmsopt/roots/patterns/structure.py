@@ -23,9 +23,15 @@ HIGHEST = 12
 
 # Of a quartic, most degenerate first: pattern, multiplicity of its rightmost root, roots on its rightmost line.
 _CANDIDATES = (
-    (PATTERNS["EP4"], 4, 4), (PATTERNS["2EP2"], 2, 2), (PATTERNS["CEP2"], 2, 4), (PATTERNS["EP3"], 3, 3),
-    (LINES["EP2+pair"], 1, 4), (PATTERNS["EP2"], 2, 2), (LINES["pair+real"], 1, 3), (LINES["two pairs"], 1, 4),
-)  # fmt: skip
+    (PATTERNS["EP4"], 4, 4),
+    (PATTERNS["2EP2"], 2, 2),
+    (PATTERNS["CEP2"], 2, 4),
+    (PATTERNS["EP3"], 3, 3),
+    (LINES["EP2+pair"], 1, 4),
+    (PATTERNS["EP2"], 2, 2),
+    (LINES["pair+real"], 1, 3),
+    (LINES["two pairs"], 1, 4),
+)
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a pattern within any sensible tolerance
 _CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4

@@ -110,9 +110,11 @@ def newton(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real,
     c1, c0 = r3 - r2 * p1 + r1 * (p1 * p1 - q1), r4 - r2 * q1 + r1 * p1 * q1
     d1, d0 = r3 - r2 * p2 + r1 * (p2 * p2 - q2), r4 - r2 * q2 + r1 * p2 * q2
     return (
-        p1 + (v * c1 - u * c0) / resultant, q1 + ((v - u * p1) * c0 + u * q1 * c1) / resultant,
-        p2 - (v * d1 - u * d0) / resultant, q2 - ((v - u * p2) * d0 + u * q2 * d1) / resultant,
-    )  # fmt: skip
+        p1 + (v * c1 - u * c0) / resultant,
+        q1 + ((v - u * p1) * c0 + u * q1 * c1) / resultant,
+        p2 - (v * d1 - u * d0) / resultant,
+        q2 - ((v - u * p2) * d0 + u * q2 * d1) / resultant,
+    )
 
 
 def abscissa(p: Real, q: Real) -> Real:

@@ -18,7 +18,7 @@ _HOPEFUL = 16  # starts for an exceptional point where the nearest one is a cros
 
 def search_elsewhere(
     work: Workspace, nlp: NLP, candidates: list[LocalEnd]
-) -> tuple[NLP, list[LocalEnd], CheckedEnd | None]:  # fmt: skip
+) -> tuple[NLP, list[LocalEnd], CheckedEnd | None]:
     """An exceptional point nearest to another start, where roots only cross nearest to the first."""
     part, ended = work.part, list(candidates)
     most = _HOPEFUL if work.freedom.count > 0 else 0

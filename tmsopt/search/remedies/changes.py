@@ -96,9 +96,14 @@ def _tried(
 
 
 def _less(
-    work: Workspace, box: Problem, limits: Sequence[Limit], text: dict[str, str], design: Mapping[str, float],
-    amounts: Mapping[str, float], answered: Answered,
-) -> dict[str, str]:  # fmt: skip
+    work: Workspace,
+    box: Problem,
+    limits: Sequence[Limit],
+    text: dict[str, str],
+    design: Mapping[str, float],
+    amounts: Mapping[str, float],
+    answered: Answered,
+) -> dict[str, str]:
     """What is written, or less where the design that answers shows that limits are moved too far, or for nothing."""
     with suppress(Spent):
         less = least_near(work, box, limits, design)

@@ -53,9 +53,11 @@ def add_required_speed(
     begin(options.progress, f"looking for the {name} that it takes")
     for most, ends in _ranges(problem, name):
         asked = replace(
-            _freed(problem, name, ends), constraints={**problem.constraints, **limits},
-            minimize=None if most else name, maximize=name if most else None,
-        )  # fmt: skip
+            _freed(problem, name, ends),
+            constraints={**problem.constraints, **limits},
+            minimize=None if most else name,
+            maximize=name if most else None,
+        )
         looked += ends
         trials = [_best(part) for part in workspace(asked, few).parts()]
         found = [t.parameters for t in trials if t and not t.checked.violations]
@@ -90,9 +92,13 @@ def _shown(problem: Problem, name: str, value: float, up: bool) -> Iterator[floa
 
 
 def irreducible(
-    problem: Problem, relaxation: Relaxation, likely: Sequence[str], wide: Problem, options: Options,
+    problem: Problem,
+    relaxation: Relaxation,
+    likely: Sequence[str],
+    wide: Problem,
+    options: Options,
     reached: Reached,
-) -> Relaxation:  # fmt: skip
+) -> Relaxation:
     """The same with limits that exclude each other, and whether without any one of them a design meets the others.
 
     Constraints are left out one after the other, first those that are not likely to have a part, then those about the
