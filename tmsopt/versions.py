@@ -24,7 +24,7 @@ NEEDED = (
     "filelock",
 )
 EXTRA = ("pyscipopt", "codac", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
-"""Distributions that tmsopt needs, and those of its extras certify, fast, cluster and data."""
+"""Distributions that tmsopt needs, and those of its extras certify, cluster and data."""
 
 
 def environment() -> dict[str, object]:
