@@ -50,22 +50,28 @@ def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
         except RuntimeError as error:  # links in a circle
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from error
         special = target.exists() and not (target.is_file() or target.is_dir())
-        folder = target.with_name(f".{target.name}.unfinished")
         if locked:
-            _remove(folder)
-            folder.mkdir()
-        else:
-            folder = Path(tempfile.mkdtemp(dir=None if special else target.parent, prefix=".tmsopt-"))
+            temporary = target.with_name(f".{target.name}.unfinished")
+            _remove(temporary)
+        else:  # a file, for a folder takes an open file to be removed
+            handle, name = tempfile.mkstemp(
+                dir=None if special else target.parent, prefix=".tmsopt-", suffix=target.suffix
+            )
+            os.close(handle)
+            temporary = Path(name)
         try:
-            temporary = folder / target.name
             yield temporary
             if special:
                 with temporary.open("rb") as source, target.open("wb") as sink:
                     shutil.copyfileobj(source, sink)
-            else:
-                os.replace(temporary, target)
+                return
+            if not locked:  # a temporary file is for its owner alone
+                umask = os.umask(0)
+                os.umask(umask)
+                os.chmod(temporary, 0o666 & ~umask)
+            os.replace(temporary, target)
         finally:
-            _remove(folder)
+            _remove(temporary)
     except OSError as error:  # some know no file, or only the temporary one
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 

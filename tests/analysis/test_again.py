@@ -18,7 +18,7 @@ def searches(monkeypatch):
     found, real = [], inner.solve_any_status
 
     def counted(problem, options, *rest, **kept):
-        found.extend([] if kept.get("blind") else [problem])
+        found.extend([] if kept.get("without_sample") else [problem])
         return real(problem, options, *rest, **kept)
 
     monkeypatch.setattr(inner, "solve_any_status", counted)

@@ -405,6 +405,7 @@ def shell(line: str, folder: Path, **variables: str) -> tuple[int, str, str]:
         ["bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
     left = [p.name for p in folder.rglob("*") if p.name.startswith(".tmsopt-") or p.suffix == ".lock"]
+    left = [name for name in left if name != "chart.lock"]  # of the folder of a chart, which stays in it
     assert left == []
     return int((folder / "status").read_text()), done.stdout, done.stderr
 
@@ -516,6 +517,7 @@ def test_every_command_ends_soon(
     time.sleep(0.5)
     assert [p for p in Path("/proc").glob("[0-9]*/environ") if group in _text(p)] == []
     left = [p.name for p in tmp_path.rglob("*") if p.name.startswith(".tmsopt-") or p.suffix == ".lock"]
+    left = [name for name in left if name != "chart.lock"]  # of the folder of a chart, which stays in it
     assert left == []
 
 

@@ -93,7 +93,7 @@ def test_the_motion_is_that_of_the_equations(browser: Any, explorers: Any, name:
     """Where the page opens: ep4 and the robot at fourfold roots."""
     explorer, path = explorers[name]
     with opened(browser, path) as page:
-        found = page.evaluate(f"tmsopt.dynamics({{lean: {lean}, push: {push}, seconds: 3}})")
+        found = page.evaluate(f"tmsopt.motion({{lean: {lean}, push: {push}, seconds: 3}})")
         A, impulse = equations(explorer, shown(page))
     assert found["t"][-1] == pytest.approx(3)
     truth = integrated(A, [np.radians(lean), 0, *(push * impulse)], found["t"])
@@ -136,7 +136,7 @@ def test_a_slow_bicycle_falls_and_the_page_says_so(browser: Any, explorers: Any)
         page.evaluate("tmsopt.set({v: 0.5})")
         drawn(page)
         assert "It falls" in page.locator("#bicycle .reading").inner_text()
-        end, falls = page.evaluate("[motionFrom(state, drawingOf()).end, tmsopt.dynamics({seconds: 3}).falls]")
+        end, falls = page.evaluate("[motionFrom(state, drawingOf()).end, tmsopt.motion({seconds: 3}).falls]")
         A, _ = equations(explorer, shown(page))
 
         def fallen(_: float, z: Any) -> float:
@@ -228,7 +228,7 @@ def test_a_stated_system_starts_from_each_of_its_states(browser: Any, tmp_path: 
     tmsopt.explore(tmp_path / "pair.toml").save(tmp_path / "pair.html")
     with opened(browser, tmp_path / "pair.html") as page:
         assert not page.locator("#bicycle").is_visible()
-        assert page.evaluate("tmsopt.dynamics({lean: 5})") is None
+        assert page.evaluate("tmsopt.motion({lean: 5})") is None
         c = shown(page)["c"]
         A = first_order([[1, 0], [0, 2]], [[c, 0], [0, 0.3]], [[3, -1], [-1, 2]])
         for k, name in enumerate(["coordinate 1", "coordinate 2", "rate of coordinate 1", "rate of coordinate 2"]):
@@ -248,7 +248,7 @@ def test_a_model_by_its_coefficients_has_no_motion(browser: Any, tmp_path: Path)
     tmsopt.explore(tmp_path / "k.toml").save(tmp_path / "k.html")
     with opened(browser, tmp_path / "k.html") as page:
         assert not page.locator("#motion").is_visible()
-        assert page.evaluate("tmsopt.dynamics()") is None
+        assert page.evaluate("tmsopt.motion()") is None
 
 
 def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser: Any, tmp_path: Path) -> None:
@@ -276,7 +276,7 @@ def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser: A
     explorer = tmsopt.explore(replace(posed, model=model))
     explorer.save(tmp_path / "lag.html")
     with opened(browser, tmp_path / "lag.html") as page:
-        found = page.evaluate("tmsopt.dynamics({lean: 2, push: 0.3, seconds: 2})")
+        found = page.evaluate("tmsopt.motion({lean: 2, push: 0.3, seconds: 2})")
         plain, impulse = equations(explorer, shown(page))
     A = np.zeros((5, 5))
     A[:4, :4] = plain

@@ -227,7 +227,7 @@ def test_what_is_not_solved_is_reported_as_a_gap(monkeypatch):
         return replace(found, status="not_converged") if any(1.5 < v < 2.5 for v in values) else found
 
     monkeypatch.setattr(subproblems, "solve_any_status", failing)
-    found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "-chi_B"]), 6)
+    found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "-chi_B"]), 6, workers=1)
     assert [g.failed for g in found.gaps] == [True]
     assert "try more starts" in found.gaps[0].reason
     k = found.gaps[0].index
