@@ -40,3 +40,12 @@ def test_a_multiple_root_is_never_certain() -> None:
     for roots in ([-1, -1, -2, -3], [-1, -1, -1, -1], [1j, -1j, 1j, -1j], [0, 0, -1, -2]):
         a = np.poly(roots).real
         assert not enclose_motions([Bounded(np.full(1, c), np.zeros(1)) for c in a], 1e-12).simple.any()
+
+
+@pytest.mark.parametrize("apart", [1e-13, -1e-13])
+def test_a_second_root_on_the_rightmost_line_is_never_certain(apart: float) -> None:
+    """Which of a pair and a real root is rightmost, rounding decides."""
+    a = np.poly([-1 + apart, -1 + 2j, -1 - 2j, -3]).real
+    assert not enclose_motions([Bounded(np.full(1, c), np.zeros(1)) for c in a], 1e-12).simple.any()
+    clear = np.poly([-1.1, -1 + 2j, -1 - 2j, -3]).real
+    assert enclose_motions([Bounded(np.full(1, c), np.zeros(1)) for c in clear], 1e-12).simple.all()

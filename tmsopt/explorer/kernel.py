@@ -160,7 +160,7 @@ for _each in (
     factors.root_pair,
     signs.stable,
     signs.classes,
-):  # fmt: skip - each uses only those before it
+):  # each uses only those before it
     _KNOWN[_each.__name__] = FunctionType(_each.__code__, {**_each.__globals__, **_KNOWN}, _each.__name__)
 _OF = SimpleNamespace(**_KNOWN)
 

@@ -132,7 +132,7 @@ class Store:
         """Keep rows; when it returns they are safe from ``kill -9``. A row that is there stays as it is.
 
         Raises:
-            InputError: on a full files.
+            InputError: on a full disk.
         """
         self.add_part(columns(rows))
 
