@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from helpers import hunt
+from helpers.bicycles import BENCHMARK
 
 import tmsopt
 from tmsopt import laws
@@ -26,35 +27,8 @@ SKATE = {"w": 1.0, "g": 9.81, "m_B": 10.0, "m_H": 1.0, "x_H": 1.0, "z_B": -0.4, 
 BOX = {"v": (2.0, 5.0), "x_B": (1.05, 1.2), "lambda_s": (0.09, 0.7)}
 SLOW = {"slow": "decay_rate >= 1"}
 
-# The benchmark bicycle of Meijaard, Papadopoulos, Ruina and Schwab (2007), table 1, and table 2 at 5 m/s.
-BENCHMARK = {
-    "w": 1.02,
-    "c": 0.08,
-    "lambda_s": math.pi / 10,
-    "g": 9.81,
-    "v": 5.0,
-    "r_R": 0.3,
-    "m_R": 2.0,
-    "I_Rxx": 0.0603,
-    "I_Ryy": 0.12,
-    "x_B": 0.3,
-    "z_B": -0.9,
-    "m_B": 85.0,
-    "I_Bxx": 9.2,
-    "I_Bzz": 2.8,
-    "I_Bxz": 2.4,
-    "x_H": 0.9,
-    "z_H": -0.7,
-    "m_H": 4.0,
-    "I_Hxx": 0.05892,
-    "I_Hzz": 0.00708,
-    "I_Hxz": -0.00756,
-    "r_F": 0.35,
-    "m_F": 3.0,
-    "I_Fxx": 0.1405,
-    "I_Fyy": 0.28,
-}
 WEAVE = 4.46486771378823
+"""Of the benchmark bicycle at 5 m/s: Meijaard, Papadopoulos, Ruina and Schwab (2007), table 2."""
 
 # objective, constraints, optimum for z from 0.05 to 3
 MINIMA = (
