@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -112,7 +113,7 @@ def _nlp(place: WeightedDesign, edge: Edge) -> NLP:
     model, of = place.problem.model, place.problem.parameter_set
     n, extra = len(place.weights), len(edge.unknowns)
     around = _around(model, of.name, tuple(place.weights))
-    kind = ca.MX if around.n_instructions() * n >= _LARGE else ca.SX
+    kind: Any = ca.MX if around.n_instructions() * n >= _LARGE else ca.SX
     x, p = kind.sym("x", n + extra), kind.sym("p", around.size1_in(1))
     y, unknowns = x[:n], [x[n + k] for k in range(extra)]
     c, sizes = (ca.vertsplit(column) for column in around(y, p))
