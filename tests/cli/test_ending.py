@@ -270,7 +270,7 @@ def test_proofs_leave_what_is_proved(run: Run, monkeypatch: pytest.MonkeyPatch, 
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify doubt"])
+@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify contradicted"])
 def test_a_proof_that_is_stopped_leaves_the_design(
     run: Run, monkeypatch: pytest.MonkeyPatch, where: str, tmp_path: Path
 ) -> None:
