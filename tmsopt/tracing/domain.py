@@ -21,7 +21,7 @@ from tmsopt.tracing.branch import Branch, Event
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
 from tmsopt.tracing.equations import coefficients
 from tmsopt.tracing.infinity import Infinity, through_infinity
-from tmsopt.tracing.monitors import on_axis
+from tmsopt.tracing.monitors import on_axis, roots_along
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
@@ -187,7 +187,8 @@ def _bounds(branch: Branch, problem: Problem) -> Truth:
     Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
     """
     rest = pattern_of(problem.model, branch.pattern).remaining(list(branch.unknowns.values()))
-    tied = on_axis(rest, len(branch))
+    z = roots_along(rest, len(branch))
+    tied = np.where(on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)  # of the fastest, squared
     if np.all(tied < 0):
         return branch.stable
     widths = {n: high - low for n, (low, high) in problem.free.items()}

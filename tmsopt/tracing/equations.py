@@ -103,6 +103,12 @@ def prepare(problem: Problem) -> Traced:
     return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
 
 
+def symbols_of(problem: Problem, x: Sequence[Any]) -> dict[str, Any]:
+    """Free parameters for traced variables that are CasADi expressions."""
+    of = problem.parameter_set
+    return {n: ca.atan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)}
+
+
 def design_at(problem: Problem, x: Array) -> dict[str, Any]:
     """Free parameters for traced variables, floats or columns."""
     of = problem.parameter_set

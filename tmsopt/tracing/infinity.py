@@ -18,7 +18,7 @@ from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.tracing.continuation import Curve, Walk, between, both_ways, contains, curve
-from tmsopt.tracing.equations import design_at, sizes
+from tmsopt.tracing.equations import design_at, sizes, symbols_of
 from tmsopt.tracing.monitors import margins, sign_changes
 from tmsopt.tracing.seeds import unexplained
 from tmsopt.tracing.solving import crossing, projected, rows_of
@@ -50,8 +50,7 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
     """Every curve a0 = 0 found in the box of a problem with two free parameters."""
     x = ca.SX.sym("x", 2)
     of = problem.parameter_set
-    symbols = {n: ca.atan(x[k]) if of[n].tangent else x[k] for k, n in enumerate(problem.free)}
-    a = Values(problem.model, of, problem.ordered(symbols)).coefficients
+    a = Values(problem.model, of, problem.ordered(symbols_of(problem, ca.vertsplit(x)))).coefficients
     if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
         return
     ends = [[np.tan(e) if of[n].tangent else e for e in problem.free[n]] for n in problem.free]
