@@ -143,7 +143,7 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
         return new[0], tangent[0], *checks[0].tolist()
 
     origin, ys, ts, step_from = y, [y], [t], Rows(on.advance, 1)
-    s, reach = step / 4, _reach(on, y, t)
+    s, reach = step / 4, advance(y, t, 0.0)[6]
     while len(ys) < most:
         s = min(s, step * reach)
         while True:
@@ -217,13 +217,6 @@ def same(one: Walk, other: Walk) -> bool:
 def _alike(y: Array, other: Array) -> Truth:
     """Whether points are one."""
     return np.asarray(np.abs(y - other).max(axis=-1) <= _SAME * (1 + np.abs(other).max(axis=-1)))
-
-
-def _reach(on: Curve, y: Array, t: Array) -> float:
-    """Longest step, per unit of `step`: boxed variables by their box, the others by their own size."""
-    boxed = np.logical_and(np.isfinite(on.lower), np.isfinite(on.upper))
-    room = np.where(boxed, 1.0, _ROOM * (1 + np.abs(y)) * np.sqrt(np.maximum(1, np.abs(y) / _REMOTE)))
-    return float(np.min(room / (np.abs(t) + 1e-300)))
 
 
 def _along(on: Curve, y: Array, t: Array) -> bool:
