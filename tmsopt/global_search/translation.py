@@ -254,7 +254,8 @@ class _Translation:
         if name == "exp":
             _refuse_huge(INTERVALS[operation](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
-            return self.once("circle", a.tangent, self.on_circle)[name == "sin"]
+            part: Term = self.once("circle", a.tangent, self.on_circle)[name == "sin"]
+            return part
         a = self.variable(a)
         v = self.defined(INTERVALS[operation](a.ball))
         if name == "log":  # SCIP keeps the argument of its own away from 0
