@@ -383,7 +383,7 @@ def test_the_nearest_polynomial_of_every_structure(name: str) -> None:
         found = structure(a, 1e-11)
         assert found.name == name
         with flint.ctx.workprec(212):
-            balls = nearest_roots(name, [exact(c) for c in a], found.roots)
+            balls = nearest_roots([exact(c) for c in a], found.roots)
             assert balls is not None
             got = sorted((nearest_double(b.re), nearest_double(b.im)) for b in balls for _ in range(b.multiplicity))
         with mp.workdps(DIGITS + 20):

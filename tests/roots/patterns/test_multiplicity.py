@@ -221,7 +221,7 @@ def test_certified_roots_of_an_exact_structure_are_the_roots_it_was_made_from(it
     p = polynomial(items)
     shown = structure(doubles(p), 1e-11)
     with flint.ctx.workprec(424):
-        found = nearest_roots(shown.name, [flint.fmpq(c.numerator, c.denominator) for c in p], shown.roots)
+        found = nearest_roots([flint.fmpq(c.numerator, c.denominator) for c in p], shown.roots)
         assert found is not None
         # a ball about 0 has no nearest double
         rounded = {(complex(nearest_double(z.re) or 0, nearest_double(z.im)), z.multiplicity) for z in found}
@@ -243,7 +243,7 @@ def test_certified_root_of_the_nearest_sixfold_polynomial() -> None:
         expected = float(mp.findroot(stationary, mp.mpf("-1.3")))
     shown = structure(c, 1e-11)
     with flint.ctx.workprec(212):
-        found = nearest_roots(shown.name, [exact(float(x)) for x in c], shown.roots)
+        found = nearest_roots([exact(float(x)) for x in c], shown.roots)
         assert found is not None
         assert (nearest_double(found[0].re), found[0].multiplicity) == (expected, 6)
 
