@@ -4,7 +4,7 @@ In: coefficients, highest power first. Out: roots, verdicts on stability, counts
 first; `patterns` says which roots meet, `quartics` takes millions at once.
 """
 
-from tmsopt.roots.count import may_be_real, real_roots
+from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
 from tmsopt.roots.many import classify, find_motion
@@ -46,7 +46,6 @@ __all__ = [
     "is_stable",
     "jordan",
     "lienard_chipart",
-    "may_be_real",
     "multiple_real_roots",
     "pattern",
     "pattern_distance",
