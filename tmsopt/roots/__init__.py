@@ -10,9 +10,8 @@ from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvecto
 from tmsopt.roots.many import classify, find_motion
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
-from tmsopt.roots.patterns.multiplicity import multiple_real_roots
 from tmsopt.roots.patterns.pattern import Pattern
-from tmsopt.roots.patterns.structure import Structure, pattern_distance, structure
+from tmsopt.roots.patterns.structure import Structure, multiple_real_roots, pattern_distance, structure
 from tmsopt.roots.polynomial import Root, determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.quartics.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
 from tmsopt.roots.quartics.quartic import Factors, Motion, abscissa_and_damping, quartic_factors

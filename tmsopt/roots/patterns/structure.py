@@ -90,6 +90,21 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
     return Structure("undecided", _simple(found), fit.distance)
 
 
+def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root, ...] | None:
+    """The roots of the `structure`, rightmost first, if all are real and two of them are equal; else None.
+
+    Example:
+        >>> found = tmsopt.roots.multiple_real_roots([1, 5, 9, 7, 2 + 1e-13], 1e-9)  # near (s + 1)³ (s + 2)
+        >>> [(round(root.re, 6), root.multiplicity) for root in found]
+        [(-1.0, 3), (-2.0, 1)]
+
+    More: docs/explanation/exceptional_points.md
+    """
+    found = structure(coefficients, tolerance).roots
+    multiple = all(root.im == 0 for root in found) and any(root.multiplicity > 1 for root in found)
+    return found if multiple else None
+
+
 def _sizes(c: Array, found: Roots, off: ArrayLike | None, tolerance: float) -> Array:
     if off is None:
         return sizes(found)
