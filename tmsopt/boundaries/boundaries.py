@@ -179,7 +179,7 @@ def heavily_damped(c: Array) -> Truth:
     """Whether all roots are real, negative and different, for coefficients of shape (…, n + 1), up to rounding.
 
     A quartic has four different real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
-    16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted (Sturm).
+    16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted.
     """
     n = c.shape[-1] - 1
     stable = is_stable(c, exact=False)
