@@ -250,11 +250,6 @@ def test_crossings_of_small_polynomials():
     assert [(c.at, c.kind) for c in crossings([y, one], -1, 1).found] == [(0, "infinity")]
 
 
-def test_crossings_of_a_polynomial_and_its_negative_are_the_same():
-    one, y = [1], [0, 1]
-    assert crossings([[-1], [0, -1], [-1]], -5, 5) == crossings([one, y, one], -5, 5)
-
-
 def test_crossings_left_of_another_root_change_no_stability():
     """(s² + y s + 1)(s − 3): the root 3 is right of all, and is double at y = −10/3; −3 mirrors it at y = 10/3."""
     found = crossings([[1], [-3, 1], [1, -3], [-3]], -5, 5)
