@@ -277,12 +277,6 @@ def test_stability_up_to_degree_12() -> None:
         assert list(is_stable(rows)) == [exact_abscissa(c) < 0 for c in rows]
 
 
-def test_roots_on_the_imaginary_axis_are_not_stable() -> None:
-    assert not is_stable(doubles(polynomial([(F(0), F(2), 1), (F(-1), F(0), 4)])))
-    assert not is_stable(doubles(polynomial([(F(0), F(0), 1), (F(-1), F(0), 5)])))
-    assert is_stable(doubles(polynomial([(F(-1), F(0), 12)])))
-
-
 def test_discriminant_of_any_degree() -> None:
     """Against SymPy's resultant, exactly."""
     rng = np.random.default_rng(7)

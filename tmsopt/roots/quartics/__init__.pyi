@@ -1,1 +1,0 @@
-from .factors import largest_root as largest_root
