@@ -4,11 +4,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon
 
 from tmsopt.paper.sketch import Sketch, sketch
-from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, REAL, new_figure, on_axes
+from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, REAL, on_axes
 from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
 
@@ -110,25 +109,6 @@ def draw_distance(data: Sketch, ax: Axes | None = None) -> Axes:
     ax.set_ylim(middle[1] + half, middle[1] - half)
     ax.set(xticks=[], yticks=[])
     return ax
-
-
-def bicycle_figure(data: Sketch, title: str) -> Figure:
-    """The side view beside the enlargement that shows u_H, with the numbers below."""
-    figure = new_figure(9.0, 4.1)
-    grid = figure.add_gridspec(1, 2, width_ratios=(2.35, 1))
-    side, near = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
-    draw_bicycle(data, side)
-    draw_distance(data, near)
-    side.set_title(title, fontsize=10.5)
-    near.set_title("enlarged: $H$ and the steer axis", fontsize=9.5)
-    p = data.parameters
-    figure.supxlabel(
-        rf"$\chi_B = x_B/w = {p['chi_B']:.4g}$    $\zeta_B = z_B/w = {p['zeta_B']:.4g}$    "
-        rf"$\chi_H = x_H/w = {p['chi_H']:.4g}$    $\zeta_H = z_H/w = {p['zeta_H']:.4g}$    "
-        rf"$\mu = m_H/m_B = {p['mu']:.4g}$    $\lambda_s = {np.rad2deg(p['lambda_s']):.4g}°$",
-        fontsize=9,
-    )
-    return figure
 
 
 def _reach(data: Sketch) -> float:
