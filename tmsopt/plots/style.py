@@ -6,12 +6,14 @@ from io import BytesIO
 from os import PathLike
 from typing import Any
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
+from numpy.typing import ArrayLike
 
 from tmsopt.files import path_of, write_atomic
 
@@ -85,16 +87,16 @@ def entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Ar
     return Line2D([], [], color=color, linestyle=style, label=label, **look)
 
 
-def note(ax: Axes, text: str, place: Sequence[float], offset: tuple[float, float], **look: Any) -> None:
+def note(ax: Axes, text: str, place: ArrayLike, offset: tuple[float, float], **look: Any) -> None:
     """A text beside a point, by an offset in points."""
     look = {"fontsize": 8, "horizontalalignment": "right" if offset[0] < 0 else "left", **look}
-    ax.annotate(text, (place[0], place[1]), offset, textcoords="offset points", **look)
+    ax.annotate(text, _point(place), offset, textcoords="offset points", **look)
 
 
 def arrow(
     ax: Axes,
-    start: Sequence[float],
-    end: Sequence[float],
+    start: ArrayLike,
+    end: ArrayLike,
     head: tuple[float, float] = (0.25, 0.5),
     zorder: float = 4,
     **look: Any,
@@ -102,7 +104,12 @@ def arrow(
     """An arrow from point to point, its head (width, length) in parts of a letter."""
     style = "-|>,head_width={},head_length={}".format(*head)
     arrowprops = {"arrowstyle": style, "shrinkA": 0, "shrinkB": 0, **look}
-    ax.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=arrowprops, zorder=zorder)
+    ax.annotate("", _point(end), _point(start), arrowprops=arrowprops, zorder=zorder)
+
+
+def _point(place: ArrayLike) -> tuple[float, float]:
+    x, y = np.asarray(place, dtype=float)
+    return float(x), float(y)
 
 
 def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
