@@ -1,7 +1,7 @@
 """What all figures share: colours that the colour-blind can tell apart, sizes for print, and saving."""
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from io import BytesIO
 from os import PathLike
 from typing import Any
@@ -70,15 +70,15 @@ def legend_below(figure: Figure, handles: Sequence[Artist], columns: int | None 
 
 def draw_bands(
     ax: Axes,
-    stable: Iterable[Sequence[float]],
-    heavily_damped: Iterable[Sequence[float]],
+    stable: ArrayLike,
+    heavily_damped: ArrayLike,
     alphas: tuple[float, float] = (0.18, 0.35),
     top: float = 1,
 ) -> None:
     """Bands of stability and of heavy damping, up to a part of the height."""
     kinds = (stable, STABLE, "stable"), (heavily_damped, HEAVY, "heavily damped")
     for (bands, colour, words), alpha in zip(kinds, alphas, strict=True):
-        for k, (low, high) in enumerate(bands):
+        for k, (low, high) in enumerate(np.reshape(bands, (-1, 2))):
             ax.axvspan(low, high, 0, top, color=colour, alpha=alpha, linewidth=0, label=None if k else words)
 
 
