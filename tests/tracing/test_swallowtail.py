@@ -10,7 +10,7 @@ import pytest
 from tmsopt import InputError, Problem, laws, models
 from tmsopt.models import copo
 from tmsopt.plots import new_figure
-from tmsopt.plots.paper import draw_swallowtail, planes_figure, quadrilaterals
+from tmsopt.plots.paper import draw_plane, draw_swallowtail, quadrilaterals
 from tmsopt.tracing import swallowtail
 
 pytestmark = pytest.mark.slow
@@ -185,8 +185,8 @@ def test_heavy_damping_on_the_law_is_bounded_by_the_EP_set_and_a_double_root_ome
 
 
 def test_the_EP_set_is_drawn_solid_below_EP4_and_dashed_above(on_law):
-    figure = planes_figure([on_law], ["a"])
-    (ax,) = figure.axes
+    ax = new_figure(4, 4).subplots()
+    draw_plane(ax, on_law)
     dashed = [line for line in ax.get_lines() if line.get_linestyle() == "--"]
     assert len(dashed) == 1
     x, y = dashed[0].get_data()
