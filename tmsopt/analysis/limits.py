@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tmsopt.analysis.again import LimitResolver, moved
+from tmsopt.analysis.again import moved, solved_again
 from tmsopt.analysis.steps import natural_step, step_within
 from tmsopt.errors import InputError
 from tmsopt.problem.expression import written_sides
@@ -96,10 +96,9 @@ def levers(solution: Solution, resolve: bool = True, progress: Counts | None = N
     found = [
         _of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name) for name in solution.active
     ]
-    again = LimitResolver(solution, {lever.name: lever.step for lever in found if lever.step})
     checked = []
     for lever in found:
-        checked.append(_resolved(again, lever) if resolve and lever.step else lever)
+        checked.append(_resolved(solution, lever) if resolve and lever.step else lever)
         if progress:
             progress(len(checked), len(solution.active))
     return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
@@ -158,16 +157,15 @@ def _size(solution: Solution, text: str) -> float:
     return max((size for size in sides if math.isfinite(size)), default=1.0)
 
 
-def _resolved(again: LimitResolver, lever: Lever) -> Lever:
+def _resolved(solution: Solution, lever: Lever) -> Lever:
     """A lever with the gain found by solving again from the optimum."""
-    solution = again.solution
     try:
         asked = moved(solution.problem, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
     gain, found = math.nan, None
     for starts in (1, _RETRY):
-        ended = again.solved(asked, lever.name, starts)
+        ended = solved_again(solution, asked, starts)
         better = -solution.problem.sign * (ended.value - solution.value)
         if ended.status == "optimal" and not better <= gain:
             gain, found = better, ended
