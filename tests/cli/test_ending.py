@@ -267,7 +267,7 @@ def test_proofs_leave_what_is_proved(run, monkeypatch, number, status):
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify contradicted"])
+@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify doubt"])
 def test_a_proof_that_is_stopped_leaves_the_design(run, monkeypatch, where, tmp_path):
     """While SCIP is at work, and while a question to it is made."""
     module, _, name = where.partition(" ")

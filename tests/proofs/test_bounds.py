@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tmsopt.algebra import EVERYTHING, NotAccepted, ball, interval, ranges, root_bound
-from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, interlacing, task, unknowns
+from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
 from tmsopt.problem import parse_value
 from tmsopt.program import NLP
 from tmsopt.roots import product
@@ -87,6 +87,7 @@ def test_all_roots_on_the_axis(pairs: tuple[int, ...], zeros: int) -> None:
     c = product(*([Fraction(1), Fraction(0), Fraction(x)] for x in pairs), *[[Fraction(1), Fraction(0)]] * zeros)
     squares = pairs[: unknowns(len(c) - 1)]
     assert holds(c, squares)
+    assert holds(c, [Fraction(x).limit_denominator() for x in squares_of([float(x) for x in c])])
 
 
 @pytest.mark.parametrize("c", [(1, 0, 1, 0, 1), (1, 0, -5, 0, 4), (1, 0, 3, 0, -4), (1, 0, 1, 0, 1, 0)])
@@ -109,6 +110,17 @@ def test_a_double_square_admits_more_than_the_theorem() -> None:
     assert holds(c, [4, 4])
 
 
+@pytest.mark.parametrize("degree", range(2, 8))
+def test_squares_are_found_for_known_coefficients(degree: int) -> None:
+    """Within half the digits of a double, which a double zero loses."""
+    rng = np.random.default_rng(degree)
+    for _ in range(30):
+        c = [float(x) for x in product(*drawn_factors(rng, degree, 0))]
+        squares = squares_of(c)
+        assert len(squares) == unknowns(degree)
+        equations, nonnegative = interlacing(c, [(x, 1.0) for x in squares])
+        size = max(c) * (1 + max(squares, default=0.0)) ** (degree // 2)
+        assert max([*map(abs, equations), *(-e for e in nonnegative)]) <= 1e-7 * size
 
 
 # Ranges

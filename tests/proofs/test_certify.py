@@ -241,17 +241,18 @@ def test_json(slow_plane: Solution, bounded_plane: Solution) -> None:
 # Wrong bounds, made for the purpose
 
 
-def unclaimed(design: Solution) -> bool:
+def unclaimed(design: Solution, names: str) -> bool:
     """Whether nothing is claimed, and the reason told."""
     said = [note for note in design.notes if note.startswith("no bound: the question excludes the design")]
     assert len(said) == 1
+    assert names in said[0]
     return not design.bound.proven and not design.bound.tolerance
 
 
 def test_a_bound_on_the_roots_that_is_too_small(slowest: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
     """A tenth, for frequencies of some 1: x1 is the square of one."""
     monkeypatch.setattr(lines, "root_bound", lambda coefficients: 0.1)
-    assert unclaimed(certify(slowest, seconds=SECONDS))
+    assert unclaimed(certify(slowest, seconds=SECONDS), "x1.0")
 
 
 def test_a_wrong_equation(slowest: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,7 +264,7 @@ def test_a_wrong_equation(slowest: Solution, monkeypatch: pytest.MonkeyPatch) ->
         return [coefficients[3] * y + x * coefficients[1]], right(coefficients, squares)[1]
 
     monkeypatch.setattr(interlaces, "interlacing", wrong)
-    assert unclaimed(certify(slowest, seconds=SECONDS))
+    assert unclaimed(certify(slowest, seconds=SECONDS), "abscissa")
 
 
 @pytest.mark.parametrize("which", [0, 1, 2, 3])
@@ -276,7 +277,7 @@ def test_a_wrong_sign(slowest: Solution, monkeypatch: pytest.MonkeyPatch, which:
         return equations, [-e if k == which else e for k, e in enumerate(nonnegative)]
 
     monkeypatch.setattr(interlaces, "interlacing", wrong)
-    assert unclaimed(certify(slowest, seconds=SECONDS))
+    assert unclaimed(certify(slowest, seconds=SECONDS), "abscissa")
 
 
 def test_a_forged_bound_is_not_believed(slow_plane: Solution) -> None:
@@ -287,7 +288,7 @@ def test_a_forged_bound_is_not_believed(slow_plane: Solution) -> None:
 
 def test_a_forged_value_is_not_believed(slow_plane: Solution) -> None:
     """A design that is not as good as it says: whatever is better than that excludes the design itself."""
-    assert unclaimed(certify(replace(slow_plane, value=slow_plane.value - 0.1), seconds=SECONDS))
+    assert unclaimed(certify(replace(slow_plane, value=slow_plane.value - 0.1), seconds=SECONDS), "")
 
 
 def test_a_forged_infeasibility_is_not_believed(slow_plane: Solution) -> None:
