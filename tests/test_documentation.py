@@ -19,28 +19,28 @@ PAGES = sorted([*ROOT.glob("*.md"), *pages.PAGES])
 README, CONTRIBUTING = (ROOT / name for name in ("README.md", "CONTRIBUTING.md"))
 
 
-def blocks(page: Path, language: str) -> list[str]:
+def blocks(page, language):
     """The fenced blocks of a page in one language."""
     return [block.text for block in pages.blocks_of(page) if block.language == language]
 
 
-def prose(page: Path) -> str:
+def prose(page):
     """A page without its fenced blocks."""
     return re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
 
 
-def anchors(page: Path) -> set[str]:
+def anchors(page):
     """What a link may name after #: a heading in lower case, spaces as hyphens, other signs left out."""
     headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-def answer(text: str) -> list[str]:
+def answer(text):
     """The lines of a printed answer, spaces and what is left out aside."""
     return [line for line in lines_of(text) if line != "…"]
 
 
-def solved(file: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+def solved(file, capsys):
     """What the command prints."""
     with pytest.raises(SystemExit) as stop:
         main(args=["solve", str(file)], prog_name="tmsopt")
@@ -48,16 +48,16 @@ def solved(file: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
     return answer(capsys.readouterr().out)
 
 
-def test_the_pages_are_there() -> None:
+def test_the_pages_are_there():
     """So that nothing below passes because nothing was read."""
     assert {"README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "index.md"} <= {p.name for p in PAGES}
 
 
-def test_the_readme_is_one_page() -> None:
+def test_the_readme_is_one_page():
     assert len(README.read_text(encoding="utf-8").splitlines()) <= 150
 
 
-def test_the_two_commands_stand_between_the_markers() -> None:
+def test_the_two_commands_stand_between_the_markers():
     """One a line, as the gate reads and runs them."""
     inside = re.findall(r"<!-- commands -->\n```sh\n(.*?)\n```\n<!-- /commands -->", README.read_text(), re.DOTALL)
     assert len(inside) == 1
@@ -67,7 +67,7 @@ def test_the_two_commands_stand_between_the_markers() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_lead_somewhere(page):
     text = re.sub(r"`[^`\n]*`", "", prose(page))
     assert re.findall(r"\]\(<|^ *\[[^]]+\]:|<a |<img ", text, re.MULTILINE) == [], (
         "links are written as [words](target)"
@@ -81,25 +81,25 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert not anchor or anchor in anchors(found), target
 
 
-def test_every_problem_is_listed() -> None:
+def test_every_problem_is_listed():
     linked = set(re.findall(r"\]\(\.\./problems/([\w.]+)\)", (ROOT / "docs" / "problems.md").read_text()))
     found = {p.name for suffix in ("toml", "py") for p in (ROOT / "problems").glob(f"*.{suffix}")}
     assert linked == found
 
 
-def test_pictures_are_small() -> None:
+def test_pictures_are_small():
     pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README.read_text(encoding="utf-8"))
     assert "docs/explorer.png" in pictures
     assert all((ROOT / p).stat().st_size < 200_000 for p in pictures)
 
 
-def test_every_command_is_documented() -> None:
+def test_every_command_is_documented():
     rows = re.findall(r"^\| `tmsopt (\w+)", (ROOT / "docs" / "reference" / "commands.md").read_text(), re.MULTILINE)
     assert set(rows) == set(import_module("tmsopt.cli.commands").every.commands)
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name != "CHANGELOG.md"], ids=lambda p: p.name)
-def test_public_names_exist(page: Path) -> None:
+def test_public_names_exist(page):
     """What a page calls tmsopt.something is public; the change log names what is gone, too."""
     text = "\n".join(
         line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith(("$ ", ".. click::"))
@@ -111,7 +111,7 @@ def test_public_names_exist(page: Path) -> None:
             assert hasattr(found, inner) or inner in getattr(found, "__annotations__", {}), f"{name}.{inner}"
 
 
-def test_options_exist() -> None:
+def test_options_exist():
     """What a page calls `--something` is an option of a command, or of the benchmarks."""
     commands = import_module("tmsopt.cli.commands").every
     options = {
@@ -127,42 +127,42 @@ def test_options_exist() -> None:
 # CONTRIBUTING
 
 
-def tree() -> list[str]:
+def tree():
     """The packages of CONTRIBUTING's tree, in its order, with the path that the indentation gives them."""
     (drawn,) = (block for block in blocks(CONTRIBUTING, "text") if block.startswith("tmsopt/"))
-    found: list[str] = []
-    above: list[str] = []
+    found = []
+    above = []
     for indent, name in re.findall(r"^( *)(\w+)/", drawn, re.MULTILINE):
         above = [*above[: len(indent) // 2], name]
         found.append("/".join(above))
     return found[1:]
 
 
-def test_the_tree_has_every_package() -> None:
+def test_the_tree_has_every_package():
     packages = {str(p.parent.relative_to(ROOT)) for p in (ROOT / "tmsopt").rglob("__init__.py")} - {"tmsopt"}
     assert sorted(tree()) == sorted(packages)
 
 
-def test_the_tree_is_in_the_order_of_the_floors() -> None:
+def test_the_tree_is_in_the_order_of_the_floors():
     from test_architecture import FLOOR
 
     floors = [FLOOR[path.split("/")[1]] for path in tree()]
     assert floors == sorted(floors)
 
 
-def test_files_that_contributing_names_exist() -> None:
+def test_files_that_contributing_names_exist():
     named = re.findall(r"`([\w./]+/[\w./]*\.\w+)`", prose(CONTRIBUTING))
     assert len(named) > 20
     assert [path for path in named if not (ROOT / path).is_file()] == []
 
 
-def test_the_table_has_the_changes_that_a_maintainer_makes() -> None:
+def test_the_table_has_the_changes_that_a_maintainer_makes():
     rows = re.findall(r"^\| (?:an? |the |another )([^|]+) \|", prose(CONTRIBUTING), re.MULTILINE)
     assert len(rows) == 11
     assert {"derived quantity", "root pattern", "model", "order of the report", "constraint type"} <= set(rows)
 
 
-def test_one_version() -> None:
+def test_one_version():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     cited = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
     assert cited is not None
@@ -172,7 +172,7 @@ def test_one_version() -> None:
 # What the README shows
 
 
-def test_the_examples_are_problem_files(tmp_path: Path) -> None:
+def test_the_examples_are_problem_files(tmp_path):
     robot, absorber = blocks(README, "toml")
     file = tmp_path / "absorber.toml"
     file.write_text(absorber, encoding="utf-8")
@@ -184,7 +184,7 @@ def test_the_examples_are_problem_files(tmp_path: Path) -> None:
         assert shown.keys() == free, "all but what is fixed"
 
 
-def test_the_robot_has_the_answer_that_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_robot_has_the_answer_that_is_printed(capsys):
     printed = blocks(README, "text")[0]
     command, *lines = answer(printed)
     assert command == "$ tmsopt solve problems/delivery_robot.toml"
@@ -193,7 +193,7 @@ def test_the_robot_has_the_answer_that_is_printed(capsys: pytest.CaptureFixture[
         assert any(agrees(line, other) for other in now), line
 
 
-def test_the_absorber_has_the_answer_that_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_absorber_has_the_answer_that_is_printed(tmp_path, capsys):
     """And its closed form: (s² + bs + k)² has k = w = 1/(1 + mu), b² = mu/(1 + mu), c = 2 b mu/(1 + mu)."""
     file = tmp_path / "absorber.toml"
     file.write_text(blocks(README, "toml")[1], encoding="utf-8")
@@ -206,7 +206,7 @@ def test_the_absorber_has_the_answer_that_is_printed(tmp_path: Path, capsys: pyt
         assert any(math.isclose(float(n), value, rel_tol=5e-5) for n in NUMBER.findall(line)), line
 
 
-def test_the_figures_stand_in_the_results() -> None:
+def test_the_figures_stand_in_the_results():
     """Solved, proved and tried: the counts of the table are those of the benchmarks."""
     results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
     counts = re.findall(r"\d+ of \d+", README.read_text(encoding="utf-8"))
@@ -214,7 +214,7 @@ def test_the_figures_stand_in_the_results() -> None:
     assert [c for c in counts if c not in results] == []
 
 
-def test_the_times_stand_in_the_results() -> None:
+def test_the_times_stand_in_the_results():
     """Medians of a solve, of its rival and of a proof: those of the benchmarks, to the digits shown."""
     results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
     table = {row[0]: row[1] for row in re.findall(r"^\| (.*?) +\| (.*) \|$", README.read_text(), re.MULTILINE)}
@@ -236,7 +236,7 @@ def test_the_times_stand_in_the_results() -> None:
 
 
 @pytest.mark.parametrize("name", ["measured", "proofs"])
-def test_counts_and_medians_of_a_page_stand_in_the_results(name: str) -> None:
+def test_counts_and_medians_of_a_page_stand_in_the_results(name):
     text = prose(ROOT / "docs" / "explanation" / f"{name}.md")
     results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
     found = re.findall(r"\d+ of \d+\b|\b\d{3,} ms\b|\d+\.\d(?= %\))", text)
@@ -244,9 +244,9 @@ def test_counts_and_medians_of_a_page_stand_in_the_results(name: str) -> None:
     assert [one for one in found if one not in results] == []
 
 
-def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_first_python_example_runs(monkeypatch):
     monkeypatch.chdir(ROOT)
-    names: dict[str, object] = {}
+    names = {}
     exec(blocks(ROOT / "docs" / "reference" / "python.md", "python")[0], names)
     design = names["design"]
     assert isinstance(design, tmsopt.Solution)
@@ -273,7 +273,7 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
         ("a chart", "charts.survey.MOST charts.survey.MOST_TILES"),
     ],
 )
-def test_limits_of_what_is_read_are_those_in_force(line: str, constants: str) -> None:
+def test_limits_of_what_is_read_are_those_in_force(line, constants):
     page = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^\| {line}.*\|$", page, re.MULTILINE)
     stated = {float(n) for n in NUMBER.findall(re.sub(r"(?<=\d) (?=\d{3})", "", row))}

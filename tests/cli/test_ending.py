@@ -7,13 +7,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 import pytest
@@ -51,10 +50,10 @@ Run = Callable[..., tuple[object, str, str]]
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], interruptible: None) -> Run:
+def run(capsys, interruptible):
     """In this process: exit status, stdout, stderr."""
 
-    def run(*arguments: object) -> tuple[object, str, str]:
+    def run(*arguments):
         with pytest.raises(SystemExit) as stop:
             main(args=[*map(str, arguments)], prog_name="tmsopt")
         written = capsys.readouterr()
@@ -63,22 +62,22 @@ def run(capsys: pytest.CaptureFixture[str], interruptible: None) -> Run:
     return run
 
 
-def at_work(monkeypatch: pytest.MonkeyPatch, work: Callable[..., Any]) -> None:
+def at_work(monkeypatch, work):
     """Have `tmsopt schema` do this."""
     monkeypatch.setattr(commands["schema"], "callback", lambda **_: work())
 
 
-def box(folder: Path) -> Path:
+def box(folder):
     (folder / "box.toml").write_text(BOX, encoding="utf-8")
     return folder / "box.toml"
 
 
-def press(number: int = signal.SIGINT) -> None:
+def press(number=signal.SIGINT):
     os.kill(os.getpid(), number)
 
 
 @pytest.mark.parametrize("command", commands)
-def test_help_names_what_may_end_every_command(run: Run, command: str) -> None:
+def test_help_names_what_may_end_every_command(run, command):
     status, out, _ = run(command, "--help")
     said = " ".join(out.split("Of every command:")[1].split())
     assert status == 0
@@ -88,10 +87,8 @@ def test_help_names_what_may_end_every_command(run: Run, command: str) -> None:
 
 
 @pytest.mark.parametrize(("number", "status"), ONCE)
-def test_a_signal_ends_with_its_status(
-    run: Run, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, status: int
-) -> None:
-    def work() -> None:
+def test_a_signal_ends_with_its_status(run, monkeypatch, number, status):
+    def work():
         press(number)
         time.sleep(LONG)
 
@@ -101,7 +98,7 @@ def test_a_signal_ends_with_its_status(
     assert signal.getsignal(number) is before
 
 
-def test_an_exec_that_is_interrupted_changes_no_status(tmp_path: Path) -> None:
+def test_an_exec_that_is_interrupted_changes_no_status(tmp_path):
     """Run by -m, Python ends by SIGINT after one, such as those of dataclasses, whatever was made of the interrupt."""
     work = "import os, signal, time; os.kill(os.getpid(), signal.SIGTERM); time.sleep(9)"
     program = f"""
@@ -123,7 +120,7 @@ main()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM])
-def test_handlers_wait_for_ipopt(number: signal.Signals) -> None:
+def test_handlers_wait_for_ipopt(number):
     """CasADi would take what they raise for a failed evaluation."""
     heard = []
     before = signal.signal(number, lambda *_: heard.append("handler"))
@@ -137,7 +134,7 @@ def test_handlers_wait_for_ipopt(number: signal.Signals) -> None:
     assert heard == ["solved", "handler"]
 
 
-def test_a_signal_that_is_ignored_stays_so(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_that_is_ignored_stays_so(run, monkeypatch):
     """As by nohup, and for what a script runs in the background."""
     monkeypatch.setattr(commands["schema"], "callback", lambda **_: press(signal.SIGHUP))
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -147,8 +144,8 @@ def test_a_signal_that_is_ignored_stays_so(run: Run, monkeypatch: pytest.MonkeyP
         signal.signal(signal.SIGHUP, before)
 
 
-def test_the_status_is_that_of_the_signal_whatever_was_made_of_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def work() -> None:
+def test_the_status_is_that_of_the_signal_whatever_was_made_of_it(run, monkeypatch):
+    def work():
         try:
             press()
             time.sleep(LONG)
@@ -159,15 +156,15 @@ def test_the_status_is_that_of_the_signal_whatever_was_made_of_it(run: Run, monk
     assert run("schema") == (130, "", "")
 
 
-def test_an_interrupt_that_would_be_lost_comes_again(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_that_would_be_lost_comes_again(run, monkeypatch):
     """Python reports what a destructor raises, and goes on."""
 
     class Last:
-        def __del__(self) -> None:
+        def __del__(self):
             press()
             time.sleep(0)
 
-    def work() -> None:
+    def work():
         Last()
         time.sleep(LONG)
 
@@ -175,17 +172,17 @@ def test_an_interrupt_that_would_be_lost_comes_again(run: Run, monkeypatch: pyte
     assert run("schema") == (130, "", STOPPED)
 
 
-def test_an_interrupt_waits_for_compiled_modules(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_waits_for_compiled_modules(run, monkeypatch):
     """While one is loaded it would come out as an ImportError."""
 
-    def create_module() -> None:
+    def create_module():
         try:
             press()
             time.sleep(0.05)
         except KeyboardInterrupt:
             raise ImportError("initialization failed") from None
 
-    def work() -> None:
+    def work():
         create_module()
         time.sleep(LONG)
 
@@ -194,13 +191,13 @@ def test_an_interrupt_waits_for_compiled_modules(run: Run, monkeypatch: pytest.M
     assert run("schema") == (130, "", STOPPED)
 
 
-def test_an_interrupt_is_not_lost_in_casadi(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_is_not_lost_in_casadi(run, monkeypatch):
     """Its compiled code asks an argument what it is, and drops what is raised then."""
 
     class Number:
         presses = iter([press])
 
-        def __DM__(self) -> ca.DM:
+        def __DM__(self):
             next(self.presses, int)()
             return ca.DM(1)
 
@@ -208,10 +205,10 @@ def test_an_interrupt_is_not_lost_in_casadi(run: Run, monkeypatch: pytest.Monkey
     assert run("schema") == (130, "", STOPPED)
 
 
-def test_a_second_one_ends_what_the_first_has_left(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_one_ends_what_the_first_has_left(run, monkeypatch):
     gone = []
 
-    def work() -> None:
+    def work():
         try:
             press()
             time.sleep(LONG)
@@ -229,10 +226,10 @@ def test_a_second_one_ends_what_the_first_has_left(run: Run, monkeypatch: pytest
     assert gone == [130]
 
 
-def test_one_that_is_told_twice_at_once_is_one(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_is_told_twice_at_once_is_one(run, monkeypatch):
     """As timeout(1) tells it to its command, and to the group of that."""
 
-    def work() -> None:
+    def work():
         try:
             press(signal.SIGTERM)
             time.sleep(LONG)
@@ -245,12 +242,12 @@ def test_one_that_is_told_twice_at_once_is_one(run: Run, monkeypatch: pytest.Mon
     assert run("schema") == (143, "the best so far\n", STOPPED)
 
 
-def test_an_answer_in_hand_is_written_as_a_whole(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def data() -> dict[str, Any]:
+def test_an_answer_in_hand_is_written_as_a_whole(run, monkeypatch):
+    def data():
         press()
         return {"numbers": [*range(1000)]}
 
-    def work() -> None:
+    def work():
         common.answer(True, data, str)
         time.sleep(LONG)
 
@@ -261,7 +258,7 @@ def test_an_answer_in_hand_is_written_as_a_whole(run: Run, monkeypatch: pytest.M
 
 @pytest.mark.skipif(not find_spec("codac"), reason="codac, which changes how a process rounds, is not installed")
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), TERM])
-def test_proofs_leave_what_is_proved(run: Run, monkeypatch: pytest.MonkeyPatch, number: int, status: int) -> None:
+def test_proofs_leave_what_is_proved(run, monkeypatch, number, status):
     """Of all designs; branch and prune is at its first box."""
     module = import_module("tmsopt.global_search.complete")
     monkeypatch.setattr(module._Run, "asked", lambda *_: (press(number), time.sleep(LONG)))
@@ -270,10 +267,8 @@ def test_proofs_leave_what_is_proved(run: Run, monkeypatch: pytest.MonkeyPatch, 
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify contradicted"])
-def test_a_proof_that_is_stopped_leaves_the_design(
-    run: Run, monkeypatch: pytest.MonkeyPatch, where: str, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify doubt"])
+def test_a_proof_that_is_stopped_leaves_the_design(run, monkeypatch, where, tmp_path):
     """While SCIP is at work, and while a question to it is made."""
     module, _, name = where.partition(" ")
     at, _, last = name.rpartition(".")
@@ -286,12 +281,12 @@ def test_a_proof_that_is_stopped_leaves_the_design(
 
 
 @pytest.mark.slow
-def test_a_front_that_is_stopped_leaves_what_is_known(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_front_that_is_stopped_leaves_what_is_known(run, monkeypatch):
     """Its two ends, and the points between them that were found before; none of them dominates another."""
     curve = import_module("tmsopt.fronts.curve")
     probe = curve._Search.probe
 
-    def third(search: Any, *words: Any, **more: Any) -> Any:
+    def third(search, *words, **more):
         return probe(search, *words, **more) if len(search.probes) < 2 else (press(), time.sleep(LONG))
 
     monkeypatch.setattr(curve._Search, "probe", third)  # of rounds: one sub-problem, then two
@@ -304,7 +299,7 @@ def test_a_front_that_is_stopped_leaves_what_is_known(run: Run, monkeypatch: pyt
 
 
 @pytest.mark.slow
-def test_what_is_said_beside_a_design_may_be_stopped(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_said_beside_a_design_may_be_stopped(run, monkeypatch):
     monkeypatch.setattr(
         import_module("tmsopt.report.solution.findings"), "explain", lambda *_, **__: (press(), time.sleep(LONG))
     )
@@ -314,7 +309,7 @@ def test_what_is_said_beside_a_design_may_be_stopped(run: Run, monkeypatch: pyte
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-def test_what_a_global_solver_raises_is_heard(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_what_a_global_solver_raises_is_heard(run, monkeypatch, tmp_path):
     race = import_module("tmsopt.global_search.race")
     process = Killable()
     try:
@@ -330,13 +325,13 @@ def test_what_a_global_solver_raises_is_heard(run: Run, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("word", ["a\0b.toml", "\ud800.toml"])
 @pytest.mark.parametrize("words", ["describe {}", "new {}", "study {}", "verify --markdown {}", "figure x --output {}"])
-def test_words_that_are_no_names_of_files(run: Run, words: str, word: str) -> None:
+def test_words_that_are_no_names_of_files(run, words, word):
     status, out, err = run(*(w.format(word) for w in words.split()))
     assert (status, out) == (2, "")
     assert f"found {word!r}; accepted: words without NUL" in err
 
 
-def test_a_figure_has_a_name(run: Run) -> None:
+def test_a_figure_has_a_name(run):
     status, out, err = run("figure", "")
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert "missing; accepted: bicycle" in err
@@ -395,7 +390,7 @@ SURROUNDINGS = {
 SURROUNDINGS["all"] = {name: value for variables in SURROUNDINGS.values() for name, value in variables.items()}
 
 
-def shell(line: str, folder: Path, **variables: str) -> tuple[int, str, str]:
+def shell(line, folder, **variables):
     """Status of the first program of a pipe, stdout, stderr."""
     (folder / "out").mkdir(exist_ok=True)
     program = f'{sys.executable} -c "from tmsopt.cli import main; main()"'
@@ -410,7 +405,7 @@ def shell(line: str, folder: Path, **variables: str) -> tuple[int, str, str]:
     return int((folder / "status").read_text()), done.stdout, done.stderr
 
 
-def pairs(every: Iterable[str], chosen: Iterable[str]) -> list[Any]:
+def pairs(every, chosen):
     """Cheap commands with all there is, at once; the others with what tells most, among the long tests."""
     rest = [name for name in WORDS if name not in CHEAP]
     return [(name, other) for name in CHEAP for other in every] + [
@@ -419,7 +414,7 @@ def pairs(every: Iterable[str], chosen: Iterable[str]) -> list[Any]:
 
 
 @pytest.mark.parametrize(("name", "stream"), pairs(STREAMS, ["full", "nobody reads", "only stdout"]))
-def test_streams_that_take_nothing(name: str, stream: str, tmp_path: Path) -> None:
+def test_streams_that_take_nothing(name, stream, tmp_path):
     end, accepted = STREAMS[stream]
     status, _, err = shell(f"tmsopt {WORDS[name]} {end}", tmp_path)
     assert status in ((0,) if name in SILENT else accepted if isinstance(accepted, tuple) else (accepted,))
@@ -428,7 +423,7 @@ def test_streams_that_take_nothing(name: str, stream: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("name", "where"), pairs(SURROUNDINGS, ["all"]))
-def test_surroundings_of_every_kind(name: str, where: str, tmp_path: Path) -> None:
+def test_surroundings_of_every_kind(name, where, tmp_path):
     status, out, err = shell(f"tmsopt {WORDS[name]}", tmp_path, **SURROUNDINGS[where])
     assert status == 0
     assert bool(out) is (name not in SILENT)
@@ -452,7 +447,7 @@ REFUSED = {
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="a folder that nobody may write to, not even root")
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_written_is_named(name: str, tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_named(name, tmp_path):
     status, _, err = shell(REFUSED[name], tmp_path)
     assert status == 2
     assert len(err.splitlines()) == 1
@@ -461,7 +456,7 @@ def test_what_cannot_be_written_is_named(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["new", "figure", "trace", "folder", "study"])
-def test_few_files_may_be_open(name: str, tmp_path: Path) -> None:
+def test_few_files_may_be_open(name, tmp_path):
     status, _, err = shell(f"ulimit -n 9; tmsopt {WORDS[name]}", tmp_path)
     assert status in (0, 2)
     assert "Traceback" not in err
@@ -488,9 +483,7 @@ WORK = {
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), TERM])
 @pytest.mark.parametrize("seconds", [0.3, 1.0])
 @pytest.mark.parametrize("name", WORK)
-def test_every_command_ends_soon(
-    name: str, seconds: float, number: signal.Signals, status: int, tmp_path: Path
-) -> None:
+def test_every_command_ends_soon(name, seconds, number, status, tmp_path):
     (tmp_path / "out").mkdir()
     group = f"TMSOPT_TEST={tmp_path}"
     process = subprocess.Popen(
@@ -521,7 +514,7 @@ def test_every_command_ends_soon(
     assert left == []
 
 
-def _text(path: Path) -> str:
+def _text(path):
     try:
         return path.read_bytes().decode(errors="replace")
     except OSError:

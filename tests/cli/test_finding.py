@@ -14,10 +14,10 @@ Run = Callable[..., tuple[object, str, str]]
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
+def run(capsys):
     """Exit status, stdout, stderr."""
 
-    def run(*arguments: object) -> tuple[object, str, str]:
+    def run(*arguments):
         with pytest.raises(SystemExit) as stop:
             main(args=[*map(str, arguments)], prog_name="tmsopt")
         written = capsys.readouterr()
@@ -27,7 +27,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 @pytest.mark.parametrize("command", ["describe", "schema", "new", "example"])
-def test_help_has_examples_and_exit_status(run: Run, command: str) -> None:
+def test_help_has_examples_and_exit_status(run, command):
     status, out, _ = run(command, "--help")
     assert status == 0
     assert f"tmsopt {command}" in out.split("Examples:")[1]
@@ -35,7 +35,7 @@ def test_help_has_examples_and_exit_status(run: Run, command: str) -> None:
 
 
 @pytest.mark.parametrize("what", ["tms", "whipple", "problems/ep4.toml", "problems/coupled_pair.toml"])
-def test_describe_writes_the_report_or_json(run: Run, what: str) -> None:
+def test_describe_writes_the_report_or_json(run, what):
     found = tmsopt.describe(what)
     assert run("describe", what) == (0, f"{found}\n", "")
     status, out, err = run("describe", what, "--json")
@@ -43,13 +43,13 @@ def test_describe_writes_the_report_or_json(run: Run, what: str) -> None:
     assert json.loads(out) == found.to_json()
 
 
-def test_describe_answers_a_wrong_word(run: Run) -> None:
+def test_describe_answers_a_wrong_word(run):
     status, out, err = run("describe", "bicycle")
     assert (status, out) == (2, "")
     assert "models: tms whipple" in err
 
 
-def test_schema_is_written_once(run: Run, tmp_path: Path) -> None:
+def test_schema_is_written_once(run, tmp_path):
     assert run("schema") == (0, schema_text(), "")
     file = tmp_path / "s.json"
     assert run("schema", "-o", file)[0] == 0
@@ -61,7 +61,7 @@ def test_schema_is_written_once(run: Run, tmp_path: Path) -> None:
     assert file.read_text() == "mine"
 
 
-def test_a_new_problem_is_written_with_its_schema(run: Run, tmp_path: Path) -> None:
+def test_a_new_problem_is_written_with_its_schema(run, tmp_path):
     file = tmp_path / "robot.toml"
     status, out, err = run("new", file)
     assert (status, out) == (0, "")
@@ -73,7 +73,7 @@ def test_a_new_problem_is_written_with_its_schema(run: Run, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("arguments", [["new"], ["example", "ep4", "--output"]])
-def test_a_file_that_is_there_stays_as_it_is(run: Run, tmp_path: Path, arguments: list[str]) -> None:
+def test_a_file_that_is_there_stays_as_it_is(run, tmp_path, arguments):
     file, beside = tmp_path / "mine.toml", tmp_path / "tmsopt.schema.json"
     file.write_text("mine")
     status, _, err = run(*arguments, file)
@@ -96,9 +96,7 @@ def test_a_file_that_is_there_stays_as_it_is(run: Run, tmp_path: Path, arguments
         (["example", "-o", "x.toml"], "tmsopt example lists all"),
     ],
 )
-def test_bad_input_is_answered(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], said: str
-) -> None:
+def test_bad_input_is_answered(run, tmp_path, monkeypatch, arguments, said):
     monkeypatch.chdir(tmp_path)
     status, out, err = run(*arguments)
     assert (status, out) == (2, "")
@@ -114,13 +112,13 @@ def test_bad_input_is_answered(
         ("growth", "; it is tmsopt solve FILE --plot growth.png\n"),
     ],
 )
-def test_a_word_that_is_no_command_is_answered_by_what_it_means(run: Run, word: str, meant: str) -> None:
+def test_a_word_that_is_no_command_is_answered_by_what_it_means(run, word, meant):
     status, out, err = run(word, "problems/ep4.toml")
     assert (status, out) == (2, "")
     assert err.endswith(f"No such command '{word}'{meant}")
 
 
-def test_examples_are_listed_and_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_are_listed_and_written(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     status, out, _ = run("example")
     assert status == 0
@@ -143,9 +141,7 @@ def test_examples_are_listed_and_written(run: Run, tmp_path: Path, monkeypatch: 
         ("bash", "tmsopt solve --cert", "plain,--certify"),
     ],
 )
-def test_shells_complete_as_the_documentation_says(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], shell: str, words: str, expected: str
-) -> None:
+def test_shells_complete_as_the_documentation_says(monkeypatch, capsys, shell, words, expected):
     documented = (Path(__file__).parents[2] / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
     assert f"_TMSOPT_COMPLETE={shell}_source tmsopt" in documented
     last = words.rsplit(maxsplit=1)[-1] if shell == "fish" else str(len(words.split()) - 1)

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -70,7 +69,7 @@ main(prog_name="tmsopt")
 """
 """The command where compiled code, as that may, drops what Ctrl-C raises."""
 
-COMMANDS: dict[str, tuple[str, set[str]]] = {
+COMMANDS = {
     "solve": ("solve {p}/realistic.toml", {"looking at designs", "searching", "looking for the nearest boundaries"}),
     "certify": ("solve {p}/realistic.toml --json --certify 2", {"searching", "bounding the optimum"}),
     "full": ("solve {p}/realistic.toml --full", {"moving limits", "splitting roots"}),
@@ -110,13 +109,13 @@ class Seen:
     seconds: float
 
     @property
-    def lines(self) -> list[tuple[float, str]]:
+    def lines(self):
         """Every line of progress that was drawn, and when."""
         drawn = [(at, part) for at, text in self.written for part in re.findall(r"\r([^\r\n\033]+)\033\[K", text)]
         return [(at, line) for at, line in drawn if line]
 
     @property
-    def screen(self) -> str:
+    def screen(self):
         """What stands there in the end."""
         left, line, column = [], "", 0
         for character in re.findall(r"\033\[K|.|\n", "".join(text for _, text in self.written).replace("\r\n", "\n")):
@@ -132,15 +131,15 @@ class Seen:
         return "".join(f"{one}\n" for one in left) + line
 
 
-def command(how: str, args: Sequence[str]) -> list[str]:
+def command(how, args):
     return [sys.executable, *(["-c", how] if how else ["-m", "tmsopt"]), *args]
 
 
-def on_a_terminal(args: Sequence[str], folder: Path, how: str = "", columns: int = 80, stop: str = "") -> Seen:
+def on_a_terminal(args, folder, how="", columns=80, stop=""):
     """Run a command; with Ctrl-C once `stop` is shown."""
     leader, follower = pty.openpty()
     fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("4H", 24, columns, 0, 0))
-    written: list[tuple[float, str]] = []
+    written = []
     began = time.monotonic()
     with open(folder / "answer", "w+", encoding="utf-8") as out:
         process = subprocess.Popen(command(how, args), cwd=folder, env=_named(), stdout=out, stderr=follower)
@@ -163,27 +162,27 @@ def on_a_terminal(args: Sequence[str], folder: Path, how: str = "", columns: int
     return Seen(status, answer, written, time.monotonic() - began)
 
 
-def into_pipes(args: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+def into_pipes(args, folder):
     return subprocess.run(command("", args), cwd=folder, env=_named(), capture_output=True, text=True, check=False)
 
 
-def _named() -> dict[str, str]:
+def _named():
     return {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"}
 
 
-def _loaded(folder: Path) -> float:
+def _loaded(folder):
     """Seconds that a command takes to begin, on this machine at this moment."""
     began = time.monotonic()
     into_pipes(["--version"], folder)
     return time.monotonic() - began
 
 
-def _steady(answer: str) -> list[str]:
+def _steady(answer):
     """An answer without what no two runs have alike."""
     return [line for line in answer.splitlines() if "second" not in line and " s" not in line]
 
 
-def test_something_is_shown_within_a_second_whatever_takes_long(tmp_path: Path) -> None:
+def test_something_is_shown_within_a_second_whatever_takes_long(tmp_path):
     """Here the modules to be loaded: 1.5 s."""
     seen = on_a_terminal(["solve", str(PROBLEMS / "ep4.toml")], tmp_path, SLOW_TO_LOAD)
     at, line = seen.lines[0]
@@ -196,7 +195,7 @@ def test_something_is_shown_within_a_second_whatever_takes_long(tmp_path: Path) 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", COMMANDS)
-def test_long_commands_say_what_they_do_and_leave_nothing(name: str, tmp_path: Path) -> None:
+def test_long_commands_say_what_they_do_and_leave_nothing(name, tmp_path):
     """The same is written as into pipes, but for the line that is gone in the end."""
     text, whats = COMMANDS[name]
     for file, content in FILES.items():
@@ -221,7 +220,7 @@ def test_long_commands_say_what_they_do_and_leave_nothing(name: str, tmp_path: P
 
 
 @pytest.mark.slow
-def test_a_narrow_terminal_has_one_line_of_it(tmp_path: Path) -> None:
+def test_a_narrow_terminal_has_one_line_of_it(tmp_path):
     seen = on_a_terminal(["solve", str(PROBLEMS / "realistic.toml")], tmp_path, SLOW_AT_WORK, columns=20)
     assert max(len(line) for _, line in seen.lines) == 19
     assert seen.screen == ""
@@ -230,7 +229,7 @@ def test_a_narrow_terminal_has_one_line_of_it(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("text", ["compare {p}/ep4.toml", "prove {p}/ep4.toml", "trace {p}/ep_set.toml", "verify"])
-def test_ctrl_c_is_answered_with_a_line(text: str, tmp_path: Path) -> None:
+def test_ctrl_c_is_answered_with_a_line(text, tmp_path):
     """The line of progress is gone, and one says that the command was stopped."""
     what = {"trace": "tracing", "verify": "recomputing"}.get(text.split(maxsplit=1)[0], "looking at designs")
     seen = on_a_terminal(text.format(p=PROBLEMS).split(), tmp_path, SLOW_AT_WORK, stop=what)
@@ -240,7 +239,7 @@ def test_ctrl_c_is_answered_with_a_line(text: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
-def test_a_second_one_that_is_not_heard_leaves_no_line(tmp_path: Path) -> None:
+def test_a_second_one_that_is_not_heard_leaves_no_line(tmp_path):
     seen = on_a_terminal(["solve", str(PROBLEMS / "ep4.toml")], tmp_path, DEAF)
     assert (seen.status, seen.answer) == (130, "")
     assert seen.lines
@@ -248,7 +247,7 @@ def test_a_second_one_that_is_not_heard_leaves_no_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path, monkeypatch):
     monkeypatch.setitem(globals(), "_named", lambda: {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "dumb"})
     seen = on_a_terminal(["compare", str(PROBLEMS / "ep4.toml")], tmp_path, SLOW_AT_WORK)
     assert (seen.status, seen.written) == (0, [])
@@ -276,11 +275,11 @@ def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path: Path, monkeypatch:
         (Progress("bounding the optimum", 60, 60, "s", 60, 0), 9, "bounding the optimum: 60 of 60 s"),
     ],
 )
-def test_a_record_in_words(told: Progress, since: float, line: str) -> None:
+def test_a_record_in_words(told, since, line):
     assert import_module("tmsopt.cli.terminal").words(told, since) == line
 
 
-def test_what_does_not_fit_is_said_shorter_before_it_is_cut() -> None:
+def test_what_does_not_fit_is_said_shorter_before_it_is_cut():
     words = import_module("tmsopt.cli.terminal").words
     told = Progress("searching", 7, 64, "start", 3.0, 19.0, "best abscissa = -0.52")
     assert words(told, 0.0, 80) == "searching: 7 of 64 starts, about 19 s left; best abscissa = -0.52 (3 s)"

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
-def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[object, str, str]:
+def run(capsys, *words):
     """Exit status, stdout, stderr."""
     with pytest.raises(SystemExit) as stop:
         main(args=list(words), prog_name="tmsopt")
@@ -26,12 +26,12 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[object, str, s
     return stop.value.code, written.out, written.err
 
 
-def test_version_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_version_is_one_line(capsys):
     assert run(capsys, "--version") == (0, f"tmsopt, version {tmsopt.__version__}\n", "")
 
 
 @pytest.mark.parametrize("words", ["--version --json", "--json --version", "--version --json solve no_such_file.toml"])
-def test_version_as_json_says_what_is_installed(capsys: pytest.CaptureFixture[str], words: str) -> None:
+def test_version_as_json_says_what_is_installed(capsys, words):
     status, out, err = run(capsys, *words.split())
     assert (status, err) == (0, "")
     data = json.loads(out)
@@ -44,14 +44,14 @@ def test_version_as_json_says_what_is_installed(capsys: pytest.CaptureFixture[st
             assert version == (there[0] if there else None), name
 
 
-def test_all_that_tmsopt_needs_or_can_use_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_that_tmsopt_needs_or_can_use_is_listed(capsys):
     extras = [PROJECT["optional-dependencies"][name] for name in ("certify", "cluster", "data")]
     stated = {re.split("[<>=!~;\\[ ]", text)[0] for text in sum(extras, PROJECT["dependencies"])}
     assert set(json.loads(run(capsys, "--version", "--json")[1])["packages"]) == stated | {"ipopt"}
 
 
-def test_what_is_not_installed_is_null(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> str:
+def test_what_is_not_installed_is_null(capsys, monkeypatch):
+    def missing(name):
         raise metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr("tmsopt.versions.version", missing)
@@ -61,7 +61,7 @@ def test_what_is_not_installed_is_null(capsys: pytest.CaptureFixture[str], monke
     assert data["tmsopt"] == tmsopt.__version__
 
 
-def test_the_version_of_ipopt_is_the_one_that_solves(capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_version_of_ipopt_is_the_one_that_solves(capfd):
     """IPOPT says it itself, in the banner of a solve."""
     import casadi
 
@@ -75,7 +75,7 @@ def test_the_version_of_ipopt_is_the_one_that_solves(capfd: pytest.CaptureFixtur
     assert told in (banner[1], None)
 
 
-def test_nothing_is_loaded_for_it() -> None:
+def test_nothing_is_loaded_for_it():
     script = (
         "import sys\nfrom tmsopt.cli import main\ntry: main(['--version', '--json'])\n"
         "except SystemExit: print(*sys.modules, file=sys.stderr)"
@@ -86,13 +86,13 @@ def test_nothing_is_loaded_for_it() -> None:
 
 
 @pytest.mark.parametrize("words", ["--json", "--json solve problems/ep4.toml"])
-def test_json_alone_is_no_option_of_the_whole(capsys: pytest.CaptureFixture[str], words: str) -> None:
+def test_json_alone_is_no_option_of_the_whole(capsys, words):
     status, out, err = run(capsys, *words.split())
     assert (status, out) == (2, "")
     assert "No such option" in err
     assert "--json" in err
 
 
-def test_the_help_says_what_json_is_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_says_what_json_is_for(capsys):
     help_ = " ".join(run(capsys, "--help")[1].split())
     assert "--json With --version: also those of Python and the libraries" in help_

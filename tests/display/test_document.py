@@ -5,14 +5,12 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from functools import cache
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,40 +26,40 @@ VOID = {"meta", "link", "img", "input", "br"}
 HALF = 0.5000001  # of the last digit that is shown
 
 
-def text_of(name: str) -> str:
+def text_of(name):
     return (PROBLEMS / f"{name}.toml").read_text(encoding="utf-8")
 
 
 @cache
-def design() -> tmsopt.Solution:
+def design():
     return tmsopt.solve(PROBLEMS / "ep4.toml")
 
 
 @cache
-def robot() -> tmsopt.Solution:
+def robot():
     """In SI, in units as they were typed."""
     return tmsopt.solve(PROBLEMS / "point_mass_robot.toml")
 
 
 @cache
-def infeasible() -> tmsopt.Solution:
+def infeasible():
     """EP4's bicycle, as fast a decay as at its best speed, at less than half of it; with a title of an enemy."""
     limits = {"decay": "abscissa <= -1", "slow": "Fr <= 1"}
     return tmsopt.solve(replace(design().problem, constraints=limits, title=HOSTILE), throw=False)
 
 
 @cache
-def charted() -> tmsopt.Chart:
+def charted():
     return tmsopt.chart(PROBLEMS / "chart.toml", points=(20, 20))
 
 
 @cache
-def traced() -> tmsopt.Trace:
+def traced():
     return tmsopt.trace(PROBLEMS / "ep_set.toml", step=0.05, starts=8)
 
 
 @cache
-def front() -> tmsopt.Front:
+def front():
     """Of s² + c s + 1: the abscissa is −c/2."""
     problem = tmsopt.Problem(
         tmsopt.models.from_coefficients([1, "c", 1]), free={"c": (0.5, 1.5)}, pareto=("abscissa", "c")
@@ -70,17 +68,17 @@ def front() -> tmsopt.Front:
 
 
 @cache
-def studied() -> tmsopt.Results:
+def studied():
     return tmsopt.run_study(tmsopt.over_grid(design().problem, {"zeta_B": [-0.5, -0.4], "mu": [0.1, 0.2]}), workers=1)
 
 
 @cache
-def built() -> tmsopt.Results:
+def built():
     sample = tmsopt.monte_carlo(design().problem, 20, tolerances={"Fr": 0.02})
     return tmsopt.run_study(sample, workers=1)
 
 
-RESULTS: dict[str, Callable[[], Any]] = {
+RESULTS = {
     "design": design,
     "robot": robot,
     "infeasible": infeasible,
@@ -98,7 +96,7 @@ each = pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow]
 class Page(HTMLParser):
     """A page as it is read: what is open, where it leads, headings, tables, texts that are verbatim."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__()
         self.open: list[str] = []
         self.tags: list[str] = []
@@ -115,7 +113,7 @@ class Page(HTMLParser):
         self.feed(text)
         self.close()
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         given = {name: value or "" for name, value in attrs}
         self.tags.append(tag)
         self.ids += [given["id"]] if "id" in given else []
@@ -129,10 +127,10 @@ class Page(HTMLParser):
         self._label = given.get("aria-label", "") if tag == "pre" else self._label
         self._row = [] if tag == "tr" else self._row
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         self._said.append(data)
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         assert self.open.pop() == tag
         said = "".join(self._said)
         if re.fullmatch("h[1-6]", tag):
@@ -150,7 +148,7 @@ class Page(HTMLParser):
 
 
 @cache
-def written(name: str) -> str:
+def written(name):
     """A page with its command and a file."""
     from tempfile import TemporaryDirectory
 
@@ -163,11 +161,11 @@ def written(name: str) -> str:
 
 
 @cache
-def page(name: str) -> Page:
+def page(name):
     return Page(written(name))
 
 
-def shown(cell: str, value: float, one: float = 1.0) -> bool:
+def shown(cell, value, one=1.0):
     """Whether a cell is a number rounded to the digits that it has."""
     digits = cell.split("e", maxsplit=1)[0].lstrip("-").replace(".", "").lstrip("0")
     size = 10.0 ** (math.floor(math.log10(abs(value / one))) + 1 - max(len(digits), 5)) if value else 1e-12
@@ -176,7 +174,7 @@ def shown(cell: str, value: float, one: float = 1.0) -> bool:
 
 @pytest.mark.slow
 @each
-def test_a_page_is_whole_and_asks_for_nothing(name: str) -> None:
+def test_a_page_is_whole_and_asks_for_nothing(name):
     read = page(name)
     assert read.open == []
     assert len(read.ids) == len(set(read.ids))
@@ -192,7 +190,7 @@ def test_a_page_is_whole_and_asks_for_nothing(name: str) -> None:
 
 @each
 @pytest.mark.slow
-def test_headings_go_down_one_by_one(name: str) -> None:
+def test_headings_go_down_one_by_one(name):
     levels = [level for level, _ in page(name).headings]
     assert levels[0] == 1
     assert levels.count(1) == 1
@@ -200,7 +198,7 @@ def test_headings_go_down_one_by_one(name: str) -> None:
 
 
 @each
-def test_pictures_lead_nowhere_either(name: str) -> None:
+def test_pictures_lead_nowhere_either(name):
     """Drawings are read as XML; what they refer to is in themselves."""
     pictures = [link for link in page(name).links if link.startswith("data:image/svg+xml;base64,")]
     assert pictures or name == "built"
@@ -212,7 +210,7 @@ def test_pictures_lead_nowhere_either(name: str) -> None:
 
 
 @each
-def test_the_page_says_where_it_is_from(name: str) -> None:
+def test_the_page_says_where_it_is_from(name):
     read = page(name)
     assert read.verbatim["ep4.toml"] == text_of("ep4")
     assert read.verbatim["command"] == "tmsopt solve '<b>.toml'"
@@ -222,7 +220,7 @@ def test_the_page_says_where_it_is_from(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [pytest.param("chart", marks=pytest.mark.slow), "front"])
-def test_the_same_result_has_the_same_page(name: str, tmp_path: Path) -> None:
+def test_the_same_result_has_the_same_page(name, tmp_path):
     """But for the date."""
     for file in ("one.html", "two.htm"):
         tmsopt.save_report(RESULTS[name](), tmp_path / file)
@@ -236,7 +234,7 @@ def test_the_same_result_has_the_same_page(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["design", *(pytest.param(n, marks=pytest.mark.slow) for n in ("robot", "infeasible"))]
 )
-def test_a_design_has_its_status_and_its_parameters(name: str) -> None:
+def test_a_design_has_its_status_and_its_parameters(name):
     solution, read = RESULTS[name](), page(name)
     data = solution.to_json()
     assert read.badges[0] == data["status"]
@@ -256,7 +254,7 @@ def test_a_design_has_its_status_and_its_parameters(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_quantities_are_those_of_the_design() -> None:
+def test_quantities_are_those_of_the_design():
     solution = robot()
     head, *rows = page("robot").tables["Quantities of the design"]
     assert head[:3] == ["quantity", "value", "unit"]
@@ -267,7 +265,7 @@ def test_quantities_are_those_of_the_design() -> None:
 
 
 @pytest.mark.slow
-def test_what_limits_are_worth() -> None:
+def test_what_limits_are_worth():
     """As the explanation has it, the most valuable first."""
     solution, tables = robot(), page("robot").tables
     levers = tmsopt.explain(solution, resolve=False).levers
@@ -282,7 +280,7 @@ def test_what_limits_are_worth() -> None:
 
 
 @pytest.mark.slow
-def test_an_infeasible_page_says_what_is_violated_and_what_to_try() -> None:
+def test_an_infeasible_page_says_what_is_violated_and_what_to_try():
     solution, text = infeasible(), written("infeasible")
     assert solution.status == "infeasible"
     stands = {row[0]: row[-1] for row in page("infeasible").tables["Limits, and how they stand"][1:]}
@@ -294,7 +292,7 @@ def test_an_infeasible_page_says_what_is_violated_and_what_to_try() -> None:
 
 
 @pytest.mark.slow
-def test_a_title_is_text() -> None:
+def test_a_title_is_text():
     """In the head, the heading, the report and the explorer, whatever is in it."""
     read = page("infeasible")
     assert read.headings[0] == (1, " ".join(HOSTILE.split()))
@@ -306,7 +304,7 @@ def test_a_title_is_text() -> None:
 
 
 @pytest.mark.slow
-def test_every_proved_digit_is_there() -> None:
+def test_every_proved_digit_is_there():
     proof, read = RESULTS["proof"](), page("proof")
     digits = {row[0]: row[1:3] for row in read.tables["Numbers that were proved, to 30 digits"][1:]}
     for name in proof.moved:
@@ -319,22 +317,22 @@ def test_every_proved_digit_is_there() -> None:
     assert read.badges[0] == "proved"
 
 
-def test_a_proved_bound_is_given_to_all_digits() -> None:
+def test_a_proved_bound_is_given_to_all_digits():
     bound = design().bound
     assert bound.proven
     found = re.findall(r"<dt>bound</dt><dd>([^<]*)</dd>", written("design"))
     assert found == [f"{bound.value:.12g}"]
 
 
-def inner(name: str) -> dict[str, Any]:
+def inner(name):
     """What the explorer of a page says of itself."""
     (frame,) = page(name).frames
-    data: dict[str, Any] = json.loads(re.findall(r"^const DATA = (.*);$", frame, re.MULTILINE)[0])
+    data = json.loads(re.findall(r"^const DATA = (.*);$", frame, re.MULTILINE)[0])
     return data
 
 
 @pytest.mark.parametrize("name", ["design", "chart", "trace", "front", "built"])
-def test_the_explorer_opens_at_what_was_found(name: str) -> None:
+def test_the_explorer_opens_at_what_was_found(name):
     """With the edges of stability around it, where there are two axes for them."""
     data = inner(name)
     opened = data["designs"][0]
@@ -352,12 +350,12 @@ def test_the_explorer_opens_at_what_was_found(name: str) -> None:
         assert opened["abscissa"] == pytest.approx(min(row.abscissa for row in built().rows), rel=1e-9)
 
 
-def test_how_good_a_design_is_begins_with_the_proof() -> None:
+def test_how_good_a_design_is_begins_with_the_proof():
     (good,) = re.findall(r'<section id="good".*?</section>', written("design"), re.DOTALL)
     assert re.findall('class="lead">([^<]*)', good)[0].startswith("proof: no design in the box decays faster")
 
 
-def test_designs_of_a_chart() -> None:
+def test_designs_of_a_chart():
     chart = charted()
     head, *rows = page("chart").tables["Designs of the grid"]
     assert head[:3] == ["Fr", "lambda_s rad", "class"]
@@ -372,7 +370,7 @@ def test_designs_of_a_chart() -> None:
     assert sum(classes.values()) == pytest.approx(100, abs=0.05)
 
 
-def test_large_tables_are_thinned_and_say_so(tmp_path: Path) -> None:
+def test_large_tables_are_thinned_and_say_so(tmp_path):
     tmsopt.save_report(tmsopt.chart(PROBLEMS / "chart.toml", points=(80, 60), boundaries=False), tmp_path / "c.html")
     text = (tmp_path / "c.html").read_text(encoding="utf-8")
     rows = Page(text).tables["Designs of the grid"][1:]
@@ -380,7 +378,7 @@ def test_large_tables_are_thinned_and_say_so(tmp_path: Path) -> None:
     assert "1200 of 4800 designs, spread evenly over each axis; --output writes all." in text
 
 
-def test_a_space_in_a_folder_has_a_page_without_a_picture(tmp_path: Path) -> None:
+def test_a_space_in_a_folder_has_a_page_without_a_picture(tmp_path):
     chart = tmsopt.chart(PROBLEMS / "ep_set.toml", points=(20, 20, 20), folder=tmp_path / "space.chart")
     tmsopt.save_report(chart, tmp_path / "c.html")
     read = Page((tmp_path / "c.html").read_text(encoding="utf-8"))
@@ -389,7 +387,7 @@ def test_a_space_in_a_folder_has_a_page_without_a_picture(tmp_path: Path) -> Non
     assert read.verbatim["report as text"] == chart.report()
 
 
-def test_points_and_events_of_a_trace() -> None:
+def test_points_and_events_of_a_trace():
     trace, tables = traced(), page("trace").tables
     events = tables["Events along the branches, to all digits"][1:]
     assert [row[1] for row in events] == [event.name for event in trace.events]
@@ -403,7 +401,7 @@ def test_points_and_events_of_a_trace() -> None:
     ]
 
 
-def test_points_of_a_front() -> None:
+def test_points_of_a_front():
     head, *rows = page("front").tables["Points of the front"]
     assert head[:2] == list(front().objectives)
     assert all(float(a) == pytest.approx(-float(c) / 2, abs=1e-11) for a, c, *_ in rows)
@@ -413,7 +411,7 @@ def test_points_of_a_front() -> None:
 
 
 @pytest.mark.parametrize("name", [pytest.param("study", marks=pytest.mark.slow), "built"])
-def test_rows_of_a_study(name: str) -> None:
+def test_rows_of_a_study(name):
     results, read = RESULTS[name](), page(name)
     head, *rows = read.tables["Rows of the study"]
     assert [int(row[0]) for row in rows] == list(range(len(results.rows)))
@@ -424,7 +422,7 @@ def test_rows_of_a_study(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_every_result_has_a_page(tmp_path: Path) -> None:
+def test_every_result_has_a_page(tmp_path):
     from test_results import RESULTS as every, made
 
     for name in every:
@@ -435,7 +433,7 @@ def test_every_result_has_a_page(tmp_path: Path) -> None:
         assert read.verbatim["report as text"] == made(name).report()
 
 
-def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_said(tmp_path):
     with pytest.raises(tmsopt.InputError, match=r"path: found '.*x\.pdf'; accepted: a file name ending in html, htm"):
         tmsopt.save_report(design(), tmp_path / "x.pdf")
     with pytest.raises(tmsopt.InputError, match="result: found 3; accepted: a result"):
@@ -446,7 +444,7 @@ def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
         tmsopt.save_report(tmsopt.describe("tms"), tmp_path / "none" / "x.html")
 
 
-def run(*words: str) -> int | str | None:
+def run(*words):
     with pytest.raises(SystemExit) as stop:
         main(args=words, prog_name="tmsopt")
     return stop.value.code
@@ -466,9 +464,7 @@ COMMANDS = {
     "name",
     [pytest.param(n, marks=[pytest.mark.slow] if n in ("solve", "prove", "front", "all") else []) for n in COMMANDS],
 )
-def test_a_command_writes_its_page(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_writes_its_page(name, tmp_path, monkeypatch, capsys):
     """With --json too, which is the same as without a page."""
     monkeypatch.chdir(PROBLEMS)
     words, path = COMMANDS[name], tmp_path / "a page.html"
@@ -483,9 +479,7 @@ def test_a_command_writes_its_page(
     assert read.verbatim[words[1]] == (PROBLEMS / words[1]).read_text(encoding="utf-8")
 
 
-def test_a_study_has_the_file_of_its_problem_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_study_has_the_file_of_its_problem_too(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "ep4.toml").write_text(text_of("ep4"), encoding="utf-8")
     study = 'problem = "ep4.toml"\n[study]\nseed = 7\n[vary]\nmu = [0.1, 0.2]\n'
@@ -499,13 +493,13 @@ def test_a_study_has_the_file_of_its_problem_too(
 
 
 @pytest.mark.parametrize("command", ["solve", "prove", "chart", "trace", "study"])
-def test_an_ending_is_refused_before_any_work(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_ending_is_refused_before_any_work(command, capsys):
     assert run(command, "none.toml", "--report", "page.pdf") == 2
     assert capsys.readouterr().err == "--report: found 'page.pdf'; accepted: a file name ending in html, htm\n"
 
 
 @pytest.mark.slow
-def test_an_infeasible_problem_has_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_infeasible_problem_has_a_page(tmp_path, capsys):
     """And the status of its command."""
     file = tmp_path / "slow.toml"
     file.write_text(text_of("ep4") + '[constraints]\ndecay = "abscissa <= -1"\nslow = "Fr <= 1"\n', encoding="utf-8")
@@ -515,7 +509,7 @@ def test_an_infeasible_problem_has_a_page(tmp_path: Path, capsys: pytest.Capture
 
 
 @pytest.mark.slow
-def test_a_design_so_far_has_a_page(tmp_path: Path) -> None:
+def test_a_design_so_far_has_a_page(tmp_path):
     for status, said in (
         ("not_converged", "stopped before the end, the best design so far"),
         ("optimal", "starts, stopped before it was proved"),
@@ -530,21 +524,21 @@ def test_a_design_so_far_has_a_page(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     from helpers.browser import chromium
 
     with chromium() as found:
         yield found
 
 
-def column(page: Any, table: str, number: int) -> list[str]:
+def column(page, table, number):
     """Cells of a column, of the rows that are seen."""
     rows = page.locator("section", has=page.locator("caption", has_text=table)).locator("tbody tr:visible")
     return [str(text) for text in rows.locator(f":nth-child({number})").all_inner_texts()]
 
 
 @pytest.mark.slow
-def test_rows_are_sorted_and_filtered(browser: Any, tmp_path: Path) -> None:
+def test_rows_are_sorted_and_filtered(browser, tmp_path):
     """By keyboard; the order is that of numbers, and comes back; opened watched, so that nothing fails or is asked for."""
     from helpers.browser import opened
 
@@ -570,7 +564,7 @@ def test_rows_are_sorted_and_filtered(browser: Any, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", ["design", "infeasible", "chart", "study"])
-def test_the_page_is_accessible_and_fits(browser: Any, tmp_path: Path, name: str, scheme: str) -> None:
+def test_the_page_is_accessible_and_fits(browser, tmp_path, name, scheme):
     from helpers.browser import opened
 
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed").Axe()
@@ -583,11 +577,11 @@ def test_the_page_is_accessible_and_fits(browser: Any, tmp_path: Path, name: str
 
 
 @pytest.mark.slow
-def test_without_scripts_the_page_is_all_there(browser: Any, tmp_path: Path) -> None:
+def test_without_scripts_the_page_is_all_there(browser, tmp_path):
     from helpers.browser import opened
 
     (tmp_path / "p.html").write_text(written("chart"), encoding="utf-8")
-    noted: list[str] = []
+    noted = []
     with browser.new_context(java_script_enabled=False) as plain:
         page = plain.new_page()
         page.goto((tmp_path / "p.html").as_uri())
@@ -600,7 +594,7 @@ def test_without_scripts_the_page_is_all_there(browser: Any, tmp_path: Path) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["design", "chart"])
-def test_the_page_prints(browser: Any, tmp_path: Path, name: str) -> None:
+def test_the_page_prints(browser, tmp_path, name):
     """On A4; what is folded is open, what moves is left out, nothing is cut at the right; 100 rows of 400."""
     from helpers.browser import opened
 

@@ -4,11 +4,8 @@ import doctest
 import inspect
 import math
 import re
-from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import matplotlib.pyplot
 import numpy as np
@@ -25,14 +22,14 @@ NEEDS = {"tmsopt.certify": "pyscipopt"}
 _PAGE = re.compile(r"^\s*More: (docs/[\w/]+\.md)$", re.MULTILINE)
 
 
-def is_ours(face: ModuleType, name: str) -> bool:
+def is_ours(face, name):
     """Whether a name of a module without `__all__` is defined there for others."""
     return not name.startswith("_") and getattr(getattr(face, name), "__module__", None) == face.__name__
 
 
-def public() -> Iterator[tuple[str, Any]]:
+def public():
     """Public functions and classes, each once, by the first name under which it is found."""
-    seen: set[int] = set()
+    seen = set()
     for face in map(import_module, FACES):
         names = getattr(face, "__all__", None) or [n for n in vars(face) if is_ours(face, n)]
         for name in names:
@@ -45,17 +42,17 @@ def public() -> Iterator[tuple[str, Any]]:
 PUBLIC = dict(public())
 
 
-def text_of(value: Any) -> str:
+def text_of(value):
     """Its own docstring, and not that of a class above it."""
     return (vars(value).get("__doc__") if inspect.isclass(value) else value.__doc__) or ""
 
 
-def example_of(name: str) -> doctest.DocTest:
+def example_of(name):
     known = {"tmsopt": tmsopt, "math": math, "np": np}
     return doctest.DocTestParser().get_doctest(text_of(PUBLIC[name]), known, name, name, 0)
 
 
-def test_the_names_are_there() -> None:
+def test_the_names_are_there():
     """So that nothing below passes because nothing was found: of each module something, decorated or not, by its kind."""
     expected = {"tmsopt.solve", "tmsopt.Solution", "tmsopt.models.Model", "tmsopt.roots.roots", "tmsopt.laws.tls"}
     assert expected | {"tmsopt.laws.EP4", "tmsopt.plots.draw_chart", "tmsopt.report.design_report"} <= set(PUBLIC)
@@ -63,13 +60,13 @@ def test_the_names_are_there() -> None:
     assert len(PUBLIC) > 150
 
 
-def test_every_name_has_an_example() -> None:
+def test_every_name_has_an_example():
     examples = {name: example_of(name).examples for name in PUBLIC}
     assert [name for name, found in examples.items() if not found] == []
     assert [name for name, found in examples.items() if any(one.options for one in found)] == []  # none is skipped
 
 
-def test_every_name_has_a_page() -> None:
+def test_every_name_has_a_page():
     """One that is there, in the last line."""
     pages = {name: _PAGE.findall(text_of(value)) for name, value in PUBLIC.items()}
     assert {name for name, found in pages.items() if len(found) != 1} == set()
@@ -78,12 +75,12 @@ def test_every_name_has_a_page() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLIC)
-def test_the_example_is_so(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_is_so(name, monkeypatch):
     if name in NEEDS:
         pytest.importorskip(NEEDS[name])
     monkeypatch.chdir(ROOT)
     matplotlib.use("agg")
-    said: list[str] = []
+    said = []
     ended = doctest.DocTestRunner(optionflags=FLAGS, verbose=False).run(example_of(name), out=said.append)
     matplotlib.pyplot.close("all")
     assert ended.attempted

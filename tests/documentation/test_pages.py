@@ -4,11 +4,10 @@ import doctest
 import re
 import shutil
 import tomllib
-from pathlib import Path
 
 import matplotlib
 import pytest
-from helpers.pages import PAGES, ROOT, Block, agrees, blocks_of, exchanges, may_install, missing, run
+from helpers.pages import PAGES, ROOT, agrees, blocks_of, exchanges, may_install, missing, run
 
 import tmsopt
 
@@ -16,14 +15,14 @@ LANGUAGES = {"toml", "console", "python", "pycon", "sh", "text", "bibtex"}
 DIRECTIVES = {"{glossary}", "{toctree}", "{include}", "{eval-rst}"}
 
 
-def part_of(part: object, whole: object) -> bool:
+def part_of(part, whole):
     """Whether every entry of a table is in another one, with the same value."""
     if isinstance(part, dict) and isinstance(whole, dict):
         return all(key in whole and part_of(value, whole[key]) for key, value in part.items())
     return part == whole
 
 
-def written(block: Block, folder: Path) -> None:
+def written(block, folder):
     """A file that the page shows, or the part of one that it says it is."""
     first, _, rest = block.text.partition("\n")
     if first.startswith("# part of "):
@@ -38,13 +37,13 @@ def written(block: Block, folder: Path) -> None:
     _ = tmsopt.load_study(file) if study else tmsopt.load(file)
 
 
-def compared(block: Block, names: dict[str, object], page: Path) -> None:
+def compared(block, names, page):
     """A session of Python prints what the page says."""
     test = doctest.DocTestParser().get_doctest(block.text, names, page.name, str(page), block.line)
     assert test.examples, f"line {block.line}: no line begins with >>>"
     assert not any(example.options for example in test.examples), f"line {block.line}: nothing is left out or loosened"
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-    said: list[str] = []
+    said = []
     doctest.DocTestRunner(optionflags=flags, verbose=False).run(test, out=said.append, clear_globs=False)
     assert not said, "".join(said)
     names.update(test.globs)
@@ -52,11 +51,11 @@ def compared(block: Block, names: dict[str, object], page: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}")
-def test_what_a_page_shows_is_so(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_page_shows_is_so(page, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "problems", tmp_path / "problems")
     monkeypatch.chdir(tmp_path)
     matplotlib.use("agg")
-    names: dict[str, object] = {"__name__": "page"}
+    names = {"__name__": "page"}
     for block in blocks_of(page):
         assert block.language in LANGUAGES | DIRECTIVES, f"line {block.line}: {block.language}"
         if block.language == "toml":
@@ -77,7 +76,7 @@ def test_what_a_page_shows_is_so(page: Path, tmp_path: Path, monkeypatch: pytest
             assert runs is None, f"line {block.line}: {runs} belongs in a block that is run or read"
 
 
-def test_the_pages_are_there() -> None:
+def test_the_pages_are_there():
     """So that nothing above passes because nothing was read."""
     assert len(PAGES) >= 15
     assert sum(block.language == "console" for page in PAGES for block in blocks_of(page)) >= 10
@@ -107,7 +106,7 @@ def test_the_pages_are_there() -> None:
         ("off by 0", "off by 3e-16", True),
     ],
 )
-def test_lines_are_compared_by_words_and_numbers(printed: str, now: str, same: bool) -> None:
+def test_lines_are_compared_by_words_and_numbers(printed, now, same):
     assert agrees(printed, now) is same
 
 
@@ -121,7 +120,7 @@ def test_lines_are_compared_by_words_and_numbers(printed: str, now: str, same: b
         (["…", "c", "…", "b"], "b"),
     ],
 )
-def test_lines_are_looked_for_in_their_order(printed: list[str], line: str | None) -> None:
+def test_lines_are_looked_for_in_their_order(printed, line):
     assert missing(printed, ["a", "b", "c", "d"]) == line
 
 
@@ -141,7 +140,7 @@ def test_lines_are_looked_for_in_their_order(printed: list[str], line: str | Non
         "```text\n[parameters]\nFr = 1\n```",
     ],
 )
-def test_a_block_that_would_not_be_run_is_found(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_block_that_would_not_be_run_is_found(text, tmp_path, monkeypatch):
     page = tmp_path / "page.md"
     page.write_text(f"# Title\n\n{text}\n", encoding="utf-8")
     with pytest.raises(AssertionError):

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -23,7 +22,7 @@ FORMS = sorted(p for p in (ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml") if
 CHANGES = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
-def read(*names: str) -> Any:
+def read(*names):
     """A file of YAML as plain data."""
     return yaml.safe_load(ROOT.joinpath(*names).read_text(encoding="utf-8"))
 
@@ -34,7 +33,7 @@ def read(*names: str) -> Any:
 CITED = read("CITATION.cff")
 
 
-def test_the_citation_has_what_the_format_asks_for() -> None:
+def test_the_citation_has_what_the_format_asks_for():
     """Citation File Format 1.2.0: keys that a software and a reference must have, and no others than it knows."""
     assert CITED["cff-version"] == "1.2.0"
     assert {"message", "title", "authors"} <= set(CITED)
@@ -69,7 +68,7 @@ def test_the_citation_has_what_the_format_asks_for() -> None:
 
 
 @pytest.mark.parametrize("reference", CITED["references"], ids=lambda r: r["title"][:30])
-def test_a_reference_can_be_found(reference: dict[str, Any]) -> None:
+def test_a_reference_can_be_found(reference):
     assert {"authors", "title", "type", "year"} <= set(reference)
     assert reference["type"] == "article"
     assert all(set(author) == {"family-names", "given-names"} for author in reference["authors"])
@@ -78,13 +77,13 @@ def test_a_reference_can_be_found(reference: dict[str, Any]) -> None:
         assert 0 < reference["start"] < reference["end"]
 
 
-def test_the_citation_agrees_with_the_project() -> None:
+def test_the_citation_agrees_with_the_project():
     assert CITED["version"] == tmsopt.__version__ == PROJECT["version"]
     assert CITED["license"] == PROJECT["license"]
     assert CITED["keywords"] == PROJECT["keywords"]
 
 
-def test_the_page_cites_the_same() -> None:
+def test_the_page_cites_the_same():
     page = (ROOT / "docs" / "explanation" / "cite.md").read_text(encoding="utf-8")
     plain = re.sub("[{}]", "", page)
     for entry in (CITED, *CITED["references"]):
@@ -97,7 +96,7 @@ def test_the_page_cites_the_same() -> None:
 # What changed
 
 
-def test_the_change_log_keeps_its_form() -> None:
+def test_the_change_log_keeps_its_form():
     """Newest first, each version once, with its date, and its changes by their kind, in one order."""
     heads = re.findall(r"^## (.*)$", CHANGES, re.MULTILINE)
     assert heads[0] == "[Unreleased]"
@@ -114,7 +113,7 @@ def test_the_change_log_keeps_its_form() -> None:
         assert len(set(found)) == len(found)
 
 
-def test_the_newest_version_is_this_one() -> None:
+def test_the_newest_version_is_this_one():
     newest = re.findall(r"^## \[(\d\S*)\] - (\S+)$", CHANGES, re.MULTILINE)[0]
     assert newest == (tmsopt.__version__, str(CITED["date-released"]))
 
@@ -122,13 +121,13 @@ def test_the_newest_version_is_this_one() -> None:
 # Reports
 
 
-def test_the_forms_are_there() -> None:
+def test_the_forms_are_there():
     assert [form.stem for form in FORMS] == ["bug", "idea", "wrong_answer"]
     assert isinstance(read(".github", "ISSUE_TEMPLATE", "config.yml")["blank_issues_enabled"], bool)
 
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda p: p.stem)
-def test_a_form_is_one_that_a_code_host_takes(form: Path) -> None:
+def test_a_form_is_one_that_a_code_host_takes(form):
     """Names and types of GitHub's syntax of issue forms."""
     data = read(".github", "ISSUE_TEMPLATE", form.name)
     assert set(data) <= {"name", "description", "title", "labels", "body", "assignees", "projects", "type"}
@@ -146,13 +145,13 @@ def test_a_form_is_one_that_a_code_host_takes(form: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["bug", "wrong_answer"])
-def test_a_report_has_what_it_takes_to_run_it(name: str) -> None:
+def test_a_report_has_what_it_takes_to_run_it(name):
     entries = {e["id"]: e for e in read(".github", "ISSUE_TEMPLATE", f"{name}.yml")["body"] if "id" in e}
     assert entries["versions"]["attributes"]["label"] == "tmsopt --version --json"
     assert {"versions", "problem", "command"} <= {n for n, e in entries.items() if e["validations"]["required"]}
 
 
-def test_files_that_forms_name_exist() -> None:
+def test_files_that_forms_name_exist():
     texts = [p.read_text(encoding="utf-8") for p in [*FORMS, ROOT / ".github" / "pull_request_template.md"]]
     named = set(re.findall(r"(?:docs/[\w/]+|[A-Z]{4,})\.md|problems/[\w.]+", "\n".join(texts)))
     assert {"SECURITY.md", "CHANGELOG.md", "docs/how_to/report_a_bug.md"} <= named
@@ -165,7 +164,7 @@ def test_files_that_forms_name_exist() -> None:
 GATE = read(".github", "workflows", "gate.yml")
 
 
-def test_the_gate_runs_on_every_python_that_is_promised() -> None:
+def test_the_gate_runs_on_every_python_that_is_promised():
     assert PROJECT["requires-python"] == f">={PYTHONS[0]}"
     gate = GATE["jobs"]["gate"]
     assert gate["strategy"]["matrix"]["python"] == PYTHONS
@@ -177,18 +176,18 @@ def test_the_gate_runs_on_every_python_that_is_promised() -> None:
     assert all(python in page for python in PYTHONS)
 
 
-def test_the_gate_is_the_one_that_is_run_here() -> None:
+def test_the_gate_is_the_one_that_is_run_here():
     assert GATE["jobs"]["gate"]["steps"][-1] == {"run": ".ci/run"}
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
 
 
-def test_the_documentation_is_built_as_contributing_says() -> None:
+def test_the_documentation_is_built_as_contributing_says():
     command = "sphinx-build -nW docs build/docs"
     assert f'pip install -e ".[docs]" && {command}' in [step.get("run") for step in GATE["jobs"]["docs"]["steps"]]
     assert command in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
-def test_the_gate_may_do_no_harm() -> None:
+def test_the_gate_may_do_no_harm():
     """It reads only, ends in time, and takes actions by their major version."""
     assert GATE["permissions"] == {"contents": "read"}
     for job in GATE["jobs"].values():
@@ -204,13 +203,13 @@ def test_the_gate_may_do_no_harm() -> None:
 HOOKS = [hook for repo in read(".pre-commit-config.yaml")["repos"] for hook in repo["hooks"]]
 
 
-def test_hooks_need_no_network() -> None:
+def test_hooks_need_no_network():
     assert [repo["repo"] for repo in read(".pre-commit-config.yaml")["repos"]] == ["local"]
     assert {hook["language"] for hook in HOOKS} == {"system"}
     assert {"ruff-check", "ruff-format", "mypy", "notebooks"} <= {hook["id"] for hook in HOOKS}
 
 
-def test_hooks_run_what_the_extra_dev_brings() -> None:
+def test_hooks_run_what_the_extra_dev_brings():
     brought = " ".join([*PROJECT["optional-dependencies"]["dev"], *PROJECT["optional-dependencies"]["test"]])
     for hook in HOOKS:
         command = shlex.split(hook["entry"])[0]
@@ -231,7 +230,7 @@ def test_hooks_run_what_the_extra_dev_brings() -> None:
         ("a\t\n", 1),
     ],
 )
-def test_blanks_are_found(tmp_path: Path, text: str, status: int) -> None:
+def test_blanks_are_found(tmp_path, text, status):
     (entry,) = (hook["entry"] for hook in HOOKS if hook["id"] == "blanks")
     file = tmp_path / "a.txt"
     file.write_bytes(text.encode())

@@ -22,14 +22,14 @@ RUN = "ep4", "three_masses", "whipple_ep4"  # all of them run where the site is 
 class Page(HTMLParser):
     """What a page links to, loads, and can be linked to."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path):
         super().__init__()
         self.links: list[str] = []
         self.loads: list[str] = []
         self.anchors: set[str] = set()
         self.feed(path.read_text(encoding="utf-8"))
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         for name, value in attrs:
             if name in ("id", "name") and value:
                 self.anchors.add(value)
@@ -40,7 +40,7 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory):
     """The site, of a copy of what it is made from, with a few of its scripts run; a warning is an error."""
     pytest.importorskip("sphinx")
     root = tmp_path_factory.mktemp("site")
@@ -54,11 +54,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def pages(site: Path) -> dict[Path, Page]:
+def pages(site):
     return {path: Page(path) for path in site.rglob("*.html") if "_static" not in path.parts}
 
 
-def test_every_link_leads_somewhere(site: Path, pages: dict[Path, Page]) -> None:
+def test_every_link_leads_somewhere(site, pages):
     """Within the site; elsewhere only by https, for what is elsewhere cannot be asked without a network."""
     led = 0
     for path, page in pages.items():
@@ -76,7 +76,7 @@ def test_every_link_leads_somewhere(site: Path, pages: dict[Path, Page]) -> None
     assert led > 5000
 
 
-def test_nothing_is_loaded_from_elsewhere(pages: dict[Path, Page]) -> None:
+def test_nothing_is_loaded_from_elsewhere(pages):
     for path, page in pages.items():
         for load in page.loads:
             assert not re.match(r"(https?:)?//", load), (path, load)
@@ -85,7 +85,7 @@ def test_nothing_is_loaded_from_elsewhere(pages: dict[Path, Page]) -> None:
             )
 
 
-def test_every_problem_is_in_the_gallery(site: Path) -> None:
+def test_every_problem_is_in_the_gallery(site):
     """Those that are run with their picture, explorer and answer."""
     for file in (*ROOT.glob("problems/*.toml"), *ROOT.glob("problems/*.py")):
         name = file.stem if file.suffix == ".toml" else f"{file.stem}_script"
@@ -102,14 +102,14 @@ def test_every_problem_is_in_the_gallery(site: Path) -> None:
         assert file.suffix == ".py" or "<iframe" in text, name
 
 
-def test_every_public_name_is_in_the_reference(site: Path) -> None:
+def test_every_public_name_is_in_the_reference(site):
     text = "".join(path.read_text(encoding="utf-8") for path in (site / "generated" / "api").glob("*.html"))
     documented = set(re.findall(r'id="(tmsopt\.[\w.]+)"', text))
     modules = {"laws", "models", "plots", "report", "roots"}
     assert {f"tmsopt.{name}" for name in tmsopt.__all__ if name not in modules | {"__version__"}} <= documented
 
 
-def test_symbols_and_keys_are_the_programs_own(site: Path) -> None:
+def test_symbols_and_keys_are_the_programs_own(site):
     quantities = (site / "reference" / "quantities.html").read_text(encoding="utf-8")
     for model in ("tms", "whipple"):
         for words in tmsopt.describe(model).sets:

@@ -7,7 +7,6 @@ import tomllib
 import webbrowser
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,25 +22,25 @@ PLAIN = [p for p in sorted(PROBLEMS.glob("*.toml")) if not p.name.startswith("st
 HOSTILE = "</script><script>alert(1)</script>&<b>"
 
 
-def data_of(html: str) -> dict[str, Any]:
+def data_of(html):
     """What the page says of itself."""
     found = re.search(r"^const DATA = (.*);$", html, re.MULTILINE)
     assert found is not None
-    data: dict[str, Any] = json.loads(found[1])
+    data = json.loads(found[1])
     return data
 
 
-def design(data: dict[str, Any], name: str) -> tuple[dict[str, float], dict[str, Any]]:
+def design(data, name):
     known = next(d for d in data["designs"] if d["name"] == name)
     return dict(zip((p["name"] for p in data["parameters"]), known["values"], strict=True)), known
 
 
 @pytest.fixture(scope="module")
-def ep4() -> tmsopt.Explorer:
+def ep4():
     return tmsopt.explore(PROBLEMS / "ep4.toml")
 
 
-def test_it_opens_at_the_optimum(ep4: tmsopt.Explorer) -> None:
+def test_it_opens_at_the_optimum(ep4):
     data = data_of(ep4.html)
     values, optimum = design(data, "optimum")
     assert ep4.solution is not None
@@ -54,7 +53,7 @@ def test_it_opens_at_the_optimum(ep4: tmsopt.Explorer) -> None:
     assert any(fact.startswith("proof: ") for fact in optimum["facts"])
 
 
-def test_its_curves_are_the_boundaries(ep4: tmsopt.Explorer) -> None:
+def test_its_curves_are_the_boundaries(ep4):
     data = data_of(ep4.html)
     names = [p["name"] for p in data["parameters"]]
     held = dict(zip(names, data["start"], strict=True))
@@ -70,7 +69,7 @@ def test_its_curves_are_the_boundaries(ep4: tmsopt.Explorer) -> None:
         )  # five digits, of which the tangent of 80 degrees takes one
 
 
-def test_the_benchmark_is_the_published_one(ep4: tmsopt.Explorer) -> None:
+def test_the_benchmark_is_the_published_one(ep4):
     values, known = design(data_of(ep4.html), "benchmark")
     bench = laws.bench
     assert values["chi_B"] == pytest.approx(bench["x_B"] / bench["w"])
@@ -79,7 +78,7 @@ def test_the_benchmark_is_the_published_one(ep4: tmsopt.Explorer) -> None:
     assert "pair" in known["structure"]
 
 
-def test_an_exceptional_point_is_found_beside_an_optimum_that_is_none() -> None:
+def test_an_exceptional_point_is_found_beside_an_optimum_that_is_none():
     page = tmsopt.explore(PROBLEMS / "least_speed.toml")
     data = data_of(page.html)
     values, known = design(data, "EP4")
@@ -91,7 +90,7 @@ def test_an_exceptional_point_is_found_beside_an_optimum_that_is_none() -> None:
 
 @pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)
 @pytest.mark.slow
-def test_what_it_saves_is_the_same_system(path: Path, tmp_path: Path) -> None:
+def test_what_it_saves_is_the_same_system(path, tmp_path):
     problem = tmsopt.load(path)
     data = data_of(page_of(problem))
     values = {p["name"]: p["value"] for p in data["parameters"]}
@@ -109,7 +108,7 @@ def test_what_it_saves_is_the_same_system(path: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)
 @pytest.mark.slow
-def test_sliders_reach_what_is_possible(path: Path) -> None:
+def test_sliders_reach_what_is_possible(path):
     problem = tmsopt.load(path)
     for p in data_of(page_of(problem))["parameters"]:
         assert p["low"] < p["high"]
@@ -123,13 +122,13 @@ def test_sliders_reach_what_is_possible(path: Path) -> None:
         assert p["one"] > 0
 
 
-def test_a_front_is_left_for_its_first_objective() -> None:
+def test_a_front_is_left_for_its_first_objective():
     page = tmsopt.explore(PROBLEMS / "pareto.toml")
     asked = tmsopt.load(PROBLEMS / "pareto.toml").pareto
     assert data_of(page.html)["objective"] == f"minimize {asked[0]}"
 
 
-def test_a_problem_that_asks_nothing_opens_in_the_middle() -> None:
+def test_a_problem_that_asks_nothing_opens_in_the_middle():
     page = tmsopt.explore(PROBLEMS / "chart.toml")
     data = data_of(page.html)
     assert page.solution is None
@@ -139,7 +138,7 @@ def test_a_problem_that_asks_nothing_opens_in_the_middle() -> None:
     assert data["shown"]
 
 
-def test_titles_and_names_are_text() -> None:
+def test_titles_and_names_are_text():
     problem = replace(tmsopt.load(PROBLEMS / "chart.toml"), title=HOSTILE)
     page = tmsopt.explore(problem)
     assert "alert(1)" not in re.sub(r"^const DATA = .*;$|<title>.*?</title>", "", page.html, flags=re.MULTILINE)
@@ -150,7 +149,7 @@ def test_titles_and_names_are_text() -> None:
     assert 'sandbox="allow-scripts allow-downloads"' in inside
 
 
-def test_it_is_saved_whole_under_a_name_of_a_page(ep4: tmsopt.Explorer, tmp_path: Path) -> None:
+def test_it_is_saved_whole_under_a_name_of_a_page(ep4, tmp_path):
     ep4.save(tmp_path / "page.html")
     assert (tmp_path / "page.html").read_text(encoding="utf-8") == ep4.html
     with pytest.raises(tmsopt.InputError, match="html"):
@@ -158,17 +157,15 @@ def test_it_is_saved_whole_under_a_name_of_a_page(ep4: tmsopt.Explorer, tmp_path
     assert repr(ep4).startswith("Explorer(")
 
 
-def test_a_solution_is_not_solved_again(monkeypatch: pytest.MonkeyPatch, ep4: tmsopt.Explorer) -> None:
+def test_a_solution_is_not_solved_again(monkeypatch, ep4):
     assert ep4.solution is not None
     again = tmsopt.explore(ep4.solution)
     assert again.solution is ep4.solution
     assert data_of(again.html)["designs"] == data_of(ep4.html)["designs"]
 
 
-def test_the_command_writes_a_page_beside_you(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    shown: list[str] = []
+def test_the_command_writes_a_page_beside_you(tmp_path, monkeypatch, capsys):
+    shown = []
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(webbrowser, "open", lambda url: bool(shown.append(url)) or True)
     with pytest.raises(SystemExit) as ended:
@@ -179,20 +176,20 @@ def test_the_command_writes_a_page_beside_you(
     assert "wrote chart.html" in capsys.readouterr().err
 
 
-def test_the_command_refuses_what_is_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_refuses_what_is_no_page(tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["explore", str(PROBLEMS / "chart.toml"), "--output", str(tmp_path / "page.pdf")])
     assert ended.value.code == 2
     assert "html" in capsys.readouterr().err
 
 
-def test_the_file_of_a_stated_model_is_kept_as_typed() -> None:
+def test_the_file_of_a_stated_model_is_kept_as_typed():
     page = tmsopt.explore(PROBLEMS / "coupled_pair.toml")
     typed = tomllib.loads((PROBLEMS / "coupled_pair.toml").read_text(encoding="utf-8"))["model"]
     assert tomllib.loads(data_of(page.html)["toml"]["before"])["model"] == typed
 
 
-def test_a_limit_that_the_page_cannot_compute_is_named() -> None:
+def test_a_limit_that_the_page_cannot_compute_is_named():
     problem = tmsopt.load(PROBLEMS / "benchmark.toml")
     page = page_of(
         replace(problem, constraints={"wide": "radius >= 0.9", "front": "load_front >= 0"}, weights={"v": 1.0})
@@ -202,7 +199,7 @@ def test_a_limit_that_the_page_cannot_compute_is_named() -> None:
     assert tomllib.loads(data["toml"]["after"])["weights"] == {"v": 1.0}
 
 
-def test_of_bands_the_page_shows_the_nominal_case_and_says_so() -> None:
+def test_of_bands_the_page_shows_the_nominal_case_and_says_so():
     data = data_of(page_of(tmsopt.load(PROBLEMS / "speed_band.toml")))
     assert data["nominal"]
     assert "left out" in data["toml"]["before"]

@@ -5,9 +5,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +13,8 @@ from helpers.browser import chromium, drawn, opened
 
 import tmsopt
 from tmsopt.problem import array_function
+
+pytestmark = pytest.mark.slow
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 PAGE = Path(tmsopt.__file__).parent / "explorer" / "page"
@@ -33,13 +33,13 @@ minimize = "abscissa"
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     with chromium() as started:
         yield started
 
 
 @pytest.fixture(scope="module")
-def explorers(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[tmsopt.Explorer, Path]]:
+def explorers(browser, tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     made = {}
     for name in NAMES:
@@ -49,46 +49,46 @@ def explorers(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[st
 
 
 @pytest.fixture(params=NAMES)
-def explored(request: pytest.FixtureRequest, explorers: Any) -> tuple[tmsopt.Explorer, Path]:
-    found: tuple[tmsopt.Explorer, Path] = explorers[request.param]
+def explored(request, explorers):
+    found = explorers[request.param]
     return found
 
 
 @pytest.fixture
-def ep4(explorers: Any) -> Path:
-    path: Path = explorers["ep4"][1]
+def ep4(explorers):
+    path = explorers["ep4"][1]
     return path
 
 
-def values_of(page: Any) -> list[float]:
+def values_of(page):
     """The parameters that the page shows, in SI."""
-    found: list[float] = page.evaluate("[...state.x]")
+    found = page.evaluate("[...state.x]")
     return found
 
 
-def verdict(page: Any) -> str:
-    text: str = page.locator("#verdict").inner_text()
+def verdict(page):
+    text = page.locator("#verdict").inner_text()
     return " ".join(text.split())
 
 
-def press(page: Any, name: str) -> None:
+def press(page, name):
     page.get_by_role("button", name=name, exact=True).click()
     drawn(page)
 
 
-def typed(page: Any, name: str, text: str) -> None:
+def typed(page, name, text):
     """A number into the field of a parameter."""
     field = page.get_by_role("textbox", name=re.compile(rf"^{re.escape(name)}( in .*)?$"))
     field.fill(text)
     field.press("Enter")
 
 
-def parameters(page: Any) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = page.evaluate("DATA.parameters")
+def parameters(page):
+    found = page.evaluate("DATA.parameters")
     return found
 
 
-def kind(roots: np.ndarray) -> int:
+def kind(roots):
     """The class by the roots themselves, for designs away from all boundaries."""
     real = np.abs(roots.imag) == 0
     if roots.real.max() < 0:
@@ -96,8 +96,7 @@ def kind(roots: np.ndarray) -> int:
     return 1 if (roots[real].real >= 0).any() else 2
 
 
-@pytest.mark.slow
-def test_names_are_given_once(ep4: Path) -> None:
+def test_names_are_given_once(ep4):
     """In one classic script the later of two functions of a name silently replaces the earlier."""
     written, _, _ = ep4.read_text().partition("const DATA = ")
     texts = [written, *(p.read_text() for p in sorted(PAGE.glob("*.js")))]
@@ -106,8 +105,7 @@ def test_names_are_given_once(ep4: Path) -> None:
     assert [n for n in names if names.count(n) > 1] == []
 
 
-@pytest.mark.slow
-def test_it_opens_without_a_fault(browser: Any, explored: Any) -> None:
+def test_it_opens_without_a_fault(browser, explored):
     explorer, path = explored
     with opened(browser, path) as page:
         of = explorer.problem.parameter_set.names
@@ -118,8 +116,7 @@ def test_it_opens_without_a_fault(browser: Any, explored: Any) -> None:
         assert page.title() == explorer.problem.title
 
 
-@pytest.mark.slow
-def test_a_state_is_what_the_package_computes(browser: Any, explored: Any) -> None:
+def test_a_state_is_what_the_package_computes(browser, explored):
     """Random designs, free and fixed parameters alike: a few typed into the fields, others set at once."""
     explorer, path = explored
     problem, random = explorer.problem, np.random.default_rng(19)
@@ -153,8 +150,7 @@ def test_a_state_is_what_the_package_computes(browser: Any, explored: Any) -> No
     assert compared >= 12  # some bicycles have no roots, but most do
 
 
-@pytest.mark.slow
-def test_sliders_move_the_design(browser: Any, ep4: Path) -> None:
+def test_sliders_move_the_design(browser, ep4):
     with opened(browser, ep4) as page:
         first = next(k for k, p in enumerate(parameters(page)) if p["name"] == "Fr")
         low, high = (parameters(page)[first][end] for end in ("low", "high"))
@@ -180,8 +176,7 @@ def test_sliders_move_the_design(browser: Any, ep4: Path) -> None:
         assert verdict(page) == said
 
 
-@pytest.mark.slow
-def test_a_drag_is_one_step(browser: Any, ep4: Path) -> None:
+def test_a_drag_is_one_step(browser, ep4):
     with opened(browser, ep4) as page:
         before = values_of(page)
         box = page.get_by_role("slider", name=re.compile("^Fr, ")).bounding_box()
@@ -205,8 +200,7 @@ def test_a_drag_is_one_step(browser: Any, ep4: Path) -> None:
         assert values_of(page) == after
 
 
-@pytest.mark.slow
-def test_it_says_the_verdict_when_it_changes(browser: Any, ep4: Path) -> None:
+def test_it_says_the_verdict_when_it_changes(browser, ep4):
     with opened(browser, ep4) as page:
         typed(page, "Fr", "0.1")
         drawn(page)
@@ -215,8 +209,7 @@ def test_it_says_the_verdict_when_it_changes(browser: Any, ep4: Path) -> None:
         assert said.get_attribute("aria-live") == "polite"
 
 
-@pytest.mark.slow
-def test_it_goes_to_known_designs(browser: Any, explored: Any) -> None:
+def test_it_goes_to_known_designs(browser, explored):
     """There the roots are those that were found, with their multiplicity; and back again."""
     _, path = explored
     with opened(browser, path) as page:
@@ -233,8 +226,7 @@ def test_it_goes_to_known_designs(browser: Any, explored: Any) -> None:
         assert page.get_by_role("button", name="start", exact=True).count() == 0
 
 
-@pytest.mark.slow
-def test_a_number_field_refuses_nonsense(browser: Any, ep4: Path) -> None:
+def test_a_number_field_refuses_nonsense(browser, ep4):
     with opened(browser, ep4) as page:
         before = values_of(page)
         field = page.get_by_role("textbox", name="Fr", exact=True)
@@ -262,8 +254,7 @@ def test_a_number_field_refuses_nonsense(browser: Any, ep4: Path) -> None:
         assert "beyond" in page.locator(f"#{field.get_attribute('aria-describedby')}").inner_text()
 
 
-@pytest.mark.slow
-def test_a_number_field_takes_what_people_write(browser: Any, explorers: Any) -> None:
+def test_a_number_field_takes_what_people_write(browser, explorers):
     with opened(browser, explorers["whipple_ep4"][1]) as page:
         at = {p["name"]: k for k, p in enumerate(parameters(page))}
         for text, value in (("3.5 m/s", 3.5), ("1 234.5", 1234.5), ("1\u202f234", 1234.0), ("2,5m/s", 2.5)):
@@ -273,8 +264,7 @@ def test_a_number_field_takes_what_people_write(browser: Any, explorers: Any) ->
         assert "a number in m/s is wanted" in page.locator("#controls .message:visible").inner_text()
 
 
-@pytest.mark.slow
-def test_a_number_field_shows_what_it_holds(browser: Any, explored: Any) -> None:
+def test_a_number_field_shows_what_it_holds(browser, explored):
     """To read with 9 digits; to write with as many as it takes to come back bit for bit."""
     _, path = explored
     with opened(browser, path) as page:
@@ -291,8 +281,7 @@ def test_a_number_field_shows_what_it_holds(browser: Any, explored: Any) -> None
         assert values_of(page) == start
 
 
-@pytest.mark.slow
-def test_close_to_a_known_design_it_says_so(browser: Any, ep4: Path) -> None:
+def test_close_to_a_known_design_it_says_so(browser, ep4):
     """Seven digits of an EP4 are none of it: its roots move as the fourth root of what is left out."""
     with opened(browser, ep4) as page:
         page.evaluate("change({x: [...state.x].map((value, k) => [k, Number(value.toPrecision(7))])})")
@@ -323,9 +312,8 @@ VERDICTS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("stated", "said"), VERDICTS.values(), ids=VERDICTS)
-def test_the_verdict_of_plain_polynomials(browser: Any, tmp_path: Path, stated: str, said: str) -> None:
+def test_the_verdict_of_plain_polynomials(browser, tmp_path, stated, said):
     """At k = 2, by their factors: both grow is (s - 1)(s^2 - 2 s + 5); one grows s^3 + s^2 - s - 2."""
     text = f'title = "t"\n[model]\nname = "m"\ncoefficients = {stated}\n[parameters]\nk = 2\n'
     (tmp_path / "m.toml").write_text(text)
@@ -334,8 +322,7 @@ def test_the_verdict_of_plain_polynomials(browser: Any, tmp_path: Path, stated: 
         assert verdict(page).startswith(said)
 
 
-@pytest.mark.slow
-def test_the_verdict_has_its_unit_and_its_reserve(browser: Any, explorers: Any) -> None:
+def test_the_verdict_has_its_unit_and_its_reserve(browser, explorers):
     of = {}
     for name in ("ep4", "whipple_ep4", "point_mass_robot"):
         with opened(browser, explorers[name][1]) as page:
@@ -352,8 +339,7 @@ def test_the_verdict_has_its_unit_and_its_reserve(browser: Any, explorers: Any) 
     assert "would lift" not in of["whipple_ep4"]
 
 
-@pytest.mark.slow
-def test_limits_of_shares_are_read_in_percent(browser: Any, explorers: Any) -> None:
+def test_limits_of_shares_are_read_in_percent(browser, explorers):
     explorer, path = explorers["whipple_ep4"]
     with opened(browser, path) as page:
         rear = page.locator("#limits li", has=page.get_by_text("rear", exact=True)).locator(".margin").inner_text()
@@ -367,8 +353,7 @@ def test_limits_of_shares_are_read_in_percent(browser: Any, explorers: Any) -> N
         assert page.evaluate("limitsInWords(drawingOf())") == ""
 
 
-@pytest.mark.slow
-def test_it_prints_without_what_is_to_be_pressed(browser: Any, ep4: Path) -> None:
+def test_it_prints_without_what_is_to_be_pressed(browser, ep4):
     with opened(browser, ep4, width=794) as page:
         page.emulate_media(media="print")
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -376,8 +361,7 @@ def test_it_prints_without_what_is_to_be_pressed(browser: Any, ep4: Path) -> Non
         assert page.locator("#sliders input:visible").count() == len(parameters(page))
 
 
-@pytest.mark.slow
-def test_a_phone_shows_pictures_first(browser: Any, ep4: Path) -> None:
+def test_a_phone_shows_pictures_first(browser, ep4):
     with opened(browser, ep4, width=400, height=800) as page:
         assert page.locator("#controls input:visible").count() == 0
         top = page.locator("#chart").bounding_box()["y"]
@@ -387,8 +371,7 @@ def test_a_phone_shows_pictures_first(browser: Any, ep4: Path) -> None:
         assert page.locator("#controls input:visible").count() > 0  # though there is no button to show them
 
 
-@pytest.mark.slow
-def test_a_link_restores_the_state(browser: Any, explored: Any) -> None:
+def test_a_link_restores_the_state(browser, explored):
     _, path = explored
     saved = "JSON.stringify([[...state.x], state.plane, state.over, state.layer])"
     with opened(browser, path) as page:
@@ -410,8 +393,7 @@ def test_a_link_restores_the_state(browser: Any, explored: Any) -> None:
         assert page.evaluate(saved) == state
 
 
-@pytest.mark.slow
-def test_what_a_link_says_wrongly_is_ignored_and_said(browser: Any, ep4: Path) -> None:
+def test_what_a_link_says_wrongly_is_ignored_and_said(browser, ep4):
     wrong = [
         "nobody=1",
         "Fr=abc",
@@ -432,8 +414,7 @@ def test_what_a_link_says_wrongly_is_ignored_and_said(browser: Any, ep4: Path) -
         assert all(part.split("%")[0] in note for part in wrong)
 
 
-@pytest.mark.slow
-def test_the_link_is_copied_or_shown(browser: Any, ep4: Path) -> None:
+def test_the_link_is_copied_or_shown(browser, ep4):
     with opened(browser, ep4) as page:
         typed(page, "Fr", "3.25")
         page.evaluate("Object.defineProperty(navigator, 'clipboard', {value: undefined, configurable: true})")
@@ -448,8 +429,7 @@ def test_the_link_is_copied_or_shown(browser: Any, ep4: Path) -> None:
         assert page.locator("#note").inner_text() == "Link copied."
 
 
-@pytest.mark.slow
-def test_a_saved_design_is_solved(browser: Any, explored: Any, tmp_path: Path) -> None:
+def test_a_saved_design_is_solved(browser, explored, tmp_path):
     """With the parameters of the page, to the last digit but one."""
     _, path = explored
     with opened(browser, path) as page:
@@ -471,8 +451,7 @@ def test_a_saved_design_is_solved(browser: Any, explored: Any, tmp_path: Path) -
     assert json.loads(solved.stdout)
 
 
-@pytest.mark.slow
-def test_text_is_no_markup(browser: Any, tmp_path: Path) -> None:
+def test_text_is_no_markup(browser, tmp_path):
     (tmp_path / "hostile.toml").write_text(HOSTILE)
     explorer = tmsopt.explore(tmp_path / "hostile.toml")
     meaning = '"meaning":"\\u003cimg src=x onerror=alert(1)\\u003e"'
@@ -488,9 +467,8 @@ def test_text_is_no_markup(browser: Any, tmp_path: Path) -> None:
         assert page.evaluate("document.querySelectorAll('script').length") == 1
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "width"), [("light", 400), ("dark", 1280)])
-def test_it_is_accessible(browser: Any, explored: Any, scheme: str, width: int) -> None:
+def test_it_is_accessible(browser, explored, scheme, width):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
     _, path = explored
     with opened(browser, path, width=width, color_scheme=scheme) as page:
@@ -504,8 +482,7 @@ def test_it_is_accessible(browser: Any, explored: Any, scheme: str, width: int) 
         assert len(found.response["passes"]) > 10
 
 
-@pytest.mark.slow
-def test_the_theme_is_that_of_the_system_until_one_is_chosen(browser: Any, ep4: Path) -> None:
+def test_the_theme_is_that_of_the_system_until_one_is_chosen(browser, ep4):
     with opened(browser, ep4, color_scheme="dark") as page:
         ground = "getComputedStyle(document.body).backgroundColor"
         dark = page.evaluate(ground)
@@ -519,9 +496,8 @@ def test_the_theme_is_that_of_the_system_until_one_is_chosen(browser: Any, ep4: 
         assert page.evaluate(ground) == light
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("width", [400, 1280])
-def test_nothing_needs_scrolling_sideways(browser: Any, explored: Any, width: int, tmp_path: Path) -> None:
+def test_nothing_needs_scrolling_sideways(browser, explored, width, tmp_path):
     explorer, path = explored
     long = tmp_path / "long.html"
     long.write_text(
@@ -547,9 +523,8 @@ def test_nothing_needs_scrolling_sideways(browser: Any, explored: Any, width: in
             page.screenshot(path=tmp_path / f"{width}.png", full_page=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("width", [400, 1280])
-def test_targets_are_large_enough_for_fingers(browser: Any, ep4: Path, width: int) -> None:
+def test_targets_are_large_enough_for_fingers(browser, ep4, width):
     with opened(browser, ep4, width=width, has_touch=True) as page:
         boxes = page.evaluate(
             "[...document.querySelectorAll('button, select, input, summary')].map((e) => [e.outerHTML, e.getBoundingClientRect()])"
@@ -561,8 +536,7 @@ def test_targets_are_large_enough_for_fingers(browser: Any, ep4: Path, width: in
         assert [b for b in main if min(b[1:]) < 44] == []
 
 
-@pytest.mark.slow
-def test_it_works_in_a_sandbox(browser: Any, explorers: Any, tmp_path: Path) -> None:
+def test_it_works_in_a_sandbox(browser, explorers, tmp_path):
     """As in a notebook, where it has no address, no storage and no history."""
     explorer, _ = explorers["ep4"]
     (tmp_path / "notebook.html").write_text(f"<!DOCTYPE html><title>notebook</title>{explorer._repr_html_()}")
@@ -582,9 +556,8 @@ def test_it_works_in_a_sandbox(browser: Any, explorers: Any, tmp_path: Path) -> 
         assert tmsopt.load(waiting.value.path().rename(tmp_path / "saved.toml")).fixed == explorer.solution.parameters
 
 
-@pytest.mark.slow
-def test_a_picture_that_fails_says_so_alone(browser: Any, ep4: Path) -> None:
-    faults: list[str] = []
+def test_a_picture_that_fails_says_so_alone(browser, ep4):
+    faults = []
     with opened(browser, ep4, faults=faults) as page:
         page.evaluate("() => { survey = () => { throw new Error('out of paper'); }; }")
         typed(page, "chi_B", "1.5")
@@ -596,8 +569,7 @@ def test_a_picture_that_fails_says_so_alone(browser: Any, ep4: Path) -> None:
     assert all("out of paper" in fault for fault in faults)
 
 
-@pytest.mark.slow
-def test_limits_are_lit(browser: Any, explorers: Any) -> None:
+def test_limits_are_lit(browser, explorers):
     """Sign, words and margin of each limit against the problem's own judgement."""
     explorer, path = explorers["point_mass_robot"]
     problem, random = explorer.problem, np.random.default_rng(20)
@@ -624,8 +596,7 @@ def test_limits_are_lit(browser: Any, explorers: Any) -> None:
                 assert float(shown[2]) == pytest.approx(abs(margin) * scale, rel=1e-4)
 
 
-@pytest.mark.slow
-def test_quantities_are_those_of_the_package(browser: Any, explored: Any) -> None:
+def test_quantities_are_those_of_the_package(browser, explored):
     explorer, path = explored
     with opened(browser, path) as page:
         for p in parameters(page):

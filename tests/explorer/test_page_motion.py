@@ -1,11 +1,9 @@
 """The motion that the page shows, in Chromium: against integrated equations, and moved by hands."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -41,13 +39,13 @@ CLOSE = 1e-8
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     with chromium() as started:
         yield started
 
 
 @pytest.fixture(scope="module")
-def explorers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[tmsopt.Explorer, Path]]:
+def explorers(tmp_path_factory):
     folder, made = tmp_path_factory.mktemp("pages"), {}
     for name in BICYCLES:
         made[name] = tmsopt.explore(PROBLEMS / f"{name}.toml"), folder / f"{name}.html"
@@ -55,19 +53,19 @@ def explorers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[tmsop
     return made
 
 
-def integrated(A: Any, start: Any, times: Any) -> Any:
+def integrated(A, start, times):
     """States of z' = A z, time by time."""
     found = solve_ivp(lambda _, z: A @ z, (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-14)
     return found.y.T
 
 
-def first_order(M: Any, D: Any, K: Any) -> Any:
+def first_order(M, D, K):
     M, D, K = (np.array(m, dtype=float) for m in (M, D, K))
     n = len(M)
     return np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
 
 
-def equations(explorer: tmsopt.Explorer, values: dict[str, float]) -> tuple[Any, Any]:
+def equations(explorer, values):
     """A of z' = A z for lean, steer and their rates, and the rates after an impulse of 1, in the units of the file."""
     if "I_Rxx" in values:  # of Whipple, by the published matrices
         M, C1, K0, K2 = (np.array(m) for m in BENCHMARK.values())
@@ -80,16 +78,14 @@ def equations(explorer: tmsopt.Explorer, values: dict[str, float]) -> tuple[Any,
     return first_order(*in_file), np.linalg.solve(in_file[0], [0, 1])
 
 
-def shown(page: Any) -> dict[str, float]:
-    found: dict[str, float] = page.evaluate(
-        "Object.fromEntries(DATA.parameters.map(({name}, k) => [name, state.x[k]]))"
-    )
+def shown(page):
+    found = page.evaluate("Object.fromEntries(DATA.parameters.map(({name}, k) => [name, state.x[k]]))")
     return found
 
 
 @pytest.mark.parametrize("name", BICYCLES)
 @pytest.mark.parametrize(("lean", "push"), [(5, 0), (0, 0.2), (-3, 0.1)])
-def test_the_motion_is_that_of_the_equations(browser: Any, explorers: Any, name: str, lean: float, push: float) -> None:
+def test_the_motion_is_that_of_the_equations(browser, explorers, name, lean, push):
     """Where the page opens: ep4 and the robot at fourfold roots."""
     explorer, path = explorers[name]
     with opened(browser, path) as page:
@@ -102,7 +98,7 @@ def test_the_motion_is_that_of_the_equations(browser: Any, explorers: Any, name:
 
 
 @pytest.mark.parametrize("name", BICYCLES)
-def test_the_contacts_go_where_the_wheels_point(browser: Any, explorers: Any, name: str) -> None:
+def test_the_contacts_go_where_the_wheels_point(browser, explorers, name):
     """psi' = (v delta + c delta') cos(lambda_s)/w, integrated beside the equations, in the lengths of the file."""
     explorer, path = explorers[name]
     with opened(browser, path) as page:
@@ -129,7 +125,7 @@ def test_the_contacts_go_where_the_wheels_point(browser: Any, explorers: Any, na
         )
 
 
-def test_a_slow_bicycle_falls_and_the_page_says_so(browser: Any, explorers: Any) -> None:
+def test_a_slow_bicycle_falls_and_the_page_says_so(browser, explorers):
     """The moment by the integrator; the page takes it between two of its 601 times, which is good to 1e-4."""
     explorer, path = explorers["whipple_benchmark"]
     with opened(browser, path, reduced_motion="reduce") as page:
@@ -139,7 +135,7 @@ def test_a_slow_bicycle_falls_and_the_page_says_so(browser: Any, explorers: Any)
         end, falls = page.evaluate("[motionFrom(state, drawingOf()).end, tmsopt.motion({seconds: 3}).falls]")
         A, _ = equations(explorer, shown(page))
 
-        def fallen(_: float, z: Any) -> float:
+        def fallen(_, z):
             return float(max(abs(z[0]) - np.pi / 6, abs(z[1]) - np.pi / 2))
 
         fallen.terminal = True  # type: ignore[attr-defined]
@@ -161,7 +157,7 @@ def test_a_slow_bicycle_falls_and_the_page_says_so(browser: Any, explorers: Any)
         assert "It falls" not in page.locator("#bicycle").inner_text()
 
 
-def test_a_start_is_typed_and_kept(browser: Any, explorers: Any) -> None:
+def test_a_start_is_typed_and_kept(browser, explorers):
     _, path = explorers["whipple_benchmark"]
     start = "[state.lean, state.push]"
     with opened(browser, path, reduced_motion="reduce") as page:
@@ -192,7 +188,7 @@ def test_a_start_is_typed_and_kept(browser: Any, explorers: Any) -> None:
         assert page.locator("#note").inner_text().startswith("Ignored in the link: ")
 
 
-def test_play_pause_restart_and_the_slider_by_keys(browser: Any, explorers: Any) -> None:
+def test_play_pause_restart_and_the_slider_by_keys(browser, explorers):
     _, path = explorers["ep4"]
     with opened(browser, path, reduced_motion="reduce") as page:
         before = page.evaluate("motionFrom(state, drawingOf()).at(0, 1)")
@@ -223,7 +219,7 @@ def test_play_pause_restart_and_the_slider_by_keys(browser: Any, explorers: Any)
         assert page.evaluate(plane) != tracks
 
 
-def test_a_stated_system_starts_from_each_of_its_states(browser: Any, tmp_path: Path) -> None:
+def test_a_stated_system_starts_from_each_of_its_states(browser, tmp_path):
     (tmp_path / "pair.toml").write_text(PAIR)
     tmsopt.explore(tmp_path / "pair.toml").save(tmp_path / "pair.html")
     with opened(browser, tmp_path / "pair.html") as page:
@@ -241,7 +237,7 @@ def test_a_stated_system_starts_from_each_of_its_states(browser: Any, tmp_path: 
             np.testing.assert_allclose(values, truth, atol=CLOSE * np.abs(truth).max())
 
 
-def test_a_model_by_its_coefficients_has_no_motion(browser: Any, tmp_path: Path) -> None:
+def test_a_model_by_its_coefficients_has_no_motion(browser, tmp_path):
     (tmp_path / "k.toml").write_text(
         '[model]\ncoefficients = ["1", "c", "1"]\n[parameters]\nc = { min = 0, max = 1 }\n'
     )
@@ -251,23 +247,23 @@ def test_a_model_by_its_coefficients_has_no_motion(browser: Any, tmp_path: Path)
         assert page.evaluate("tmsopt.motion()") is None
 
 
-def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser: Any, tmp_path: Path) -> None:
+def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser, tmp_path):
     """T' = (-k phidot - T)/lag on the steering: five states, whose matrices I, -A have no mass in them."""
     lag, gain = 0.2, 8.0
     whipple = tmsopt.models.whipple
 
-    def pencil(p: Any) -> Any:
+    def pencil(p):
         assert whipple.pencil is not None
         (a, b), (c, d) = whipple.pencil(p)[0]
         inverse = [[d / (a * d - b * c), -b / (a * d - b * c)], [-c / (a * d - b * c), a / (a * d - b * c)]]
-        rows: list[list[Any]] = [[0, 0, -1, 0, 0], [0, 0, 0, -1, 0]]
+        rows = [[0, 0, -1, 0, 0], [0, 0, 0, -1, 0]]
         for row in inverse:
             K, D = ([row[0] * m[0][k] + row[1] * m[1][k] for k in (0, 1)] for m in reversed(whipple.pencil(p)[1:]))
             rows.append([*K, *D, -row[1]])
         identity = [[float(i == k) for k in range(5)] for i in range(5)]
         return identity, [*rows, [0, 0, gain / lag, 0, 1 / lag]]
 
-    def feedback(p: Any) -> Any:
+    def feedback(p):
         assert whipple.pencil is not None
         return SimpleNamespace(mass=whipple.pencil(p)[0])  # what the page asks of it
 
@@ -286,7 +282,7 @@ def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser: A
     np.testing.assert_allclose([found["phi"], found["delta"]], truth[:, :2].T, atol=CLOSE * np.abs(truth[:, :2]).max())
 
 
-def test_programs_set_and_get_the_design(browser: Any, explorers: Any) -> None:
+def test_programs_set_and_get_the_design(browser, explorers):
     explorer, path = explorers["ep4"]
     with opened(browser, path) as page:
         at_start = page.evaluate("tmsopt.get()")
@@ -307,7 +303,7 @@ def test_programs_set_and_get_the_design(browser: Any, explorers: Any) -> None:
         assert shown(page) == values
 
 
-def test_a_page_is_small_and_its_texts_are_whole(explorers: Any) -> None:
+def test_a_page_is_small_and_its_texts_are_whole(explorers):
     """What the documentation promises; and taking blanks out of a script takes none out of its texts."""
     html = tmsopt.explore(PROBLEMS / "whipple_ep4.toml").html
     assert len(html.encode()) < 150_000

@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,9 +25,7 @@ CASES = (
 
 
 @pytest.mark.parametrize(("H", "design", "texts", "kind"), CASES)
-def test_it_shows_eigenfrequencies(
-    H: Any, design: dict[str, float], texts: list[str], kind: str, tmp_path: Path
-) -> None:
+def test_it_shows_eigenfrequencies(H, design, texts, kind, tmp_path):
     """At the design that it was given and at one that it computes itself, and in the file that it saves."""
     solution = tmsopt.solve(tmsopt.Problem(from_hamiltonian(H), fixed=design))
     html = page_of(solution)
@@ -48,7 +45,7 @@ def test_it_shows_eigenfrequencies(
 
 
 @pytest.mark.parametrize(("name", "omega"), [("pt_trimer", 0), ("bose_hubbard", 0), ("loss_only_dimer", -0.6j)])
-def test_a_file_saved_at_an_exceptional_point_solves_to_it(name: str, omega: complex, tmp_path: Path) -> None:
+def test_a_file_saved_at_an_exceptional_point_solves_to_it(name, omega, tmp_path):
     """The numbers of the file are rounded, and the carrier is that of a point; the EP is still recognised."""
     solution = tmsopt.solve(PROBLEMS / f"{name}.toml")
     said = said_by(page_of(solution), ASK)
@@ -62,14 +59,14 @@ def test_a_file_saved_at_an_exceptional_point_solves_to_it(name: str, omega: com
     assert not {"weave", "carrier", "roots"} & set(" ".join(said["verdict"]).replace(":", "").split())
 
 
-def test_a_size_below_what_files_take_is_0(tmp_path: Path) -> None:
+def test_a_size_below_what_files_take_is_0(tmp_path):
     pair = from_hamiltonian([["a - 1j", 1], [1, "b - 1j"]])
     text = said_by(page_of(tmsopt.Problem(pair, fixed={"a": 1.0, "b": 2.0})), "(state.x[0] = -1e-62, problemText())")
     (tmp_path / "saved.toml").write_text(text, encoding="utf-8")
     assert dict(tmsopt.load(tmp_path / "saved.toml").fixed) == {"a": 0.0, "b": 2.0}
 
 
-def test_the_plane_is_around_the_frequencies(tmp_path: Path) -> None:
+def test_the_plane_is_around_the_frequencies(tmp_path):
     """A path of size 1e-14 about an EP at 0 is no picture of it, nor is one of 200 about frequencies 1 apart."""
     solution = tmsopt.solve(PROBLEMS / "pt_trimer.toml")
     reach = said_by(page_of(solution), "planeReach([[0, 0, 3]], [{re: 1, im: 1}, {re: -1, im: 0.5}], null).reach")

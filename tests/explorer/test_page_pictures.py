@@ -1,8 +1,6 @@
 """The pictures of the page in Chromium: what they show is what the package computes, and hands can move it."""
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -70,24 +68,24 @@ PIXELS = """(grid) => {
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     with chromium() as started:
         yield started
 
 
-def saved(problem: Any, tmp_path: Path) -> Path:
+def saved(problem, tmp_path):
     path = tmp_path / "page.html"
     tmsopt.explore(problem).save(path)
     return path
 
 
-def stated(text: str, tmp_path: Path) -> Path:
+def stated(text, tmp_path):
     path = tmp_path / "stated.toml"
     path.write_text(text)
     return saved(path, tmp_path)
 
 
-def plot_of(page: Any, panel: str) -> tuple[Any, Any]:
+def plot_of(page, panel):
     """The corner and the size of a plot, in pixels of the window."""
     canvas = page.locator(f"#{panel} canvas").first
     canvas.scroll_into_view_if_needed()
@@ -96,7 +94,7 @@ def plot_of(page: Any, panel: str) -> tuple[Any, Any]:
     return np.array([box["x"] + x0, box["y"] + y0]), np.array([width, height])
 
 
-def wait_until(page: Any, condition: str) -> None:
+def wait_until(page, condition):
     """Ten seconds at most; the page forbids the text that Playwright's own way would run."""
     for _ in range(200):
         if page.evaluate(condition):
@@ -105,7 +103,7 @@ def wait_until(page: Any, condition: str) -> None:
     pytest.fail(f"never came: {condition}")
 
 
-def uniform(kind: Any) -> Any:
+def uniform(kind):
     """Where a design of a grid is of one class with all eight around it."""
     around = np.lib.stride_tricks.sliding_window_view(kind, (3, 3))
     same = np.zeros(kind.shape, dtype=bool)
@@ -114,7 +112,7 @@ def uniform(kind: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", ["chart", "ep_set"])
-def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser: Any, tmp_path: Path, name: str) -> None:
+def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser, tmp_path, name):
     """What a reader takes from the picture and its legend, against `tmsopt.chart`; without what is drawn above."""
     page_path = saved(PROBLEMS / f"{name}.toml", tmp_path)
     with opened(browser, page_path) as page:
@@ -141,7 +139,7 @@ def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser: Any, 
     assert np.array_equal(seen[inner], found.kind[inner])
 
 
-def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(browser: Any, tmp_path: Path) -> None:
+def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(browser, tmp_path):
     with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path)) as page:
         before = page.evaluate("[...state.x]")
         i, j = page.evaluate("state.plane")
@@ -162,7 +160,7 @@ def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(browse
         assert page.evaluate("[...state.x]") == before
 
 
-def test_a_finger_moves_the_design_too(browser: Any, tmp_path: Path) -> None:
+def test_a_finger_moves_the_design_too(browser, tmp_path):
     with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path), width=400, has_touch=True) as page:
         page.evaluate("document.getElementById('controls').hidden = true")  # they cover the chart until folded up
         low, high = page.evaluate("rangeOf(state.plane[0])")
@@ -174,7 +172,7 @@ def test_a_finger_moves_the_design_too(browser: Any, tmp_path: Path) -> None:
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
-def test_arrow_keys_move_the_design_over_the_grid(browser: Any, tmp_path: Path) -> None:
+def test_arrow_keys_move_the_design_over_the_grid(browser, tmp_path):
     with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path)) as page:
         before = np.array(page.evaluate("state.plane.map((k) => state.x[k])"))
         steps = np.array([(high - low) / (GRID - 1) for low, high in page.evaluate("state.plane.map(rangeOf)")])
@@ -190,7 +188,7 @@ def test_arrow_keys_move_the_design_over_the_grid(browser: Any, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", ["whipple_benchmark", "ep4"])
-def test_events_are_the_speeds_of_the_package(browser: Any, tmp_path: Path, name: str) -> None:
+def test_events_are_the_speeds_of_the_package(browser, tmp_path, name):
     """Bisected signs, against exact roots of polynomials in the speed; of meetings those on the real axis."""
     explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
     explorer.save(tmp_path / "page.html")
@@ -209,7 +207,7 @@ def test_events_are_the_speeds_of_the_package(browser: Any, tmp_path: Path, name
     np.testing.assert_allclose([e["at"] for e in events if e["kind"] == "meeting"], meetings, rtol=1e-3)
 
 
-def test_a_window_that_the_design_stands_in_is_found(browser: Any, tmp_path: Path) -> None:
+def test_a_window_that_the_design_stands_in_is_found(browser, tmp_path):
     """Of s² + ((1e-4)² - (b - 1/3 - 1/1000)²) s + 1, where damping is positive for 2e-4 of the range."""
     with opened(browser, stated(WINDOW, tmp_path)) as page:
         middle = 1 / 3 + 1e-3
@@ -221,7 +219,7 @@ def test_a_window_that_the_design_stands_in_is_found(browser: Any, tmp_path: Pat
         np.testing.assert_allclose([at for _, _, at in found], [middle - 1e-4, middle + 1e-4], atol=2e-10)
 
 
-def test_tiny_numbers_are_told_from_0(browser: Any, tmp_path: Path) -> None:
+def test_tiny_numbers_are_told_from_0(browser, tmp_path):
     """Their products underflow; one of two masses may be 1e-15 of the other."""
     with opened(browser, stated(CAR, tmp_path)) as page:
         assert page.evaluate(
@@ -235,7 +233,7 @@ def test_tiny_numbers_are_told_from_0(browser: Any, tmp_path: Path) -> None:
         np.testing.assert_allclose(end, [-1, -1, 0, 0], atol=1e-10)
 
 
-def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser: Any, tmp_path: Path) -> None:
+def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser, tmp_path):
     with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
         low, high = page.evaluate("rangeOf(state.over)")
         corner, size = plot_of(page, "growth")
@@ -251,7 +249,7 @@ def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser: A
 
 
 @pytest.mark.parametrize("name", ["ep4", "point_mass_robot", "whipple_ep4"])
-def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser: Any, tmp_path: Path, name: str) -> None:
+def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser, tmp_path, name):
     """The distance of H from the drawn axis is the quantity of the model; leaning and steering keep all distances."""
     explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
     explorer.save(tmp_path / "page.html")
@@ -276,7 +274,7 @@ def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser: Any, tmp_path: Pat
     assert ahead[1] > 0  # a steer to the right
 
 
-def test_motion_waits_where_the_reader_wants_none(browser: Any, tmp_path: Path) -> None:
+def test_motion_waits_where_the_reader_wants_none(browser, tmp_path):
     path = saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)
     with opened(browser, path, reduced_motion="reduce") as page:
         page.wait_for_timeout(1200)
@@ -291,7 +289,7 @@ def test_motion_waits_where_the_reader_wants_none(browser: Any, tmp_path: Path) 
         wait_until(page, "clock.time > 0.2")
 
 
-def test_time_of_the_motion_is_real(browser: Any, tmp_path: Path) -> None:
+def test_time_of_the_motion_is_real(browser, tmp_path):
     """From frame to frame by the moments of the frames, so that a busy machine does not matter; one frame of slack."""
     watch = """() => new Promise((done) => {
         const frames = [];
@@ -311,7 +309,7 @@ def test_time_of_the_motion_is_real(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("layer", ["kind", "abscissa", "damping"])
-def test_pictures_stand_undefined_designs(browser: Any, tmp_path: Path, layer: str) -> None:
+def test_pictures_stand_undefined_designs(browser, tmp_path, layer):
     """A leading coefficient 0: no roots, no class. A page with faults or errors in its console fails in `opened`."""
     with opened(browser, stated(POLE, tmp_path)) as page:
         page.evaluate(f"change({{x: [[0, 0]], layer: '{layer}'}})")
@@ -322,13 +320,13 @@ def test_pictures_stand_undefined_designs(browser: Any, tmp_path: Path, layer: s
         assert not page.locator("#bicycle").is_visible()
 
 
-def test_a_model_of_one_parameter_has_no_chart_and_says_so(browser: Any, tmp_path: Path) -> None:
+def test_a_model_of_one_parameter_has_no_chart_and_says_so(browser, tmp_path):
     with opened(browser, stated(ALONE, tmp_path)) as page:
         assert "needs two parameters" in page.locator("#chart").inner_text()
         assert page.locator("#growth canvas").first.is_visible()
 
 
-def test_pictures_say_what_they_show(browser: Any, tmp_path: Path) -> None:
+def test_pictures_say_what_they_show(browser, tmp_path):
     with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
         pictures = page.locator("canvas[aria-label]")
         assert pictures.count() == 6
@@ -341,13 +339,13 @@ def test_pictures_say_what_they_show(browser: Any, tmp_path: Path) -> None:
         assert "is unstable by weave" in page.locator("#growth canvas").first.get_attribute("aria-label")
 
 
-def growth_sentence(page: Any, change: str = "{}") -> str:
+def growth_sentence(page, change="{}"):
     page.evaluate(f"change({change})")
     drawn(page)
     return str(page.locator("#growth .reading").nth(1).inner_text())
 
 
-def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(browser: Any, tmp_path: Path) -> None:
+def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(browser, tmp_path):
     """A mass from 0 on, where its matrix is singular; the three roots that meet at the optimum; an undamped car."""
     index = "DATA.parameters.findIndex(({ name }) => name === '%s')"
     with opened(browser, stated(CAR, tmp_path)) as page:
@@ -360,7 +358,7 @@ def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(browser: 
         assert "within a multiple" not in page.locator("#motion").inner_text()
 
 
-def test_roots_that_cross_0_are_told_where_all_is_unstable(browser: Any, tmp_path: Path) -> None:
+def test_roots_that_cross_0_are_told_where_all_is_unstable(browser, tmp_path):
     """The number of growing roots, by NumPy, changes there by as many as are said to cross."""
     with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
         tilt = "DATA.parameters.findIndex(({ name }) => name === 'lambda_s')"
@@ -375,7 +373,7 @@ def test_roots_that_cross_0_are_told_where_all_is_unstable(browser: Any, tmp_pat
         assert abs(after - before) == event["roots"]
 
 
-def test_an_envelope_is_drawn_where_it_is_one(browser: Any, tmp_path: Path) -> None:
+def test_an_envelope_is_drawn_where_it_is_one(browser, tmp_path):
     """Where four roots meet a push goes as t^3 e^(abscissa t), which no multiple of e^(abscissa t) bounds."""
     with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path)) as page:
         assert "within a multiple" not in page.locator("#motion").inner_text()
@@ -384,7 +382,7 @@ def test_an_envelope_is_drawn_where_it_is_one(browser: Any, tmp_path: Path) -> N
         assert "within a multiple" in page.locator("#motion").inner_text()
 
 
-def test_one_pole_does_not_set_the_scale_of_the_growth_rates(browser: Any, tmp_path: Path) -> None:
+def test_one_pole_does_not_set_the_scale_of_the_growth_rates(browser, tmp_path):
     """Robot, wheelbase: a root passes infinity beside the optimum, whose roots are at -11 1/s."""
     with opened(browser, saved(PROBLEMS / "point_mass_robot.toml", tmp_path)) as page:
         wheelbase = page.evaluate("DATA.parameters.findIndex(({ name }) => name === 'w')")
@@ -403,7 +401,7 @@ def test_one_pole_does_not_set_the_scale_of_the_growth_rates(browser: Any, tmp_p
         assert max(fork) <= 0  # none of it in the ground
 
 
-def test_unstable_classes_are_told_apart_in_the_dark(browser: Any, tmp_path: Path) -> None:
+def test_unstable_classes_are_told_apart_in_the_dark(browser, tmp_path):
     """Relative luminance of the swatches, as WCAG has it: twice as bright at least."""
     with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path), color_scheme="dark") as page:
         colours = {
@@ -414,7 +412,7 @@ def test_unstable_classes_are_told_apart_in_the_dark(browser: Any, tmp_path: Pat
     assert capsize >= 2 * weave
 
 
-def test_pictures_with_keys_are_no_mere_images(browser: Any, tmp_path: Path) -> None:
+def test_pictures_with_keys_are_no_mere_images(browser, tmp_path):
     with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path)) as page:
         roles = page.evaluate("[...document.querySelectorAll('canvas[aria-label]')].map((c) => [c.tabIndex, c.role])")
         assert sorted(roles) == [[-1, "img"]] * 3 + [[0, "application"]] * 3

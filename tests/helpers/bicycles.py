@@ -4,8 +4,6 @@ Source: J. P. Meijaard, J. M. Papadopoulos, A. Ruina and A. L. Schwab (2007), ta
 """
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -41,7 +39,7 @@ BENCHMARK = {
 BODIES = "w c r_R m_R I_Rxx I_Ryy x_B z_B m_B I_Bxx I_Bzz I_Bxz x_H z_H m_H I_Hxx I_Hzz I_Hxz r_F m_F I_Fxx I_Fyy"
 
 
-def bicycles(count: int, seed: int = 0) -> Iterator[dict[str, float]]:
+def bicycles(count, seed=0):
     """Random bicycles with everything that a bicycle can have, of both tilt signs and trails."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
@@ -76,7 +74,7 @@ def bicycles(count: int, seed: int = 0) -> Iterator[dict[str, float]]:
         }
 
 
-def appendix(p: Mapping[str, Any], sine: Any, cosine: Any) -> Any:
+def appendix(p, sine, cosine):
     """M, C1, K0, K2 by appendix A of the paper, as it is printed: with the front assembly's common centre of mass."""
     (
         w,

@@ -2,10 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -16,7 +13,7 @@ _OWN = ("about:", "data:", "blob:")
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
+def chromium():
     """A headless browser, by Playwright."""
     play = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     found = next(filter(None, map(shutil.which, _NAMES)), None)
@@ -31,15 +28,15 @@ def chromium() -> Iterator[Any]:
 
 @contextmanager
 def opened(
-    browser: Any,
-    path: Path,
+    browser,
+    path,
     *,
-    width: int = 1280,
-    height: int = 900,
-    link: str = "",
-    faults: list[str] | None = None,
-    **context: Any,
-) -> Iterator[Any]:
+    width=1280,
+    height=900,
+    link="",
+    faults=None,
+    **context,
+):
     """A page of a file, drawn. In the end it must have been without faults and without requests.
 
     Args:
@@ -47,18 +44,18 @@ def opened(
         faults: where errors, warnings, dialogs and requests are noted; a list that is given is the caller's to judge.
         context: options of Playwright's `new_context`, such as ``color_scheme="dark"``.
     """
-    noted: list[str] = [] if faults is None else faults
+    noted = [] if faults is None else faults
     address = path.resolve().as_uri()
     with browser.new_context(viewport={"width": width, "height": height}, **context) as surroundings:
 
-        def watched(route: Any) -> None:
+        def watched(route):
             if route.request.url.split("#")[0] == address or route.request.url.startswith(_OWN):
                 route.continue_()
             else:
                 noted.append(f"request: {route.request.url}")
                 route.abort()
 
-        def heard(message: Any) -> None:
+        def heard(message):
             if message.type in ("error", "warning"):
                 noted.append(f"{message.type}: {message.text}")
 
@@ -74,7 +71,7 @@ def opened(
     assert faults is not None or not noted, noted
 
 
-def drawn(page: Any) -> None:
+def drawn(page):
     """Wait until all that was asked for is drawn."""
     page.evaluate(
         "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"

@@ -4,11 +4,9 @@ Nothing here imports the package. The polynomial comes from `oracles.symbolic_co
 matrices, with T = tan(lambda_s); tilts are given in rad and turned into T at 40 digits or more.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cache
 from itertools import pairwise
-from typing import Any
 
 import flint
 import numpy as np
@@ -25,7 +23,7 @@ _P = sum(a * S ** (4 - k) for k, a in enumerate(COPO))
 # Special points as square systems of polynomial equations
 
 
-def equations(pattern: str) -> list[sympy.Expr]:
+def equations(pattern):
     """What a pattern demands, without the factored form where there is another: derivatives, coefficients, minors."""
     a0, a1, a2, a3, a4 = COPO
     hurwitz = a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4
@@ -46,14 +44,12 @@ class Point(dict):
     """Name → 40-digit value of the unknowns that solve a system; the tilt as T and, derived, lambda_s."""
 
     @property
-    def lambda_s(self) -> Any:
+    def lambda_s(self):
         with mp.workdps(DIGITS):
             return mp.atan(self["T"])
 
 
-def certified(
-    system: Sequence[sympy.Expr], start: Mapping[str, float], fixed: Mapping[str, Any], radius: float = 1e-25
-) -> Point:
+def certified(system, start, fixed, radius=1e-25):
     """The solution near `start`, whose keys are the unknowns: Newton at 40 digits, then proven by interval Newton.
 
     `lambda_s` in `start` or `fixed` is turned into T. Raises AssertionError if balls of `radius` around the solution
@@ -80,7 +76,7 @@ def certified(
 
 
 @cache
-def _compiled(system: tuple[sympy.Expr, ...], names: tuple[str, ...], known: tuple[str, ...]) -> tuple[Any, Any]:
+def _compiled(system, names, known):
     of = {**SYMBOLS, "s": S, "b": B, "c": C}
     unknowns = [of[n] for n in names]
     arguments = unknowns + [of[n] for n in known]
@@ -89,7 +85,7 @@ def _compiled(system: tuple[sympy.Expr, ...], names: tuple[str, ...], known: tup
     return F, J
 
 
-def _prove(F: Any, J: Any, x: list[Any], known: list[Any], radius: float) -> None:
+def _prove(F, J, x, known, radius):
     """Interval Newton: N(X) = m − J(X)⁻¹ F(m) inside X proves one solution in X."""
     before, flint.ctx.dps = flint.ctx.dps, DIGITS + 30
     try:
@@ -107,7 +103,7 @@ def _prove(F: Any, J: Any, x: list[Any], known: list[Any], radius: float) -> Non
         flint.ctx.dps = before
 
 
-def _ball(value: Any) -> Any:
+def _ball(value):
     sign, mantissa, exponent, _ = value._mpf_
     mantissa = int(mantissa)
     return flint.arb(-mantissa if sign else mantissa) * flint.arb(2) ** int(exponent)
@@ -116,7 +112,7 @@ def _ball(value: Any) -> Any:
 # Closed forms for chi_H = 1 at 40 digits, from the paper
 
 
-def epset_Fr(zeta_B: float, zeta_H: float, lambda_s: float) -> Any:
+def epset_Fr(zeta_B, zeta_H, lambda_s):
     """Fr on the EP set, equation `epset`, for the tilt exactly as given."""
     with mp.workdps(DIGITS):
         zB, zH, T = mp.mpf(zeta_B), mp.mpf(zeta_H), mp.tan(mp.mpf(lambda_s))
@@ -132,7 +128,7 @@ FR_C2_SLOPE = float(3 + 2 * mp.sqrt(2))
 # Exact classes of designs
 
 
-def exact_polynomial(design: Mapping[str, Any]) -> list[Fraction]:
+def exact_polynomial(design):
     """Coefficients of a dimensionless design in Fractions; tan(lambda_s) is rounded to 40 digits."""
     with mp.workdps(DIGITS):
         sign, mantissa, exponent, _ = mp.tan(mp.mpf(design["lambda_s"]))._mpf_
@@ -145,7 +141,7 @@ _EXACT = sympy.lambdify(list(SYMBOLS.values()), COPO, modules="math")
 """By + - * and whole powers alone; fast in FLINT's rationals."""
 
 
-def sturm(coefficients: Sequence[Any]) -> tuple[int, int, int]:
+def sturm(coefficients):
     """Numbers of different real roots below, at and above 0, by Sturm's theorem in Fractions."""
     p = [Fraction(c) for c in coefficients]
     zero = 0
@@ -166,7 +162,7 @@ def sturm(coefficients: Sequence[Any]) -> tuple[int, int, int]:
     return minus - middle, zero, middle - plus
 
 
-def _remainder(p: list[Fraction], q: list[Fraction]) -> list[Fraction]:
+def _remainder(p, q):
     p = list(p)
     while len(p) >= len(q):
         ratio = p[0] / q[0]
@@ -178,22 +174,22 @@ def _remainder(p: list[Fraction], q: list[Fraction]) -> list[Fraction]:
     return p
 
 
-def _changes(values: Sequence[Fraction]) -> int:
+def _changes(values):
     signs = [v > 0 for v in values if v != 0]
     return sum(a != b for a, b in pairwise(signs))
 
 
-def stable(a: Sequence[Any]) -> bool:
+def stable(a):
     """All roots left of the imaginary axis, by the exact Routh table."""
     return a[0] != 0 and routh_exact(a)
 
 
-def damped(a: Sequence[Any]) -> bool:
+def damped(a):
     """All roots negative and different, by exact counting; boundaries themselves do not count."""
     return a[0] != 0 and sturm(a)[0] == len(a) - 1
 
 
-def kind(a: Sequence[Any]) -> str:
+def kind(a):
     """The class of a polynomial by exact arithmetic."""
     if a[0] == 0:
         return "undefined"
@@ -205,7 +201,7 @@ def kind(a: Sequence[Any]) -> str:
 # Polylines in a plane
 
 
-def distance(point: Sequence[float], arcs: Sequence[np.ndarray]) -> float:
+def distance(point, arcs):
     """Distance from a point to polylines given as arrays of shape (n, 2)."""
     best = np.inf
     for arc in arcs:
@@ -216,9 +212,7 @@ def distance(point: Sequence[float], arcs: Sequence[np.ndarray]) -> float:
     return best
 
 
-def changes(
-    inside: Callable[[np.ndarray], bool], begin: np.ndarray, end: np.ndarray, samples: int
-) -> Iterator[np.ndarray]:
+def changes(inside, begin, end, samples):
     """Points on a segment where a truth changes, bisected to 1e-10 of its length; found among `samples` points."""
     shares = np.linspace(0, 1, samples)
     truths = [inside(begin + s * (end - begin)) for s in shares]

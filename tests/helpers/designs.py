@@ -27,7 +27,7 @@ minimize = "abscissa"
 """
 
 
-def designs(count: int, seed: int = 0) -> list[dict[str, float]]:
+def designs(count, seed=0):
     """Random designs of both tilt signs, χ_H ≠ 1."""
     rng = np.random.default_rng(seed)
     return [
@@ -44,7 +44,7 @@ def designs(count: int, seed: int = 0) -> list[dict[str, float]]:
     ]
 
 
-def wide_designs(seed: int, count: int) -> dict[str, np.ndarray]:
+def wide_designs(seed, count):
     """Both tilt signs in equal numbers and χ_H ≠ 1, over a box much wider than any bicycle."""
     rng = np.random.default_rng(seed)
     return {

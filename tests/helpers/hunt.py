@@ -13,11 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from tmsopt import laws
-from tmsopt.records import Array
 
 Design = Mapping[str, Any]
 Merit = Callable[[dict[str, Any]], tuple[Any, Any]]
@@ -32,7 +30,7 @@ NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
 # Problem files
 
 
-def number(written: Any) -> float:
+def number(written):
     """A number, or a text with a unit, in SI and radians."""
     if not isinstance(written, str):
         return float(written)
@@ -40,7 +38,7 @@ def number(written: Any) -> float:
     return float(value) * UNITS[unit]
 
 
-def read(name: str) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+def read(name):
     """Fixed values and boxes of a problem file."""
     written = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["parameters"]
     fixed = {n: number(v) for n, v in written.items() if not isinstance(v, dict)}
@@ -51,7 +49,7 @@ def read(name: str) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
 # Designs
 
 
-def native(design: Design) -> dict[str, Any]:
+def native(design):
     """The dimensionless parameters of a design in SI; of a dimensionless one, its parameters."""
     if "w" not in design:
         return {n: design[n] for n in NATIVE}
@@ -67,37 +65,37 @@ def native(design: Design) -> dict[str, Any]:
     }
 
 
-def roots(design: Design) -> NDArray[np.complex128]:
+def roots(design):
     """Roots of the characteristic polynomials, shape (..., 4)."""
     a = laws.copo(**native(design))
     companion = np.zeros((*a.shape[1:], 4, 4))
     with np.errstate(divide="ignore", invalid="ignore"):
         companion[..., 0, :] = np.moveaxis(np.nan_to_num(-a[1:] / a[0], nan=1e9, posinf=1e9, neginf=-1e9), 0, -1)
     companion[..., (1, 2, 3), (0, 1, 2)] = 1.0
-    found: NDArray[np.complex128] = np.linalg.eigvals(companion)
+    found = np.linalg.eigvals(companion)
     return found
 
 
-def abscissa(design: Design) -> Array:
+def abscissa(design):
     """Largest real part of the roots; scattered by 4e-4 at an EP4, 1e-5 at an EP3, 1e-8 at an EP2."""
-    found: Array = roots(design).real.max(axis=-1)
+    found = roots(design).real.max(axis=-1)
     return found
 
 
-def damping_ratio(design: Design) -> Array:
+def damping_ratio(design):
     """Least -Re s/|s| of the roots."""
     s = roots(design)
-    found: Array = (-s.real / np.abs(s)).min(axis=-1)
+    found = (-s.real / np.abs(s)).min(axis=-1)
     return found
 
 
-def centre(design: Design) -> Any:
+def centre(design):
     """chi_T, the centre of mass of the whole bicycle: the share of the weight on the front wheel."""
     d = native(design)
     return (d["chi_B"] + d["mu"] * d["chi_H"]) / (1 + d["mu"])
 
 
-def arm(design: Design) -> Any:
+def arm(design):
     """nu_H, the distance of the front mass from the steer axis, per wheelbase."""
     d = native(design)
     return (d["chi_H"] - 1) * np.cos(d["lambda_s"]) - d["zeta_H"] * np.sin(d["lambda_s"])
@@ -107,16 +105,16 @@ def arm(design: Design) -> Any:
 
 
 def least(
-    merit: Merit,
-    fixed: Mapping[str, float],
-    box: Mapping[str, tuple[float, float]],
-    seed: int = 1,
-    generations: int = 150,
-    rounds: int = 6,
-    shrink: float = 0.2,
-    population: int = 12,
-    start: Mapping[str, float] | None = None,
-) -> tuple[dict[str, float], float]:
+    merit,
+    fixed,
+    box,
+    seed=1,
+    generations=150,
+    rounds=6,
+    shrink=0.2,
+    population=12,
+    start=None,
+):
     """The best design and its value: differential evolution in the box, then `rounds` times in a smaller one around it.
 
     With a `start`, the first round is around that design already, in a box of the width `shrink`.
@@ -124,7 +122,7 @@ def least(
     names = list(box)
     low, high = np.array([box[n] for n in names]).T
 
-    def cost(points: Array) -> Array:
+    def cost(points):
         value, violation = merit({**fixed, **dict(zip(names, np.atleast_2d(points.T).T, strict=True))})
         return np.where(violation > 0, 1e3 + violation, value)
 
@@ -160,9 +158,7 @@ def least(
     return {**fixed, **dict(zip(names, map(float, centre_), strict=True))}, best
 
 
-def placed(
-    zeta_B: Any, zeta_H: Any, chi_H: Any, gamma: Any, beta_1: Any, kappa_1: Any, beta_2: Any, kappa_2: Any
-) -> list[dict[str, Any]]:
+def placed(zeta_B, zeta_H, chi_H, gamma, beta_1, kappa_1, beta_2, kappa_2):
     """The two designs whose roots are those of t² + β t + κ, twice, with t = s - γ; chi_H not 1.
 
     The coefficients `copo` set equal to a0 times those of the product: a3/a1 gives chi_B, a1 and a4 give Fr and mu

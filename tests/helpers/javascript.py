@@ -4,10 +4,8 @@ import json
 import re
 import subprocess
 import tempfile
-from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -26,13 +24,13 @@ fs.writeFileSync(process.argv[3], JSON.stringify(answer(given), plain));
 """Reads what is given and writes the answer, after the scripts under test."""
 
 
-def page_script(problem: Any) -> str:
+def page_script(problem):
     """Model, kernel and numerics of the page of a problem."""
     page = files("tmsopt.explorer") / "page" / "numerics.js"
     return "\n".join([model_script(problem).text, kernel_script(problem.model.degree), page.read_text("utf-8")])
 
 
-def run(scripts: Sequence[str], answer: str, given: Any) -> Any:
+def run(scripts, answer, given):
     """The value of a JavaScript function of the given data, in a program of the scripts; nan and inf come as text.
 
     Args:
@@ -59,7 +57,7 @@ Object.assign(globalThis, {window: globalThis, location: {hash: ""}, matchMedia:
 """
 
 
-def said_by(html: str, answer: str) -> Any:
+def said_by(html, answer):
     """An expression in a whole page, whose pictures draw nowhere."""
     script = re.search(r"<script>(.*)</script>", html, re.DOTALL)
     assert script is not None

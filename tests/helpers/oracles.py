@@ -6,13 +6,10 @@ exactly, so the 60 digits refer to the very numbers the package was given.
 Source of the model: O. N. Kirillov (2018), equation `matrices`.
 """
 
-from collections.abc import Sequence
 from fractions import Fraction
 from math import prod
-from typing import Any
 
 import flint
-import mpmath  # type: ignore[import-untyped]
 import numpy as np
 import sympy  # type: ignore[import-untyped]
 from mpmath import mp
@@ -24,9 +21,7 @@ GUARD = 20  # digits carried and not promised
 # The model at 60 digits, from its matrices
 
 
-def polynomial_60(
-    Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any
-) -> list[mpmath.mpf]:
+def polynomial_60(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s):
     """a0, ..., a4 of det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)); mu, nu_H and cos(lambda_s) not 0."""
     with mp.workdps(DIGITS + GUARD):
         Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s = map(_mpf, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s))
@@ -35,9 +30,7 @@ def polynomial_60(
         return _rounded(a / (mu * nu_H * cos) for a in _determinant(M, V, P))
 
 
-def polynomial_exact(
-    Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, tan_lambda_s: Any
-) -> list[Fraction]:
+def polynomial_exact(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s):
     """The same coefficients as Fractions, for rational data and a rational tan(lambda_s).
 
     cos(lambda_s) may be irrational, but with sin = T cos the second row and the second column of the matrices
@@ -48,14 +41,14 @@ def polynomial_exact(
     return [a / (mu * nu_H) for a in _determinant(M, V, P)]
 
 
-def polynomial_floats(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any) -> list[Any]:
+def polynomial_floats(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s):
     """The same coefficients, but for a common factor, in double precision for arrays."""
     cos, sin = np.cos(lambda_s), np.sin(lambda_s)
     M, V, P, _ = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
     return _determinant(M, V, P)
 
 
-def symbolic_copo() -> tuple[list[sympy.Expr], dict[str, sympy.Symbol]]:
+def symbolic_copo():
     """The coefficients a0, ..., a4 as expanded SymPy expressions, and their symbols by name.
 
     The symbols are Fr, mu, chi_B, chi_H, zeta_B, zeta_H and T = tan(lambda_s).
@@ -68,7 +61,7 @@ def symbolic_copo() -> tuple[list[sympy.Expr], dict[str, sympy.Symbol]]:
     return [sympy.expand(sympy.cancel(a / (mu * nu_H * cos))) for a in _determinant(M, V, P)], symbols
 
 
-def matrices(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, cos: Any, sin: Any) -> Any:
+def matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin):
     """M, V, P as printed, and nu_H, in whatever arithmetic the arguments bring."""
     nu_H = (chi_H - 1) * cos - zeta_H * sin
     M = [[mu * zeta_H**2 + zeta_B**2, -mu * zeta_H * nu_H], [-mu * zeta_H * nu_H, mu * nu_H**2]]
@@ -80,7 +73,7 @@ def matrices(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any,
     return M, V, P, nu_H
 
 
-def _determinant(M: Any, V: Any, P: Any) -> list[Any]:
+def _determinant(M, V, P):
     """Coefficients of det(M s^2 + V s + P) for 2x2 matrices."""
     entry = [[(M[i][j], V[i][j], P[i][j]) for j in range(2)] for i in range(2)]
     main, cross = _product(entry[0][0], entry[1][1]), _product(entry[0][1], entry[1][0])
@@ -90,7 +83,7 @@ def _determinant(M: Any, V: Any, P: Any) -> list[Any]:
 # Roots at 60 digits
 
 
-def roots_60(coefficients: Sequence[Any]) -> list[mpmath.mpc]:
+def roots_60(coefficients):
     """All roots with multiplicity, sorted by real then imaginary part; the leading coefficient must not be 0.
 
     Raises mpmath.NoConvergence rather than returning roots that are not settled.
@@ -111,17 +104,17 @@ def roots_60(coefficients: Sequence[Any]) -> list[mpmath.mpc]:
     return sorted((+root for root in _at_60(found)), key=lambda root: (root.real, root.imag))
 
 
-def abscissa_60(coefficients: Sequence[Any]) -> mpmath.mpf:
+def abscissa_60(coefficients):
     """The largest real part of the roots."""
     return max(root.real for root in roots_60(coefficients))
 
 
-def is_stable_60(coefficients: Sequence[Any]) -> bool:
+def is_stable_60(coefficients):
     """Whether every root has a negative real part, by the roots; on the axis only `routh_exact` can tell."""
     return bool(abscissa_60(coefficients) < 0)
 
 
-def elementary(roots: Sequence[Any]) -> list[Any]:
+def elementary(roots):
     """Coefficients of the monic polynomial with these roots, at 60 digits."""
     with mp.workdps(DIGITS + GUARD):
         monic = [mp.mpc(1)]
@@ -130,13 +123,13 @@ def elementary(roots: Sequence[Any]) -> list[Any]:
     return _at_60(monic)
 
 
-def weave_Fr_60(mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any) -> mpmath.mpf | None:
+def weave_Fr_60(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s):
     """The Froude number in (1e-3, 1e3) where the Hurwitz determinant of the 60-digit polynomial vanishes.
 
     By root finding on the speed alone; no formula for it is used. None where the determinant keeps its sign.
     """
 
-    def determinant(logarithm: Any) -> Any:
+    def determinant(logarithm):
         Fr = mp.exp(logarithm)
         a0, a1, a2, a3, a4 = polynomial_60(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
         return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2  # the factor Fr^2 hides the zero from bisection
@@ -154,7 +147,7 @@ def weave_Fr_60(mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambd
 # Exact arithmetic
 
 
-def exact_multiplicities(coefficients: Sequence[Any]) -> list[tuple[int, int]]:
+def exact_multiplicities(coefficients):
     """(multiplicity, degree) of each square-free part over the rationals, sorted.
 
     [(1, 2), (3, 1)] is one triple root and two simple ones. Coefficients are rational; floats are exact.
@@ -165,21 +158,21 @@ def exact_multiplicities(coefficients: Sequence[Any]) -> list[tuple[int, int]]:
     return sorted((multiplicity, factor.degree()) for factor, multiplicity in polynomial.sqf_list()[1])
 
 
-def certified_roots(coefficients: Sequence[Any]) -> list[tuple[mpmath.mpc, int]]:
+def certified_roots(coefficients):
     """Each distinct root once, with its exact multiplicity, from balls that provably isolate it (FLINT)."""
     exact = [Fraction(c) for c in coefficients]
     polynomial = flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in reversed(exact)])
     before = flint.ctx.dps
     flint.ctx.dps = DIGITS + GUARD
     try:
-        balls: Any = polynomial.complex_roots()
+        balls = polynomial.complex_roots()
         with mp.workdps(DIGITS + GUARD):
             return [(mp.mpc(_middle(ball.real), _middle(ball.imag)), count) for ball, count in balls]
     finally:
         flint.ctx.dps = before
 
 
-def routh_exact(coefficients: Sequence[Any]) -> bool:
+def routh_exact(coefficients):
     """Whether all roots lie in the open left half plane, by the Routh table in Fractions.
 
     Any degree and either sign of the leading coefficient, which must not be 0.
@@ -198,7 +191,7 @@ def routh_exact(coefficients: Sequence[Any]) -> bool:
     return True
 
 
-def discriminant_exact(coefficients: Sequence[Any]) -> Fraction:
+def discriminant_exact(coefficients):
     """Discriminant (-1)^(n(n-1)/2) Res(p, p') / a0 by the Sylvester determinant in Fractions; degree >= 1."""
     a = [Fraction(c) for c in coefficients]
     n = len(a) - 1
@@ -210,7 +203,7 @@ def discriminant_exact(coefficients: Sequence[Any]) -> Fraction:
     return (-resultant if n * (n - 1) // 2 % 2 else resultant) / a[0]
 
 
-def _determinant_exact(rows: list[list[Fraction]]) -> Fraction:
+def _determinant_exact(rows):
     rows, sign = [list(row) for row in rows], 1
     for i in range(len(rows)):
         pivot = next((j for j in range(i, len(rows)) if rows[j][i] != 0), None)
@@ -227,30 +220,30 @@ def _determinant_exact(rows: list[list[Fraction]]) -> Fraction:
 # Small change
 
 
-def _product(p: Sequence[Any], q: Sequence[Any]) -> list[Any]:
-    total: list[Any] = [0] * (len(p) + len(q) - 1)
+def _product(p, q):
+    total = [0] * (len(p) + len(q) - 1)
     for i, x in enumerate(p):
         for j, y in enumerate(q):
             total[i + j] += x * y
     return total
 
 
-def _mpf(value: Any) -> mpmath.mpf:
+def _mpf(value):
     """Exact for floats (NumPy's too) and mpf; Fractions are rounded to the working precision."""
     if isinstance(value, Fraction):
         return mp.mpf(value.numerator) / value.denominator
     return value if isinstance(value, mp.mpf) else mp.mpf(float(value) if isinstance(value, float) else value)
 
 
-def _middle(ball: Any) -> mpmath.mpf:
+def _middle(ball):
     mantissa, exponent = ball.mid().man_exp()
     return mp.ldexp(mp.mpf(int(mantissa)), int(exponent))
 
 
-def _at_60(values: Any) -> list[Any]:
+def _at_60(values):
     with mp.workdps(DIGITS):
         return [+value for value in values]
 
 
-def _rounded(values: Any) -> list[mpmath.mpf]:
+def _rounded(values):
     return _at_60(list(values))

@@ -10,7 +10,6 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +37,7 @@ class Block:
     line: int
 
 
-def blocks_of(page: Path) -> list[Block]:
+def blocks_of(page):
     """The fenced blocks of a page, in its order."""
     text = page.read_text(encoding="utf-8")
     found = [Block(m[2], m[3], text.count("\n", 0, m.start()) + 1) for m in _FENCE.finditer(text)]
@@ -47,12 +46,12 @@ def blocks_of(page: Path) -> list[Block]:
     return found
 
 
-def lines_of(text: str) -> list[str]:
+def lines_of(text):
     """The lines of an answer, blanks aside."""
     return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
 
 
-def agrees(printed: str, now: str) -> bool:
+def agrees(printed, now):
     """The same words, and the same numbers within the rounding of the last digits: other machines, other sums.
 
     Times of runs count as equal, and ``…`` stands for anything. Of numbers of more digits than a double every one
@@ -67,7 +66,7 @@ def agrees(printed: str, now: str) -> bool:
     return all(_same(a, b) for a, b in pairs)
 
 
-def _same(printed: str, now: str) -> bool:
+def _same(printed, now):
     a, b = float(printed), float(now)
     if sum(map(str.isdigit, printed.partition("e")[0])) > _DIGITS:
         return printed == now
@@ -76,7 +75,7 @@ def _same(printed: str, now: str) -> bool:
     return math.isclose(a, b, rel_tol=1e-6, abs_tol=_NOISE)
 
 
-def exchanges(block: Block) -> Iterator[tuple[str, list[str]]]:
+def exchanges(block):
     """Each command of a console block, with what the page says that it prints."""
     before, *parts = re.split(r"^\$ ", block.text, flags=re.MULTILINE)
     assert not before.strip(), f"line {block.line}: a command stands after $"
@@ -86,7 +85,7 @@ def exchanges(block: Block) -> Iterator[tuple[str, list[str]]]:
         yield command, lines_of(printed)
 
 
-def run(command: str, folder: Path, path: Path) -> list[str]:
+def run(command, folder, path):
     """What a command prints, its diagnostics after its answer; it fails no other way than by a message."""
     if command.startswith(_INSTALLS):
         return []
@@ -111,7 +110,7 @@ def run(command: str, folder: Path, path: Path) -> list[str]:
     return lines_of(ended.stdout) + lines_of(ended.stderr)
 
 
-def missing(printed: list[str], now: list[str]) -> str | None:
+def missing(printed, now):
     """The first line that is printed on the page and not by the command, or not where it should be."""
     rest = iter(now)
     anywhere = True  # what is printed may begin anywhere: a page shows a part
@@ -127,7 +126,7 @@ def missing(printed: list[str], now: list[str]) -> str | None:
     return None
 
 
-def may_install(block: Block) -> bool:
+def may_install(block):
     """Whether a block of `sh` has nothing that should have been run: what installs, or sets up a shell."""
     lines = [line for line in block.text.splitlines() if line.strip() and not line.startswith("#")]
     return all(line.startswith(_INSTALLS) for line in lines)

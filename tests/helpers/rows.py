@@ -1,8 +1,7 @@
 """Rows of a study for tests of its store, also in processes that load nothing else."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,7 +13,7 @@ STUDY = Study(
 )
 
 
-def row(number: int, **given: Any) -> Row:
+def row(number, **given):
     return Row(
         number,
         1000 + number,
@@ -22,16 +21,16 @@ def row(number: int, **given: Any) -> Row:
     )
 
 
-def flat(row: Row) -> dict[str, Any]:
+def flat(row):
     """All that a row says, but how long it took and where."""
-    found: dict[str, Any] = {}
+    found = {}
     for name, value in row.to_json().items():
         some = {f"{name}.{key}": x for key, x in value.items()} if isinstance(value, Mapping) else {name: value}
         found |= some if name not in ("seconds", "host") else {}
     return found
 
 
-def assert_same(rows: Iterable[Row], others: Iterable[Row]) -> None:
+def assert_same(rows, others):
     """The same rows in any order: texts are equal, numbers to 1e-9 of their size; laws are rounding errors."""
     pairs = zip(*(sorted(some, key=lambda row: row.number) for some in (rows, others)), strict=True)
     for one, other in (map(flat, pair) for pair in pairs):

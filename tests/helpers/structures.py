@@ -1,6 +1,6 @@
 """Factored forms of every structure of four roots, and the dimensionless design, in mpmath."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from mpmath import mp
@@ -10,7 +10,7 @@ LENGTHS = {"chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
 Factors = Callable[..., list[list[Any]]]
 
 
-def native_60(p: Mapping[str, Any]) -> dict[str, Any]:
+def native_60(p):
     """The seven dimensionless parameters of a design in either set."""
     exact = {name: mp.mpf(value) for name, value in p.items()}
     if "Fr" in exact:
@@ -23,8 +23,8 @@ def native_60(p: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def times(*factors: Sequence[Any]) -> list[Any]:
-    found: list[Any] = [mp.mpf(1)]
+def times(*factors):
+    found = [mp.mpf(1)]
     for factor in factors:
         longer = [mp.mpf(0)] * (len(found) + len(factor) - 1)
         for i, x in enumerate(found):
@@ -34,16 +34,16 @@ def times(*factors: Sequence[Any]) -> list[Any]:
     return found
 
 
-def pair(g: Any, W: Any) -> list[Any]:
+def pair(g, W):
     return [1, -2 * g, g * g + W]
 
 
-def pair_roots(g: Any, W: Any) -> list[Any]:
+def pair_roots(g, W):
     root = mp.sqrt(mp.mpc(-W))
     return [g + root, g - root]
 
 
-FORMS: dict[str, tuple[Factors, Callable[..., list[Any]], Callable[..., list[Any]]]] = {
+FORMS = {
     # structure: (factors of the unknowns, roots with multiplicity, unknowns for the printed roots)
     "EP4": (lambda r: [[1, -r]] * 4, lambda r: [r] * 4, lambda z: [z[0].real]),
     "EP3": (

@@ -27,7 +27,7 @@ class Fake:
     leaves: Sequence[int] = ()
     raises: Sequence[int] = ()
 
-    def __call__(self, number: int) -> tuple[float, int]:
+    def __call__(self, number):
         before = self.tries(number)
         with (self.folder / str(number)).open("a") as marks:
             marks.write("x")
@@ -40,7 +40,7 @@ class Fake:
         time.sleep(self.seconds)
         return number / 7, os.getpid()
 
-    def tries(self, number: int) -> int:
+    def tries(self, number):
         """How often it was called with a number."""
         marks = self.folder / str(number)
         return marks.stat().st_size if marks.exists() else 0
@@ -50,7 +50,7 @@ class Fake:
 class Unloadable(Fake):
     """Work that no worker can load."""
 
-    def __reduce__(self) -> tuple[type[int], tuple[str]]:
+    def __reduce__(self):
         return int, ("not a number",)
 
 
@@ -58,16 +58,16 @@ class Unloadable(Fake):
 class Big(Fake):
     """Answers of a megabyte, which no pipe takes at once."""
 
-    def __call__(self, number: int) -> tuple[float, int]:
+    def __call__(self, number):
         x, process = super().__call__(number)
         return float(len(str(x) * 10**5)), process
 
 
-def main(folder: str) -> None:
+def main(folder):
     """A program whose workers would never end by themselves: the ids of two of them, then nothing."""
     from tmsopt.executor import processes
 
-    seen: set[int] = set()
+    seen = set()
     try:
         with processes(2) as executor:
             for _, (_, process) in executor.map(Fake(Path(folder), 0.01), range(10**5)):

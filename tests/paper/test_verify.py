@@ -50,7 +50,7 @@ def by_key(ledger):
 # The ledger as a whole
 
 
-def test_every_entry_is_complete(ledger) -> None:
+def test_every_entry_is_complete(ledger):
     assert len({entry.key for entry in ledger.entries}) == len(ledger.entries)
     for entry in ledger.entries:
         assert entry.remark or entry.verdict == EXACT
@@ -58,12 +58,12 @@ def test_every_entry_is_complete(ledger) -> None:
     assert sum(ledger.counts.values()) == len(ledger.entries)
 
 
-def test_json_is_finite_and_round_trips(ledger) -> None:
+def test_json_is_finite_and_round_trips(ledger):
     data = ledger.to_json()
     assert json.loads(json.dumps(data, allow_nan=False)) == data
 
 
-def test_progress_counts_up(monkeypatch) -> None:
+def test_progress_counts_up(monkeypatch):
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
     seen = []
     verify(lambda told: seen.append((told.done, told.most)), only=["tab1-*"])
@@ -73,7 +73,7 @@ def test_progress_counts_up(monkeypatch) -> None:
     assert len(seen) == len(select_claims(["tab1-*"])) > 5
 
 
-def test_labels_of_the_paper_are_covered(ledger) -> None:
+def test_labels_of_the_paper_are_covered(ledger):
     """Every labelled equation, the table and every figure with numbers or claims has a place in the ledger."""
     places = " ".join(entry.place for entry in ledger.entries)
     labels = (
@@ -144,7 +144,7 @@ KEYS = [
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_decimals_have_forty_true_digits_and_the_verdict_of_rounding(key, numbers, by_key) -> None:
+def test_decimals_have_forty_true_digits_and_the_verdict_of_rounding(key, numbers, by_key):
     """Decimal rounding of the independent value to the printed places, in a rule of its own."""
     entry = by_key[key]
     with mp.workdps(60):
@@ -155,7 +155,7 @@ def test_decimals_have_forty_true_digits_and_the_verdict_of_rounding(key, number
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_a_wrong_printed_digit_would_not_pass(key, by_key) -> None:
+def test_a_wrong_printed_digit_would_not_pass(key, by_key):
     text, value = by_key[key].printed, by_key[key].computed
     last, early = list(text), list(text)
     last[-1] = str((int(text[-1]) + 5) % 10)
@@ -165,7 +165,7 @@ def test_a_wrong_printed_digit_would_not_pass(key, by_key) -> None:
         assert judge_decimal("".join(early), flint.arb(value)).verdict == FAILS
 
 
-def test_the_rule_for_decimals() -> None:
+def test_the_rule_for_decimals():
     third = flint.fmpq(1, 3)
     with flint.ctx.workdps(60):
         assert judge_decimal("0.5", flint.fmpq(1, 2)).verdict == EXACT
@@ -177,7 +177,7 @@ def test_the_rule_for_decimals() -> None:
             judge_decimal("0.5", flint.arb(0.5, 0.1))
 
 
-def test_the_rule_for_statements() -> None:
+def test_the_rule_for_statements():
     assert judge_identity(True).verdict == EXACT
     assert judge_identity(False).verdict == FAILS
     assert judge_statement("c", True, "x", True).verdict == CONDITIONAL
@@ -190,7 +190,7 @@ NEEDS = {"decimal": "printed value", "identity": "holds", "universal": "refutes 
 MAY = {"decimal": "", "identity": "otherwise printed computed", "universal": "condition holds computed"}
 
 
-def test_the_file_of_claims_has_no_faults() -> None:
+def test_the_file_of_claims_has_no_faults():
     """No field is missing, unknown or empty, and all that is defined is used; names that are not fail in every run."""
     for claim in select_claims():
         needs = {*f"key section place statement route rule {NEEDS[claim['rule']]}".split()}
@@ -205,7 +205,7 @@ def test_the_file_of_claims_has_no_faults() -> None:
     assert {*re.findall(r"'setting': '(\w+)'", text)} == {*read_tables()["setting"]}
 
 
-def test_expressions_are_a_small_part_of_python() -> None:
+def test_expressions_are_a_small_part_of_python():
     assert compute("[1/10 == 0.1, 1 < 2 < 2, *[x + y for x, y in [[1, 2], [3, 4]] if x > 1]]", {}) == [True, False, 7]
     for text in ("(lambda: 1)()", "1 if 2 else 3", "open('x')", "sqrt.__class__"):
         with pytest.raises((SyntaxError, KeyError, TypeError)):
@@ -236,7 +236,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("name", "key", "change"), WRONG)
-def test_a_wrong_printed_formula_would_not_hold(name, key, change, by_key, monkeypatch) -> None:
+def test_a_wrong_printed_formula_would_not_hold(name, key, change, by_key, monkeypatch):
     assert by_key[key].verdict != FAILS
     if name in list_definitions():
         parameters, text = list_definitions()[name]
@@ -255,7 +255,7 @@ def fractions(name):
     return [Fraction(str(x)) for x in compute(name, {})]
 
 
-def test_the_counterexample_to_sufficiency() -> None:
+def test_the_counterexample_to_sufficiency():
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = fractions("witness_design(2)")
     assert (chi_H, chi_B, zeta_B, zeta_H, mu, T, Fr) == tuple(
         map(Fraction, ("0.9", "1.2", "-0.5", "-0.4", "5", "0.5", "2"))
@@ -277,7 +277,7 @@ def test_the_counterexample_to_sufficiency() -> None:
         (0.377177, 1.424214, (2.23, 2.239, 2.25), [2, 4, 2]),
     ],
 )
-def test_curves_still_meet_near_the_real_exceptional_points(tilt, chi_B, speeds, real, by_key) -> None:
+def test_curves_still_meet_near_the_real_exceptional_points(tilt, chi_B, speeds, real, by_key):
     """Number of real roots by mpmath at 40 digits, from the oracle's own coefficients."""
     with mp.workdps(40):
         found = []
@@ -289,7 +289,7 @@ def test_curves_still_meet_near_the_real_exceptional_points(tilt, chi_B, speeds,
     assert by_key["fig3-repelling"].verdict == CONDITIONAL
 
 
-def test_other_chi_H_affect_generality(by_key) -> None:
+def test_other_chi_H_affect_generality(by_key):
     """Faster than the ω0 of χ_H = 1 with the same heights; and μ moves the product of the roots only off χ_H = 1."""
     a = oracles.polynomial_exact("2.2362", "1.9673", "1.4754", "0.95", ZB, ZH, "0.4903")
     shifted = np.poly1d([float(c / a[0]) for c in a])(np.poly1d([1, -2.4]))
@@ -303,7 +303,7 @@ def test_other_chi_H_affect_generality(by_key) -> None:
     assert by_key["chi_H-generality"].verdict == CONDITIONAL
 
 
-def test_the_speed_of_capsize_is_a_closed_form(by_key) -> None:
+def test_the_speed_of_capsize_is_a_closed_form(by_key):
     """Meijaard et al. (2007), Table 2: 6.02426201538837 m/s; here by bisection of det(g K0 + v² K2)."""
     K0 = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])
     K2 = np.array([[0, 76.59734589573222], [0, 2.65431523794604]])
@@ -316,7 +316,7 @@ def test_the_speed_of_capsize_is_a_closed_form(by_key) -> None:
     assert by_key["conclusion-numerical"].verdict == FAILS
 
 
-def test_a_bicycle_that_is_stable_backward() -> None:
+def test_a_bicycle_that_is_stable_backward():
     """In the sense of the paper's own polynomial, with both masses behind the rear contact."""
     design = fractions("backward_design")
     assert design[0] < 0 < design[6]
@@ -324,7 +324,7 @@ def test_a_bicycle_that_is_stable_backward() -> None:
     assert not oracles.routh_exact(oracles.polynomial_exact(-design[0], *design[1:]))
 
 
-def test_no_sampled_bicycle_with_chi_H_above_0_is_stable_backward() -> None:
+def test_no_sampled_bicycle_with_chi_H_above_0_is_stable_backward():
     rng = np.random.default_rng(3)
     for _ in range(3000):
         values = [
@@ -343,7 +343,7 @@ def hand(Fr, T):
     return [c / a[0] for c in a]
 
 
-def test_the_EP4_is_not_where_the_tangent_is_vertical() -> None:
+def test_the_EP4_is_not_where_the_tangent_is_vertical():
     """With Fr² = 36 T²/(12 T − 2), dFr²/dT = 0 at T = 1/3, where p is no fourth power; the EP4 is at T = 17/48."""
     T = sympy.Symbol("T")
     square = 36 * T**2 / (12 * T - 2)
@@ -356,7 +356,7 @@ def test_the_EP4_is_not_where_the_tangent_is_vertical() -> None:
     assert oracles.exact_multiplicities(hand(Fraction(17, 12), Fraction(17, 48))) == [(4, 1)]
 
 
-def test_the_tangent_of_the_printed_curve_in_the_figure(by_key) -> None:
+def test_the_tangent_of_the_printed_curve_in_the_figure(by_key):
     with mp.workdps(60):
         omega0, zeta_B = -mp.mpf(25) / 2, mp.mpf(-2) / 5
         square = mp.sqrt(-omega0)
@@ -372,7 +372,7 @@ def test_the_tangent_of_the_printed_curve_in_the_figure(by_key) -> None:
         assert abs(curve(turn) - mp.sqrt(5)) < mp.mpf(10) ** -30
 
 
-def test_shallow_bicycles_have_no_pairs_of_double_roots() -> None:
+def test_shallow_bicycles_have_no_pairs_of_double_roots():
     """tan λ_s = 1/10 is below the pole: heavily damped at ever greater speeds, by the discriminant and certified roots."""
     for Fr in (2, 10, 1000):
         roots = oracles.certified_roots(hand(Fraction(Fr), Fraction(1, 10)))
@@ -380,7 +380,7 @@ def test_shallow_bicycles_have_no_pairs_of_double_roots() -> None:
     assert oracles.exact_multiplicities(hand(Fraction(3, 2), Fraction(1, 4))) == [(2, 2)]
 
 
-def test_negative_eigenvalues_first_move_apart(by_key) -> None:
+def test_negative_eigenvalues_first_move_apart(by_key):
     def reals(Fr):
         return sorted(float(z.real) for z, _ in oracles.certified_roots(hand(Fraction(Fr), Fraction(1, 4))))[:2]
 
@@ -397,7 +397,7 @@ def test_negative_eigenvalues_first_move_apart(by_key) -> None:
     assert spans[1] > max(spans[0], spans[2])
 
 
-def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers() -> None:
+def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers():
     """Two modes of the linear system itself, scaled to leans 1 and −1: the lean starts at 0 and grows."""
     with mp.workdps(30):
         lean_angle = mp.atan(mp.mpf(1) / 4)
@@ -414,7 +414,7 @@ def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers() -> None:
         assert lean[0] == 0 < lean[2] < lean[1]
 
 
-def test_slow_heavily_damped_bicycles_stand_off_the_plane() -> None:
+def test_slow_heavily_damped_bicycles_stand_off_the_plane():
     """Eigenvalues −6, −4, −3, −1/72 chosen; the design from a1, a2, a3 over a0 in fractions."""
     x = [Fraction(6), Fraction(4), Fraction(3), Fraction(1, 72)]
     e1, e3 = sum(x), sum(1 / k for k in x)
@@ -429,20 +429,20 @@ def test_slow_heavily_damped_bicycles_stand_off_the_plane() -> None:
         assert not all(z.imag == 0 and z.real < 0 for z, _ in roots)
 
 
-def test_dp_is_empty_for_lower_rear_mass() -> None:
+def test_dp_is_empty_for_lower_rear_mass():
     """ζ_B = −1/2, ζ_H = −2: ω0 = −1, and (tls) in fractions."""
     zeta_B, zeta_H = Fraction(-1, 2), Fraction(-2)
     total = zeta_B + zeta_H
     assert (zeta_B - zeta_H) / (16 * zeta_H) * (total - 6) / (total - 2) == Fraction(-17, 192)
 
 
-def test_the_abscissa_below_that_of_the_optimised_benchmark() -> None:
+def test_the_abscissa_below_that_of_the_optimised_benchmark():
     design = [Fraction(x) for x in ("2.243", "5.82", "1.3366", "1.02", "-0.4", "-0.2", "0.5573")]
     roots = oracles.certified_roots(oracles.polynomial_exact(*design))
     assert max(z.real for z, _ in roots) < -1.2
 
 
-def test_an_exceptional_point_that_is_no_minimum() -> None:
+def test_an_exceptional_point_that_is_no_minimum():
     x = sympy.Symbol("x")
     assert sympy.solve(
         sympy.discriminant(sympy.Symbol("s") ** 2 + 2 * x * sympy.Symbol("s") + x**2 + x - 1, sympy.Symbol("s")), x
@@ -453,7 +453,7 @@ def test_an_exceptional_point_that_is_no_minimum() -> None:
 # Statements that were proved by exact algebra, by sampling
 
 
-def test_heavy_damping_is_never_steeper_than_the_EP4_or_the_2EP2() -> None:
+def test_heavy_damping_is_never_steeper_than_the_EP4_or_the_2EP2():
     """Four random negative roots with product 1 (over |ω0|) fix the tilt and the speed; r = √2."""
     rng = np.random.default_rng(5)
     r, h = np.sqrt(2), np.sqrt(2) / 5
@@ -484,7 +484,7 @@ def test_heavy_damping_is_never_steeper_than_the_EP4_or_the_2EP2() -> None:
     assert np.all(tilt[faster] <= f * (r - 1) / (2 * U * h) * (1 + 1e-9))
 
 
-def test_the_cusp_is_a_triple_root(by_key) -> None:
+def test_the_cusp_is_a_triple_root(by_key):
     with mp.workdps(60):
         chi_B = mp.sqrt(2) - mp.mpf("0.1")
 
@@ -498,7 +498,7 @@ def test_the_cusp_is_a_triple_root(by_key) -> None:
         assert abs(found[0] / mp.mpf(by_key["fig2-left"].computed) - 1) < mp.mpf(10) ** -38
 
 
-def test_the_standstill_identity_symbolically() -> None:
+def test_the_standstill_identity_symbolically():
     """ζ_H > ζ_B is necessary because a2 < 0 at Fr = 0 where a0, a4 > 0."""
     expressions, s = oracles.symbolic_copo()
     a0, a2, a4 = (expressions[k].subs(s["Fr"], 0) for k in (0, 2, 4))
@@ -506,7 +506,7 @@ def test_the_standstill_identity_symbolically() -> None:
     assert sympy.expand(-a2 * (B + mu * H) + a4 * (B**2 + mu * H**2) + a0 * (1 + mu)) == 0
 
 
-def test_the_machine_of_the_photograph_has_an_EP4(by_key) -> None:
+def test_the_machine_of_the_photograph_has_an_EP4(by_key):
     """With the μ, λ_s and Fr that the entry names: rounded to six digits the coefficients match to about as many."""
     text = by_key["fige-abscissa"].remark
     mu, T, Fr = (float(text.split(f"{name} = ")[1].split(" ")[0].rstrip(",")) for name in ("μ", "tan λ_s", "Fr"))
@@ -518,7 +518,7 @@ def test_the_machine_of_the_photograph_has_an_EP4(by_key) -> None:
 # What a reader sees
 
 
-def test_the_text_fits_the_page_and_counts(ledger) -> None:
+def test_the_text_fits_the_page_and_counts(ledger):
     text = ledger_table(ledger)
     assert max(map(len, text.splitlines())) <= 100
     for entry in ledger.entries:
@@ -526,12 +526,12 @@ def test_the_text_fits_the_page_and_counts(ledger) -> None:
     assert text.splitlines()[-1].split() == [str(len(ledger.entries)), "entries"]
 
 
-def test_the_page_in_the_repository_is_the_ledger(ledger) -> None:
+def test_the_page_in_the_repository_is_the_ledger(ledger):
     again = "`tmsopt verify --markdown problems/paper.md` writes it anew"
     assert PAGE.read_text(encoding="utf-8") == ledger_page(ledger), again
 
 
-def test_the_documentation_counts_as_the_ledger(ledger) -> None:
+def test_the_documentation_counts_as_the_ledger(ledger):
     text = " ".join((PAGE.parents[1] / "docs" / "explanation" / "paper.md").read_text(encoding="utf-8").split())
     verdicts = Counter(entry.verdict for entry in ledger.entries)
     assert f"{len(ledger.entries)} numbers and statements" in text
@@ -539,7 +539,7 @@ def test_the_documentation_counts_as_the_ledger(ledger) -> None:
     assert f"{verdicts[CONDITIONAL]} hold only under a condition" in text
 
 
-def test_the_command(tmp_path) -> None:
+def test_the_command(tmp_path):
     runner = CliRunner()
     found = runner.invoke(main, ["verify", "--only", "tab1-*", "--only", "epset", "--json"])
     assert found.exit_code == 0

@@ -4,7 +4,6 @@ import json
 import math
 import subprocess
 import sys
-from itertools import pairwise
 from pathlib import Path
 
 import mpmath
@@ -12,30 +11,27 @@ import numpy as np
 import pytest
 import sympy
 from click.testing import CliRunner
-from helpers.oracles import is_stable_60, polynomial_60, roots_60, weave_Fr_60
+from helpers.oracles import is_stable_60, polynomial_60, weave_Fr_60
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tmsopt import laws
 from tmsopt.cli import every as main
-from tmsopt.models import Model, Parameter, ParameterSet, tms
 from tmsopt.paper import (
     benchmark,
     ep_set,
     experiment,
     experimental,
     heavy_section,
-    locus,
+    multiple_roots,
     normalised,
     optimised,
     sketch,
     spire,
     spire_faces,
-    stability_margin,
     table_1,
     table_1_loci,
     table_1_paths,
-    universal_path,
 )
 from tmsopt.plots import Name, draw_bicycle, draw_distance, new_figure, place_names, save
 from tmsopt.plots.paper import (
@@ -172,107 +168,41 @@ def rows():
     return table_1_loci()
 
 
-def test_roots_of_the_law_run_on_the_circle_below_the_exceptional_point(rows):
-    """At χ_B = √2 complex roots have |s| = |ω0| until the EP; both pairs meet at CEP2, hence half the digits."""
+def test_the_root_locus_shows_the_roots_of_the_law(rows):
+    """At χ_B = √2 complex roots have |s| = |ω0| until the EP, and cross the axis at Fr_c; both pairs meet at CEP2."""
     for row, end in zip(rows, (FR_EP4, 2.257421384, 4.103508160), strict=True):
-        ax = axes()
-        draw_row(ax, row, full_window(row), zoom=False)
+        ax, tilt = axes(), row.bicycle.parameters["lambda_s"]
+        draw_row(ax, row, full_window(row), 1)
         (circle,) = drawn(ax, "circle")
         assert np.hypot(*circle.T) == pytest.approx(-OMEGA0, rel=ROUNDING)
-        before = [t for t in row.loci[0].tracks if t.values[-1] <= end + 1e-8]  # printed to nine decimals
-        complex_roots = np.concatenate([t.s[t.s.imag != 0] for t in before])
-        assert complex_roots.size > 200
-        assert np.abs(complex_roots) == pytest.approx(-OMEGA0, abs=1e-6)
+        law = row.loci[0]
+        assert law.design == pytest.approx(end, abs=1e-8)  # printed to nine decimals
+        before = np.concatenate([m.roots for m in law.modes if m.values[-1] <= end + 1e-8 and m.roots.imag.any()])
+        assert before.size > 200
+        assert np.abs(before) == pytest.approx(-OMEGA0, abs=1e-6)
+        expected = np.concatenate([m.roots for data in row.loci for m in data.modes])
         points = np.concatenate(drawn(ax, "track"))
-        expected = np.concatenate([t.s for locus in row.loci for t in locus.tracks])
-        assert set(map(tuple, points)) == set(zip(expected.real, expected.imag, strict=True))
+        assert set(map(tuple, np.abs(points))) == set(zip(abs(expected.real), abs(expected.imag), strict=True))
+        (crossing,) = drawn(ax, "crossing")
+        assert crossing == pytest.approx(np.array([[0, -OMEGA0], [0, OMEGA0]]), rel=1e-12)
+        (onset,) = (c.at for c in law.events if c.changes)
+        assert onset == pytest.approx(float(laws.frm(-0.4, -0.2, tilt)), rel=1e-12)
+        for data in row.loci[1:]:  # off the law there is none
+            assert {name for name, _, _ in multiple_roots(data)} == {"EP2"}
 
 
-def test_exceptional_points_are_those_of_table_1(rows):
-    """Froude numbers as printed: exact for EP4, else nine decimals of which the last is off by up to five."""
-    expected = (("EP4", FR_EP4, 1e-12), ("2EP2", 2.257421384, 1e-8), ("CEP2", 4.103508160, 1e-8))
-    for row, (name, Fr, tolerance) in zip(rows, expected, strict=True):
-        (mark,) = (m for m in row.loci[0].marks if m.name == name)
-        assert mark.value == pytest.approx(Fr, abs=tolerance)
-        for other in row.loci[1:]:  # off the law there is none
-            assert {m.name for m in other.marks} == {"EP2"}
-    assert rows[0].loci[0].marks[-1].s == pytest.approx(np.array([OMEGA0 + 0j]), abs=1e-12)
-
-
-def test_marked_double_roots_are_double(rows):
+def test_marked_multiple_roots_are_multiple(rows):
     """p and p' vanish at 60 digits, relative to their terms: p to the square of the error of the place."""
+    names = []
     for row in rows:
-        for data, chi_B in zip(row.loci, (row.chi_B, row.chi_B - row.offset, row.chi_B + row.offset), strict=True):
-            for mark in data.marks:
-                a = polynomial_60(mark.value, 1.0, chi_B, 1.0, -0.4, -0.2, row.tilt)
-                for s in map(complex, mark.s):
-                    for c in (a, mpmath_derivative(a)):
-                        size = sum(abs(float(x)) * abs(s) ** k for k, x in enumerate(reversed(c)))
-                        assert abs(mpmath.polyval(c, s)) < 1e-7 * size
-        positive = next(m for m in row.loci[0].marks if m.s[0].real > 0)  # where the unstable real roots merge
-        assert positive.s[0] == pytest.approx(-OMEGA0, abs=1e-7)
-
-
-def mpmath_derivative(a):
-    return [x * (len(a) - 1 - k) for k, x in enumerate(a[:-1])]
-
-
-def test_tracks_are_roots_and_never_pass_an_exceptional_point(rows):
-    for row in rows:
-        for data, chi_B in zip(row.loci, (row.chi_B, row.chi_B - row.offset, row.chi_B + row.offset), strict=True):
-            for track in data.tracks:
-                assert np.all(np.diff(track.values) > 0)
-                assert np.abs(np.diff(track.s)).max() <= 0.02  # the resolution asked for
-                assert not [m for m in data.marks if track.values[0] < m.value < track.values[-1]]
-                for k in range(0, len(track.s), 149):
-                    a = polynomial_60(track.values[k], 1.0, chi_B, 1.0, -0.4, -0.2, row.tilt)
-                    size = sum(abs(float(x)) * abs(track.s[k]) ** j for j, x in enumerate(reversed(a)))
-                    assert abs(mpmath.polyval(a, complex(track.s[k]))) < 1e-12 * size
-            ends = sorted({(t.values[0], t.values[-1]) for t in data.tracks})
-            assert (ends[0][0], ends[-1][1]) == (0.0, 5.0)
-            # what the tracks leave out around a multiple root is too short to see
-            assert sum(b[0] - a[1] for a, b in pairwise(ends)) < 1e-3
-
-
-def test_a_track_follows_one_root(rows):
-    """Along every step the continuation agrees with Newton's method started from the root before it."""
-    row = rows[0]
-    for track in row.loci[1].tracks:
-        for k in range(0, len(track.s) - 1, 97):
-            a = [
-                complex(x)
-                for x in polynomial_60(track.values[k + 1], 1.0, row.chi_B - row.offset, 1.0, -0.4, -0.2, row.tilt)
-            ]
-            s = track.s[k]
-            for _ in range(30):
-                s -= np.polyval(a, s) / np.polyval(np.polyder(a), s)
-            assert s == pytest.approx(track.s[k + 1], abs=1e-6)
-
-
-def test_crossings_of_the_imaginary_axis(rows):
-    for row in rows:
-        (Fr, frequency) = row.loci[0].crossings[0]
-        assert Fr == pytest.approx(float(laws.frm(-0.4, -0.2, row.tilt)), rel=1e-12)
-        assert frequency == pytest.approx(-OMEGA0, rel=1e-12)
-    Fr, frequency = rows[2].loci[1].crossings[0]
-    found = roots_60(polynomial_60(Fr, 1.0, rows[2].chi_B - 0.1, 1.0, -0.4, -0.2, rows[2].tilt))
-    pair = max(found, key=lambda s: s.real)
-    assert abs(float(pair.real)) < 1e-12
-    assert abs(float(pair.imag)) == pytest.approx(frequency, rel=1e-12)
-
-
-def test_locus_over_another_parameter_passes_a_root_at_zero():
-    """a4 = −ζ_B T − μ (χ_H − 1) vanishes at T = tan λ_s = 0.05: a real root changes sign, and no pair crosses there."""
-    p = {**benchmark().parameters, "Fr": 2.0, "mu": 1.0}
-    data = locus(tms, tms.sets[0], p, "lambda_s", (0.01, 0.3))
-    changes = [
-        (t.values[k], t.values[k + 1])
-        for t in data.tracks
-        for k in np.flatnonzero((t.s.real[1:] * t.s.real[:-1] < 0) & (t.s.imag[1:] == 0))
-    ]
-    assert len(changes) == 1
-    assert changes[0][0] < math.atan(0.05) < changes[0][1]
-    assert not [value for value, _ in data.crossings if value < 0.06]
+        for data, shift in zip(row.loci, (0.0, -row.offset, row.offset), strict=True):
+            for name, Fr, s in multiple_roots(data):
+                a = polynomial_60(**{**row.bicycle.parameters, "chi_B": math.sqrt(2) + shift, "Fr": Fr})
+                for c in (a, [x * (4 - k) for k, x in enumerate(a[:-1])]):
+                    size = sum(abs(float(x)) * abs(s) ** k for k, x in enumerate(reversed(c)))
+                    assert abs(mpmath.polyval(c, s)) < 1e-7 * size
+                names += [name] if not shift else []
+    assert sorted(names) == ["2EP2"] * 2 + ["CEP2"] * 2 + ["EP2"] * 5 + ["EP4"]
 
 
 # The experimental bicycle
@@ -367,24 +297,11 @@ def heavy_exact(A1, A2, A3):
 
 
 def test_scaling_keeps_the_roots():
-    rng = np.random.default_rng(1)
-    a = rng.normal(size=(200, 5))
-    A, omega0 = normalised(a)
-    gap = a[:, 4] / a[:, 0] <= 0
-    assert np.array_equal(np.isnan(omega0), gap)
-    assert np.array_equal(np.isnan(A).any(axis=1), gap)
-    for c, scaled, w in zip(a[~gap], A[~gap], omega0[~gap], strict=True):
-        original = np.poly(np.roots(np.concatenate([[1.0], scaled, [1.0]])) * -w)
+    a = np.random.default_rng(1).normal(size=(200, 5))
+    a[:, 4] = np.abs(a[:, 4]) * np.sign(a[:, 0])
+    for c, scaled in zip(a, normalised(a), strict=True):
+        original = np.poly(np.roots(np.concatenate([[1.0], scaled, [1.0]])) * (c[4] / c[0]) ** 0.25)
         assert original == pytest.approx(c / c[0], rel=1e-9, abs=1e-9)  # companion roots, away from multiple ones
-
-
-def test_stability_margin_has_the_sign_of_the_roots():
-    rng = np.random.default_rng(2)
-    A = rng.uniform([-2, -2, -2], [6, 8, 6], (2000, 3))
-    rightmost = np.array([np.roots([1, *x, 1]).real.max() for x in A])
-    clear = np.abs(rightmost) > 1e-9
-    assert np.array_equal(stability_margin(A[clear]) > 0, rightmost[clear] < 0)
-    assert 100 < np.count_nonzero(rightmost < 0) < 1900
 
 
 def test_heavy_damping_in_the_section_by_exact_counts():
@@ -427,113 +344,32 @@ def test_spire_bounds_heavy_damping():
     assert counts == {True, False}  # one face bounds from below, two from above
 
 
-def test_paths_of_table_1():
-    """Fr_c and Fr_EP as printed (nine decimals, the last off by up to six); EP4 is (4, 6, 4)."""
-    paths = table_1_paths()
-    expected = (("EP4", FR_C_EP4, FR_EP4), ("2EP2", 1.482682090, 2.257421384), ("CEP2", 3.934331969, 4.103508160))
-    for path, (name, Fr_c, Fr_EP) in zip(paths, expected, strict=True):
-        assert [e.name for e in path.events] == ["stable", name]
-        assert [e.value for e in path.events] == pytest.approx([Fr_c, Fr_EP], abs=1e-8)
-        assert path.events[0].A[1] == pytest.approx(2, abs=1e-12)  # A2 = A1/A3 + A3/A1, in the plane A1 = A3
-        first, second, third = path.events[1].A
-        assert first == pytest.approx(third, rel=1e-12)
-        assert second == pytest.approx(2 + first**2 / 4, rel=1e-12)
-        assert path.omega0 == pytest.approx(OMEGA0, rel=ROUNDING)
-    assert list(paths[0].events[1].A) == pytest.approx([4, 6, 4], rel=1e-12)
-    assert paths[1].events[1].A[0] > 4 > paths[2].events[1].A[0]
-
-
-def test_drawn_paths_are_the_data():
+def test_drawn_paths_are_those_of_table_1():
+    """Stability begins at A2 = A1/A3 + A3/A1; the exceptional point is of the EP set, EP4 is (4, 6, 4)."""
     paths = table_1_paths()
     box, section = axes(projection="3d"), axes()
     draw_box(box, paths, spire_faces(8.0))
     draw_section(section, paths)
-    for path, flat in zip(paths, drawn(section, "path"), strict=True):
-        assert flat == pytest.approx(path.A[:, :2], abs=1e-9)  # A1 = A3 here
     solid = [line.get_data_3d() for line in box.lines if line.get_gid() == "path"]
-    for path, (x, y, z) in zip(paths, solid, strict=True):
-        shown = np.isfinite(x)
-        assert np.array_equal(np.stack([x, z, y], axis=1)[shown], path.A[shown])
-        assert np.all((path.A[~shown, [[0], [2]]] > 8) | (path.A[~shown, 1] > 18))  # only what is outside is left out
-    for ax, dims in ((section, 2), (box, 3)):
-        for name, point in (("EP4", (4, 6)), ("stable", (FR_C_EP4 * 4 / FR_EP4, 2))):
-            line = next(line for line in ax.lines if line.get_gid() == name)
-            data = line.get_data() if dims == 2 else [line.get_data_3d()[k] for k in (0, 2)]
-            assert [d[0] for d in data] == pytest.approx(point, rel=1e-9)  # at chi_H = 1, A1 is proportional to Fr
-    styles = {line.get_linestyle() for line in section.lines if line.get_gid() == "ep-set"}
-    assert styles == {"--", "-"}
-
-
-def test_off_the_plane_the_path_is_that_of_the_roots():
-    p = benchmark().parameters
-    path = universal_path(tms, tms.sets[0], p, "Fr", np.linspace(0.01, 4, 400))
-    (event,) = path.events
-    assert (event.name, event.value) == ("stable", pytest.approx(0.9070641497, abs=2e-10))
-    s = np.roots(np.concatenate([[1.0], path.A[250], [1.0]])) * abs(path.omega0[250])
-    found = roots_60(polynomial_60(**{**p, "Fr": path.values[250]}))
-    assert np.sort_complex(s) == pytest.approx(np.sort_complex(np.array([complex(z) for z in found])), rel=1e-9)
-
-
-def test_a_path_that_leaves_stability():
-    """The optimised bicycle over its tilt: EP4 at the printed tilt, then a loss of stability."""
-    p = optimised().parameters
-    path = universal_path(tms, tms.sets[0], p, "lambda_s", np.linspace(0.7, 1.2, 101))
-    assert [e.name for e in path.events] == ["EP4", "unstable"]
-    assert path.events[0].value == pytest.approx(0.8514403685, abs=5e-11)  # printed digits
-    for step, stable in ((-1e-9, True), (1e-9, False)):
-        assert is_stable_60(polynomial_60(**{**p, "lambda_s": path.events[1].value + step})) is stable
-
-
-def test_sweep_in_si_units():
-    """The EP4 design with w = 2 m: the same chart at v = Fr √(g w)."""
-    p = table_1()[0].parameters
-    si = {
-        "w": 2.0,
-        "g": 9.81,
-        "lambda_s": p["lambda_s"],
-        "m_B": 10.0,
-        "m_H": 1.0,
-        "x_B": 2 * math.sqrt(2),
-        "x_H": 2.0,
-        "z_B": -0.8,
-        "z_H": -0.4,
-    }
-    path = universal_path(tms, tms.parameter_set("SI"), si, "v", np.linspace(0.5, 15, 300))
-    speeds = [Fr * math.sqrt(2 * 9.81) for Fr in (FR_C_EP4, FR_EP4)]
-    assert [e.value for e in path.events] == pytest.approx(speeds, rel=1e-12)
-
-
-def quartic(p, q, r):
-    return [1, p, q, p, r]
-
-
-TOY = Model(
-    "toy",
-    "s⁴ + p s³ + q s² + p s + r",
-    4,
-    (ParameterSet("native", tuple(Parameter(n, "1", n, n) for n in "pqr"), dict),),
-    dict,
-    quartic,
-)
-
-
-def test_another_model_and_a_gap():
-    """σ⁴ + p σ³ + q σ² + p σ + 1 over q: stable from q = 2 and on the EP set at q = 2 + p²/4."""
-    path = universal_path(TOY, TOY.sets[0], {"p": 5.0, "r": 1.0}, "q", np.linspace(0, 10, 64))
-    assert [(e.name, e.value) for e in path.events] == [
-        ("stable", pytest.approx(2, rel=1e-12)),
-        ("2EP2", pytest.approx(8.25, rel=1e-12)),
-    ]
-    path = universal_path(TOY, TOY.sets[0], {"p": 5.0, "q": 6.0}, "r", np.linspace(-1, 1, 41))
-    assert np.array_equal(np.isnan(path.A[:, 0]), path.values <= 0)
-    ax = axes()
-    draw_section(ax, [path])
-    ((*_, last),) = [line[np.isfinite(line).all(axis=1)] for line in drawn(ax, "path")]
-    assert last == pytest.approx([5, 6])
-    flipped = universal_path(TOY, TOY.sets[0], {"p": -5.0, "r": 1.0}, "q", np.linspace(0, 10, 64))
-    assert not [e for e in flipped.events if e.name == "stable"]
-    with pytest.raises(ValueError, match="accepted: p q r"):
-        universal_path(TOY, TOY.sets[0], {"p": 5.0, "r": 1.0}, "Fr", [1.0])
+    for path, flat, (x, y, z) in zip(paths, drawn(section, "path"), solid, strict=True):
+        assert path.stable[1] == pytest.approx(2, abs=1e-12)
+        assert path.A[:, 0] == pytest.approx(path.A[:, 2], rel=1e-12)
+        assert path.exceptional == pytest.approx(ep_set(path.exceptional[0]), rel=1e-12)
+        assert flat == pytest.approx(path.A[:, :2])
+        shown = (path.A[:, 0] <= 8) & (path.A[:, 1] <= 18)
+        assert np.stack([x, z, y], axis=1) == pytest.approx(path.A[shown], rel=1e-12)
+        # at χ_H = 1, A1 is proportional to Fr
+        Fr_c, Fr_EP = {
+            "EP4": (FR_C_EP4, FR_EP4),
+            "2EP2": (1.482682090, 2.257421384),
+            "CEP2": (3.934331969, 4.103508160),
+        }[path.name]
+        assert path.stable[0] / path.exceptional[0] == pytest.approx(Fr_c / Fr_EP, abs=1e-8)
+        (mark,) = drawn(section, path.name)
+        assert mark[0] == pytest.approx(path.exceptional[:2])
+    assert paths[0].exceptional == pytest.approx([4, 6, 4], rel=1e-12)
+    assert paths[1].exceptional[0] > 4 > paths[2].exceptional[0]
+    assert {line.get_linestyle() for line in section.lines if line.get_gid() == "ep-set"} == {"--", "-"}
 
 
 # The command

@@ -469,14 +469,14 @@ def test_every_public_picture_is_tried_here_or_above():
     assert public == {*NAMES, "front", "histogram", "swallowtail", "distance"}
 
 
-def test_one_design_far_away_hides_no_other() -> None:
+def test_one_design_far_away_hides_no_other():
     """Forty values within 1 of 3, one at −1700: that one is counted, not shown."""
     near = import_module("tmsopt.plots.study")._near
     values = np.append(np.linspace(2.0, 4.0, 40), (-1700.0, np.nan))
     assert near(values).tolist() == [True] * 40 + [False, False]
 
 
-def test_letters_that_no_font_has_cost_no_warning(tmp_path: Path) -> None:
+def test_letters_that_no_font_has_cost_no_warning(tmp_path):
     """Drawn as boxes; warnings are errors here."""
     ax = tmsopt.plots.draw_growth(tmsopt.growth(Path(__file__).parents[2] / "problems" / "whipple_benchmark.toml"))
     ax.set_title("自行车 \U0001f6b2")

@@ -4,7 +4,6 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,19 +17,19 @@ FOREIGN = re.compile(r"weave|capsize|carrier|heav|(Re|Im)\W*s\b")
 
 
 @pytest.fixture(scope="module")
-def trimer() -> tmsopt.Solution:
+def trimer():
     return tmsopt.solve(TRIMER)
 
 
-def words_of(figure: Any) -> list[str]:
+def words_of(figure):
     return [re.sub(r"\\mathrm|[{}$]", "", t.get_text()) for t in figure.findobj(Text)]
 
 
-def eigenvalues(x: float, gain: float, loss: float) -> np.ndarray:
+def eigenvalues(x, gain, loss):
     return np.linalg.eigvals(np.array([[x + 1j * gain, 1, 0], [1, 0, 1], [0, 1, -1j * loss]]))
 
 
-def test_all_branches_are_drawn_to_their_ends(trimer: tmsopt.Solution) -> None:
+def test_all_branches_are_drawn_to_their_ends(trimer):
     """The eigenvalues of H themselves, over d1 at gain = loss = √2, where an EP3 is 0."""
     figure = plots.growth_figure(tmsopt.growth(trimer, over="d1"))
     upper, lower = figure.axes
@@ -54,7 +53,7 @@ def test_all_branches_are_drawn_to_their_ends(trimer: tmsopt.Solution) -> None:
         assert "EP3" in words_of(ax)
 
 
-def test_a_frequency_far_from_0_fills_the_picture() -> None:
+def test_a_frequency_far_from_0_fills_the_picture():
     """200 ± √(1 − g²): 0 is not among what is shown."""
     pair = tmsopt.models.from_hamiltonian([["200 + 1j*g", 1], [1, "200 - 1j*g"]])
     ax = plots.draw_frequencies(tmsopt.growth(tmsopt.Problem(pair, fixed={"g": 0.5}), over="g"))
@@ -63,7 +62,7 @@ def test_a_frequency_far_from_0_fills_the_picture() -> None:
     assert 200.99 < top < 202
 
 
-def test_roots_are_eigenfrequencies(trimer: tmsopt.Solution) -> None:
+def test_roots_are_eigenfrequencies(trimer):
     """−3 − 0.2i and 1 + 0.1i stand at (−3, −0.2) and (1, 0.1); an EP at 0 stands at 0."""
     apart = tmsopt.models.from_hamiltonian([["w - 0.2j", 0], [0, "1 + 0.1j"]])
     ax = plots.draw_roots(tmsopt.solve(tmsopt.Problem(apart, fixed={"w": -3.0})))
@@ -74,7 +73,7 @@ def test_roots_are_eigenfrequencies(trimer: tmsopt.Solution) -> None:
     assert right - left > 1
 
 
-def test_a_chart_and_a_trace_speak_of_h(trimer: tmsopt.Solution) -> None:
+def test_a_chart_and_a_trace_speak_of_h(trimer):
     fixed, free = {"k": 1.0, "loss": 1.0, "d3": 0.0}, {"gain": (0.2, 2.0), "d1": (-1.0, 1.0)}
     edge = tmsopt.Problem(trimer.problem.model, fixed=fixed, free=free, locate="weave")
     chart = tmsopt.chart(replace(edge, locate=None), points=(12, 12))
@@ -85,7 +84,7 @@ def test_a_chart_and_a_trace_speak_of_h(trimer: tmsopt.Solution) -> None:
     assert any("largest Im" in w for w in words_of(plots.chart_figure(chart, "abscissa")))
 
 
-def test_what_happens_over_a_phase_is_told_of_h() -> None:
+def test_what_happens_over_a_phase_is_told_of_h():
     """Where entries are no polynomials, crossings are found by halving, and are of ω all the same.
 
     H = [[5, e^(iφ)], [e^(iφ), 5]] − 0.5i has ω = 5 − 0.5i ± e^(iφ): Im ω = 0 at sin φ = 1/2, where Re ω = 5 + cos φ.

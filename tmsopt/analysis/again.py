@@ -10,10 +10,14 @@ from tmsopt.program.options import DEFAULTS
 from tmsopt.search.solve import solve_any_status
 
 
-def solved_again(solution: Solution, asked: Problem, starts: int) -> Solution:
-    """The solution of a problem with a limit moved, from an optimum of the unmoved one."""
-    near = {n: solution.parameters[n] for n in asked.free}
-    return solve_any_status(asked, replace(DEFAULTS, starts=starts, near=near), bound=False)
+def solve_again(solution: Solution, asked: Problem, starts: int, look: bool = True) -> Solution:
+    """The solution of a problem with a limit moved, from an optimum of the unmoved one.
+
+    Args:
+        look: whether to look at the whole box for designs that are better; else at this optimum alone.
+    """
+    options = replace(DEFAULTS, starts=starts, near={n: solution.parameters[n] for n in asked.free})
+    return solve_any_status(asked, options, without_sample=not look, bound=False)
 
 
 def moved(problem: Problem, name: str, step: float) -> Problem:

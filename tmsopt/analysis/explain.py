@@ -68,7 +68,7 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
     """Say what a solution means; of one that is not optimal, what can be said.
 
     Args:
-        resolve: check each multiplier by solving again with its limit moved, from the optimum.
+        resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
         progress: called with a `tmsopt.Progress` now and then.
 
     Example:

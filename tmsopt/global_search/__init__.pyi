@@ -1,4 +1,6 @@
-from .interlacing import interlace as interlace, interlacing as interlacing, unknowns as unknowns
+from .interlacing import (
+    interlace as interlace, interlacing as interlacing, squares_of as squares_of, unknowns as unknowns,
+)
 from .question import Question as Question
 from .race import SolverPool as SolverPool
 from .scip import SCIP as SCIP

@@ -6,13 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
+import numpy as np
+
+from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.walk import NotAccepted
 from tmsopt.global_search.question import Question
 from tmsopt.global_search.race import SolverPool
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import design_of, variables_of
+from tmsopt.program.starts import initial_point
 from tmsopt.progress import Counts
+
+_HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
 
 _AROUND = 1e-4  # of a range, which counts as
 _COARSE = 1e-2  # at least: SCIP cannot look closer
@@ -128,10 +134,34 @@ def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Con
     raise AssertionError  # unreachable: time ends
 
 
+def doubt(question: Question, design: Mapping[str, float]) -> str:
+    """Why the answer to a question would say nothing of a design that should be one; empty if it is admitted.
+
+    A wrong limit, range or equation would exclude the design itself: what is proved of the others would be worthless.
+    """
+    nearest: list[tuple[float, str]] = []
+    for sign in question.signs():
+        nlp = question.program(sign)
+        x = initial_point(nlp, question.problem, design)
+        rows = np.array(nlp.at(x)[1]).ravel()
+        reached = ranges(nlp.functions, list(zip(nlp.lower, nlp.upper, strict=True)))[1]
+        sizes = np.array([max(map(abs, ends)) for ends in reached])
+        sizes = np.where(np.isfinite(sizes), np.maximum(sizes, 1e-300), 1.0)
+        off = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / sizes
+        span = np.maximum(1.0, np.abs(x))
+        outside = np.maximum(np.array(nlp.lower) - x, x - np.array(nlp.upper)) / span
+        named = [*zip(off.tolist(), nlp.rows, strict=True), *zip(outside.tolist(), nlp.variables, strict=True)]
+        nearest.append(max(((np.inf if np.isnan(e) else e), name) for e, name in named))
+    if not nearest:
+        return "the question admits no design, so not even the one that was found"
+    excess, name = min(nearest)
+    return "" if excess <= _HOLDS else f"the question excludes the design that was found: {name} by {excess:.2g}"
+
+
 def contradicted(question: Question, design: Mapping[str, float], clock: Clock) -> bool:
     """Whether the solver finds nothing feasible even close around a design that is: then no answer of it is worth much.
 
-    A wrong limit, range or equation would exclude the design itself: what is proved of the others would be worthless.
+    `doubt` looks at the equations; this looks at what became of them in the solver, its ranges and tolerances included.
     """
     at = variables_of(question.problem, design)
     verdicts = []

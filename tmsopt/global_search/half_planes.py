@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -11,12 +12,13 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.algebra.intervals import Interval, ranges, root_bound
-from tmsopt.global_search.interlacing import interlace
+from tmsopt.global_search.interlacing import interlace, squares_of, unknowns
 from tmsopt.models import Model, Values
 from tmsopt.program.formulate import Builder
-from tmsopt.program.lifts import Lifted
+from tmsopt.program.lifts import Lifted, quadratic_pairs
 from tmsopt.program.nlp import AddedVariable
 from tmsopt.roots import Pattern, product, shift
+from tmsopt.roots.patterns.pattern import Roots
 
 _PLAIN = 4  # degree up to which the powers of the unit are near enough to 1
 
@@ -85,7 +87,8 @@ def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lift
         edges = interlace(build, case, c, frame.largest(over(build, c), case == covered[0]), frame.compact)
         if line is None and frame.touching and len(covered) == 1:
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
-    return _carried("abscissa", at)
+    size = (line is None) + len(looked) * unknowns(frame.model.degree)
+    return Lifted(ca.SX(at), AddedVariable("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ())
 
 
 def _reach(frame: Frame, build: Builder, looked: Sequence[int]) -> tuple[float, float]:
@@ -107,6 +110,7 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
     covered, values = build.covered, build.values
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
     looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
+    size = int(ratio is None)
     for case in looked:
         a = frame.coefficients(values, case)
         largest = frame.largest(over(build, a), case == covered[0])
@@ -115,6 +119,7 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
             w = build.variable(f"w{k}.{case}", 0.0, largest)
             q = build.variable(f"q{k}.{case}", -largest * largest, largest * largest) if ratio is None else w * w
+            size += 2 + (ratio is None)
             pairs.append(p)
             monic.append([1, p, q])
             build.row("damping_ratio", p - 2 * zeta * w, 0.0, np.inf)
@@ -123,6 +128,7 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
                 build.row("damping_ratio", w * w - q, 0.0, np.inf)
         if len(a) % 2 == 0:
             d = build.variable(f"d.{case}", 0.0 if ratio is not None else -largest, largest)
+            size += 1 + (ratio is None)
             monic.append([1, d])
             if ratio is None:
                 e = build.variable(f"e.{case}", 0.0, largest)
@@ -132,7 +138,8 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
             build.row("damping_ratio", other - one, 0.0, np.inf)
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
     build.row("damping_ratio", 1 - zeta, 0.0, np.inf)  # real roots would satisfy any larger one, too
-    return _carried("damping_ratio", zeta)
+    guess = partial(_sector_guess, frame, looked, ratio, build.unit)
+    return Lifted(ca.SX(zeta), AddedVariable("damping_ratio", size, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
@@ -149,6 +156,27 @@ def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
                     build.bounds[j - count] = (max(lower, -most), min(upper, most))
 
 
-def _carried(name: str, symbol: Any) -> Lifted:
-    """A root quantity by variables that need no start: branch and bound looks at all of their ranges."""
-    return Lifted(ca.SX(symbol), AddedVariable(name, 0, lambda values, z: []), (), ())
+def _half_plane_guess(
+    frame: Frame, covered: Sequence[int], line: float | None, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    """The least line, if it is not known, and squared frequencies."""
+    at = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
+    squares = [x for case in covered for x in squares_of([float(c) for c in frame.about(values, case, at)])]
+    return [[*([at] if line is None else []), *(x / (1 + x) if frame.compact else x for x in squares)]]
+
+
+def _sector_guess(
+    frame: Frame, covered: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    """Damping ratio, if it is not known, and factors; the roots are given in the unit of the NLP."""
+    factors = []
+    for case in covered:
+        split = quadratic_pairs(z[case] * unit / frame.unit)
+        for p, q in sorted((float(-r.sum().real), float(r.prod().real)) for r in split if len(r) == 2):
+            unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
+            factors += [p, abs(p) / 2 if unstable else math.sqrt(q), *([q] if ratio is None else [])]
+        for d in (-float(r[0].real) for r in split if len(r) == 1):
+            factors += [d, abs(d)] if ratio is None else [d]
+    if ratio is not None:
+        return [factors]
+    return [[min(float(values[case]["damping_ratio"]) for case in covered), *factors]]

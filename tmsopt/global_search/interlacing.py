@@ -9,7 +9,7 @@ c3 = x c1 and c2 x ≥ c0 x² + c4.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -71,3 +71,29 @@ def interlace(build: Rows, case: int, coefficients: Sequence[Any], largest: floa
         build.row("abscissa", expression, 0.0, np.inf)
     signs = nonnegative[len(coefficients) : len(coefficients) + count]
     return [coefficients[-1], *(signs or coefficients[1:2])]
+
+
+def squares_of(coefficients: Sequence[float]) -> list[float]:
+    """Squared frequencies for known coefficients that interlace best."""
+    return min(_candidates(coefficients), key=lambda squares: _violation(coefficients, squares))
+
+
+def _violation(coefficients: Sequence[float], squares: Sequence[float]) -> float:
+    equations, nonnegative = interlacing(coefficients, [(x, 1.0) for x in squares])
+    return float(max(*map(abs, equations), *(-e for e in nonnegative), 0.0))
+
+
+def _candidates(coefficients: Sequence[float]) -> Iterator[list[float]]:
+    """Zeros of the second part; values between those of the first, where the second vanishes; and 0."""
+    count = unknowns(len(coefficients) - 1)
+    for part in (coefficients[1::2], coefficients[0::2]):
+        alternating = np.array([c if k % 2 == 0 else -c for k, c in enumerate(part)])
+        found = np.roots(alternating) if np.any(alternating) else np.zeros(0)
+        squares = sorted((max(float(x.real), 0.0) for x in found), reverse=True)
+        if len(squares) == count:
+            yield squares
+        elif len(squares) == count + 1:
+            yield [(a + b) / 2 for a, b in pairwise(squares)]
+            yield squares[:-1]
+            yield squares[1:]
+    yield [0.0] * count

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from tmsopt.algebra.walk import NotAccepted
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.global_search.answer import Answer, Clock, answer, contradicted
+from tmsopt.global_search.answer import Answer, Clock, answer, contradicted, doubt
 from tmsopt.global_search.question import Question, unit_of
 from tmsopt.global_search.race import SolverPool
 from tmsopt.global_search.scip import SCIP
@@ -107,4 +107,4 @@ def _admits(question: Question, best: Evaluation, known: Mapping[str, float], cl
     """Whether the question for a line just right of a known design admits that design, as put and as solved."""
     design = {n: known[n] for n in question.problem.free}
     wider = replace(question, limit=best.structure.abscissa + _MARGIN * question.unit)
-    return not contradicted(wider, design, clock)
+    return not doubt(wider, design) and not contradicted(wider, design, clock)

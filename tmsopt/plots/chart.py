@@ -20,7 +20,7 @@ from tmsopt.charts.chart import Chart
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Model, in_words_of
 from tmsopt.plots.labels import AxisScale, Name, abscissa_label, events_of, finished, scale_of
-from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
+from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, entry, figure_of, on_axes
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit
@@ -92,18 +92,18 @@ def domain_curves(ax: Axes, domain: Domain, plane: Plane) -> list[Name]:
             )
     names = [Name(c.name, *(float(s.of(c.parameters[s.name])) for s in plane)) for c in domain.corners]
     for name in names:
-        ax.plot([name.x], [name.y], "o", color=MARK, markersize=4, zorder=5)
+        ax.plot(name.x, name.y, "o", color=MARK, markersize=4, zorder=5)
     return names
 
 
-def domain_handles(domain: Domain) -> list[Line2D]:
+def domain_handles(domain: Domain) -> list[Artist]:
     """Legend entries of the boundaries that occur."""
-    handles = []
     boundaries = (domain.parting, domain.stability, domain.heavy_damping)
-    for arcs, (words, (colour, width)) in zip(boundaries, _BOUNDARIES.items(), strict=True):
-        for style, how in dict.fromkeys(_KINDS.get(arc.kind, _OTHER) for arc in arcs):
-            handles.append(Line2D([], [], color=colour, linewidth=width, linestyle=style, label=words + how))
-    return handles
+    return [
+        entry(words + how, colour, style, linewidth=width)
+        for arcs, (words, (colour, width)) in zip(boundaries, _BOUNDARIES.items(), strict=True)
+        for style, how in dict.fromkeys(_KINDS.get(arc.kind, _OTHER) for arc in arcs)
+    ]
 
 
 def frame(ax: Axes, chart: Chart, plane: Plane) -> None:
@@ -269,7 +269,7 @@ def _fill_layer(ax: Axes, chart: Chart, plane: Plane, layer: str) -> None:
     figure.colorbar(mesh, ax=ax, label=label, extend="both" if low > known.min(initial=low) else "max")
 
 
-def _optimum(ax: Axes, chart: Chart, plane: Plane) -> list[Artist]:
+def _optimum(ax: Axes, chart: Chart, plane: Plane) -> list[Line2D]:
     """The best design of the plane, solved for or of the grid: a star, and the legend says which."""
     problem = chart.problem.nominal
     if problem.objective is not None or problem.pattern is not None:
@@ -288,19 +288,6 @@ def _optimum(ax: Axes, chart: Chart, plane: Plane) -> list[Artist]:
     return _mark(ax, float(x), float(y), "*", f"{word} on the grid, {values[row, column]:.4g}")
 
 
-def _mark(ax: Axes, x: float, y: float, marker: str, label: str) -> list[Artist]:
-    size = 12 if marker == "*" else 6
-    return [
-        *ax.plot(
-            [x],
-            [y],
-            marker,
-            color="#F0E442",
-            markeredgecolor=LINE,
-            markersize=size,
-            zorder=6,
-            label=label,
-            linestyle="none",
-            clip_on=False,
-        )
-    ]
+def _mark(ax: Axes, x: float, y: float, marker: str, label: str) -> list[Line2D]:
+    size, yellow = 12 if marker == "*" else 6, "#F0E442"
+    return ax.plot(x, y, marker, color=yellow, mec=LINE, markersize=size, zorder=6, label=label, clip_on=False)

@@ -3,7 +3,6 @@
 import re
 from itertools import pairwise
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -88,14 +87,8 @@ def _draw_two(ax: Axes, front: Front, values: Array) -> None:
     stable = [bool(p.stable) for p in front.points]
     for k, (a, b) in enumerate(pairwise(values)):
         if k not in gaps:
-            whole = stable[k] and stable[k + 1]
-            ax.plot(
-                *np.stack([a, b]).T,
-                color=LINE if whole else MARK,
-                linestyle="-" if whole else "--",
-                linewidth=1,
-                zorder=2,
-            )
+            colour, style = (LINE, "-") if stable[k] and stable[k + 1] else (MARK, "--")
+            ax.plot(*np.stack([a, b]).T, style, color=colour, linewidth=1, zorder=2)
         else:
             label = "not solved" if gaps[k].failed else "gap: no efficient design"
             ax.plot(*np.stack([a, b]).T, color=CAPSIZE, linewidth=0.8, linestyle=":", zorder=1, label=label)
@@ -108,7 +101,7 @@ def _draw_two(ax: Axes, front: Front, values: Array) -> None:
 
 
 def _draw_three(ax: Axes, front: Front, values: Array) -> None:
-    drawn = ax.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap=matplotlib.colormaps["viridis"], s=22, zorder=3)
+    drawn = ax.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap="viridis", s=22, zorder=3)
     figure_of(ax).colorbar(drawn, ax=ax, label=scale_of(front.problem, front.objectives[2]).label)
 
 
@@ -116,16 +109,7 @@ def _ring_unstable(ax: Axes, front: Front, values: Array) -> None:
     """A ring around each design that is not stable, or is not known to be."""
     rings = values[[not p.stable for p in front.points], :2]
     if len(rings):
-        ax.plot(
-            *rings.T,
-            "o",
-            color=LINE,
-            markerfacecolor="none",
-            markersize=8,
-            zorder=2.5,
-            label="not stable",
-            linestyle="none",
-        )
+        ax.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
 
 
 def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:

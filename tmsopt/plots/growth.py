@@ -15,11 +15,10 @@ from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
     CRITICAL,
-    HEAVY,
     LINE,
     MARK,
     REAL,
-    STABLE,
+    draw_bands,
     legend_below,
     new_figure,
     on_axes,
@@ -28,13 +27,6 @@ from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
 
 _DASHED, _DOTTED = (0, (6, 2)), (0, (4, 2, 1, 2))
-_STYLES: Mapping[str, tuple[str, LineStyleType]] = {
-    "weave": (CRITICAL, "-"),
-    "capsize": (MARK, _DASHED),
-    "castering": (REAL, _DOTTED),
-    "capsize + castering": (COMPLEX, "-"),
-    "second pair": (COMPLEX, _DASHED),
-}
 _OTHERS: Sequence[tuple[str, LineStyleType]] = (
     (CRITICAL, "-"),
     (MARK, _DASHED),
@@ -42,6 +34,8 @@ _OTHERS: Sequence[tuple[str, LineStyleType]] = (
     (COMPLEX, "-"),
     (LINE, _DASHED),
 )
+_STYLES = dict(zip(("weave", "capsize", "castering", "capsize + castering"), _OTHERS, strict=False))
+_STYLES["second pair"] = (COMPLEX, _DASHED)
 """Colours and lines of modes: of a bicycle by name, of others in their order at the design."""
 
 _EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
@@ -49,6 +43,12 @@ _EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
     "capsize": (MARK, "-."),
     "infinity": (CAPSIZE, (0, (1, 1))),
 }
+
+_LABELS = {
+    "real": (r"growth rate $\mathrm{Re}\,s$", "growth rate in 1/s"),
+    "imag": (r"frequency $\mathrm{Im}\,s$", "frequency in Hz"),
+}
+"""Without and with a unit of time."""
 
 _NOTHING = 1e-12  # of the range: less is 0 but for rounding
 
@@ -126,33 +126,19 @@ def _drawn(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
 def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     """Everything but the legend; the names of the modes, to place."""
     scale = scale_over(data.problem, data.over)
-    for bands, colour, alpha, words in (
-        (data.stable, STABLE, 0.18, "stable"),
-        (data.heavily_damped, HEAVY, 0.35, "heavily damped"),
-    ):
-        for k, ends in enumerate(bands):
-            ax.axvspan(*scale.of(ends), color=colour, alpha=alpha, linewidth=0, label=words if k == 0 else None)
+    draw_bands(ax, scale.of(data.stable), scale.of(data.heavily_damped))
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _reached(m, data.design))))
     for mode in data.modes:
         if part == "imag" and not (_of_H(data) or mode.roots.imag.any()):
             continue
         colour, style = _STYLES.get(mode.name, _OTHERS[names.index(mode.name) % len(_OTHERS)])
-        ax.plot(
-            scale.of(mode.values),
-            _part(data, mode, part),
-            color=colour,
-            linewidth=1.4,
-            linestyle=style,
-            zorder=2 + 0.01 * names.index(mode.name),
-        )  # whole lines below dashed ones
+        level = 2 + 0.01 * names.index(mode.name)  # whole lines below dashed ones
+        x, y = scale.of(mode.values), _part(data, mode, part)
+        ax.plot(x, y, color=colour, linewidth=1.4, linestyle=style, zorder=level)
     _marks(ax, data, scale, part)
-    unit = "" if data.rate is None else " in 1/s" if part == "real" else " in Hz"
-    symbol = rf" $\mathrm{{{'Re' if part == 'real' else 'Im'}}}\,s$" if data.rate is None else ""
-    label = ("growth rate" if part == "real" else "frequency") + symbol + unit
-    ax.set_ylabel(OF_H[part] if _of_H(data) else label)
-    ax.set_xlabel(scale.label)
-    low, high = scale.of([min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0], data.values[-1]])
-    ax.set_xlim(low, high)
+    label = _LABELS[part][data.rate is not None]
+    first = min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0]
+    ax.set(ylabel=OF_H[part] if _of_H(data) else label, xlabel=scale.label, xlim=scale.of([first, data.values[-1]]))
     _focus(ax, data, part)
     return _names(ax, data, scale, part, names)
 
@@ -189,23 +175,21 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     met = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind] + _multiple(data)
     if met:
         places, roots = zip(*met, strict=True)
-        ax.plot(
-            scale.of(places),
-            _heights(data, places, roots, part),
-            linestyle="none",
-            marker="o",
-            markersize=4.5,
-            color=LINE,
-            markerfacecolor="white",
-            zorder=4,
-            label=f"{'eigenfrequencies' if _of_H(data) else 'roots'} meet",
-        )
+        label = f"{'eigenfrequencies' if _of_H(data) else 'roots'} meet"
+        x, y = scale.of(places), _heights(data, places, roots, part)
+        ax.plot(x, y, "o", markersize=4.5, color=LINE, markerfacecolor="white", zorder=4, label=label)
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
 
 
 def _focus(ax: Axes, data: Growth, part: str) -> None:
     """Limits that show the roots around the design and the events, even where others run away."""
+    if _of_H(data):  # all there is
+        every = np.concatenate([_part(data, m, part) for m in data.modes] + [np.zeros(1 if part == "real" else 0)])
+        bottom, top = every.min(), every.max()
+        margin = _ROOM * (top - bottom) or _ROOM * abs(top) or _ROOM
+        ax.set_ylim(bottom - margin, top + margin)
+        return
     centres = [data.design, *(c.at for c in data.events if c.kind in ("weave", "capsize"))]
     low, high = min(centres), max(centres)
     room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
@@ -214,12 +198,6 @@ def _focus(ax: Axes, data: Growth, part: str) -> None:
         for m in data.modes
         if part == "real" or m.roots.imag.any()
     ]
-    if _of_H(data):  # all there is
-        every = np.concatenate([_part(data, m, part) for m in data.modes] + [np.zeros(1 if part == "real" else 0)])
-        bottom, top = every.min(), every.max()
-        margin = _ROOM * (top - bottom) or _ROOM * abs(top) or _ROOM
-        ax.set_ylim(bottom - margin, top + margin)
-        return
     near = np.concatenate([*shown, np.zeros(1)])
     bottom, top = (float(np.percentile(near, q)) for q in ((1, 99) if part == "real" else (0, 99)))
     margin = 0.2 * (top - bottom) or 0.1

@@ -13,7 +13,7 @@ from tmsopt.evaluation.law_rows import SAME_LAW
 from tmsopt.models import words_of
 from tmsopt.paper import Comparison, Ledger
 from tmsopt.plots.labels import Name, abscissa_label, finished, scale_of
-from tmsopt.plots.style import CRITICAL, STABLE, on_axes
+from tmsopt.plots.style import CRITICAL, STABLE, note, on_axes
 from tmsopt.search import Every
 
 _LEAST = 1e-17  # of differences on a logarithmic axis: those of no double
@@ -123,7 +123,7 @@ def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
     ax = on_axes(ax, 6.0, 1.2 + 0.3 * len(counts), f"{len(data.entries)} claims of the paper")
     _bars(ax, list(counts), [float(n) for n in counts.values()])
     for k, n in enumerate(counts.values()):
-        ax.annotate(str(n), (n, k), xytext=(4, 0), textcoords="offset points", fontsize=8, verticalalignment="center")
+        note(ax, str(n), (n, k), (4, 0), verticalalignment="center")
     ax.margins(x=0.12)
     ax.set_xlabel("claims")
     return finished(ax, own)
@@ -150,16 +150,15 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
     scales = [scale_of(problem, name) for name in [*problem.free][:2]]
     points = np.stack([s.of([d.parameters[s.name] for d in data.solutions]) for s in scales], axis=-1)
     if len(scales) < 2:
+        ax.set_ylabel(abscissa_label(problem))
         points = np.stack([points[:, 0], [d.abscissa for d in data.solutions]], axis=-1)
     proved = data.proved or (False,) * len(points)
     for wanted, inside, label in ((True, CRITICAL, "proved"), (False, "white", "found")):
         own_points = points[[p is wanted for p in proved]]
         if len(own_points):
             ax.plot(*own_points.T, "o", color=CRITICAL, markerfacecolor=inside, label=label, linestyle="none")
-    ax.set(xlabel=scales[0].label, ylabel=scales[1].label if len(scales) > 1 else abscissa_label(problem))
-    ax.set_xlim(*scales[0].of(problem.free[scales[0].name]))
-    if len(scales) > 1:
-        ax.set_ylim(*scales[1].of(problem.free[scales[1].name]))
+    for scale, letter in zip(scales, "xy", strict=False):
+        ax.set(**{f"{letter}label": scale.label, f"{letter}lim": scale.of(problem.free[scale.name])})
     names = [Name(f"{d.abscissa:.4g}", float(x), float(y)) for d, (x, y) in zip(data.solutions, points, strict=True)]
     return finished(ax, own, names)
 
@@ -175,14 +174,7 @@ def _bars(
     for kind, (colour, hatch) in enumerate(((CRITICAL, ""), (STABLE, "//"))):
         chosen = [k for k in range(len(names)) if (second[k] if second else False) is bool(kind)]
         if chosen:
-            ax.barh(
-                chosen,
-                [lengths[k] for k in chosen],
-                color=colour,
-                hatch=hatch,
-                edgecolor="white",
-                height=0.7,
-                label=words[kind] or None,
-            )
+            sizes, label = [lengths[k] for k in chosen], words[kind] or None
+            ax.barh(chosen, sizes, color=colour, hatch=hatch, edgecolor="white", height=0.7, label=label)
     ax.set_yticks(range(len(names)), names, fontsize=8)
     ax.invert_yaxis()

@@ -1,7 +1,5 @@
 """The motion of a design over time, and the path of its wheels."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -68,30 +66,17 @@ def _torques(motion: Simulation, ax: Axes) -> None:
 
 
 def _path(motion: Simulation, ax: Axes) -> None:
-    x = np.asarray(motion["x"])
-    ahead = dict(_contacts(motion))
-    for (name, column), colour in zip(ahead.items(), _COLOURS, strict=False):
-        ax.plot(x, np.asarray(motion[column]), color=colour, linewidth=1.2, label=name)
+    for end, colour in zip(("rear", "front"), _COLOURS, strict=False):
+        ax.plot(motion["x"], motion[f"y_{end}"], color=colour, linewidth=1.2, label=f"{end} contact")
     ax.invert_yaxis()  # seen from above, ahead is to the right
     unit = motion.units["x"]
     ax.set(xlabel=f"way of the rear contact in {unit}", ylabel=f"to the right in {unit}")
 
 
-def _contacts(motion: Simulation) -> Iterator[tuple[str, str]]:
-    yield from (("rear contact", "y_rear"), ("front contact", "y_front"))
-
-
 def _lines(motion: Simulation, ax: Axes, names: list[str], scale: float) -> None:
     for k, name in enumerate(names):
-        label = _LATEX.get(name, name)
-        ax.plot(
-            np.asarray(motion["t"]),
-            scale * np.asarray(motion[name]),
-            color=_COLOURS[k % 6],
-            linewidth=1.2,
-            linestyle="-" if k < 6 else "--",
-            label=label,
-        )
+        x, y, style = motion["t"], scale * np.asarray(motion[name]), "-" if k < 6 else "--"
+        ax.plot(x, y, style, color=_COLOURS[k % 6], linewidth=1.2, label=_LATEX.get(name, name))
     ax.axhline(0, color="0.6", linewidth=0.6, zorder=0, label="_0")
     ax.set_xlim(0, motion["t"][-1])
     unit = motion.units.get("t", "")

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from tmsopt.analysis import Diagnosis, Optimality
 from tmsopt.plots.labels import OF_H, finished
-from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, on_axes
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, note, on_axes
 from tmsopt.problem.solution import Solution
 from tmsopt.proofs import Proof
 
@@ -84,7 +84,7 @@ def _mark(ax: Axes, found: Mapping[tuple[float, float], int]) -> None:
     for place, m in found.items():
         ax.plot(*place, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
         if m > 1:
-            ax.annotate(f"{m}-fold", place, xytext=(7, 7), textcoords="offset points", fontsize=9)
+            note(ax, f"{m}-fold", place, (7, 7), fontsize=9)
 
 
 def _of_H(data: Any) -> bool:
@@ -116,18 +116,10 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
     for k, response in enumerate(data.responses):
         for law in response.laws[:1]:
             reach = min(max(law.below, law.above, 1e-15), 1.0)
-            eps = np.geomspace(1e-16, reach, 2)
-            label = rf"{response.parameter}: $\varepsilon^{{{law.branches.exponent}}}$"
-            ax.loglog(
-                eps,
-                law.branches.size * eps ** float(law.branches.exponent),
-                color=_COLOURS[k % 5],
-                label=label,
-                linestyle=_STYLES[k % 4],
-                marker="o",
-                markevery=[1],
-                markersize=4,
-            )
+            eps, power = np.array([1e-16, reach]), law.branches.exponent
+            label, style = rf"{response.parameter}: $\varepsilon^{{{power}}}$", "o" + _STYLES[k % 4]
+            shift = law.branches.size * eps ** float(power)
+            ax.loglog(eps, shift, style, color=_COLOURS[k % 5], label=label, markevery=[1], markersize=4)
     farthest = "root" if omega is None else "eigenfrequency"
     ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {farthest}")
     return finished(ax, own)

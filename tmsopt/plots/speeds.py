@@ -2,11 +2,12 @@
 
 import math
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from tmsopt.dynamics.speeds import Speeds
 from tmsopt.plots.labels import events_of, finished, scale_over
-from tmsopt.plots.style import CAPSIZE, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, on_axes
+from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, REAL, draw_bands, note, on_axes
 
 _COLOURS = {"weave": CRITICAL, "capsize": MARK, "infinity": CAPSIZE}
 _LEVELS = 3  # heights at which names stand in turn
@@ -32,26 +33,14 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
     at = data.parameters.get(data.parameter, data.lower)
     last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
     high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)
-    for bands, colour, label in ((data.stable, STABLE, "stable"), (data.heavily_damped, HEAVY, "heavily damped")):
-        for k, (a, b) in enumerate(bands):
-            low, end = scale.of([a, min(b, high)])
-            ax.axvspan(low, end, 0, 0.25, color=colour, label=None if k else label)
+    stable, damped = (np.minimum(bands, high) for bands in (data.stable, data.heavily_damped))
+    draw_bands(ax, scale.of(stable), scale.of(damped), (1, 1), 0.25)
     for k, event in enumerate(data.found):
         x, height = float(scale.of(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
         colour = _COLOURS.get(event.kind, REAL)
         ax.plot([x, x], [0, height], color=colour, linewidth=2.0 if event.changes else 0.9)
-        text = f"{words.get(event.kind, event.kind)} {x:.4g}"
-        left = event.at < (data.lower + high) / 2
-        ax.annotate(
-            text,
-            (x, height),
-            xytext=(3 if left else -3, 0),
-            textcoords="offset points",
-            fontsize=8,
-            color=LINE,
-            horizontalalignment="left" if left else "right",
-            verticalalignment="top",
-        )
+        side = 3 if event.at < (data.lower + high) / 2 else -3
+        note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")
     if data.parameter in data.parameters:
         label = f"design at {scale.unit.show(at, 4)}"
         ax.plot([scale.of(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False)

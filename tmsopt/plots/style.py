@@ -4,11 +4,16 @@ import warnings
 from collections.abc import Sequence
 from io import BytesIO
 from os import PathLike
+from typing import Any
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
+from numpy.typing import ArrayLike
 
 from tmsopt.files import path_of, write_atomic
 
@@ -18,6 +23,8 @@ STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00"
 REAL, COMPLEX, CAPSIZE = "#009E73", "#CC79A7", "#999999"
 """Real and complex exceptional points, the capsize boundary."""
 
+EDGE: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 0.6}
+"""Of filled markers."""
 
 _ENTRY = 2.6  # inches of a legend entry
 _TITLE = 11
@@ -53,12 +60,56 @@ def figure_of(ax: Axes) -> Figure:
     return figure
 
 
-def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+def legend_below(figure: Figure, handles: Sequence[Artist], columns: int | None = None) -> None:
     """One legend for the whole figure, below it, where it covers nothing; each label once."""
     once = {str(h.get_label()): h for h in handles}
     if once:
-        beside = min(len(once), int(figure.get_figwidth() / _ENTRY))
+        beside = columns or min(len(once), int(figure.get_figwidth() / _ENTRY))
         figure.legend(handles=list(once.values()), loc="outside lower center", ncols=beside, fontsize=8, frameon=False)
+
+
+def draw_bands(
+    ax: Axes,
+    stable: ArrayLike,
+    heavily_damped: ArrayLike,
+    alphas: tuple[float, float] = (0.18, 0.35),
+    top: float = 1,
+) -> None:
+    """Bands of stability and of heavy damping, up to a part of the height."""
+    kinds = (stable, STABLE, "stable"), (heavily_damped, HEAVY, "heavily damped")
+    for (bands, colour, words), alpha in zip(kinds, alphas, strict=True):
+        for k, (low, high) in enumerate(np.reshape(bands, (-1, 2))):
+            ax.axvspan(low, high, 0, top, color=colour, alpha=alpha, linewidth=0, label=None if k else words)
+
+
+def entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Artist:
+    """An entry of a legend: a line or a marker."""
+    return Line2D([], [], color=color, linestyle=style, label=label, **look)
+
+
+def note(ax: Axes, text: str, place: ArrayLike, offset: tuple[float, float], **look: Any) -> None:
+    """A text beside a point, by an offset in points."""
+    look = {"fontsize": 8, "horizontalalignment": "right" if offset[0] < 0 else "left", **look}
+    ax.annotate(text, _point(place), offset, textcoords="offset points", **look)
+
+
+def arrow(
+    ax: Axes,
+    start: ArrayLike,
+    end: ArrayLike,
+    head: tuple[float, float] = (0.25, 0.5),
+    zorder: float = 4,
+    **look: Any,
+) -> None:
+    """An arrow from point to point, its head (width, length) in parts of a letter."""
+    style = "-|>,head_width={},head_length={}".format(*head)
+    arrowprops = {"arrowstyle": style, "shrinkA": 0, "shrinkB": 0, **look}
+    ax.annotate("", _point(end), _point(start), arrowprops=arrowprops, zorder=zorder)
+
+
+def _point(place: ArrayLike) -> tuple[float, float]:
+    x, y = np.asarray(place, dtype=float)
+    return float(x), float(y)
 
 
 def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:

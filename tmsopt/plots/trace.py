@@ -52,7 +52,7 @@ def draw_trace(data: Trace, ax: Axes | None = None, horizontal: str | None = Non
     marked = [e for e in data.events if e.name not in _UNLABELLED]
     names = [Name(in_words_of(model, e.name), *(float(s.of(e.parameters[s.name])) for s in plane)) for e in marked]
     for name in names:
-        drawn.plot([name.x], [name.y], "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
+        drawn.plot(name.x, name.y, "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
     drawn.set(xlabel=plane[0].label, ylabel=plane[1].label)
     return finished(drawn, ax is None, names)
 

@@ -8,7 +8,7 @@ from tmsopt.algebra.walk import NotAccepted
 from tmsopt.errors import Fault, InputError
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.global_search.answer import Clock, answer, contradicted
+from tmsopt.global_search.answer import Clock, answer, contradicted, doubt
 from tmsopt.global_search.half_planes import over
 from tmsopt.global_search.question import Question, unit_of
 from tmsopt.global_search.race import SolverPool
@@ -102,8 +102,11 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     known = _known(design)
     if known.proven:
         return replace(design, bound=known), False
-    if contradicted(_question(design, -PROVEN), _free(design), clock):
-        return _in_vain(design, "no bound: the question excludes the design that was found"), False
+    admitted = _question(design, -PROVEN)
+    if words := doubt(admitted, _free(design)):
+        return _in_vain(design, f"no bound: {words}"), False
+    if contradicted(admitted, _free(design), clock):
+        return _in_vain(design, f"no bound: {SOLVER.name}'s relaxation excludes the design that was found"), False
     proved, failed = math.inf, 0.0
     converged = design.status == "optimal"
     while (level := _next(proved, failed, converged)) is not None and clock.left > 0:

@@ -1,34 +1,69 @@
 """The planes of the paper: domains with exact boundaries, the EP set, and the abscissa with the laws drawn in."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from tmsopt.paper.planes import Plane
+from tmsopt.paper.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, Plane, chi_B_plane, tilt_plane
 from tmsopt.plots.chart import class_handles, domain_curves, domain_handles, fill_classes, frame, plane_of
 from tmsopt.plots.labels import Name, place_all, place_names
-from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
+from tmsopt.plots.style import COMPLEX, HEAVY, MARK, REAL, STABLE, entry, legend_below, new_figure
 from tmsopt.plots.trace import draw_branch
 
-LAW_STYLE: Mapping[str, tuple[str, str]] = {
-    "Frc1": (CRITICAL, "-"),
-    "epset": (REAL, "-"),
-    "tls": (LINE, ":"),
-    "chib1": (LINE, ":"),
+_LAWS = {
+    "Frc1": (r"$\mathrm{Fr}_c$ (Frc1)", STABLE, "-"),
+    "epset": ("EP set (epset)", HEAVY, "-"),
+    "tls": (r"$\tan\lambda_s$ (tls)", "white", ":"),
+    "chib1": (r"$\chi_B$ (chib1)", "white", ":"),
 }
-"""Colour and line of each law."""
+"""Words, colour and line of each law over the colours of the abscissa."""
 
-_LAW_WORDS = {
-    "Frc1": r"$\mathrm{Fr}_c$ (Frc1)",
-    "epset": "EP set (epset)",
-    "tls": r"$\tan\lambda_s$ (tls)",
-    "chib1": r"$\chi_B$ (chib1)",
-}
+_LEAST, _GREATEST = -1.9, 0.1  # of the abscissa in colours
+
+_ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}_4} = 0.4107$ rad")
+
+EP_SET_HANDLES = [entry("2EP2", REAL, linewidth=2), entry("CEP2", COMPLEX, "--", linewidth=2)]
+"""Legend entries of the EP set."""
+
+
+def ep_set_figure() -> Figure:
+    """Stability and heavy damping with the EP set, on the laws."""
+    return _planes_figure([tilt_plane(), chi_B_plane()], _ON_LAW)
+
+
+def off_law_figure() -> Figure:
+    """The same beside the laws."""
+    titles = [
+        rf"(a) $\chi_B = \sqrt{{2}} {OFF_LAW_CHI_B:+g}$",
+        rf"(b) $\lambda_s = \lambda_s^{{\mathrm{{EP}}_4}} {OFF_LAW_TILT:+g}$ rad",
+    ]
+    return _planes_figure([tilt_plane(OFF_LAW_CHI_B), chi_B_plane(OFF_LAW_TILT)], titles)
+
+
+def abscissa_figure() -> Figure:
+    """The abscissa over both planes, one colour scale for them."""
+    figure, points = new_figure(10.4, 4.4), (480, 360)
+    panels = figure.subplots(1, 2)
+    for ax, make, title in zip(panels, (tilt_plane, chi_B_plane), _ON_LAW, strict=True):
+        plane = make(0, points, False)
+        grid, abscissa = plane.chart.grid, plane.chart.abscissa
+        values = np.clip(abscissa, _LEAST, _GREATEST)
+        mesh = ax.pcolormesh(*grid, values, cmap="cividis", vmin=_LEAST, vmax=_GREATEST, rasterized=True)
+        levels = np.arange(-1.75, 0.01, 0.25)
+        ax.contour(*grid, abscissa, levels=levels, colors="white", linewidths=0.5, linestyles="-")
+        for law, (x, y) in plane.laws.items():
+            words, colour, style = _LAWS[law]
+            ax.plot(x, y, style, color=colour, linewidth=1.5, label=words)
+        names = _draw_marked(ax, plane)
+        ax.legend(fontsize=7.5, facecolor="0.25", framealpha=0.85, loc="upper left", labelcolor="white")
+        frame(ax, plane.chart, plane_of(plane.chart))
+        place_names(ax, names)
+        ax.set_title(title, fontsize=10)
+    figure.colorbar(mesh, ax=panels.tolist(), label="spectral abscissa", extend="max")
+    return figure
 
 
 def draw_plane(ax: Axes, plane: Plane) -> list[Name]:
@@ -36,73 +71,38 @@ def draw_plane(ax: Axes, plane: Plane) -> list[Name]:
     chart, axes = plane.chart, plane_of(plane.chart)
     fill_classes(ax, chart, axes)
     names = domain_curves(ax, chart.domain, axes) if chart.domain is not None else []
-    if plane.ep_set is not None:
-        for branch in plane.ep_set.branches:
-            draw_branch(ax, branch, axes, width=2.0)
-    names += _draw_marked(ax, plane)
+    for branch in plane.ep_set.branches if plane.ep_set is not None else ():
+        draw_branch(ax, branch, axes, width=2.0)
     frame(ax, chart, axes)
-    return names
+    return names + _draw_marked(ax, plane)
 
 
 def plane_handles(plane: Plane) -> list[Artist]:
     """Legend entries of the classes and the curves of a plane."""
-    handles: list[Artist] = [*class_handles(plane.chart.kind, plane.chart.problem.model)]
-    if plane.chart.domain is not None:
-        handles += domain_handles(plane.chart.domain)
-    if plane.ep_set is not None:
-        handles.append(Line2D([], [], color=REAL, linewidth=2, label="2EP2"))
-        handles.append(Line2D([], [], color=COMPLEX, linewidth=2, linestyle="--", label="CEP2"))
-    return handles
-
-
-def draw_abscissa(ax: Axes, plane: Plane, low: float, high: float) -> ScalarMappable:
-    """The abscissa as colours and contours between two values, with the laws as curves."""
     chart = plane.chart
-    values = np.clip(chart.abscissa, low, high)
-    mesh = ax.pcolormesh(*chart.grid, values, cmap="cividis", vmin=low, vmax=high, rasterized=True)
-    levels = np.arange(-1.75, 0.01, 0.25)
-    ax.contour(*chart.grid, chart.abscissa, levels=levels, colors="white", linewidths=0.5, linestyles="-")
-    for label, (x, y) in plane.laws.items():
-        colour, line = LAW_STYLE[label]
-        colour = {LINE: "white", CRITICAL: "#56B4E9", REAL: "#E69F00"}[colour]
-        ax.plot(x, y, color=colour, linestyle=line, linewidth=1.5, label=_LAW_WORDS[label])
-    names = _draw_marked(ax, plane)
-    legend = ax.legend(fontsize=7.5, facecolor="0.25", framealpha=0.85, loc="upper left")
-    for text in legend.get_texts():
-        text.set_color("white")
-    frame(ax, chart, plane_of(chart))
-    place_names(ax, names)
-    return mesh
+    boundaries = domain_handles(chart.domain) if chart.domain is not None else []
+    ep_set = EP_SET_HANDLES if plane.ep_set is not None else []
+    return [*class_handles(chart.kind, chart.problem.model), *boundaries, *ep_set]
 
 
-def planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
+def _planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
     """Planes side by side."""
-    figure = new_figure(4.8 * len(planes), 5.0)
-    panels = np.atleast_1d(figure.subplots(1, len(planes)))
-    names = []
-    for ax, plane, title in zip(panels, planes, titles, strict=True):
-        names.append(draw_plane(ax, plane))
+    figure = new_figure(9.6, 5.0)
+    draw_planes(figure, figure.subplots(1, 2), planes, titles)
+    return figure
+
+
+def draw_planes(figure: Figure, panels: Sequence[Axes], planes: Sequence[Plane], titles: Sequence[str]) -> None:
+    """Planes with their titles, one legend for all, and their names."""
+    names = [draw_plane(ax, plane) for ax, plane in zip(panels, planes, strict=True)]
+    for ax, title in zip(panels, titles, strict=True):
         ax.set_title(title, fontsize=10)
     legend_below(figure, [h for plane in planes for h in plane_handles(plane)])
-    place_all(list(zip(panels, names, strict=True)))
-    return figure
-
-
-def abscissa_figure(planes: Sequence[Plane], titles: Sequence[str], low: float = -1.9, high: float = 0.1) -> Figure:
-    """The abscissa over planes side by side, one colour scale for all."""
-    figure = new_figure(4.8 * len(planes) + 0.8, 4.4)
-    panels = np.atleast_1d(figure.subplots(1, len(planes)))
-    mesh = None
-    for ax, plane, title in zip(panels, planes, titles, strict=True):
-        mesh = draw_abscissa(ax, plane, low, high)
-        ax.set_title(title, fontsize=10)
-    if mesh is not None:
-        figure.colorbar(mesh, ax=panels.tolist(), label="spectral abscissa", extend="max")
-    return figure
+    place_all([*zip(panels, names, strict=True)])
 
 
 def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
     for x, y in plane.marked.values():
-        ax.plot([x], [y], "o", color=MARK, markeredgecolor="white", markersize=6, zorder=6)
+        ax.plot(x, y, "o", color=MARK, markeredgecolor="white", markersize=6, zorder=6)
     words = {"least Fr_c": r"least $\mathrm{Fr}_c$"}
     return [Name(words.get(name, name), x, y) for name, (x, y) in plane.marked.items()]
