@@ -156,24 +156,13 @@ def _violated(
     for name, condition in conditions.items():
         at = looked.at(problem, condition)
         violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
-        if is_violated(problem, condition, violation, worst):
+        if not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, worst)):
             violations[name] = violation
             amounts[name] = float(condition.excess(float(condition(worst))))
     return violations, amounts
 
 
-def is_violated(
-    problem: Problem, condition: Expression, violation: float, values: Values | Mapping[str, float]
-) -> bool:
-    """Whether a condition is violated by so much of the size of its sides that it is not for rounding alone.
-
-    Args:
-        values: of the parameters, and of the root quantities that it names.
-    """
-    return not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, values))
-
-
-def _beyond(problem: Problem, condition: Expression, values: Values | Mapping[str, float]) -> bool:
+def _beyond(problem: Problem, condition: Expression, values: Values) -> bool:
     """Whether no design within `FEASIBLE` of another meets a condition, so that a small excess is none of rounding.
 
     Parameters move by so much of their size or of their range, root quantities of theirs; (Fr - 1.7)**4 <= 0 is missed
