@@ -4,7 +4,6 @@ An EP4 or EP2 is judged by its coefficients, in exact arithmetic on the very flo
 recomputed roots: those scatter by 4e-4 around a four-fold root.
 """
 
-import ast
 import inspect
 from fractions import Fraction
 from math import comb
@@ -95,18 +94,6 @@ def test_the_printed_coefficients_are_the_determinant() -> None:
         for mine, true, size in zip(a[:, i], oracles.polynomial_60(**design), sizes, strict=True):
             # a dozen roundings; the tangent of a tilt below 72 degrees loses no more
             assert abs(float(mine - true)) <= 16 * np.finfo(float).eps * size
-
-
-def test_the_printed_coefficients_are_the_determinant_symbolically() -> None:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = SYMBOLS.values()
-    printed = [
-        -(zeta_H * T - chi_H + 1) * zeta_B**2,
-        Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
-        Fr**2 * (zeta_B - zeta_H) * zeta_B - zeta_B * (zeta_B + zeta_H) * T - (chi_H - 1) * (mu * zeta_H - zeta_B),
-        -Fr * (chi_B - chi_H) * zeta_B,
-        -zeta_B * T - mu * (chi_H - 1),
-    ]
-    assert [sympy.expand(p - e) for p, e in zip(printed, EXPRESSIONS, strict=True)] == [0] * 5
 
 
 def test_matrices_give_copo() -> None:
@@ -201,14 +188,6 @@ def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio
     for design, solution in zip(laws.ep4(-1, ZB, ZH, 1.02), solutions, strict=True):
         for value, true in ((design.Fr, Fr), (design.mu, mu), (design.tan_lambda_s, T)):
             assert value == pytest.approx(float(solution[true].evalf(30)), rel=2e-14)
-
-
-def test_the_optimised_benchmark_to_twelve_digits() -> None:
-    """Digits beyond the paper's ten, from the exact solution of its equations (the test above)."""
-    design, other = laws.ep4(omega0=-1, zeta_B=ZB, zeta_H=ZH, chi_H=1.02)
-    values = (design.Fr, design.mu, design.lambda_s, design.chi_B)
-    assert values == pytest.approx((2.337214016650773, 20.8462670127613, 0.8514403685251676, 1.19), rel=1e-13)
-    assert other.mu < 0
 
 
 # Stability
@@ -370,15 +349,6 @@ def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists() -> None:
             assert np.isnan([design.Fr, design.mu, design.tan_lambda_s]).all()
     # zeta_H > 0, a hanging front mass: y = -1/2 and chi_H = 1/2 give the square 81/16 - 18
     assert np.isnan(laws.ep4(-1, ZB, 0.5, 0.5)[0].Fr)
-
-
-def test_ep4_tends_to_the_compact_form() -> None:
-    """At omega0 = `w01` the first branch reaches the chi_H = 1 design, at a rate linear in chi_H - 1."""
-    limit = laws.ep4_chi_H_1(ZB, ZH)
-    for step in (1e-3, -1e-3, 1e-6, -1e-6):
-        near = laws.ep4(laws.w01(ZB, ZH), ZB, ZH, 1 + step)[0]
-        for value, true in zip(near[:4], limit[:4], strict=True):
-            assert abs(value - true) < 10 * abs(step)
 
 
 # EP4, chi_H = 1
@@ -610,14 +580,6 @@ def test_every_label_is_a_law() -> None:
         assert hasattr(laws, {"4poly": "poly4"}.get(label, label))
 
 
-def test_laws_stand_alone() -> None:
-    """An oracle shares no code with what it checks."""
-    tree = ast.parse(inspect.getsource(laws))
-    imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert imported == {"numpy", "numpy.typing", "functools", "typing", "collections.abc"}
-
-
 # The oracles themselves
 
 
@@ -625,27 +587,6 @@ def _fraction(number) -> Fraction:
     """An mpf as it is stored, a dyadic rational."""
     sign, mantissa, exponent, _ = number._mpf_
     return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent
-
-
-def test_the_oracles_agree_with_each_other() -> None:
-    """mpmath with FLINT's balls, roots with coefficients, Routh with roots, Sylvester with SymPy."""
-    rng = np.random.default_rng(9)
-    s = sympy.Symbol("s")
-    verdicts = []
-    for degree in (1, 2, 3, 4, 4, 4, 5, 6) * 2:
-        a = [int(c) for c in rng.integers(1, 30, degree + 1)]
-        a = a if rng.uniform() < 0.7 else [-c for c in a]
-        roots = oracles.roots_60(a)
-        certified = [root for root, count in oracles.certified_roots(a) for _ in range(count)]
-        for root in roots:
-            assert min(abs(root - other) for other in certified) < mp.mpf(10) ** -55
-        assert all(abs(c * a[0] - d) < 1e-55 for c, d in zip(oracles.elementary(roots), a, strict=True))
-        verdicts.append(oracles.routh_exact(a))
-        assert verdicts[-1] == oracles.is_stable_60(a)
-        if degree > 1:
-            true = sympy.discriminant(sympy.Poly(a, s))
-            assert oracles.discriminant_exact(a) == Fraction(int(true))
-    assert {True, False} == set(verdicts)
 
 
 @pytest.mark.parametrize(
@@ -665,14 +606,3 @@ def test_the_oracles_on_multiple_roots(coefficients, structure, stable) -> None:
     rebuilt = oracles.elementary(oracles.roots_60(coefficients))
     assert all(abs(c * coefficients[0] - d) < 1e-55 for c, d in zip(rebuilt, coefficients, strict=True))
     assert (oracles.discriminant_exact(coefficients) == 0) == (structure[-1][0] > 1)
-
-
-def test_the_exact_polynomial_is_the_60_digit_one() -> None:
-    parameters = designs(20, seed=10)
-    for i in range(20):
-        design = one(parameters, i)
-        with mp.workdps(60):
-            T = _fraction(mp.tan(mp.mpf(design["lambda_s"])))
-        rational = oracles.polynomial_exact(*list(design.values())[:-1], T)
-        for a, b in zip(rational, oracles.polynomial_60(**design), strict=True):
-            assert abs(a - _fraction(b)) < Fraction(1, 10**55)

@@ -7,7 +7,6 @@ import pickle
 from dataclasses import FrozenInstanceError, replace
 from importlib import import_module
 from itertools import pairwise
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -124,36 +123,6 @@ def test_every_point_is_on_the_closed_form(front):
         assert (abscissa, Fr) == (p.solution.abscissa, p.solution.parameters["Fr"])
 
 
-def test_no_design_of_a_grid_dominates_the_closed_form():
-    """Designs over the whole box and, finely, around the front; roots of far-apart designs are good to 1e-6."""
-    rng = np.random.default_rng(1)
-    box = rng.uniform([0.01, 1.01, T_MIN], [2.4, 3.0, 1.0], (20_000, 3))
-    sigmas = rng.uniform(0.31, 1.8, 40)
-    centres = [on_one_line(s, best_W(s)) for s in sigmas]
-    scales = 10 ** rng.uniform(-3, -1, (40, 250, 1))
-    around = (np.array(centres)[:, None, :] * (1 + scales * rng.normal(size=(40, 250, 3)))).reshape(-1, 3)
-    designs = np.vstack([box, around[(around[:, 2] >= T_MIN) & (around[:, 1] > 1)]])
-    abscissa = abscissas(*designs.T)
-    decaying = abscissa < -0.3
-    assert decaying.sum() > 2_000
-    sigma = np.linspace(0.3, -EP4[0], 150)
-    curve = np.array([least_Fr(s) for s in sigma])
-    # linear interpolation of a concave stretch lies below it, elsewhere above by less than h² max|Fr''|/8 = 1e-4
-    assert np.all(designs[decaying, 0] >= np.interp(-abscissa[decaying], sigma, curve) - 2e-4)
-    assert abscissa.min() > EP4[0]
-
-
-def abscissas(Fr, chi_B, T):
-    """Largest real parts of the roots, by companion matrices: u = Fr/T in the coefficients of `inverse`, turned round."""
-    u = Fr / T
-    c1, c3 = u * (chi_B * Z_H - Z_B) / H2, u * (chi_B - 1) / H2
-    c2 = (Z_B + Z_H - u * u * T * (Z_B - Z_H)) / H2
-    companion = np.zeros((len(Fr), 4, 4))
-    companion[:, 0, :] = -np.stack([c1, c2, c3, np.full_like(Fr, 1 / H2)], axis=1)
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1
-    return np.linalg.eigvals(companion).real.max(axis=1)
-
-
 def test_ends_are_EP4_and_the_decay_that_is_asked_for(front):
     first, last = front.points[0], front.points[-1]
     assert first.objectives == pytest.approx(EP4, abs=1e-12)  # a polished optimum
@@ -266,28 +235,6 @@ def test_an_end_at_a_bound_is_best_in_the_others_too():
 TILTED = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (math.radians(-80), math.radians(80))}
 
 
-def sides(forward, backward):
-    return SimpleNamespace(sides={"normal rake": forward, "reversed rake": backward})
-
-
-@pytest.mark.parametrize(
-    ("halves", "k", "limits", "end", "out"),
-    [
-        (sides(-1.0, 0.1), 1, {0: -0.3}, (0.0, 9.0), {"reversed rake"}),
-        (sides(-1.0, 0.1), 1, {0: 0.1}, (0.0, 9.0), set()),
-        (sides(-1.0, 0.1), 1, {0: -2.0}, (0.0, 9.0), set()),  # no half is left
-        (sides(-1.0, math.nan), 1, {0: -0.3}, (0.0, 9.0), set()),  # a half of which nothing is known
-        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 0.9), {"reversed rake"}),  # an end that meets the limit is better
-        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 1.1), set()),  # an end that does not
-        (sides(-1.0, 0.1), 0, {}, (-0.5, 1.1), {"reversed rake"}),
-    ],
-)
-def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
-    end = front_data.FrontPoint(end, None, ())
-    ask = subproblems.FrontSolver(problem(free=TILTED), options.Options(), ends=(end,), easier={0: halves})
-    assert ask._hopeless(subproblems.subproblem(ask, k, limits), ()) == out
-
-
 def test_a_half_that_is_left_out_is_not_searched(monkeypatch):
     searched, explore, asked = [], solve.explore, problem(free=TILTED, pareto=[], minimize="abscissa")
     monkeypatch.setattr(solve, "explore", lambda work, insist: searched.append(work.name) or explore(work, insist))
@@ -296,20 +243,6 @@ def test_a_half_that_is_left_out_is_not_searched(monkeypatch):
     )
     assert searched == ["normal rake"]
     assert found.value == pytest.approx(EP4[0], abs=1e-8)
-
-
-def test_designs_are_judged_by_other_limits_as_if_looked_at_anew():
-    limits = {"decay": "abscissa <= -0.3", "far": "chi_B >= 1.5"}
-    of = problem(free=TILTED, pareto=[], minimize="Fr", constraints=limits)
-    other = replace(of, constraints={**of.constraints, "decay": "abscissa <= -0.7"})
-    memory = sample.Remembered()
-    sample.Sampler(of, 0, memory).draw()
-    recalled, anew = sample.Sampler(other, 0, memory).draw(), sample.Sampler(other, 0).draw()
-    assert np.array_equal(recalled.u, anew.u)
-    assert np.array_equal(recalled.worth, anew.worth)
-    assert np.array_equal(recalled.violation, anew.violation)
-    with pytest.raises(AssertionError, match="more than their limits"):
-        sample.Sampler(replace(of, constraints={"decay": "abscissa <= -0.3", "far": "chi_B >= 2"}), 0, memory).draw()
 
 
 @pytest.mark.slow

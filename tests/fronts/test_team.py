@@ -67,13 +67,6 @@ def test_a_round_knows_what_the_rounds_before_met_and_nothing_else(processes):
     assert set(map(str, second.values())) == {str(({"here": 4}, 2))}
 
 
-def test_new_designs_come_first_and_the_oldest_are_forgotten():
-    old = sample.SampleCache({"here": np.arange(float(sample.REMEMBERED))[:, None]})
-    met = [sample.SampleCache({"here": np.concatenate([[[x], [x + 1]], old.refined["here"]])}) for x in (-8.0, -4.0)]
-    joined = team._joined(old, met).refined["here"].ravel()
-    assert joined.tolist() == [-8, -7, -4, -3, *range(sample.REMEMBERED - 4)]
-
-
 def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():
     with team.Team(1) as side_by_side:
         found = []

@@ -100,11 +100,8 @@ k = 1
 
 WRONG = {
     "unknown section": (GOOD, "[tolerances]", "[tolerance]", ""),
-    "unknown key of an objective": (GOOD, "minimize", "minimise", "objective"),
     "two senses": (GOOD, '"abscissa"', '"abscissa"\nmaximize = "v"', "objective"),
     "strict comparison": (GOOD, "u_H >= 0.02", "u_H > 0.02", "constraints.arm"),
-    "signs the other way round": (GOOD, "u_H >= 0.02", "u_H => 0.02", "constraints.arm"),
-    "two comparisons": (GOOD, "u_H >= 0.02", "1 >= u_H >= 0.02", "constraints.arm"),
     "a number for a limit": (GOOD, '"u_H >= 0.02"', "0.02", "constraints.arm"),
     "unknown parameter": (GOOD, "m_H = 3", "m_H = 3\ntrail = 0.1", "parameters"),
     "sets mixed": (GOOD, "m_H = 3", "m_H = 3\nmu = 0.1", "parameters"),
@@ -113,7 +110,6 @@ WRONG = {
     "no greatest value": (GOOD, "max = 4, ", "", "parameters.v"),
     "misspelt start": (GOOD, "start", "strat", "parameters.v"),
     "number in quotes": (GOOD, '"20 kg"', '"20"', "parameters.m_B"),
-    "list for a number": (GOOD, "m_H = 3", "m_H = [3]", "parameters.m_H"),
     "unknown model": (GOOD, '"tms"', '"TMS"', "model"),
     "unknown pattern": (GOOD, 'minimize = "abscissa"', 'locate = "EP1"', "objective.locate"),
     "tolerance of nothing": (GOOD, 'x_B = "5 mm"', 'c = "5 mm"', "tolerances"),
@@ -121,8 +117,6 @@ WRONG = {
     "unknown gain": (STEERED, "k_phidot = {", "k_phidott = {", "feedback"),
     "dimensionless gain of wheels": (STEERED, "k_phidot = {", "kappa_phidot = {", "feedback"),
     "unknown gain among parameters": (STEERED, "k_phi = -10", "k_fi = -10", "parameters"),
-    "gain without end": (STEERED, ', max = "5 N m s/rad"', "", "feedback.k_phidot"),
-    "gain in quotes": (STEERED, '"5 N m s/rad"', '"5"', "feedback.k_phidot.max"),
     "no lag": (STEERED, '"50 ms"', "0", "feedback.lag"),
     "feedback of one's own system": (OWN, "[parameters]", "[feedback]\nk_phi = 1\n[parameters]", "feedback"),
     "feedback that is no table": (GOOD, 'model = "tms"', 'model = "tms"\nfeedback = 3', "feedback"),
@@ -132,7 +126,6 @@ WRONG = {
     "study without problem": (STUDY, 'problem = "ep4.toml"\n', "", ""),
     "objective beside a study": (STUDY, "[vary]", '[objective]\nminimize = "Fr"\n[vary]', ""),
     "unknown matrix": (OWN, "M =", "Q =", "model"),
-    "matrix that is a row": (OWN, "M = [[1]]", "M = [1]", "model.M.0"),
 }
 
 

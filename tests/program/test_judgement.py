@@ -102,13 +102,3 @@ def test_a_design_without_motion_is_none() -> None:
     assert np.isfinite(found.worth).tolist() == [False, False, True, False]
     assert found.excess.tolist() == [[np.inf, np.inf, 0.0, np.inf]]
     assert set(recheck(stated, {"x": 0.0, "y": 1.0}).violations) == {"a0"}
-
-
-@pytest.mark.parametrize("shape", [(6,), (2, 3), (1, 6)])
-def test_designs_come_in_any_shape(shape: tuple[int, ...]) -> None:
-    stated, drawn = problem(minimize="abscissa"), designs(6, seed=1)
-    columns = {n: np.array([d[n] for d in drawn]) for n in stated.free}
-    flat = judgement.evaluate(stated, columns)
-    found = judgement.evaluate(stated, {n: c.reshape(shape) for n, c in columns.items()})
-    assert np.array_equal(found.worth, flat.worth.reshape(shape))
-    assert np.array_equal(found.excess, flat.excess.reshape(-1, *shape))
