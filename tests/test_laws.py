@@ -84,7 +84,7 @@ def ep4_defect(design: laws.EP4, mu: float, chi_H: float, zeta_B: float, zeta_H:
 # The polynomial
 
 
-def test_the_printed_coefficients_are_the_determinant() -> None:
+def test_the_printed_coefficients_are_the_determinant():
     """`copo` against det(M s^2 + V s + P)/(mu nu_H cos) from the printed matrices, at 60 digits."""
     parameters = designs(200, seed=1)
     a = laws.copo(**parameters)
@@ -96,7 +96,7 @@ def test_the_printed_coefficients_are_the_determinant() -> None:
             assert abs(float(mine - true)) <= 16 * np.finfo(float).eps * size
 
 
-def test_matrices_give_copo() -> None:
+def test_matrices_give_copo():
     parameters = designs(50, seed=2)
     M, V, P = laws.matrices(**parameters)
     assert M.shape == V.shape == P.shape == (50, 2, 2)
@@ -110,7 +110,7 @@ def test_matrices_give_copo() -> None:
         assert np.all(abs(determinant - value) < 1e-13 * scale)
 
 
-def test_poly4_is_the_product_of_its_roots() -> None:
+def test_poly4_is_the_product_of_its_roots():
     assert np.array_equal(laws.poly4(-1.5), [complex(c).real for c in oracles.elementary([-1.5] * 4)])
 
 
@@ -134,7 +134,7 @@ PRINTED = [
 
 
 @pytest.mark.parametrize(("value", "printed", "units"), [row[1:] for row in PRINTED], ids=[row[0] for row in PRINTED])
-def test_printed_decimals(value: float, printed: str, units: float) -> None:
+def test_printed_decimals(value, printed, units):
     unit = 10.0 ** -len(printed.partition(".")[2])
     assert abs(value - float(printed)) <= units * unit
 
@@ -151,12 +151,12 @@ def test_printed_decimals(value: float, printed: str, units: float) -> None:
     ],
     ids=["omega0", "chi_B", "tan lambda_s", "Fr_c", "Fr_EP4", "EP4 on the EP set"],
 )
-def test_printed_radicals(value: float, printed: float) -> None:
+def test_printed_radicals(value, printed):
     """Table 1, first row."""
     assert value == pytest.approx(printed, rel=1e-14)  # some ten roundings
 
 
-def test_the_benchmark_equations_are_the_general_ones() -> None:
+def test_the_benchmark_equations_are_the_general_ones():
     """`e1`, `e2`, `e3` are a2 - 6 a0, a4 - a0, p(-1) with exact decimals: they differ by rounding only."""
     rng = np.random.default_rng(3)
     Fr, mu, lambda_s = rng.uniform(0, 4, 20), rng.uniform(0, 30, 20), rng.uniform(0, 1.2, 20)
@@ -170,7 +170,7 @@ def test_the_benchmark_equations_are_the_general_ones() -> None:
     assert np.allclose(laws.e1(Fr, mu, lambda_s), ZB * laws.a2(Fr, mu, 1.02, ZB, ZH, lambda_s, -1), atol=1e-14)
 
 
-def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio() -> None:
+def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio():
     """The paper's uniqueness claim, by exact elimination; `ep4` returns both solutions."""
     Fr, mu, T = sympy.symbols("Fr mu T")
     decimal = sympy.Rational
@@ -193,7 +193,7 @@ def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio
 # Stability
 
 
-def test_flus_is_where_the_60_digit_determinant_vanishes() -> None:
+def test_flus_is_where_the_60_digit_determinant_vanishes():
     """Every chi_H, both signs of lambda_s; where the square is negative there is no root to find."""
     parameters = designs(60, seed=4)
     del parameters["Fr"]
@@ -208,7 +208,7 @@ def test_flus_is_where_the_60_digit_determinant_vanishes() -> None:
             assert found is None
 
 
-def test_stability_begins_at_Fr_c() -> None:
+def test_stability_begins_at_Fr_c():
     """The paper's claim, decided by 60-digit roots 1e-8 of it below and above; both classes of design."""
     parameters = designs(4000, seed=5)
     above = laws.lscf_complete(**parameters)
@@ -229,20 +229,20 @@ def judged():
     return parameters, routh
 
 
-def test_the_complete_conditions_are_exact(judged) -> None:
+def test_the_complete_conditions_are_exact(judged):
     parameters, routh = judged
     assert routh.sum() > 100
     assert np.array_equal(laws.lscf_complete(**parameters), routh)
 
 
-def test_the_printed_conditions_hold_for_positive_tilt_and_chi_H_from_1(judged) -> None:
+def test_the_printed_conditions_hold_for_positive_tilt_and_chi_H_from_1(judged):
     parameters, routh = judged
     regime = (parameters["lambda_s"] > 0) & (parameters["chi_H"] >= 1)
     assert routh[regime].sum() > 20
     assert np.array_equal(laws.lscf(**parameters).all(axis=0)[regime], routh[regime])
 
 
-def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged) -> None:
+def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged):
     """Necessary, not sufficient: a third of the designs they admit are unstable. With a1 > 0 none is."""
     parameters, routh = judged
     regime = (parameters["lambda_s"] > 0) & (parameters["chi_H"] < 1)
@@ -255,7 +255,7 @@ def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged) -> None:
     assert np.array_equal((printed & (a1 > 0))[regime], routh[regime])
 
 
-def test_the_printed_conditions_mirrored_hold_for_negative_tilt(judged) -> None:
+def test_the_printed_conditions_mirrored_hold_for_negative_tilt(judged):
     """As printed they admit no design there; with the first four and a1 reversed, just the stable ones."""
     parameters, routh = judged
     regime = parameters["lambda_s"] < 0
@@ -266,7 +266,7 @@ def test_the_printed_conditions_mirrored_hold_for_negative_tilt(judged) -> None:
     assert np.array_equal(mirrored[regime], routh[regime])
 
 
-def test_flus_is_positive_where_a0_a1_a3_a4_agree_and_chi_H_is_positive(judged) -> None:
+def test_flus_is_positive_where_a0_a1_a3_a4_agree_and_chi_H_is_positive(judged):
     parameters, _ = judged
     a = laws.copo(**parameters)
     agree = (np.abs(np.sign(a[[0, 1, 3, 4]]).sum(axis=0)) == 4) & (parameters["chi_H"] > 0)
@@ -275,7 +275,7 @@ def test_flus_is_positive_where_a0_a1_a3_a4_agree_and_chi_H_is_positive(judged) 
     assert (laws.flus(**without)[agree] > 0).all()
 
 
-def test_a_design_the_printed_conditions_wrongly_admit() -> None:
+def test_a_design_the_printed_conditions_wrongly_admit():
     """All rational: Fr_c = 1 exactly, Fr = 2, and a1 = -3/100."""
     design = {"Fr": 2.0, "mu": 5.0, "chi_B": 1.2, "chi_H": 0.9, "zeta_B": -0.5, "zeta_H": -0.4}
     assert laws.lscf(**design, lambda_s=np.arctan(0.5)).all()
@@ -287,7 +287,7 @@ def test_a_design_the_printed_conditions_wrongly_admit() -> None:
     assert at_1[1] * at_1[2] * at_1[3] - at_1[0] * at_1[3] ** 2 - at_1[1] ** 2 * at_1[4] == 0
 
 
-def test_w0_bounds_the_abscissa() -> None:
+def test_w0_bounds_the_abscissa():
     """The product of the roots is a4/a0: no abscissa lies left of `w0`, nan where that is negative."""
     parameters = designs(300, seed=7)
     bound = laws.w0(*(parameters[name] for name in ("mu", "chi_H", "zeta_B", "zeta_H", "lambda_s")))
@@ -304,7 +304,7 @@ def test_w0_bounds_the_abscissa() -> None:
 
 @repeatable
 @given(omega0=st.floats(-5, -0.2), zeta_B=depth, zeta_H=depth, chi_H=st.floats(0.2, 3))
-def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H) -> None:
+def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H):
     assume(abs(chi_H - 1) > 1e-6 and abs(zeta_B - zeta_H) > 1e-6)
     first, second = laws.ep4(omega0, zeta_B, zeta_H, chi_H)
     for design in (first, second):
@@ -326,7 +326,7 @@ def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H) 
         (-1, -0.2, -0.4, 0.9, -1),
     ],
 )
-def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign) -> None:
+def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign):
     """chi_H on either side of 1, either sign of lambda_s: a stable bicycle with mu > 0 and just this EP4."""
     design, other = laws.ep4(omega0, zeta_B, zeta_H, chi_H)
     assert design.mu > 0 > other.mu
@@ -343,7 +343,7 @@ def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign) -> No
     assert laws.w0(design.mu, **geometry) == pytest.approx(omega0, rel=1e-12)
 
 
-def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists() -> None:
+def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists():
     for omega0, zeta_B, zeta_H, chi_H in ((-1, ZB, ZH, 1), (laws.w01(ZB, ZH), ZB, ZH, 1), (-1, ZB, ZB, 1.02)):
         for design in laws.ep4(omega0, zeta_B, zeta_H, chi_H):
             assert np.isnan([design.Fr, design.mu, design.tan_lambda_s]).all()
@@ -356,7 +356,7 @@ def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists() -> None:
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth, mu=st.floats(0.01, 30))
-def test_compact_ep4_is_a_fourfold_root_for_any_mass_ratio(zeta_B, zeta_H, mu) -> None:
+def test_compact_ep4_is_a_fourfold_root_for_any_mass_ratio(zeta_B, zeta_H, mu):
     assume(abs(zeta_B - zeta_H) > 1e-6)
     design = laws.ep4_chi_H_1(zeta_B, zeta_H)
     assert ep4_defect(design, mu, 1.0, zeta_B, zeta_H) < 1e-14
@@ -367,7 +367,7 @@ def test_compact_ep4_is_a_fourfold_root_for_any_mass_ratio(zeta_B, zeta_H, mu) -
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth)
-def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H) -> None:
+def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H):
     assume(abs(zeta_B / zeta_H - 1) > 1e-2)
     true, spurious = laws.frep4(zeta_B, zeta_H)
     design = laws.ep4_chi_H_1(zeta_B, zeta_H)
@@ -384,7 +384,7 @@ def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H) -> None:
     assert ep4_defect(design._replace(Fr=spurious), 0.1, 1.0, zeta_B, zeta_H) > 1e-4
 
 
-def test_compact_ep4_needs_unequal_heights() -> None:
+def test_compact_ep4_needs_unequal_heights():
     design = laws.ep4_chi_H_1(ZB, ZB)
     assert np.isnan([design.Fr, design.tan_lambda_s]).all()
 
@@ -394,7 +394,7 @@ def test_compact_ep4_needs_unequal_heights() -> None:
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth, chi_B=st.floats(0.2, 5), T=tangent, mu=st.floats(0.01, 30))
-def test_Frc1_is_flus(zeta_B, zeta_H, chi_B, T, mu) -> None:
+def test_Frc1_is_flus(zeta_B, zeta_H, chi_B, T, mu):
     assume(abs(chi_B - 1) > 1e-3 and abs(zeta_B - zeta_H * chi_B) > 1e-3 and abs(zeta_B - zeta_H) > 1e-3)
     lambda_s = np.arctan(T)
     general = laws.flus(mu, chi_B, 1, zeta_B, zeta_H, lambda_s)
@@ -403,7 +403,7 @@ def test_Frc1_is_flus(zeta_B, zeta_H, chi_B, T, mu) -> None:
 
 @repeatable
 @given(zeta_B=depth, ratio=st.floats(0.05, 0.95), T=tangent)
-def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T) -> None:
+def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T):
     zeta_H, lambda_s = zeta_B * ratio, np.arctan(T)
     least = laws.frm(zeta_B, zeta_H, lambda_s)
     best = laws.chibm(zeta_B, zeta_H)
@@ -422,7 +422,7 @@ def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T) -> None:
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth, excess=st.floats(1.1, 30))
-def test_epset_is_a_squared_quadratic(zeta_B, zeta_H, excess) -> None:
+def test_epset_is_a_squared_quadratic(zeta_B, zeta_H, excess):
     """p/a0 = (s^2 + b s + c)^2, stable; real roots below the EP4 tilt, complex above."""
     assume(abs(zeta_B / zeta_H - 1) > 1e-2)
     r, h = np.sqrt(zeta_B / zeta_H), np.sqrt(zeta_B * zeta_H)
@@ -443,7 +443,7 @@ def test_epset_is_a_squared_quadratic(zeta_B, zeta_H, excess) -> None:
         assert (b**2 > 4 * c) == (tilt_ratio < 1)
 
 
-def test_epset_ends_at_its_pole() -> None:
+def test_epset_ends_at_its_pole():
     """No EP set below |tan| = (r - 1)/(r + 1) r/(4 h), and none for the wrong sign of lambda_s."""
     r, h = np.sqrt(2), np.sqrt(0.08)
     pole = (r - 1) / (r + 1) * r / (4 * h)
@@ -452,7 +452,7 @@ def test_epset_ends_at_its_pole() -> None:
 
 
 @pytest.mark.parametrize(("zeta_B", "zeta_H"), [(-0.4, -0.2), (-1.3, -0.3), (-0.2, -0.4)])
-def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H) -> None:
+def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H):
     """Below the bound some speed makes all roots real and negative, above none does; certified roots."""
     chi_B, bound = laws.dp(zeta_B, zeta_H)
     design = laws.ep4_chi_H_1(zeta_B, zeta_H)
@@ -473,7 +473,7 @@ def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H) -> None:
     assert not heavily_damped(-0.5 * bound)
 
 
-def test_complex_roots_run_on_a_circle() -> None:
+def test_complex_roots_run_on_a_circle():
     """For chi_B = `chib1` every complex root below the EP set has modulus |omega0| (text)."""
     lambda_s, chi_B, radius = EP4_TILT + 0.8, laws.chib1(ZB, ZH), -laws.w01(ZB, ZH)
     for Fr in (2.0, laws.frm(ZB, ZH, lambda_s), 4.0):
@@ -496,7 +496,7 @@ def test_complex_roots_run_on_a_circle() -> None:
     T=st.floats(-5, 5),
     mu=st.floats(0.1, 10),
 )
-def test_the_dual_has_the_same_spectrum(Fr, chi_B, zeta_B, zeta_H, T, mu) -> None:
+def test_the_dual_has_the_same_spectrum(Fr, chi_B, zeta_B, zeta_H, T, mu):
     assume(abs(T) > 1e-3)
     design = {"Fr": Fr, "chi_B": chi_B, "zeta_B": zeta_B, "zeta_H": zeta_H, "lambda_s": np.arctan(T)}
     dual = laws.dual(**design)
@@ -510,7 +510,7 @@ def test_the_dual_has_the_same_spectrum(Fr, chi_B, zeta_B, zeta_H, T, mu) -> Non
     assert [again[name] for name in design] == pytest.approx(list(design.values()), rel=1e-12)
 
 
-def test_the_dual_of_EP4_is_EP4() -> None:
+def test_the_dual_of_EP4_is_EP4():
     """It maps the lambda_s > 0 class onto the lambda_s < 0 class."""
     ours, theirs = laws.ep4_chi_H_1(ZB, ZH), laws.ep4_chi_H_1(ZH, ZB)
     dual = laws.dual(ours.Fr, ours.chi_B, ZB, ZH, ours.lambda_s)
@@ -545,7 +545,7 @@ def _leaves(answer):
 
 
 @pytest.mark.parametrize(("law", "arguments"), list(_calls()))
-def test_every_law_broadcasts(law, arguments) -> None:
+def test_every_law_broadcasts(law, arguments):
     """An array for one argument gives, entry by entry, what the floats give; lists are taken too."""
     plain = _leaves(law(**arguments))
     for leaf in plain:
@@ -564,7 +564,7 @@ def test_every_law_broadcasts(law, arguments) -> None:
         assert np.array_equal(np.squeeze(leaf), part, equal_nan=True)
 
 
-def test_poles_are_silent() -> None:
+def test_poles_are_silent():
     """Division by zero and roots of negative numbers answer inf and nan; any warning is an error here."""
     assert np.isinf(laws.Frc1(1, ZB, ZH, 0.3))
     assert not np.isfinite(laws.flus(0.1, 1.02, 1.02, ZB, ZH, 0.3))
@@ -575,7 +575,7 @@ def test_poles_are_silent() -> None:
     assert not laws.lscf(1, 0.1, 0.5, 1, ZB, ZH, 0.3)[4]
 
 
-def test_every_label_is_a_law() -> None:
+def test_every_label_is_a_law():
     for label in laws.LABELS:
         assert hasattr(laws, {"4poly": "poly4"}.get(label, label))
 
@@ -600,7 +600,7 @@ def _fraction(number) -> Fraction:
     ],
     ids=["EP4", "double imaginary pair", "EP3 with a0 < 0", "zeros and a triple", "on the axis"],
 )
-def test_the_oracles_on_multiple_roots(coefficients, structure, stable) -> None:
+def test_the_oracles_on_multiple_roots(coefficients, structure, stable):
     assert oracles.exact_multiplicities(coefficients) == structure
     assert oracles.routh_exact(coefficients) is stable
     rebuilt = oracles.elementary(oracles.roots_60(coefficients))

@@ -33,7 +33,7 @@ def drawn(rng: np.random.Generator, depth: int) -> tuple[Any, Any]:
 
 
 @pytest.mark.skipif(not available(), reason="codac is not installed")
-def test_no_box_loses_a_zero() -> None:
+def test_no_box_loses_a_zero():
     """Systems with a zero planted at a fraction, mid in the box or on an end of it, singular ones among them."""
     worker = Killable()
     rng = np.random.default_rng(0)
@@ -54,7 +54,7 @@ def test_no_box_loses_a_zero() -> None:
         worker.end()
 
 
-def test_identities_of_angles() -> None:
+def test_identities_of_angles():
     t = variable("x")
     assert t.atan().tan() == t
     sine, cosine = t.atan().sin(), t.atan().cos()

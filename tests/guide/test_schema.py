@@ -22,26 +22,26 @@ def faults(text: str) -> list[str]:
     return [".".join(map(str, e.absolute_path)) for e in VALIDATOR.iter_errors(tomllib.loads(text))]
 
 
-def test_it_is_a_schema_of_its_draft() -> None:
+def test_it_is_a_schema_of_its_draft():
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert json.loads(schema_text()) == SCHEMA
 
 
-def test_the_file_for_editors_is_the_schema() -> None:
+def test_the_file_for_editors_is_the_schema():
     """Where this fails: tmsopt schema > problems/tmsopt.schema.json"""
     assert (Path("problems") / SCHEMA_FILE).read_text(encoding="utf-8") == schema_text()
 
 
 @pytest.mark.parametrize("path", PROBLEMS, ids=lambda p: p.stem)
-def test_every_example_refers_to_it_and_fits(path: Path) -> None:
+def test_every_example_refers_to_it_and_fits(path):
     text = path.read_text(encoding="utf-8")
     assert text.startswith(f"#:schema ./{SCHEMA_FILE}\n")  # the directive of Taplo, a comment to TOML
     assert faults(text) == []
 
 
 @pytest.mark.parametrize("kind", STARTS)
-def test_every_new_problem_fits(kind: str) -> None:
+def test_every_new_problem_fits(kind):
     assert faults(new_problem(kind)) == []
 
 
@@ -130,12 +130,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN])
-def test_what_they_are_made_from_fits(text: str) -> None:
+def test_what_they_are_made_from_fits(text):
     assert faults(text) == []
 
 
 @pytest.mark.parametrize("kind", WRONG)
-def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind: str, tmp_path: Path) -> None:
+def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind, tmp_path):
     text, old, new, place = WRONG[kind]
     assert old in text
     wrong = text.replace(old, new, 1)
@@ -147,7 +147,7 @@ def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind: str, tmp_
         (tmsopt.load_study if text == STUDY else tmsopt.load)(file)
 
 
-def test_parameters_are_explained_by_their_meanings() -> None:
+def test_parameters_are_explained_by_their_meanings():
     for name in ("tms", "whipple"):
         explained: dict[str, Any] = SCHEMA["$defs"][f"parameters_{name}"]["properties"]
         model = getattr(tmsopt.models, name)
@@ -156,13 +156,13 @@ def test_parameters_are_explained_by_their_meanings() -> None:
         assert all(explained[p.name]["description"].startswith(p.meaning) for of in model.sets for p in of.parameters)
 
 
-def test_every_key_is_explained() -> None:
+def test_every_key_is_explained():
     problem = SCHEMA["$defs"]["problem"]["properties"]
     study = SCHEMA["$defs"]["study_file"]["properties"]
     inner = (problem, study, problem["objective"]["properties"], study["study"]["properties"])
     assert [key for keys in inner for key, found in keys.items() if not found.get("description")] == []
 
 
-def test_a_bicycle_of_its_own_file_needs_no_parameters() -> None:
+def test_a_bicycle_of_its_own_file_needs_no_parameters():
     assert faults('bicycle = "Browser.txt"\n[parameters]\nv = 5\n') == []
     assert faults('bicycle = "Browser.txt"\n[parameters]\nFr = 5\n') == ["parameters"]

@@ -21,7 +21,7 @@ def asked(degree: int, objective: str) -> tmsopt.Problem:
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("objective", ["minimize abscissa", "maximize damping_ratio", "minimize angular_frequency"])
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 5])
-def test_any_design_has_such_factors(degree: int, objective: str, sign: int) -> None:
+def test_any_design_has_such_factors(degree, objective, sign):
     """With a0 of either sign, small or not: a start meets all rows, and says of the roots what NumPy does."""
     problem, rng = asked(degree, objective), np.random.default_rng(degree)
     nlp = formulate(problem, lead=sign)

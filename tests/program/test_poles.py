@@ -54,7 +54,7 @@ CASES: tuple[tuple[tuple[str, ...], tuple[float, float], tuple[float, float]], .
 
 
 @pytest.mark.parametrize(("limits", "aim", "best"), CASES)
-def test_optimum_beside_a_pole(limits: tuple[str, ...], aim: tuple[float, float], best: tuple[float, float]) -> None:
+def test_optimum_beside_a_pole(limits, aim, best):
     design = tmsopt.solve(problem(limits, aim))
     assert design.status == "optimal"
     assert design.value == pytest.approx(-4 + math.dist(aim, best) ** 2, abs=MET)
@@ -72,7 +72,7 @@ def test_optimum_beside_a_pole(limits: tuple[str, ...], aim: tuple[float, float]
         ),
     ],
 )
-def test_edges_that_are_curved(limits: tuple[str, ...], aim: tuple[float, float], edge: Any) -> None:
+def test_edges_that_are_curved(limits, aim, edge):
     """The nearest point by a scan of the edge, 1e-6 from the next: its distance is right to 1e-12."""
     across = np.linspace(0, 1, 1_000_001)
     squared = (across - aim[0]) ** 2 + (edge(across) - aim[1]) ** 2
@@ -83,9 +83,7 @@ def test_edges_that_are_curved(limits: tuple[str, ...], aim: tuple[float, float]
 @pytest.mark.parametrize(
     ("limit", "aim", "gap"), [("1/(x - y) >= 1000", (0.9, 0.1), 1e-3), ("1/(y - x) >= 300", (0.2, 0.9), -1 / 300)]
 )
-def test_the_side_of_a_pole_does_not_depend_on_the_seed(
-    limit: str, aim: tuple[float, float], gap: float, seed: int
-) -> None:
+def test_the_side_of_a_pole_does_not_depend_on_the_seed(limit, aim, gap, seed):
     design = tmsopt.solve(problem((limit,), aim), seed=seed)
     assert design.value == pytest.approx(-4 + math.dist(aim, line(*aim, gap)) ** 2, abs=MET)
 
@@ -98,18 +96,18 @@ def test_the_side_of_a_pole_does_not_depend_on_the_seed(
         ({"minimize": "max(tan(3*x), -2) + y"}, -2.0),
     ],
 )
-def test_objectives_with_poles(asked: dict[str, str], best: float) -> None:
+def test_objectives_with_poles(asked, best):
     design = tmsopt.solve(problem((), **asked))
     assert design.value == pytest.approx(best, abs=MET)
 
 
-def test_what_no_side_of_a_pole_allows() -> None:
+def test_what_no_side_of_a_pole_allows():
     """x − y ≤ 1/30 and ≥ 1/20."""
     design = tmsopt.solve(problem(("1/(x - y) >= 30", "x - y >= 0.05")), throw=False)
     assert design.status == "infeasible"
 
 
-def test_members_of_a_family_with_poles() -> None:
+def test_members_of_a_family_with_poles():
     family = Family(["limit0.limit"])
     for least in (30.0, 100.0, 1000.0):
         stated = problem((f"1/(x - y) >= {least}",), (0.7, 0.3))

@@ -20,7 +20,7 @@ def powers(rate: float, **asked: str) -> tmsopt.Problem:
 
 
 @pytest.mark.parametrize("rate", [1e-6, 0.01, 1.0, 300.0, 1e5])
-def test_the_unit_is_that_of_the_roots(rate: float) -> None:
+def test_the_unit_is_that_of_the_roots(rate):
     """All roots are −r with the median r at the rate: the nearest power of 2 is at most √2 off, and so is 2."""
     found = scale_of(powers(rate, minimize="abscissa"))
     assert abs(math.log2(found.unit / rate)) <= 0.55  # the median over the designs is a little off the middle
@@ -29,6 +29,6 @@ def test_the_unit_is_that_of_the_roots(rate: float) -> None:
 
 
 @pytest.mark.parametrize("unit", [1.0, 2.0**-20, 2.0**-60])
-def test_what_is_the_same_optimum_does_not_depend_on_the_unit(unit: float) -> None:
+def test_what_is_the_same_optimum_does_not_depend_on_the_unit(unit):
     for a, b, expected in ((-1.0, -1.0 - 1e-8, True), (-1.0, -1.0 - 1e-6, False), (0.0, 1e-8, True)):
         assert same_objective(a * unit, b * unit, unit) is expected

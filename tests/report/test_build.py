@@ -60,7 +60,7 @@ B, H = (sympy.Integer(1), chi_B, zeta_B), (mu, chi_H, zeta_H)
 SCALES = (1, Fr, 1, sine, cosine)  # w = 1, g = 1, v = Fr
 
 
-def test_the_equations_used_here_are_those_of_the_model() -> None:
+def test_the_equations_used_here_are_those_of_the_model():
     """Two independent sources, one system: so that what follows is about the model."""
     paper = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, sine, cosine)
     general = lateral([B], [H], *SCALES)
@@ -75,7 +75,7 @@ def changes(rear: Sequence[Body], front: Sequence[Body]) -> list[Any]:
 
 @pytest.mark.parametrize("contact", [0, 1])
 @pytest.mark.parametrize("carrier", ["rear", "front"])
-def test_ballast_at_a_contact_has_no_part_in_the_lateral_motion(contact: int, carrier: str) -> None:
+def test_ballast_at_a_contact_has_no_part_in_the_lateral_motion(contact, carrier):
     """For any mass: its rigid body has another centre and inertia, and M, V and P stay as they are.
 
     On the rear frame at either contact, and on the front assembly at the front contact, which the steer axis meets.
@@ -89,7 +89,7 @@ def test_ballast_at_a_contact_has_no_part_in_the_lateral_motion(contact: int, ca
         assert change == [0] * 12
 
 
-def test_ballast_above_the_contact_does_change_the_motion() -> None:
+def test_ballast_above_the_contact_does_change_the_motion():
     assert any(changes([B, (m, 0, sympy.Rational(-1, 10))], [H]))
 
 
@@ -108,7 +108,7 @@ def exact(p: dict[str, float]) -> dict[str, Fraction]:
     return {name: Fraction(value) for name, value in p.items()}
 
 
-def test_loads_balance_forces_and_moments() -> None:
+def test_loads_balance_forces_and_moments():
     for p in designs(60, 1):
         q, got = exact(p), values(p)
         bodies = [(Fraction(1), q["chi_B"], q["zeta_B"]), (q["mu"], q["chi_H"], q["zeta_H"])]
@@ -120,7 +120,7 @@ def test_loads_balance_forces_and_moments() -> None:
         assert got["load_front"] + got["load_rear"] == pytest.approx(1, abs=2 * bound)
 
 
-def test_ballast_is_the_mass_that_takes_the_load_of_the_lifted_wheel_to_0() -> None:
+def test_ballast_is_the_mass_that_takes_the_load_of_the_lifted_wheel_to_0():
     """With it the moment balance has no load at the lifted wheel, with more a positive one; else none is needed."""
     seen = set()
     for p in designs(80, 2):
@@ -140,7 +140,7 @@ def test_ballast_is_the_mass_that_takes_the_load_of_the_lifted_wheel_to_0() -> N
     assert seen == {"front", "rear", ""}
 
 
-def test_si_loads_are_in_newtons_and_ballast_in_kilograms() -> None:
+def test_si_loads_are_in_newtons_and_ballast_in_kilograms():
     """The benchmark: 10 kg at 1.2 m and 1 kg at 1.02 m over a wheelbase of 1 m, by hand."""
     p = tmsopt.load("problems/benchmark.toml").fixed
     got = values({name: p[name] for name in SI.names}, SI)
@@ -156,7 +156,7 @@ def test_si_loads_are_in_newtons_and_ballast_in_kilograms() -> None:
 # The mass matrix
 
 
-def test_mass_margin_is_the_smallest_eigenvalue_of_the_mass_matrix() -> None:
+def test_mass_margin_is_the_smallest_eigenvalue_of_the_mass_matrix():
     """At 60 digits, from the double ν_H; tan λ_s and ν_H cancel as they do in nu_H, which is tested on its own."""
     for p in designs(100, 3):
         got = values(p)
@@ -168,7 +168,7 @@ def test_mass_margin_is_the_smallest_eigenvalue_of_the_mass_matrix() -> None:
         assert got["mass_margin"] == pytest.approx(float(least), rel=50 * EPS * sum(lengths) / lengths[2])
 
 
-def test_mass_margin_vanishes_like_the_square_of_nu_H() -> None:
+def test_mass_margin_vanishes_like_the_square_of_nu_H():
     """Limit of margin/ν_H²: det M / (tr M ν_H²) = μ ζ_B²/(μ ζ_H² + ζ_B²), with relative error of the order of ν_H²."""
     for nu in (1e-3, 1e-6, 1e-9, 1e-12):
         p = {"Fr": 1, "mu": 0.5, "chi_B": 1.2, "chi_H": 1.0, "zeta_B": -0.5, "zeta_H": -0.25}
@@ -178,7 +178,7 @@ def test_mass_margin_vanishes_like_the_square_of_nu_H() -> None:
 
 
 @pytest.mark.parametrize("on", [{"mu": 0.0}, {"zeta_B": 0.0}, {"chi_H": 1.0, "lambda_s": 0.0}, {"mu": 0, "zeta_B": 0}])
-def test_mass_margin_of_a_singular_mass_matrix_is_0(on: dict[str, float]) -> None:
+def test_mass_margin_of_a_singular_mass_matrix_is_0(on):
     p = {"Fr": 1, "mu": 0.5, "chi_B": 1.2, "chi_H": 1.1, "zeta_B": -0.5, "zeta_H": -0.25, "lambda_s": 0.3, **on}
     assert values(p)["mass_margin"] == 0
 
@@ -200,7 +200,7 @@ def test_mass_margin_of_a_singular_mass_matrix_is_0(on: dict[str, float]) -> Non
         ),
     ],
 )
-def test_a_builders_limits_hold_by_statics(tmp_path: Any, limits: dict[str, str]) -> None:
+def test_a_builders_limits_hold_by_statics(tmp_path, limits):
     """Each limit on loads, ballast or inertia is recomputed from the SI parameters of the optimum, to 1e-7."""
     file = tmp_path / "robot.toml"
     file.write_text(ROBOT % "\n".join(f'{name} = "{text}"' for name, text in limits.items()))
@@ -248,18 +248,18 @@ def test_a_builders_limits_hold_by_statics(tmp_path: Any, limits: dict[str, str]
         (-35.0, "N", (-35.0, "N")),
     ],
 )
-def test_readings_by_the_definitions_of_the_units(value: float, unit: str, expected: tuple[float, str]) -> None:
+def test_readings_by_the_definitions_of_the_units(value, unit, expected):
     assert reading(value, unit) == expected
 
 
 @pytest.mark.parametrize(("name", "unit"), [("km/h", "m/s"), ("mm", "m"), ("deg", "rad")])
-def test_what_was_written_with_a_unit_reads_the_same(name: str, unit: str) -> None:
+def test_what_was_written_with_a_unit_reads_the_same(name, unit):
     """Exactly, although SI lies in between: tenths from 0.1 to 100."""
     for tenths in range(1, 1001):
         assert reading(with_unit(f"{tenths / 10} {name}", unit), unit) == (tenths / 10, name)
 
 
-def test_si_of_the_benchmark_is_the_motion_in_seconds() -> None:
+def test_si_of_the_benchmark_is_the_motion_in_seconds():
     """Eigenvalues of the dimensional equations in m, kg and s; simple and well apart, so doubles give 1e-10."""
     design = tmsopt.solve(tmsopt.load("problems/benchmark.toml"))
     p = design.parameters
@@ -287,7 +287,7 @@ def test_si_of_the_benchmark_is_the_motion_in_seconds() -> None:
     assert si["m_ballast_rear_kg"] == pytest.approx(2.02, rel=1e-13)
 
 
-def test_si_of_an_unstable_bicycle_has_a_growth_time() -> None:
+def test_si_of_an_unstable_bicycle_has_a_growth_time():
     """The benchmark at 2 m/s, below v_c = 2.841 m/s; the roots at 60 digits."""
     fixed = {**tmsopt.load("problems/benchmark.toml").fixed, "v": 2.0}
     design = tmsopt.solve(tmsopt.Problem(tms, fixed=fixed))
@@ -298,7 +298,7 @@ def test_si_of_an_unstable_bicycle_has_a_growth_time() -> None:
     assert si["frequencies_Hz"][0] == pytest.approx(float(z.imag) * math.sqrt(9.81) / (2 * math.pi), rel=1e-9)
 
 
-def test_a_dimensionless_problem_has_no_si() -> None:
+def test_a_dimensionless_problem_has_no_si():
     """Its lengths, masses and seconds are not known."""
     design = tmsopt.solve(tmsopt.Problem(tms, fixed=designs(1, 5)[0]))
     assert design.si == {}
