@@ -7,6 +7,7 @@ import pickle
 from dataclasses import FrozenInstanceError, replace
 from importlib import import_module
 from itertools import pairwise
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -24,7 +25,6 @@ from tmsopt.search import solve_any_status
 cases = import_module("tmsopt.problem.cases")
 front_data = import_module("tmsopt.fronts.front")
 options = import_module("tmsopt.program.options")
-sample = import_module("tmsopt.search.sample")
 solve = import_module("tmsopt.search.solve")
 worst_case = import_module("tmsopt.evaluation.worst_case")
 subproblems = import_module("tmsopt.fronts.subproblems")
@@ -233,6 +233,26 @@ def test_an_end_at_a_bound_is_best_in_the_others_too():
 
 
 TILTED = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (math.radians(-80), math.radians(80))}
+
+
+def sides(forward, backward):
+    return SimpleNamespace(sides={"normal rake": forward, "reversed rake": backward})
+
+
+@pytest.mark.parametrize(
+    ("halves", "k", "limits", "end", "out"),
+    [
+        (sides(-1.0, 0.1), 1, {0: -0.3}, (0.0, 9.0), {"reversed rake"}),
+        (sides(-1.0, 0.1), 1, {0: -2.0}, (0.0, 9.0), set()),  # no half is left
+        (sides(-1.0, math.nan), 1, {0: -0.3}, (0.0, 9.0), set()),  # a half of which nothing is known
+        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 0.9), {"reversed rake"}),  # an end that meets the limit is better
+        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 1.1), set()),  # an end that does not
+    ],
+)
+def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
+    end = front_data.FrontPoint(end, None, ())
+    ask = subproblems.FrontSolver(problem(free=TILTED), options.Options(), ends=(end,), easier={0: halves})
+    assert ask._hopeless(subproblems.subproblem(ask, k, limits), ()) == out
 
 
 def test_a_half_that_is_left_out_is_not_searched(monkeypatch):

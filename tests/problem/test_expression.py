@@ -166,6 +166,7 @@ def test_values_and_comparisons_are_told_apart():
         "Fr <=",
         "<= 1",
         "min(Fr <= 1, 2) <= 3",
+        "Fr <= True",
         "Fr <= x",
     ],
 )
