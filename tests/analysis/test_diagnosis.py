@@ -360,15 +360,6 @@ def test_a_solution_says_what_its_multiple_root_is():
     assert "ε^(1/4)" in splitting
 
 
-@pytest.mark.slow
-def test_the_command_shows_it():
-    printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--full"]).output
-    assert "4-fold root -1.8803015: defective" in printed
-    assert "holds for ε > 0" in printed
-    data = json.loads(CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--json", "--full"]).output)
-    assert [(d["algebraic"], d["geometric"], d["partial"]) for d in data["diagnosis"]] == [(4, 1, [4])]
-
-
 def test_all_designs_take_no_diagnosis():
     ended = CliRunner().invoke(main, ["solve", "problems/coupled_pair.toml", "--all", "--full"])
     assert ended.exit_code == 2

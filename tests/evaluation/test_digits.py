@@ -1,7 +1,5 @@
 """Every digit that ``solve --json`` prints of a design, from the printed parameters alone: another way, 60 digits.
 
-pytestmark = pytest.mark.slow
-
 Nothing here uses a formula of the package. The polynomial is the determinant of the paper's matrices in mpmath, roots
 are mpmath's, mass margins are eigenvalues, and the weave speed is where the Hurwitz determinant changes sign. The
 numbers compared are equal as doubles, ``==``: the printed one is the double nearest to the 60-digit one.
@@ -249,9 +247,7 @@ FILES = sorted(
 )
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n == "point_mass_robot" else ()) for n in FILES]
-)
+@pytest.mark.parametrize("name", FILES)
 @pytest.mark.slow
 def test_every_digit_of_the_problem_files(name):
     assert wrong_digits(printed(tmsopt.solve(tmsopt.load(PROBLEMS / f"{name}.toml")))) == []
