@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,11 @@ from tmsopt.models import canonical, from_matrices, whipple
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK = PROBLEMS / "whipple_benchmark.toml"
+
+
+@cache
+def ep4() -> tmsopt.Solution:
+    return tmsopt.solve(PROBLEMS / "ep4.toml")
 
 
 def spring(damping: float) -> tmsopt.Problem:
@@ -290,10 +296,10 @@ def test_without_a_design_there_is_no_motion(tmp_path):
 
 
 def test_the_default_and_units_are_said():
-    text = str(tmsopt.simulate(PROBLEMS / "ep4.toml"))
+    text = str(tmsopt.simulate(ep4()))
     assert "from lean phi = 1 deg, as nothing else was asked" in text
     assert "√(w/g)" in text
-    pushed = str(tmsopt.simulate(PROBLEMS / "ep4.toml", push=0.001, noise=0.1, seed=5))
+    pushed = str(tmsopt.simulate(ep4(), push=0.001, noise=0.1, seed=5))
     assert "an impulse of steer torque of 0.001 m_B g w √(w/g)" in pushed
     assert "white noise of steer torque of 0.1 m_B g w (w/g)^(1/4) (seed 5)" in pushed
     fast = tmsopt.simulate(tmsopt.Problem(whipple, fixed={**tmsopt.load(BENCHMARK).fixed, "v": 2.0}), lean=1)

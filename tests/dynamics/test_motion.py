@@ -3,6 +3,7 @@
 import math
 import pickle
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,11 @@ from tmsopt.records import Array
 PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK, EP4 = PROBLEMS / "whipple_benchmark.toml", PROBLEMS / "ep4.toml"
 STATES = ("phi", "delta", "phidot", "deltadot")
+
+
+@cache
+def ep4() -> tmsopt.Solution:
+    return tmsopt.solve(EP4)
 
 
 def table(motion: tmsopt.Simulation, names: Sequence[str]) -> Array:
@@ -118,7 +124,7 @@ def test_at_an_ep4_it_moves_with_the_third_power_of_time(start):
 
     Rounding moves the roots by 4e-4 and e^(At) by about 1e-15 times the growth of its derivative.
     """
-    motion = tmsopt.simulate(EP4, start=dict(zip(STATES, start, strict=True)), seconds=8, points=81)
+    motion = tmsopt.simulate(ep4(), start=dict(zip(STATES, start, strict=True)), seconds=8, points=81)
     with mp.workdps(50):
         A, root = ideal_ep4()
         N, x = A - root * mp.eye(4), mp.matrix(list(start))
@@ -172,7 +178,7 @@ def test_at_the_capsize_speed_it_rides_a_circle():
 
 @pytest.mark.slow
 def test_a_response_is_a_simulation_and_is_pickled():
-    design = tmsopt.solve(EP4)
+    design = ep4()
     one, other = design.response(lean=5, seconds=3), tmsopt.simulate(design, lean=5, seconds=3)
     assert one.columns == other.columns == tmsopt.simulate(EP4, lean=5, seconds=3).columns
     assert pickle.loads(pickle.dumps(one)).columns == one.columns
