@@ -7,7 +7,6 @@ polynomials with the structure, spanned by exact derivatives, in units of the ex
 
 from collections.abc import Sequence
 from fractions import Fraction as F
-from types import SimpleNamespace
 
 import casadi as ca
 import flint
@@ -24,7 +23,6 @@ from tmsopt.roots import (
     discriminant,
     exact_abscissa,
     is_stable,
-    pattern_distance,
     product,
     roots,
     structure,
@@ -180,36 +178,6 @@ def test_a_structure_is_named_within_the_tolerance_and_not_beyond(items, toleran
         assert within.distance == pytest.approx((1 - slack) * tolerance, rel=slack)
         beyond = structure(doubles(polynomial(items)) + (1 + slack) * tolerance * size * change, tolerance)
         assert sorted(r.multiplicity for r in beyond.roots) != sorted(m for _, m in every_root(items))
-
-
-@pytest.mark.parametrize("items", [*STRUCTURES, [(F(-1), F(1), 1), (F(-1), F(2), 1), (F(-1), F(0), 1)]])
-def test_zero_tolerance_is_undecided_at_a_structure(items):
-    assert structure(doubles(polynomial(items)), 0.0).name == "undecided"
-
-
-def test_zero_tolerance_is_decided_away_from_every_structure():
-    assert structure(doubles(polynomial([(F(-1), F(1), 1), (F(-2), F(0), 1), (F(-4), F(3), 1)])), 0.0).name == "pair"
-
-
-@pytest.mark.parametrize("k", [2, 3, 5])
-def test_distance_to_a_pattern_of_any_degree(k):
-    """A k-fold root and a free factor of degree 6 in all, against the distance the polynomial was made at."""
-    items = [(F(-1), F(0), k), *((F(-3 - j), F(0), 1) for j in range(6 - k))]
-    pattern = SimpleNamespace(
-        name=f"EP{k}",
-        degree=6,
-        unknowns=tuple("u" * (7 - k)),
-        factors=lambda u: [[1, -u[0]]] * k + [[1, *u[1:]]],
-        monic=lambda u: product(*[[1, -u[0]]] * k, [1, *u[1:]]),
-        nonnegative=lambda u: [],
-        guesses=lambda z: [[-1.001, *np.poly([-3.0 - j for j in range(6 - k)])[1:]]],
-    )
-    size, change = across(items, np.random.default_rng(k))
-    assert pattern_distance(pattern, doubles(polynomial(items))) <= 1e-14
-    made = pattern_distance(pattern, doubles(polynomial(items)) + 1e-7 * size * change)
-    # the terms are those of the perturbed roots, which scatter by (1e-7)^(1/k)
-    assert made == pytest.approx(1e-7, rel=0.1 * 1e-7 ** (1 / k) * k)
-    assert pattern_distance(pattern, [1, 4, 6, 4, 1]) == np.inf
 
 
 # The nearest polynomial in ball arithmetic

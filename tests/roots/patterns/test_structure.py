@@ -163,15 +163,6 @@ def perturbed(name: str, seed: int, distance: float) -> list[float]:
             return [1.0, *(p[1:] + size * change * distance / reach)]
 
 
-@pytest.mark.parametrize("name", LINEAR)
-def test_the_definition_of_the_tolerance(name):
-    """Named when a polynomial that has the structure lies within the tolerance, and not otherwise."""
-    inside = [structure(perturbed(name, seed, 0.99e-9), 1e-9).name for seed in range(8)]
-    outside = [structure(perturbed(name, seed, 1.01e-9), 1e-9).name for seed in range(8)]
-    assert inside == [name] * 8
-    assert name not in outside
-
-
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("name", LINEAR)
 def test_pattern_distance_is_the_least_root_sum_of_squares(name, seed):
