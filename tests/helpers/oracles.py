@@ -13,7 +13,6 @@ from typing import Any
 
 import flint
 import mpmath  # type: ignore[import-untyped]
-import numpy as np
 import sympy  # type: ignore[import-untyped]
 from mpmath import mp
 
@@ -46,13 +45,6 @@ def polynomial_exact(
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(Fraction, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s))
     M, V, P, nu_H = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Fraction(1), T)
     return [a / (mu * nu_H) for a in _determinant(M, V, P)]
-
-
-def polynomial_floats(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any) -> list[Any]:
-    """The same coefficients, but for a common factor, in double precision for arrays."""
-    cos, sin = np.cos(lambda_s), np.sin(lambda_s)
-    M, V, P, _ = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
-    return _determinant(M, V, P)
 
 
 def symbolic_copo() -> tuple[list[sympy.Expr], dict[str, sympy.Symbol]]:
