@@ -18,11 +18,11 @@ from helpers.oracles import polynomial_60, roots_60
 from mpmath import mp
 
 import tmsopt
-from tmsopt.analysis import Diagnosis, Response, branches, diagnosed
+from tmsopt.analysis import Diagnosis, Response, diagnosed
 from tmsopt.cli import every as main
 from tmsopt.models import Model, from_coefficients, from_hamiltonian, from_matrices, tms
 from tmsopt.report import diagnosis_lines
-from tmsopt.roots import is_regular, jordan, structure
+from tmsopt.roots import jordan, structure
 
 # Jordan chains
 
@@ -75,37 +75,7 @@ def test_chains_of_matrices_with_a_known_jordan_form(chains: tuple[int, ...], ot
         assert found.nonzero >= 1e-9  # of transformations that may be this ill-conditioned
 
 
-def test_chains_of_a_quadratic_pencil() -> None:
-    """(s + 1)² I + N with nilpotent N: det = (s + 1)⁶; N of rank 1 gives the chains 4 and 2 (one, and two uncoupled)."""
-    M = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    D = [[2 * x for x in row] for row in M]
-    for coupled, partial in (((0, 0), (2, 2, 2)), ((1, 0), (4, 2)), ((1, 1), (6,))):
-        K = [[1, coupled[0], 0], [0, 1, coupled[1]], [0, 0, 1]]
-        balls = [[[flint.arb(x) for x in row] for row in P] for P in (M, D, K)]
-        found = jordan(balls, flint.acb(-1), 6, 1e-7)
-        assert (found.geometric, found.partial) == (len(partial), partial)
-        assert is_regular(balls, flint.acb(-1), 1e-7)
-
-
-def test_matrices_that_are_singular_everywhere_are_seen() -> None:
-    singular = [[[flint.arb(1), flint.arb(1)], [flint.arb(1), flint.arb(1)]]] * 2
-    assert not is_regular(singular, flint.acb(-1), 1e-7)
-
-
 # Newton's polygon
-
-
-def test_branches_of_known_curves() -> None:
-    """t³ − ε t − ε³ = 0: t² = ε twice and t = −ε² once. t² (t − ε) = 0: two stay. (t² − ε)² + ε⁴ = 0: t⁴ cycles meet."""
-    found, unmoved = branches([[0, 0, 0, 1], [0, -1, 0, 0], [0, 0, 0, 0], [-1, 0, 0, 0]])
-    assert [(b.roots, str(b.exponent), b.constants) for b in found] == [(2, "1/2", (1,)), (1, "2", (-1,))]
-    assert unmoved == 0
-    found, unmoved = branches([[0, 0, 0, 1], [0, 0, -1, 0]])
-    assert [(b.roots, str(b.exponent), b.constants) for b in found] == [(1, "1", (1,))]
-    assert unmoved == 2
-    found, unmoved = branches([[0, 0, 0, 0, 1], [0, 0, -2, 0, 0], [1, 0, 0, 0, 0]])
-    assert [(b.roots, b.numerator, b.denominator, len(b.constants)) for b in found] == [(4, 1, 2, 2)]
-    assert branches([[0, 0, 1], [0, 0, 0]]) == ((), 2)
 
 
 # Systems
@@ -189,16 +159,6 @@ def test_the_sixfold_root_of_two_masses_and_a_controller() -> None:
     assert (law.below, law.above) == (1.0, 1.0)
 
 
-def test_a_defective_pair_of_first_order() -> None:
-    """[[−1, 1], [d, −1]] at d = 0: (s + 1)² = d exactly, so the law holds as far as it was sampled."""
-    d, rate = symbols("d rate")
-    found = diagnosis_of(from_matrices(A=[[-rate, 1], [d, -rate]]), d=0.0, rate=1.0)
-    assert (found.kind, found.partial, found.re, found.im) == ("defective", (2,), -1.0, 0.0)
-    law = response(found, "d").laws[0]
-    assert (str(law.branches.exponent), law.branches.constants[0]) == ("1/2", pytest.approx(1, rel=1e-14))
-    assert (law.below, law.above) == (1.0, 1.0)
-
-
 def test_chains_two_and_one_of_a_threefold_root() -> None:
     d, f = symbols("d f")
     found = diagnosis_of(from_matrices(A=[[-1, 1, 0], [d, -1, 0], [0, 0, -1 + f]]), d=0.0, f=0.0)
@@ -218,18 +178,6 @@ def test_a_bare_polynomial_has_one_chain_and_may_move_linearly() -> None:
     assert str(law.branches.exponent) == "1"
     assert sorted(c.real for c in law.branches.constants) == pytest.approx([-1, 1], rel=1e-12)
     assert "no matrices" in diagnosis_lines([found])[0]
-
-
-def test_the_exceptional_point_of_a_pair_with_balanced_gain_and_loss() -> None:
-    """s⁴ + (2 − γ²) s² + 1 − κ²: a double pair where 2 − γ² = 2 √(1 − κ²), and t² = γ² ε/2 for γ (1 + ε)."""
-    gamma, kappa = symbols("gamma kappa")
-    model = from_matrices([[1, 0], [0, 1]], [[gamma, 0], [0, -gamma]], [[1, kappa], [kappa, 1]])
-    at = sqrt(2 - 2 * sqrt(1 - 0.36))
-    found = diagnosis_of(model, gamma=at, kappa=0.6)
-    assert (found.algebraic, found.geometric, found.kind) == (2, 1, "defective")
-    assert complex(found.re, found.im) == pytest.approx(1j * 0.8**0.5, rel=1e-14)
-    law = response(found, "gamma").laws[0].branches
-    assert (str(law.exponent), law.constants[0]) == ("1/2", pytest.approx(at**2 / 2, rel=1e-12))
 
 
 def test_flutter_of_the_undamped_ziegler_pendulum() -> None:
@@ -252,13 +200,6 @@ def test_the_law_holds_farther_on_one_side() -> None:
     (x,) = symbols("x")
     (law,) = diagnosis_of(from_coefficients([1, 2, 1 - x - 2 * x * x]), x=0.0).responses[0].laws
     assert (law.below, law.above) == (pytest.approx(10**-1.25), pytest.approx(0.1))
-
-
-def test_parameters_are_ordered_by_how_far_they_move_the_root() -> None:
-    """(s + 1)² = a + 4b + c²: t² = 4ε moves farther than t² = ε, and t = ±ε least."""
-    a, b, c = symbols("a b c")
-    found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
-    assert [r.parameter for r in found.responses] == ["b", "a", "c"]
 
 
 # Points that are met to rounding, or less
@@ -320,9 +261,11 @@ def test_orders_beyond_ten_count() -> None:
     assert [str(response(found, n).laws[0].branches.exponent) for n in "xy"] == ["11/12", "1/12"]
 
 
-def test_every_parameter_is_listed_with_its_law() -> None:
+def test_every_parameter_is_listed_with_its_law_by_how_far_it_moves_the_root() -> None:
+    """(s + 1)² = a + 4b + c²: t² = 4ε moves farther than t² = ε, and t = ±ε least."""
     a, b, c = symbols("a b c")
     found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
+    assert [r.parameter for r in found.responses] == ["b", "a", "c"]
     (_, line) = diagnosis_lines([found])
     assert "of b moves it by 2 ε^(1/2)" in line
     assert "a (absolute) by 1 ε^(1/2)" in line

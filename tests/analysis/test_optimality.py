@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from helpers.oracles import abscissa_60, polynomial_60
+from helpers.structures import times as product
 from mpmath import mp
 
 import tmsopt
@@ -85,14 +86,6 @@ def moved_abscissa(solution, factor, extra, scale):
     with mp.workdps(50):
         step = mp.mpf(scale)
         return float((equations(step) - equations(-step)) / (2 * step))
-
-
-def product(p, q):
-    total = [0] * (len(p) + len(q) - 1)
-    for i, x in enumerate(p):
-        for j, y in enumerate(q):
-            total[i + j] += x * y
-    return total
 
 
 # Multipliers beside closed forms and moved factors

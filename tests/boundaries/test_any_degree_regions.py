@@ -13,7 +13,7 @@ import pytest
 from helpers import curves
 from helpers.oracles import certified_roots, routh_exact
 
-from tmsopt.boundaries import edges, heavily_damped, nearest, robustness
+from tmsopt.boundaries import nearest, robustness
 from tmsopt.charts import chart
 from tmsopt.dynamics import growth
 from tmsopt.evaluation import cover, omega0_bound
@@ -25,13 +25,9 @@ from tmsopt.roots import (
     CLASSES,
     classify,
     find_motion,
-    hurwitz_minors,
     is_stable,
-    lienard_chipart,
-    multiple_real_roots,
     product,
     quadratic_pencil,
-    real_roots,
     roots,
 )
 from tmsopt.search import solve
@@ -89,57 +85,6 @@ def test_stability_beside_the_axis_is_that_of_the_very_coefficients(degree):
             moved = c.copy()
             moved[k] = np.nextafter(moved[k], 0)
             assert is_stable(moved) == routh_exact([Fraction(x) for x in moved.tolist()])
-
-
-@pytest.mark.parametrize("degree", [5, 8, 12])
-def test_conditions_by_minors_and_by_scheme_agree(degree):
-    rng = np.random.default_rng(degree)
-    pairs = [
-        product(*([1, x, y] for x, y in rng.uniform(-0.1, 2, (degree // 2, 2))), *[[1, 0.7]] * (degree % 2))
-        for _ in range(60)
-    ]
-    c = np.array(pairs)
-    positive = np.all(np.array(lienard_chipart(list(c.T))) > 0, axis=0)
-    assert np.array_equal(is_stable(c), positive)
-    assert 0 < positive.sum() < 60
-    # Orlando: the last but one minor is the product of all −(zᵢ + zⱼ), for a leading 1.
-    i, j = np.triu_indices(degree, 1)
-    z = roots(c)
-    orlando = np.prod(-(z[:, i] + z[:, j]), axis=1).real
-    assert hurwitz_minors(list(c.T))[degree - 2] == pytest.approx(orlando, rel=1e-6)  # cancels: pairs near the axis
-
-
-@pytest.mark.parametrize("degree", [6, 9, 12])
-def test_real_roots_are_counted_where_sturm_sequences_lose_all_digits(degree):
-    rng = np.random.default_rng(degree)
-    for _ in range(8):
-        real = int(rng.integers(0, degree // 2 + 1)) * 2 + degree % 2
-        found = rng.choice(np.arange(-20, 0), real, replace=False)
-        pairs = [[1, 1, int(x)] for x in rng.integers(1, 30, (degree - real) // 2)]
-        c = [float(x) for x in product(*([1, -int(r)] for r in found), *pairs)]
-        assert [int(x) for x in real_roots(c)] == list(curves.sturm([Fraction(x) for x in c])[::2])
-
-
-@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6, 8, 12])
-def test_heavy_damping_by_signs_is_that_of_distinct_real_roots(degree):
-    rng = np.random.default_rng(1)
-    apart = np.array([np.poly(-np.cumsum(rng.uniform(0.3, 1, degree))) for _ in range(40)])
-    assert heavily_damped(apart).all()
-    z = -np.cumsum(rng.uniform(0.3, 1, (40, degree)), axis=1) + 0j
-    z[:, 0] = z[:, 1].real + 0.2j
-    z[:, 1] = z[:, 0].conj()
-    assert not heavily_damped(np.array([np.poly(row).real for row in z])).any()
-
-
-@pytest.mark.parametrize("multiplicity", [(2, 1), (4,), (5,), (2, 2, 1, 1), (3, 2, 1), (6,), (2, 1, 1, 1, 1, 1)])
-def test_multiple_real_roots_are_recognised_by_coefficients(multiplicity):
-    at = [-0.8, -1.4, -2.3, -3.0, -4.0, -5.5][: len(multiplicity)]
-    c = np.array(product(*([1, -r] for r, m in zip(at, multiplicity, strict=True) for _ in range(m))))
-    found = multiple_real_roots(c, 1e-11)
-    assert [r.multiplicity for r in found] == list(multiplicity)
-    assert [r.re for r in found] == pytest.approx(at, rel=1e-9)  # 1e-16 of coefficients times the factors' condition
-    assert multiple_real_roots(c + 1e-6 * np.eye(len(c))[-1] * c[-1], 1e-11) is None
-    assert multiple_real_roots(np.convolve(c, [1, 2, 2]), 1e-11) is None
 
 
 # Robustness radii in closed form
@@ -245,20 +190,6 @@ def test_no_ray_of_a_chain_of_three_masses_finds_a_nearer_change():
         assert np.all(right(share * found.distance * rays) < 0)
     assert right((1 + 1e-5) * answer[None]) > 0
     assert found.refined
-
-
-def test_edges_of_degree_12_start_in_their_own_equations():
-    """A polynomial made of an edge's factors: the guess gives its coefficients back to rounding."""
-    pairs = [[1, 0.2 + 0.1 * k, (1 + 0.3 * k) ** 2] for k in range(5)]
-    weave = np.array(product([1, 0, 2.0], *pairs)) / 200
-    linear = [[0.3 + 0.2 * k, 1.0] for k in range(10)]
-    double = np.array(product([1, 1.1], [1, 1.1], *linear))
-    for name, c in (("weave", weave), ("EP2", double)):
-        edge = edges(12)[name]
-        left = np.array(edge.equations(c, edge.guess(c)))
-        size = np.abs(c)
-        assert np.abs(left / size).max() <= 1e-7  # a double root by numeric ones: half the digits
-        assert np.all(np.array(edge.nonnegative(c, edge.guess(c))) >= -1e-7)
 
 
 # Worst cases and charts

@@ -1,16 +1,15 @@
-"""The most tolerant design: its radius by the nearest points of three surfaces, and the best of all by a search."""
+"""The most tolerant design: its radius by the nearest points of three surfaces, and the best that a search found."""
 
 import numpy as np
 import pytest
 from helpers import hunt
-from scipy.optimize import minimize
 
 import tmsopt
 from tmsopt import laws
 
 NAMES = hunt.NATIVE
 BEST = 0.1418017253
-"""Of `search(seed)` with generations=40, rounds=8: 5 s each, and the same to 2e-9 from seeds 1 to 4."""
+"""By differential evolution on `radius` (`hunt.least`, 40 generations, 8 rounds), the same to 2e-9 from four seeds."""
 
 AT = {"chi_B": 1.3851576491, "Fr": 2.8517689591, "lambda_s": 0.6296873459}
 
@@ -51,52 +50,6 @@ def radius(d, steps=20, starts=1):
         lost = ~settled & (size < 0.4)
     found = np.where(np.isinf(nearest) & lost, 0.0, nearest).min(0)
     return np.where(laws.lscf_complete(**dict(zip(NAMES, nominal, strict=True))), found, 0.0)
-
-
-def tolerant(d):
-    return -radius(d), hunt.abscissa(d) + 0.5
-
-
-def search(seed, **effort):
-    fixed, box = hunt.read("tolerant")
-    return hunt.least(tolerant, fixed, box, seed=seed, shrink=0.4, population=10, **effort)
-
-
-def the_best():
-    return {**hunt.read("tolerant")[0], **AT}
-
-
-def test_radius_is_a_radius():
-    """No unstable design within it by the complete conditions, and one at it by SLSQP on each surface."""
-    design = the_best()
-    found = float(radius(design, starts=8)[0])
-    assert found == pytest.approx(BEST, abs=1e-7)
-    nominal = np.array([design[name] for name in NAMES])
-    normal = np.random.default_rng(1).normal(size=(7, 200_000))
-    inside = nominal[:, None] * (1 + 0.999 * found * normal / np.linalg.norm(normal, axis=0))
-    assert laws.lscf_complete(**dict(zip(NAMES, inside, strict=True))).all()
-
-    size = surfaces(design)
-
-    def g(x, k):
-        return surfaces(dict(zip(NAMES, nominal * (1 + x), strict=True)))[k] / size[k]
-
-    distances = []
-    for k in range(3):
-        for start in 0.03 * np.random.default_rng(2).normal(size=(4, 7)):
-            on_it = {"type": "eq", "fun": g, "args": (k,)}
-            done = minimize(lambda x: x @ x, start, constraints=on_it, method="SLSQP", tol=1e-14)
-            if done.success and abs(g(done.x, k)) < 1e-8:
-                distances.append(float(np.sqrt(done.fun)))
-    assert min(distances) == pytest.approx(found, rel=1e-5)
-
-
-def test_search_finds_none_more_tolerant():
-    assert hunt.abscissa(the_best()) == pytest.approx(-0.5, abs=1e-7)
-    _, found = search(2, generations=12, rounds=2)
-    assert 0.9 * BEST < -found < BEST + 1e-7  # anywhere
-    _, found = search(3, generations=12, rounds=2, start=AT)
-    assert -found == pytest.approx(BEST, abs=1e-7)  # around it
 
 
 def test_solver_finds_the_most_tolerant_design():

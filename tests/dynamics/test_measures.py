@@ -133,15 +133,6 @@ def test_an_oscillator_in_noise_has_the_variance_of_the_closed_form() -> None:
     assert path.var(axis=0) == pytest.approx([sigma**2 / (2 * c * k), sigma**2 / (2 * c)], rel=off)
 
 
-def test_short_steps_shake_as_much_as_long_ones() -> None:
-    """A mass without spring: q is Brownian, var q′ = σ² t and var q = σ² t³/3 after any number of steps."""
-    A, force = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([0.0, 0.5])
-    for steps in (1, 7):
-        ends = np.array([shaken(A, np.zeros(2), force, 3.0 / steps, steps + 1, seed)[-1] for seed in range(1500)])
-        assert ends.var(axis=0) == pytest.approx([0.25 * 9, 0.25 * 3], rel=5 * math.sqrt(2 / 1500))
-        assert np.cov(ends.T)[0, 1] == pytest.approx(0.25 * 9 / 2, rel=0.15)
-
-
 def test_the_benchmark_in_noise_has_the_variance_of_its_frequency_response() -> None:
     """(1/2π) ∫ |H(iω)|² dω σ², H from the matrices of Meijaard et al.; nothing of tmsopt's motion in it."""
     motion = tmsopt.simulate(BENCHMARK, noise=0.2, seed=3)

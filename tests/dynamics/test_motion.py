@@ -3,8 +3,6 @@
 import math
 import pickle
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,6 @@ from tmsopt.dynamics import system_of
 from tmsopt.models import canonical, from_matrices, matrices, tms, whipple
 from tmsopt.records import Array
 
-Feedback = import_module("tmsopt.models.model").Feedback
 PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK, EP4 = PROBLEMS / "whipple_benchmark.toml", PROBLEMS / "ep4.toml"
 STATES = ("phi", "delta", "phidot", "deltadot")
@@ -115,16 +112,6 @@ def ideal_ep4() -> tuple[Any, Any]:
     return A, -1 / mp.sqrt(h)
 
 
-def test_the_closed_form_of_the_ep4_is_that_of_the_paper() -> None:
-    design = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2)
-    with mp.workdps(50):
-        A, root = ideal_ep4()
-        assert float(root) == pytest.approx(design.omega0, rel=1e-14)
-        N = A - root * mp.eye(4)
-        assert mp.mnorm(N**4) < mp.mpf(10) ** -45
-        assert mp.mnorm(N**3) > mp.mpf("0.1")
-
-
 @pytest.mark.parametrize("start", [(1.0, 0.0, 0.0, 0.0), (0.0, 0.1, 0.0, -0.5)])
 def test_at_an_ep4_it_moves_with_the_third_power_of_time(start: tuple[float, ...]) -> None:
     """x(t) = e^(rt) Σ t^k N^k x(0)/k!, N = A − r, at 50 digits for the ideal design; the motion is that of the rounded one.
@@ -194,82 +181,34 @@ def test_a_response_is_a_simulation_and_is_pickled() -> None:
 # Controllers
 
 
-GAINS = np.array([[0.0, 0, 0, 0], [-60.0, 18.0, -9.0, 2.5]])
+GAINS = np.array([-60.0, 18.0, -9.0, 2.5])
+"""The torque on the steer is −G (φ, δ, φ̇, δ̇), at once or by a motor with a lag: τ T′ = −T − G x."""
+
 LAG = 0.05
 
 
-def steered(lag: float | None) -> tmsopt.models.Model:
-    """The Whipple bicycle with steer torque −(60…) x, at once or by a motor with a lag: τ T′ = −T − G x."""
-
-    def pencil(p: Mapping[str, Any]) -> tuple[Any, ...]:
-        M, D, K = whipple.pencil(p)  # type: ignore[misc]
-        if lag is None:
-            return M, added(D, GAINS[:, 2:]), added(K, GAINS[:, :2])
-        determinant = M[0][0] * M[1][1] - M[0][1] * M[1][0]
-        inverse = [[M[1][1], -M[0][1]], [-M[1][0], M[0][0]]]
-        zero, one = 0 * determinant, 1 + 0 * determinant
-        A = [[zero, zero, one, zero, zero], [zero, zero, zero, one, zero]]
-        for row in inverse:
-            force = [-sum(a * F[i][j] for i, a in enumerate(row)) / determinant for F in (K, D) for j in range(2)]
-            A.append([*force, row[1] / determinant])
-        A.append([*(-float(g) / lag * one for g in GAINS[1]), -one / lag])
-        return [[int(i == j) for j in range(5)] for i in range(5)], [[-x for x in row] for row in A]
-
-    def polynomial(**p: Any) -> list[Any]:
-        if lag is None:
-            return list(tmsopt.roots.quadratic_pencil(*pencil(p)))
-        M, D, K = whipple.pencil(p)  # type: ignore[misc]
-        L = [[[M[i][j], D[i][j], K[i][j]] for j in range(2)] for i in range(2)]
-        late = [
-            sums(convolved([lag, 1], L[1][j]), [0, 0, float(GAINS[1, 2 + j]), float(GAINS[1, j])]) for j in range(2)
-        ]
-        return sums(convolved(L[0][0], late[1]), [-x for x in convolved(L[0][1], late[0])])
-
-    return replace(
-        whipple,
-        pencil=pencil,
-        algebraic=dict,
-        polynomial=polynomial,
-        compact=None,
-        degree=4 if lag is None else 5,
-        feedback=lambda p: Feedback(whipple.pencil(p)[0], GAINS.tolist(), lag),  # type: ignore[misc]
-    )
-
-
-def convolved(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
-    """Coefficients of a product of polynomials, numbers of any kind."""
-    found = [0 * b[0]] * (len(a) + len(b) - 1)
-    for i, x in enumerate(a):
-        for j, y in enumerate(b):
-            found[i + j] = found[i + j] + x * y
-    return found
-
-
-def sums(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
-    return [x + y for x, y in zip(a, b, strict=True)]
-
-
-def added(F: Sequence[Sequence[Any]], G: Array) -> list[list[Any]]:
-    return [[a + float(b) for a, b in zip(*rows, strict=True)] for rows in zip(F, G, strict=True)]
+def steered(lag: float | None) -> dict[str, float]:
+    return dict(zip((f"k_{name}" for name in STATES), GAINS, strict=True)) | ({"lag": lag} if lag else {})
 
 
 @pytest.mark.parametrize("lag", [None, LAG])
 def test_a_controller_steers_and_its_torque_is_told(lag: float | None) -> None:
     """Against an integrator in which the torque acts on the passive bicycle; its peak against 100 000 points."""
     p = {**tmsopt.load(BENCHMARK).fixed, "v": 3.0}
-    motion = tmsopt.simulate(tmsopt.Problem(steered(lag), fixed=p), lean=4, push=0.2, seconds=2, points=101)
+    robot = tmsopt.Problem(whipple, fixed=p | steered(lag))
+    motion = tmsopt.simulate(robot, lean=4, push=0.2, seconds=2, points=101)
     passive, M = rolling(p), np.array(canonical(p)[0], dtype=float)
 
     def right(x: Array) -> Array:
-        torque = -GAINS[1] @ x[:4] if lag is None else x[6]
+        torque = -GAINS @ x[:4] if lag is None else x[6]
         moved = passive(x[:6])
         moved[2:4] += np.linalg.solve(M, [0, torque])
-        return np.r_[moved, [] if lag is None else [(-x[6] - GAINS[1] @ x[:4]) / lag]]
+        return np.r_[moved, [] if lag is None else [(-x[6] - GAINS @ x[:4]) / lag]]
 
     start = np.r_[math.radians(4), 0, np.linalg.solve(M, [0, 0.2]), 0, 0, [] if lag is None else [0.0]]
     found = integrated(right, start, np.array(motion["t"]))
     assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found[:6], abs=1e-10)
-    torque = -GAINS[1] @ found[:4] if lag is None else found[6]
+    torque = -GAINS @ found[:4] if lag is None else found[6]
     assert np.array(motion["T_delta"]) == pytest.approx(torque, abs=1e-9)
     assert "T_phi" not in motion.columns
     assert motion.names == ("t", *STATES)
@@ -283,32 +222,11 @@ def test_a_controller_steers_and_its_torque_is_told(lag: float | None) -> None:
 @pytest.mark.parametrize("lag", [None, LAG])
 def test_a_motor_of_skates_has_its_torque_in_newton_metres(lag: float | None) -> None:
     """Of tms in SI, whose matrices have no units: beside the same bicycle as Whipple's, whose have."""
-    own = tmsopt.load(PROBLEMS / "benchmark.toml")
-    p = {**own.fixed, "v": 3.5}
-    wheels = tmsopt.Problem(steered(lag), fixed=as_whipple(p))
-    native = tms.parameter_set("SI").native(p)
-    unit = p["m_B"] * p["g"] * p["w"]
-    rate = math.sqrt(p["g"] / p["w"])
-    gains = GAINS * [1, 1, rate, rate] / unit
-    M, D, K = (np.array(m, dtype=float) for m in tms.pencil(native))  # type: ignore[misc]
-    if lag is None:
-        pencil: tuple[Array, ...] = (M, D + gains[:, 2:], K + gains[:, :2])
-        coefficients = tmsopt.roots.quadratic_pencil(*(m.tolist() for m in pencil))
-    else:
-        J = np.linalg.inv(M)
-        top = np.hstack([np.zeros((2, 2)), np.eye(2), np.zeros((2, 1))])
-        A = np.vstack([top, np.hstack([-J @ K, -J @ D, J[:, 1:]]), np.r_[-gains[1], -1] / (lag * rate)])
-        pencil, coefficients = (np.eye(5), -A), np.poly(A).tolist()
-    driven = replace(
-        tms,
-        degree=len(coefficients) - 1,
-        compact=None,
-        pencil=lambda p: tuple(m.tolist() for m in pencil),
-        polynomial=lambda **p: list(coefficients),
-        feedback=lambda p: Feedback(M.tolist(), gains.tolist(), lag and lag * rate),
-    )
+    p = {**tmsopt.load(PROBLEMS / "benchmark.toml").fixed, "v": 3.5}
+    wheels = tmsopt.Problem(whipple, fixed=as_whipple(p) | steered(lag))
+    driven = tmsopt.Problem(tms, fixed=p | steered(lag))
     asked: dict[str, Any] = {"lean": 2, "push": 0.05, "seconds": 0.4, "points": 41}
-    skates, same = (tmsopt.simulate(q, **asked) for q in (tmsopt.Problem(driven, fixed=p), wheels))
+    skates, same = (tmsopt.simulate(q, **asked) for q in (driven, wheels))
     for name in (*STATES, "T_delta", "psi", "y_rear", "y_front"):
         scale = np.abs(same[name]).max()
         assert np.array(skates[name]) / scale == pytest.approx(np.array(same[name]) / scale, abs=1e-10), name

@@ -2,7 +2,6 @@
 
 import json
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from helpers.bicycles import BODIES, appendix
 import tmsopt
 from benchmarks.judges.whipple import largest_real_part
 from tmsopt.cli import every as main
-from tmsopt.models import canonical, inertia_margin, matrices, whipple
+from tmsopt.models import inertia_margin
 
 ROBOT = {
     "w": 0.8,
@@ -38,34 +37,6 @@ def abscissa(p, **inertia):
     D, K = p["v"] * C1, p["g"] * K0 + p["v"] ** 2 * K2
     A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
     return np.linalg.eigvals(A).real.max()
-
-
-def test_matrices_without_wheels_and_trail_are_those_of_skates_in_exact_numbers():
-    """M, v C1 and g K0 + v² K2 of Meijaard et al. are m_B w² times M, V √(g/w) and P g/w of Kirillov."""
-    rng = np.random.default_rng(3)
-    for _ in range(50):
-        w, rate, Fr, mu, chi_B, chi_H, zeta_B, zeta_H, m_B, t = (Fraction(int(n), 8) for n in rng.integers(1, 40, 10))
-        sine, cosine = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)
-        g, v = rate**2 * w, Fr * rate * w
-        si = {"w": w, "x_B": chi_B * w, "z_B": -zeta_B * w, "m_B": m_B}
-        si |= {"x_H": chi_H * w, "z_H": -zeta_H * w, "m_H": mu * m_B}
-        M, C1, K0, K2 = appendix({n: Fraction(x) for n, x in NOTHING.items()} | si, sine, cosine)
-        D, K = (
-            [[v * x for x in row] for row in C1],
-            [[g * a + v * v * b for a, b in zip(*rows, strict=True)] for rows in zip(K0, K2, strict=True)],
-        )
-        own = matrices(Fr, mu, chi_B, chi_H, -zeta_B, -zeta_H, sine, cosine)
-        for printed, skates, power in zip((M, D, K), own, range(3), strict=True):
-            assert printed == [[m_B * w * w * rate**power * x for x in row] for row in skates]
-
-
-def test_the_package_has_the_matrices_of_the_appendix_without_wheels():
-    values = {p.name: p.default or 0.0 for p in whipple.sets[0].parameters} | ROBOT | {"I_Hzz": 0.01, "I_Bxx": 0.2}
-    expected = appendix(
-        NOTHING | values | {"r_R": 1.0, "r_F": 1.0}, np.sin(ROBOT["lambda_s"]), np.cos(ROBOT["lambda_s"])
-    )
-    for got, printed in zip(canonical(values), expected, strict=True):
-        np.testing.assert_allclose(got, printed, rtol=1e-12, atol=1e-12)
 
 
 def test_the_robot_of_point_masses():

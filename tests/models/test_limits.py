@@ -86,26 +86,6 @@ def test_what_is_not_beyond_is_read(written):
     assert expression.parse_value(written, ["Fr"]).names == ("Fr",)
 
 
-@pytest.mark.parametrize(
-    ("written", "found"),
-    [
-        ("x*y**2 + x", (3, 0)),
-        ("1/x + 1/y", (1, 2)),
-        ("(x + 1)**5/(y - x)**2", (5, 2)),
-        ("x**-3", (0, 3)),
-        ("(x/y)**-2", (2, 2)),
-        ("sin(x**900)*x", (2, 0)),
-        ("sqrt(x**3)", (3, 0)),
-        ("2*3", (0, 0)),
-    ],
-)
-def test_degrees_are_those_of_the_quotient_multiplied_out(written, found):
-    """Of x y² + x; (x + y)/(x y); (x + 1)⁵/(y − x)² and so on, by hand."""
-    symbols = {"x": degree.Degree(), "y": degree.Degree()}
-    value = expression.parse_value(written, ["x", "y"]).evaluate(symbols, expression.DEGREES)
-    assert (value.over, value.under) == found
-
-
 @pytest.mark.parametrize("size", [4, 6])
 def test_what_a_program_builds_may_cancel(size):
     """An inverse is of the degree of its matrix, and the steps to it sum up to more than 10 000."""

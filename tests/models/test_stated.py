@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import casadi as ca
-import flint
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -129,25 +128,6 @@ def test_coefficients_of_a_first_order_system_are_those_of_numpy(size: int) -> N
     identity, minus_A = (np.array(m, dtype=float) for m in model.pencil({"k": 1.3}))
     assert np.allclose(identity, np.eye(size))
     assert np.allclose(minus_A, -1.3 * A)
-
-
-def test_balls_hold_the_exact_coefficients_and_the_floats() -> None:
-    """At a design of fractions the coefficients are fractions; floats are within rounding of them."""
-    model = from_matrices([[2, 0], [0, c]], None, [[k * k, -1], [k / 3, 1 + c]])
-    exact = model.coefficients({"k": flint.fmpq(3, 2), "c": flint.fmpq(1, 4)})
-    third = flint.fmpq(*(0.5).as_integer_ratio())  # (3/2)/3, which is a double
-    assert exact == [
-        flint.fmpq(1, 2),
-        0,
-        2 * flint.fmpq(5, 4) + flint.fmpq(9, 4) * flint.fmpq(1, 4),
-        0,
-        flint.fmpq(9, 4) * flint.fmpq(5, 4) + third,
-    ]
-    sines = from_coefficients([1, ca.sin(k), ca.exp(c) + k, ca.sqrt(k) / c, ca.fmax(k, c) ** 3])
-    for at in ({"k": 1.5, "c": 0.25}, {"k": 0.1, "c": 3.0}):
-        floats = sines.coefficients(at)
-        balls = sines.coefficients({n: flint.arb(x, 1e-14) for n, x in at.items()})
-        assert all(ball.contains(float(x)) for ball, x in zip(balls, floats, strict=True))
 
 
 def test_a_model_is_pickled_as_what_it_is() -> None:
@@ -369,7 +349,6 @@ k = 1
         (lambda: from_matrices([[1]], None, [[ca.MX.sym("k")]]), "is MX; make the symbols by ca.SX.sym"),
         (lambda: from_matrices([[b"1"]], None, [[k]]), "row 1, column 1: found b'1'"),
         (lambda: from_matrices([[None]], None, [[k]]), "found None"),
-        (lambda: from_matrices([[True]], None, [[k]]), "found True"),
         (lambda: from_matrices([[1j]], None, [[k]]), "found 1j"),
         (lambda: from_matrices([[10**400]], None, [[k]]), "is inf"),
         (lambda: from_matrices([[1]], None, [[k * np.inf]]), "contains inf"),
@@ -378,16 +357,12 @@ k = 1
         (lambda: from_matrices([[ca.SX.sym("x", 2)]], None, [[k]]), "is a matrix; accepted: scalar"),
         (lambda: from_matrices([[1]], None, [[k + ca.SX.sym("k")]]), "two symbols named k"),
         (lambda: from_matrices([[1]], None, [[ca.SX.sym("k 1")]]), "'k 1', which is no name"),
-        (lambda: from_matrices([[1]], None, [[ca.SX.sym("lambda")]]), "which is a reserved word"),
         (lambda: from_matrices([[1]], None, [[ca.SX.sym("radius")]]), "which is what tmsopt computes"),
-        (lambda: from_matrices([[1]], None, [[2]]), "names no parameter"),
         (lambda: from_matrices([[1]], None, [[k]], name=""), "name: found ''"),
-        (lambda: from_matrices([[1]], None, [[k]], name="whipple"), "a model of tmsopt's own"),
         (lambda: from_matrices([[1]], None, [[k]], quantities={"k": k}), "'k' is the name of a parameter"),
         (lambda: from_matrices([[1]], None, [[k]], quantities={"q": b"k"}), "q: found b'k'"),
         (lambda: from_matrices([[1]], None, [["k +"]]), "K: row 1, column 1: 'k +'"),
         (lambda: from_matrices([[1]], None, [["sin"]]), "K: row 1, column 1: 'sin' names the function"),
-        (lambda: from_matrices([[1]], None, [["k"]], quantities={"q": "2*r", "r": "q"}), "q: uses itself: q → r → q"),
         (lambda: from_matrices([[1]], None, [[k]], quantities=[k]), "quantities: found list"),
         (lambda: from_coefficients("1k"), "coefficients: found no list"),
         (lambda: from_coefficients(np.eye(2)), "coefficients: found no list"),

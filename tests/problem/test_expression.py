@@ -3,156 +3,62 @@
 import builtins
 import math
 import os
+import re
 import string
 import subprocess
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings, strategies as st
+from mpmath import mp
 
 from tmsopt.problem import Expression, ExpressionError, parse_comparison, parse_value
 
 NAMES = ("Fr", "mu", "zeta_B", "a0", "lambda_s", "abscissa")
-UNIT = np.finfo(float).eps
 
 
-# Random expressions, with their value by Python's own floats and a bound of its rounding
+# Random expressions, whose text Python reads in the same way
 
 
-@dataclass(frozen=True)
-class Tree:
-    """An expression as text, how tightly it binds, and its value with an error bound for given names."""
-
-    text: str
-    binding: int  # 1 sums, 2 products, 3 signs, 4 powers, 5 atoms
-    value: Callable[[dict[str, float]], tuple[float, float]]
-
-
-def wrapped(tree: Tree, least: int) -> str:
-    return tree.text if tree.binding >= least else f"({tree.text})"
-
-
-def number(text: str) -> Tree:
-    return Tree(text, 5, lambda at: (float(text), 0.0))
-
-
-def name(text: str) -> Tree:
-    return Tree(text, 5, lambda at: (at[text], 0.0))
-
-
-def signed(sign: str, a: Tree) -> Tree:
-    def value(at: dict[str, float]) -> tuple[float, float]:
-        v, e = a.value(at)
-        return (-v if sign == "-" else v), e
-
-    return Tree(sign + wrapped(a, 3), 3, value)
-
-
-def binary(op: str, a: Tree, b: Tree, space: str) -> Tree:
-    least = {"+": (1, 2, 1), "-": (1, 2, 1), "*": (2, 3, 2), "/": (2, 3, 2), "**": (5, 3, 4)}
-    left, right, own = least[op]
-
-    def value(at: dict[str, float]) -> tuple[float, float]:
-        (x, dx), (y, dy) = a.value(at), b.value(at)
-        if op in "+-":
-            v, e = (x + y if op == "+" else x - y), dx + dy
-        elif op == "*":
-            v, e = x * y, abs(x) * dy + abs(y) * dx + dx * dy
-        elif op == "/":
-            v = x / y
-            e = (dx + abs(v) * dy) / max(abs(y) - dy, 1e-300)
-        else:
-            assume(x > 1e-3)
-            v = x**y
-            e = abs(v) * (abs(y) * dx / x + abs(math.log(x)) * dy) * 2
-        return v, e + 4 * UNIT * abs(v)
-
-    return Tree(wrapped(a, left) + space + op + space + wrapped(b, right), own, value)
-
-
-SLOPES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
-    "sin": (math.sin, lambda x: 1),
-    "cos": (math.cos, lambda x: 1),
-    "tan": (math.tan, lambda x: 1 + math.tan(x) ** 2),
-    "asin": (math.asin, lambda x: 1 / math.sqrt(1 - x * x)),
-    "acos": (math.acos, lambda x: 1 / math.sqrt(1 - x * x)),
-    "atan": (math.atan, lambda x: 1),
-    "sqrt": (math.sqrt, lambda x: 0.5 / math.sqrt(x)),
-    "exp": (math.exp, math.exp),
-    "log": (math.log, lambda x: 1 / x),
-    "abs": (abs, lambda x: 1),
-}
-
-
-def call(function: str, a: Tree) -> Tree:
-    f, slope = SLOPES[function]
-
-    def value(at: dict[str, float]) -> tuple[float, float]:
-        x, dx = a.value(at)
-        v = f(x)
-        return v, 2 * slope(x) * dx + 4 * UNIT * abs(v)
-
-    return Tree(f"{function}({a.text})", 5, value)
-
-
-def extreme(function: str, arguments: list[Tree]) -> Tree:
-    def value(at: dict[str, float]) -> tuple[float, float]:
-        found = [a.value(at) for a in arguments]
-        return (min if function == "min" else max)(v for v, _ in found), max(e for _, e in found)
-
-    return Tree(f"{function}({', '.join(a.text for a in arguments)})", 5, value)
-
-
-leaves = st.one_of(
-    st.sampled_from(["0", "1", "2", "7", "0.5", ".25", "3.", "1e-3", "2.5E2", "1e+1"]).map(number),
-    st.floats(0.001, 1000).map(repr).map(number),
-    st.sampled_from(NAMES).map(name),
-    st.just(Tree("pi", 5, lambda at: (math.pi, 0.0))),
-)
-trees = st.recursive(
+FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log")
+OTHERS = {"abs": math.fabs, "min": min, "max": max}
+ROUGH = {n: getattr(math, n) for n in (*FUNCTIONS, "pi")} | OTHERS | {"mpf": float}
+TRUTH = {n: getattr(mp, n) for n in (*FUNCTIONS, "pi", "mpf")} | OTHERS | {"abs": abs}
+leaves = st.sampled_from(["0", "1", "7", "0.5", ".25", "3.", "1e-3", "2.5E2", "1e+1", "pi", *NAMES])
+texts = st.recursive(
     leaves,
     lambda inner: st.one_of(
-        st.builds(binary, st.sampled_from(["+", "-", "*", "/", "**"]), inner, inner, st.sampled_from(["", " "])),
-        st.builds(signed, st.sampled_from("+-"), inner),
-        st.builds(call, st.sampled_from(sorted(SLOPES)), inner),
-        st.builds(extreme, st.sampled_from(["min", "max"]), st.lists(inner, min_size=2, max_size=4)),
-        inner.map(lambda t: Tree(f"({t.text})", 5, t.value)),
+        st.builds("{}{}{}".format, inner, st.sampled_from([" + ", "-", "*", " / ", "**", " ** "]), inner),
+        st.builds("{}{}".format, st.sampled_from("+-"), inner),
+        st.builds("{}({})".format, st.sampled_from([*FUNCTIONS, "abs", ""]), inner),
+        st.builds("{}({}, {}, {})".format, st.sampled_from(["min", "max"]), inner, inner, inner),
     ),
     max_leaves=12,
 )
 
 
-@settings(
-    max_examples=250,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
-)
-@given(trees, st.lists(st.floats(-3, 3), min_size=len(NAMES), max_size=len(NAMES)))
-def test_random_expressions_mean_what_they_mean_in_python(tree: Tree, numbers: list[float]) -> None:
-    """NumPy and CasADi against Python's floats, within the running error bound of the operations."""
-    assume(len(tree.text) <= 2000)
+@settings(max_examples=250, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(texts, st.lists(st.floats(-3, 3), min_size=len(NAMES), max_size=len(NAMES)))
+def test_random_expressions_mean_what_they_mean_in_python(text: str, numbers: list[float]) -> None:
+    """NumPy and CasADi against Python's own reading of the text, at 40 digits; where rounding matters nothing is asked."""
     at = dict(zip(NAMES, numbers, strict=True))
+    written = re.sub(r"(?<![\w.])(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", r"mpf('\g<0>')", text)
     try:
-        value, error = tree.value(at)
-    except (ValueError, ZeroDivisionError, OverflowError):
+        rough = eval(written, {**ROUGH, **at})
+        with mp.workdps(40):
+            value = eval(written, {**TRUTH, **{n: mp.mpf(x) for n, x in at.items()}})
+    except (ValueError, ZeroDivisionError, OverflowError, TypeError):  # the last of complex numbers
         assume(False)
-    assume(math.isfinite(value) and abs(value) < 1e100 and error <= 1e-9 * max(1.0, abs(value)))
-    expression = parse_value(tree.text, NAMES)
-    tolerance = error + 1e-300
-
-    assert abs(expression(at) - value) <= tolerance
-
-    several = expression({n: np.array([v, v]) for n, v in at.items()})
-    assert np.all(np.abs(several - value) <= tolerance)
-
+    assume(isinstance(rough, float) and abs(rough - value) < 1e-11 * min(abs(value), 1e100))
+    expression = parse_value(text, NAMES)
     symbols = {n: ca.SX.sym(n) for n in NAMES}
     function = ca.Function("f", list(symbols.values()), [ca.SX(expression.symbolic(symbols))])
-    assert abs(float(function(*numbers)) - value) <= tolerance
+    several = expression({n: np.array([v, v]) for n, v in at.items()})
+    for found in (expression(at), float(function(*numbers)), *np.broadcast_to(several, 2)):
+        assert found == pytest.approx(float(value), rel=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -248,38 +154,21 @@ def test_values_and_comparisons_are_told_apart() -> None:
     "text",
     [
         "Fr < 1",
-        "Fr > 1",
         "Fr != 1",
         "Fr is mu",
-        "Fr is not mu",
-        "Fr in mu",
         "Fr not in mu",
         "Fr = 1",
         "Fr =< 1",
-        "Fr => 1",
         "Fr <> 1",
         "Fr ≤ 1",
-        "Fr ≥ 1",
         "Fr <= 1 <= mu",
-        "Fr == mu == a0",
         "Fr <= (mu <= 1)",
-        "(Fr <= 1) <= mu",
-        "Fr <= 1, mu <= 1",
         "Fr <= 1 and mu <= 1",
         "not Fr <= 1",
-        "Fr <= 1; mu <= 1",
-        "Fr <= 1 if mu else 0",
         "Fr <=",
         "<= 1",
-        "-(Fr <= 1)",
         "min(Fr <= 1, 2) <= 3",
-        "Fr <= True",
-        "Fr <= 1e999",
-        "Fr <= inf",
         "Fr <= x",
-        "Fr <= 'a'",
-        "(Fr := 1) <= 1",
-        "Fr <= print(1)",
     ],
 )
 def test_other_comparisons_are_refused(text: str) -> None:
@@ -295,26 +184,17 @@ FORBIDDEN = {
     "call": [
         "print(1)",
         "__import__('os')",
-        "eval('1')",
-        "open('x')",
         "Fr()",
-        "pi()",
-        "Fr(1)",
         "sin(1)(2)",
-        "(sin)(1)(1)",
     ],
     "attribute": [
         "Fr.real",
-        "Fr.__class__",
-        "sin.__globals__",
         "().__class__.__bases__",
-        "math.pi",
-        "(1).real",
         "np.sin(Fr)",
     ],
-    "subscript": ["Fr[0]", "[Fr][0]", "(1, 2)[0]", "Fr[1:2]"],
+    "subscript": ["Fr[0]", "Fr[1:2]"],
     "lambda": ["lambda: 1", "(lambda x: x)(1)"],
-    "comprehension": ["[x for x in (1, 2)]", "{x for x in (1, 2)}", "{1: x for x in ()}", "min(x for x in (1, 2))"],
+    "comprehension": ["[x for x in (1, 2)]", "min(x for x in (1, 2))"],
     "container": ["[Fr]", "(Fr,)", "Fr, mu", "{Fr}", "{1: 2}", "()"],
     "string": ["'Fr'", '"Fr"', "b'Fr'", "'a' * 3", "'''x'''"],
     "walrus": ["(Fr := 1)", "min(x := 1, 2)"],
@@ -339,13 +219,8 @@ FORBIDDEN = {
         "Fr = 1",
         "Fr; mu",
         "import os",
-        "del Fr",
-        "return 1",
         "yield",
         "await Fr",
-        "pass",
-        "assert Fr",
-        "x: int",
     ],
     "wrong number of arguments": ["sin()", "sin(1, 2)", "min()", "min(1)", "max(Fr)", "sqrt(1, 2)", "abs()"],
     "function without argument": ["sin", "min + 1", "sin(cos)", "abs"],
@@ -359,21 +234,12 @@ FORBIDDEN = {
         "1 +",
         "* 1",
         "1 2",
-        "Fr mu",
-        "2 Fr",
         "2Fr",
         "1..2",
-        "1e",
         "sin 1",
-        "(1",
-        "1)",
         "$",
-        "Fr!",
-        "?",
-        "@Fr",
         "1,000.5",
         "0777",
-        "Fr''",
     ],
     "line break": ["Fr\nmu", "Fr\n+ 1", "(Fr\n+ 1)", "(Fr +\r\n1)", "Fr \\\n+ 1", "sin(\nFr)"],
     "control character": ["Fr\x00", "\x00", "Fr + \x001", "Fr\x1b", "Fr\x07+1", "Fr\x7f"],
@@ -381,24 +247,14 @@ FORBIDDEN = {
     "unicode": [
         "ｓｉｎ(Fr)",
         "𝐅𝐫",
-        "Ｆｒ",
-        "ℱr",
-        "F\u0280",
         "Fr − 1",
-        "Fr × 2",
-        "Fr ÷ 2",
         "２",
         "Fr\u00a0+ 1",
-        "Fr\u200b",
         "\ufeffFr",
-        "π",
-        "µ",
         "μ",
         "а0",
         "Fr²",
-        "√Fr",
         "\u202eFr",
-        "m\u1d58",
         "\ud800",
     ],
 }
@@ -500,71 +356,8 @@ def test_a_caret_is_answered_with_the_power() -> None:
 
 
 ALLOWED = set(string.ascii_letters + string.digits + "_.+-*/(), <>=")
-tokens = st.lists(
-    st.sampled_from(
-        [
-            *NAMES,
-            "sin",
-            "min",
-            "max",
-            "abs",
-            "pi",
-            "1",
-            "2.5",
-            "1e3",
-            ".5",
-            "+",
-            "-",
-            "*",
-            "/",
-            "**",
-            "(",
-            ")",
-            ",",
-            "<=",
-            ">=",
-            "==",
-            "<",
-            "!=",
-            "=",
-            ".",
-            "[",
-            "]",
-            "{",
-            "}",
-            ":",
-            ";",
-            "'",
-            '"',
-            "lambda",
-            "if",
-            "else",
-            "for",
-            "in",
-            "not",
-            "and",
-            "True",
-            "None",
-            "~",
-            "^",
-            "%",
-            "@",
-            "#",
-            "\\",
-            "\n",
-            "\x00",
-            "é",
-            "f''",
-            ":=",
-            "...",
-            "await",
-            "yield",
-            "0x",
-            "_",
-        ]
-    ),
-    max_size=12,
-)
+WORDS = "sin min max abs pi 1 2.5 1e3 .5 + - * / ** ( ) , <= >= == < != = . [ ] { } : ; ' \" lambda if else for in not and True None ~ ^ % @ # \\ é f'' := ... await yield 0x _"
+tokens = st.lists(st.sampled_from([*NAMES, *WORDS.split(), "\n", "\x00"]), max_size=12)
 
 
 @settings(max_examples=800, deadline=None, derandomize=True)

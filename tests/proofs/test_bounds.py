@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -11,7 +11,7 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.algebra import EVERYTHING, INTERVALS, NotAccepted, ball, interval, ranges, root_bound, walk
+from tmsopt.algebra import EVERYTHING, NotAccepted, ball, interval, ranges, root_bound
 from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
 from tmsopt.problem import parse_value
 from tmsopt.program import NLP
@@ -110,19 +110,6 @@ def test_a_double_square_admits_more_than_the_theorem() -> None:
     assert holds(c, [4, 4])
 
 
-def test_compact_squares_say_the_same() -> None:
-    """X/(1 − X) for x only multiplies conditions by powers of 1 − X > 0."""
-    rng = np.random.default_rng(3)
-    for degree in range(3, 8):
-        for _ in range(20):
-            c = [Fraction(int(k), 3) for k in rng.integers(0, 20, degree + 1)]
-            x = sorted((Fraction(int(k), 5) for k in rng.integers(0, 40, unknowns(degree))), reverse=True)
-            plain = interlacing(c, [(e, Fraction(1)) for e in x])
-            finite = interlacing(c, [(e / (1 + e), 1 - e / (1 + e)) for e in x])
-            signs = [[np.sign(float(e)) for e in part] for part in plain]
-            assert [[np.sign(float(e)) for e in part] for part in finite] == signs
-
-
 @pytest.mark.parametrize("degree", range(2, 8))
 def test_squares_are_found_for_known_coefficients(degree: int) -> None:
     """Within half the digits of a double, which a double zero loses."""
@@ -206,88 +193,12 @@ def test_no_root_is_larger_than_the_bound(degree: int) -> None:
             assert np.abs(found).max(initial=0) <= most * (1 + 1e-3)
 
 
-def test_the_bound_on_roots_is_fujiwaras() -> None:
-    """(t − 1)⁴ = t⁴ − 4t³ + 6t² − 4t + 1: 2 max(4, √6, ∛4, ⁴√½) = 8."""
-    assert root_bound([(x, x) for x in (1.0, -4.0, 6.0, -4.0, 1.0)]) == pytest.approx(8, rel=1e-12)
-    assert root_bound([(2.0, 2.0), (0.0, 0.0), (8.0, 8.0)]) == pytest.approx(2 * math.sqrt(2), rel=1e-12)
-
-
 def test_roots_have_no_bound_where_one_may_be_at_infinity() -> None:
     for leading in ((0.0, 1.0), (-1.0, 1.0), (-1.0, 0.0)):
         assert root_bound([leading, (1.0, 1.0), (1.0, 1.0)]) == math.inf
 
 
 # One instruction after the other
-
-EVERY_OPERATION = (
-    "x + y - x*y/z + x**2 + y**3 + z**-1 + x**-2 + y**0.5 + z**2.5 + x**y + 2**x - (-y) + x + x"
-    " + sin(x) + cos(x) + tan(x) + asin(y/9) + acos(y/9) + atan(x) + sqrt(x) + exp(x/9) + log(y) + abs(x - y)"
-    " + min(x, y) + max(y, z) + pi"
-)
-FLOATS: dict[int, Callable[..., float]] = {
-    ca.OP_CONST: float,
-    ca.OP_ADD: lambda a, b: a + b,
-    ca.OP_SUB: lambda a, b: a - b,
-    ca.OP_MUL: lambda a, b: a * b,
-    ca.OP_DIV: lambda a, b: a / b,
-    ca.OP_NEG: lambda a: -a,
-    ca.OP_SQ: lambda a: a * a,
-    ca.OP_TWICE: lambda a: 2 * a,
-    ca.OP_INV: lambda a: 1 / a,
-    ca.OP_POW: lambda a, b: a**b,
-    ca.OP_CONSTPOW: lambda a, b: a**b,
-    ca.OP_SQRT: math.sqrt,
-    ca.OP_EXP: math.exp,
-    ca.OP_LOG: math.log,
-    ca.OP_SIN: math.sin,
-    ca.OP_COS: math.cos,
-    ca.OP_TAN: math.tan,
-    ca.OP_ASIN: math.asin,
-    ca.OP_ACOS: math.acos,
-    ca.OP_ATAN: math.atan,
-    ca.OP_FABS: abs,
-    ca.OP_FMAX: max,
-    ca.OP_FMIN: min,
-}
-
-
-def test_walking_is_evaluating() -> None:
-    """CasADi's own value, within the roundings of some fifty operations."""
-    x, at = ca.SX.sym("x", 3), [1.25, 2.5, 0.75]
-    value = parse_value(EVERY_OPERATION, ("x", "y", "z")).symbolic(dict(zip("xyz", ca.vertsplit(x), strict=True)))
-    f = ca.Function("f", [x], [ca.vertcat(value, x[0] * value), x[2]])
-    expected = [np.array(part).ravel().tolist() for part in f(at)]
-    walked = walk(f, at, FLOATS)
-    balls = walk(f, [flint.arb(v) for v in at], INTERVALS)
-    for row, floats, enclosed in zip(expected, walked, balls, strict=True):
-        assert floats == pytest.approx(row, rel=1e-14)
-        assert [float(b) for b in enclosed] == pytest.approx(row, rel=1e-14)
-
-
-def test_outputs_that_are_nought_are_walked_too() -> None:
-    x = ca.SX.sym("x")
-    assert walk(ca.Function("f", [x], [ca.vertcat(x, 0, 2)]), [3.0], FLOATS) == [[3.0, 0.0, 2.0]]
-
-
-def test_what_is_shared_is_marked_once() -> None:
-    x = ca.SX.sym("x")
-    twice = ca.sin(x)
-    marked: list[float] = []
-
-    def mark(value: float) -> float:
-        marked.append(value)
-        return value
-
-    walk(ca.Function("f", [x], [twice * ca.exp(twice), ca.cos(x)]), [0.5], FLOATS, mark)
-    assert marked == [math.sin(0.5)]
-
-
-@pytest.mark.parametrize("name", ["floor", "erf", "atan2"])
-def test_an_unknown_operation_is_named(name: str) -> None:
-    x = ca.SX.sym("x")
-    made = getattr(ca, name)(x, 2) if name == "atan2" else getattr(ca, name)(x)
-    with pytest.raises(NotAccepted, match=f"^{name}$"):
-        walk(ca.Function("f", [x], [made]), [1.0], FLOATS)
 
 
 # What SCIP is told

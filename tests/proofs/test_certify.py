@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers import timid
-from helpers.oracles import polynomial_floats
+from helpers import hunt, timid
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from benchmarks.suites import REFERENCES, random_problem, references
@@ -51,22 +50,9 @@ def problem(free: Mapping[str, tuple[float, float]] = PLANE, **asked: Any) -> Pr
     return Problem(models.tms, {n: v for n, v in TILTED.items() if n not in free}, free, **asked)
 
 
-def spectra(**design: Any) -> Array:
-    """NumPy's roots for arrays of designs; the last axis counts the roots."""
-    a = np.stack(np.broadcast_arrays(*polynomial_floats(**{**TILTED, **design})), axis=-1)
-    companion = np.zeros((*a.shape[:-1], 4, 4))
-    companion[..., 0, :] = -a[..., 1:] / a[..., :1]
-    companion[..., 1:, :-1] = np.eye(3)
-    return np.linalg.eigvals(companion)
-
-
 def growth(**design: Any) -> Array:
-    return spectra(**design).real.max(axis=-1)
-
-
-def damping(**design: Any) -> Array:
-    z = spectra(**design)
-    return (-z.real / np.abs(z)).min(axis=-1)
+    """Abscissae of arrays of designs, by eigenvalues."""
+    return hunt.abscissa({**TILTED, **design})
 
 
 def plane(count: int = 120) -> tuple[Array, Array]:
@@ -195,7 +181,7 @@ def test_the_greatest_damping_ratio() -> None:
     )
     assert is_closed(design)
     Fr, chi_B = plane()
-    greatest = damping(Fr=Fr, chi_B=chi_B)[Fr <= 1.6].max()
+    greatest = hunt.damping_ratio({**TILTED, "Fr": Fr, "chi_B": chi_B})[Fr <= 1.6].max()
     assert design.value - 0.1 <= greatest <= design.bound.value < 1
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -43,27 +42,6 @@ def test_published_exceptional_points_are_located_and_proved(name: str) -> None:
     assert [z.multiplicity for z in proof.eigenfrequencies] == [order]
     (diagnosis,) = tmsopt.diagnose(found)
     assert (diagnosis.algebraic, diagnosis.geometric, diagnosis.kind) == (order, 1, "defective")
-
-
-def test_the_matrix_itself_has_them() -> None:
-    """By another route, at 60 digits: H − ω to the power of the order vanishes, and to one less does not."""
-    with mpmath.workdps(60):
-        v, g = mpmath.mpf(1), mpmath.mpf(1)
-        three = mpmath.sqrt(3)
-        bosons = mpmath.matrix(
-            [
-                [-3j * g, three * v, 0, 0],
-                [three * v, -1j * g, 2 * v, 0],
-                [0, 2 * v, 1j * g, three * v],
-                [0, 0, three * v, 3j * g],
-            ]
-        )
-        root = mpmath.sqrt(2)
-        trimer = mpmath.matrix([[1j * root, 1, 0], [1, 0, 1], [0, 1, -1j * root]])
-        for matrix in (bosons, trimer):
-            n = matrix.rows
-            assert mpmath.mnorm(matrix**n) < mpmath.mpf(10) ** -55
-            assert mpmath.mnorm(matrix ** (n - 1)) > 1
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from math import comb
 
 import numpy as np
 import pytest
+from helpers.oracles import routh_exact
 
 import tmsopt
 from tmsopt.records import Table
@@ -53,17 +54,6 @@ def test_a_limit_that_a_needle_meets_is_not_out_of_reach() -> None:
     assert (limits, relaxation.irreducible) == (set(FAST.constraints), True)
 
 
-def routh(coefficients: list[Fraction]) -> bool:
-    """Whether all roots are left of the axis, exactly."""
-    above, row = coefficients[0::2], coefficients[1::2]
-    while row:
-        if row[0] <= 0:
-            return False
-        ratio = above[0] / row[0]
-        above, row = row, [x - ratio * y for x, y in zip(above[1:], [*row[1:], Fraction(0)], strict=False)]
-    return coefficients[0] > 0
-
-
 def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish() -> None:
     """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
     search = import_module("tmsopt.search.search")
@@ -73,7 +63,7 @@ def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may
     for end in range(len(shifted), 1, -1):
         for k in range(1, end):
             shifted[k] -= Fraction(98, 100) * shifted[k - 1]
-    assert routh(shifted)
+    assert routh_exact(shifted)
     assert search._reached(workspace(DAMPED), ["damped"]) == (None, False)
 
 
@@ -157,16 +147,6 @@ def test_a_root_of_any_multiplicity_is_within_reach_alone(fold: int) -> None:
     asked = replace(FAST, model=tmsopt.models.from_coefficients(coefficients), free=free)
     relaxation = tmsopt.solve(asked, throw=False, alone=False, stability=0.0).relaxation
     assert {"far", "x"} <= set(relaxation.conflict)
-
-
-def test_what_a_sample_misses_a_multiple_root_by_depends_on_its_multiplicity() -> None:
-    """A coefficient that is 4e-4 off moves an n-fold root by the n-th root of that."""
-    sample = import_module("tmsopt.search.sample")
-    for fold in (4, 6, 8, 12):
-        moved = np.abs(np.roots([comb(fold, k) for k in range(fold)] + [1 + 4e-4]) + 1).min()
-        assert moved == pytest.approx(4e-4 ** (1 / fold), rel=1e-3)
-        seen = [sample.Looked(np.zeros((1, 1)), np.zeros(1), np.array([off])) for off in (1.5 * moved, 3 * moved)]
-        assert [one.out_of_reach(fold) for one in seen] == [False, True]
 
 
 @pytest.mark.slow

@@ -12,20 +12,12 @@ x = ca.SX.sym("x")
 
 
 @pytest.mark.parametrize("seconds", [0, 60], ids=["search", "proof"])
-@pytest.mark.parametrize("ends", [(-2.0, 2.0), (-2.0, 5.0), (-5.0, 2.0)])
-def test_solutions_on_the_ends_of_a_box_are_in_it(ends: tuple[float, float], seconds: float) -> None:
+@pytest.mark.parametrize("ends", [(-2.0, 2.0), (-2.0, 5.0), (-5.0, 2.0), (-1.999, 5.0), (-5.0, 1.999)])
+def test_a_box_has_the_solutions_on_its_ends_and_none_beyond(ends: tuple[float, float], seconds: float) -> None:
     """s² + x s + 1 has double roots at x = ±2."""
     problem = tmsopt.Problem(model=from_coefficients([1, x, 1]), free={"x": ends}, locate="EP2")
     found = sorted(s.parameters["x"] for s in tmsopt.solve_all(problem, seconds=seconds).solutions)
-    assert found == pytest.approx([-2, 2], abs=1e-12)
-
-
-@pytest.mark.parametrize("seconds", [0, 60], ids=["search", "proof"])
-@pytest.mark.parametrize("ends", [(-1.999, 5.0), (-5.0, 1.999)])
-def test_solutions_beyond_an_end_are_not(ends: tuple[float, float], seconds: float) -> None:
-    problem = tmsopt.Problem(model=from_coefficients([1, x, 1]), free={"x": ends}, locate="EP2")
-    (design,) = tmsopt.solve_all(problem, seconds=seconds).solutions
-    assert abs(design.parameters["x"]) == pytest.approx(2, abs=1e-12)
+    assert found == pytest.approx([at for at in (-2, 2) if ends[0] <= at <= ends[1]], abs=1e-12)
 
 
 @pytest.mark.parametrize(

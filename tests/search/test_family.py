@@ -1,7 +1,6 @@
 """A family solves each of its problems as if it were alone, whatever it solved before."""
 
 import math
-import pickle
 from dataclasses import replace
 
 import casadi as ca
@@ -71,15 +70,7 @@ MEMBERS = {
 }
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(
-            n, marks=pytest.mark.slow if n in ("tolerance", "quantity in pieces", "heavy damping or not") else ()
-        )
-        for n in MEMBERS
-    ],
-)
+@pytest.mark.parametrize("name", MEMBERS)
 @pytest.mark.slow
 def test_a_member_is_solved_as_alone_and_whatever_came_before(name: str) -> None:
     """The same optimum as without a family; the very same bits in a family of its own."""
@@ -132,25 +123,6 @@ def test_nothing_grows_without_end() -> None:
     for k in range(40):
         family.formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)}))
     assert len(family._nlps) == 32
-
-
-def test_settings_reach_every_function() -> None:
-    """Rows of the NLP at a point, against those of the problem's own NLP with the numbers built in."""
-    family = Family(["mu", "trail.limit"])
-    for mu, limit in ((0.1, 0.02), (0.4, 0.07)):
-        problem = with_fixed(
-            replace(
-                EP4,
-                constraints={"trail": f"nu_H >= {limit}"},
-            ),
-            mu=mu,
-            chi_H=1.1,
-        )
-        shared, own = family.formulate(problem), formulate(problem)
-        x = np.linspace(0.3, 1.2, len(own.variables))
-        for a, b in zip(shared.at(x), own.at(x), strict=True):
-            np.testing.assert_allclose(np.array(a), np.array(b), rtol=1e-13, atol=1e-14)
-    assert pickle.loads(pickle.dumps(problem)) == problem
 
 
 ALIKE = {

@@ -146,23 +146,6 @@ def test_the_benchmark_bicycle():
     assert tmsopt.solve(replace(problem, constraints={"f": "frequency <= 0.7107"})).status == "optimal"
 
 
-def test_a_band_of_speeds_holds_at_every_speed_of_it():
-    fixed = {n: x for n, x in BENCHMARK.items() if n not in ("v", "w")}
-    asked = tmsopt.Problem(
-        tmsopt.models.whipple,
-        fixed=fixed,
-        free={"w": (0.9, 1.3)},
-        scenarios={"v": tmsopt.Band(4.5, 6.0, 3)},
-        maximize="w",
-        constraints={"slow": "frequency <= 0.8"},
-    )
-    design = tmsopt.solve(asked)
-    speeds = np.linspace(4.5, 6.0, 1001)
-    each = [eigenvalues(asked, {**design.parameters, "v": v}).imag.max() / (2 * math.pi) for v in speeds]
-    assert max(each) == pytest.approx(0.8, abs=TOLERANCE)
-    assert design.quantities["frequency"] == pytest.approx(max(each), abs=TOLERANCE)
-
-
 def eigenvalues(problem, parameters):
     a = problem.model.coefficients({n: parameters[n] for n in problem.parameter_set.names}, problem.parameter_set)
     return np.roots([float(x) for x in a])

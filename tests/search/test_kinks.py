@@ -11,7 +11,6 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients, tms
-from tmsopt.program import abscissa as abscissa_nlp, formulate
 from tmsopt.search import Family, solve
 
 pytestmark = pytest.mark.slow
@@ -163,34 +162,6 @@ def test_the_least_relaxation_of_a_kink():
     design = solve(oscillator(minimize="z", constraints=limits), throw=False)
     assert design.status == "infeasible"
     assert design.relaxation.amounts["wish"] == pytest.approx(1.9, abs=1e-7)
-
-
-def test_without_kinks_the_nlp_is_the_same():
-    plain = bicycle(minimize="abscissa", constraints={"trail": "nu_H >= 0.02", "sway": "damping_ratio >= 0.3"})
-    one, other = formulate(plain), abscissa_nlp(plain)
-    assert (one.variables, one.rows, one.upper, one.row_upper) == (
-        other.variables,
-        other.rows,
-        other.upper,
-        other.row_upper,
-    )
-    assert one.touches == {}
-    assert str(one.functions.serialize()) == str(other.functions.serialize())
-
-
-@pytest.mark.parametrize(
-    ("objective", "held"),
-    [
-        ("max(abscissa, -0.4)", set()),  # more of t, and of the abscissa, is worse for certain
-        ("abs(z - 1)", set()),
-        ("abs(abscissa + 9)", {"abscissa"}),  # falls where the abscissa is below −9
-        ("-abs(z - 1)", {".kink1"}),
-        ("max(damping_ratio, 0.5)", {"damping_ratio"}),
-        ("-min(damping_ratio, 0.5)", set()),
-    ],
-)
-def test_what_is_held_is_what_tempts(objective, held):
-    assert set(formulate(oscillator(minimize=objective)).touches) == held
 
 
 def test_members_of_a_family_with_kinks():

@@ -17,7 +17,6 @@ import mpmath  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 import sympy as sp  # type: ignore[import-untyped]
-from scipy.optimize import differential_evolution
 
 import tmsopt
 
@@ -98,7 +97,7 @@ def freitas_lancaster(k: Any = 4) -> Answer:
 def chocolate(delta: Any = 9 * TENTH) -> Answer:
     """(s + r)⁵ with a and b of the file: y = p/b at the roots e^(±it) of a must be real, so 5 arg(e^(it) + r) = t + π/2.
 
-    No other polynomial is better. At e^(it) a factor s + c with c > r, or a pair left of −r, turns by less than s + r
+    No other polynomial is better: at e^(it) a factor s + c with c > r, or a pair left of −r, turns by less than s + r
     or its square; five of them turn by more than 0 and less than t + π/2, and y is not real in between.
     """
     t = sp.acos(delta)
@@ -125,7 +124,10 @@ def chocolate_limit() -> Answer:
 
 
 def three_masses() -> Answer:
-    """det(L + x − K) = x³: with u = mu + 1 − L, v = nu + 1 − L, S = u + v, uv = S² + 2 and S (uv + 1) = 0."""
+    """Of six complex solutions the one with real parts and imaginary parts above 0.
+
+    det(L + x − K) = x³: with u = mu + 1 − L, v = nu + 1 − L, S = u + v, uv = S² + 2 and S (uv + 1) = 0.
+    """
     w = sp.sqrt(3)
     found = {"mu_r": sp.Rational(3, 2), "mu_i": 3 * w / 2, "nu_r": sp.Rational(1, 2), "nu_i": 3 * w / 2}
     return Answer(found, (s**2 - 4 * s + 7) ** 3, sp.S(2), "CEP3")
@@ -282,15 +284,6 @@ def test_best_damping_need_not_be_positive() -> None:
     assert solved("freitas_lancaster").quantities["det_D"] == pytest.approx(7, abs=MET)
 
 
-def test_chocolate_of_third_order_ends_at_cos_22_degrees_and_a_half() -> None:
-    """r = 0: 5 t = t + π/2, and x is stable there."""
-    delta, y = sp.sqrt(2 + sp.sqrt(2)) / 2, sp.sqrt(1 + 1 / sp.sqrt(2))
-    found = {"delta": delta, "x0": y, "x1": 1 + sp.sqrt(2), "x2": 2 * delta, "y": y}
-    assert vanishes(at("chocolate_limit", found) - s**5)
-    assert sp.radsimp(delta - sp.cos(sp.pi / 8)) == 0
-    assert (found["x1"] * found["x2"] - found["x0"]).is_positive
-
-
 def test_poles_far_smaller_than_the_rates_of_the_system_meet_too() -> None:
     """Poles at −0.05 of a system of rate 1: the last coefficient, 3e-7, is a difference of numbers near 1."""
     problem = tmsopt.load(PROBLEMS / "chocolate_limit.toml")
@@ -306,25 +299,6 @@ def test_chocolate_controllers_are_stable() -> None:
     for name in ("chocolate", "chocolate_limit"):
         x = [1.0, *(solved(name).parameters[n] for n in ("x2", "x1", "x0"))]
         assert np.roots(x).real.max() < -0.5
-
-
-def test_three_masses_have_six_ep3() -> None:
-    """det(L + x − K) = x³ in complex mu, nu and L, where the trace gives L: every solution, by elimination."""
-    u, v, x = sp.symbols("u v x")
-    L = 2 + u + v
-    K = sp.Matrix([[u + L, -1, 0], [-1, 2, -1], [0, -1, v + L]])
-    trace, *conditions = sp.Poly(((L + x) * sp.eye(3) - K).det(), x).all_coeffs()[1:]
-    assert sp.expand(trace) == 0
-    found = sp.solve(conditions, [u, v])
-    w, half = sp.sqrt(3) * sp.I / 2, sp.Rational(1, 2)
-    known = [(sp.sqrt(2) * sp.I, -sp.sqrt(2) * sp.I), (half + w, w - half), (half - w, -w - half)]
-    every = {p for one in known for p in (one, one[::-1])}
-    assert len(every) == 6
-    assert {tuple(sp.expand_complex(c) for c in point) for point in found} == every
-    mu, nu = (sp.expand(c + L.subs({u: half + w, v: w - half}) - 1) for c in (half + w, w - half))
-    exact = three_masses().parameters
-    assert sp.expand(mu - exact["mu_r"] - sp.I * exact["mu_i"]) == 0
-    assert sp.expand(nu - exact["nu_r"] - sp.I * exact["nu_i"]) == 0
 
 
 def test_all_ep3_of_three_masses_are_found() -> None:
@@ -367,45 +341,6 @@ def test_no_controller_of_two_masses_is_faster() -> None:
     assert sp.expand(p[3] - 2 * p[1]) == 0  # the only condition: five parameters, six coefficients
     condition = q[2] + 4 * v * q[1] + (10 * v**2 - 2) * q[0] + 4 * v * (5 * v**2 - 3)
     assert sp.expand(a[3] - 2 * a[1] - condition) == 0  # each term positive for v² > 3/5
-
-
-def test_no_controller_of_third_order_is_faster() -> None:
-    """The poles turn p at e^(it) by less than y needs, as `chocolate` says: many choices of five left of −r."""
-    t = np.arccos(0.9)
-    r, root, rng = -float(chocolate().abscissa), np.exp(1j * t), np.random.default_rng(0)
-    left, height = r + rng.exponential(1, (5, 200_000)) ** 3, rng.exponential(1, (2, 200_000)) ** 3
-    turns = np.angle(root + left)
-    pairs = np.angle((root + left[:2]) ** 2 + height**2)
-    for turn in (turns.sum(axis=0), turns[2:].sum(axis=0) + pairs[0], turns[4] + pairs.sum(axis=0)):
-        assert np.all((turn > 0) & (turn < t + np.pi / 2))  # y is real where it is this, or less by π and negative
-
-
-def test_no_two_gains_are_better() -> None:
-    """Differential evolution on eigenvalues; at a double pair these are right to half the digits."""
-    asked = problem("transport_aircraft")
-    p = polynomial("transport_aircraft")
-    coefficients = sp.lambdify([sp.Symbol(n) for n in asked.free], [sp.N(c) for c in p.all_coeffs()])
-
-    def abscissae(designs: Any) -> Any:
-        a = np.stack(np.broadcast_arrays(*coefficients(*designs), designs[0])[:-1], axis=-1).astype(float)
-        companion = np.zeros((len(a), 6, 6))
-        companion[:, 0, :] = -a[:, 1:]
-        companion[:, np.arange(1, 6), np.arange(5)] = 1
-        return np.linalg.eigvals(companion).real.max(axis=1)
-
-    found = differential_evolution(
-        abscissae,
-        list(asked.free.values()),
-        rng=1,
-        maxiter=150,
-        popsize=20,
-        tol=0,
-        vectorized=True,
-        updating="deferred",
-        polish=False,
-    )
-    assert found.fun == pytest.approx(float(transport_aircraft().abscissa), abs=1e-4)
-    assert found.fun > float(transport_aircraft().abscissa) - 1e-7
 
 
 @pytest.mark.parametrize("rate", [1.0, 1e-3, 1e3])

@@ -13,7 +13,7 @@ from benchmarks.reports import Asked
 from benchmarks.rivals import evolve_system
 from benchmarks.suites import known, random_system, random_systems
 from tmsopt import Problem, models, solve
-from tmsopt.program import opposite, start_objective as start_worth
+from tmsopt.program import start_objective as start_worth
 
 SUITE = list(random_systems())
 KNOWN = known()
@@ -152,24 +152,6 @@ def test_a_start_better_than_its_basin_is_not_lost() -> None:
     assert start_worth(system.problem, one.parameters) == pytest.approx(one.value, rel=1e-9)
 
 
-def test_worth_of_a_start() -> None:
-    """s² + 2 s + 2: abscissa −1, damping ratio 1/√2; infinite where a limit is violated."""
-    d, k = ca.SX.sym("d"), ca.SX.sym("k")
-    model = models.from_coefficients([1, d, k], name="plain")
-    box = {"d": (0.0, 3.0), "k": (1.0, 3.0)}
-    most = Problem(model, fixed={}, free=box, maximize="damping_ratio", constraints={"soft": "k <= 2"})
-    assert start_worth(most, {"d": 2.0, "k": 2.0}) == pytest.approx(-math.sqrt(0.5), rel=1e-14)
-    assert start_worth(most, {"d": 2.0, "k": 2.5}) == math.inf
-
-
-def test_opposite_ends() -> None:
-    d, k = ca.SX.sym("d"), ca.SX.sym("k")
-    model = models.from_coefficients([1, d, k], name="plain")
-    problem = Problem(model, fixed={}, free={"d": (0.0, 3.0), "k": (1.0, 3.0)}, minimize="abscissa")
-    assert opposite(problem, {"d": 1.5, "k": 2.0}) == []
-    assert opposite(problem, {"d": 3.0, "k": 1.0}) == [{"d": 0.0, "k": 1.0}, {"d": 3.0, "k": 3.0}]
-
-
 def test_a_limit_on_the_damping_ratio_below_minus_one_forbids_nothing() -> None:
     """s² − 2 a s + a² − 0.04 + c, a = 1 + 10 c: the roots a ± √(0.04 − c) are least at c = 0, where they are real.
 
@@ -182,12 +164,3 @@ def test_a_limit_on_the_damping_ratio_below_minus_one_forbids_nothing() -> None:
     assert solve(problem).value == pytest.approx(1.2, rel=1e-12)
     limited = Problem(model, {}, {"c": (0.0, 1.0)}, constraints={"z": "damping_ratio >= -1.1"}, minimize="abscissa")
     assert solve(limited).value == pytest.approx(1.2, rel=1e-12)
-
-
-def test_limits_of_the_suite_are_met_by_some_design() -> None:
-    for index, one in KNOWN.items():
-        system = SUITE[index]
-        plain = {n: np.array([x]) for n, x in one.parameters.items()}
-        roots = {"abscissa": np.array([-math.inf]), "damping_ratio": np.array([1.0])}  # those are judged elsewhere
-        if "roots" not in system.constraints:
-            assert system.violation({**plain, **roots})[0] <= 1e-9

@@ -4,7 +4,6 @@ Each answer is held from both sides: its own eigenvalues satisfy what was asked,
 """
 
 from functools import cache
-from itertools import permutations
 
 import numpy as np
 import pytest
@@ -89,13 +88,6 @@ QUESTIONS = {
         lambda d: d["Fr"],
         lambda d: 0.7 - damping_ratio(d),
     ),
-    "slowest heavily damped": (  # a cuspidal edge: a double root is a pair 1e-8 apart to eigenvalues, a triple one 1e-5
-        "minimize",
-        "Fr",
-        ["damping_ratio >= 1"],
-        lambda d: d["Fr"],
-        lambda d: 1 - 1e-9 - damping_ratio(d),
-    ),
     "slowest weaving": ("minimize", "Fr_c", ["abscissa <= -0.3"], weaving, lambda d: abscissa(d) + 0.3),
     "weighted": ("minimize", "abscissa + 1.5*Fr", [], lambda d: abscissa(d) + 1.5 * d["Fr"], anything),
     "weighted with sway": (
@@ -106,13 +98,9 @@ QUESTIONS = {
         anything,
     ),
 }
-RELAXED = {"slowest heavily damped": 2e-6}
-"""Where the search asks 1e-9 less: a cusp makes 1e-6 of that."""
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n == "most unstable" else ()) for n in QUESTIONS]
-)
+@pytest.mark.parametrize("name", QUESTIONS)
 def test_answer_is_attained_and_no_search_does_better(name):
     sense, expression, constraints, merit, violation = QUESTIONS[name]
     design = tmsopt.solve(problem(constraints={f"c{k}": c for k, c in enumerate(constraints)}, **{sense: expression}))
@@ -122,7 +110,7 @@ def test_answer_is_attained_and_no_search_does_better(name):
     assert float(violation(own)) <= SCATTER
     seeds = (1, 31) if name == "sways least at its speed" else (1,)  # one ends in a lesser optimum
     best = min(hunt.least(lambda d: (merit(d), violation(d)), FIXED, BOX, seed, 45, 6)[1] for seed in seeds)
-    tolerance = RELAXED.get(name, SCATTER) * (1 + abs(best))
+    tolerance = SCATTER * (1 + abs(best))
     assert sign * design.value <= best + tolerance
     assert sign * design.value == pytest.approx(best, abs=max(tolerance, 1e-6 * (1 + abs(best))))
 
@@ -246,26 +234,6 @@ def shared_out(pairs):
 def test_a_double_root_may_not_be_split_over_two_factors(pairs, tangled):
     nlp, x = shared_out(pairs)
     assert nlp.tangled(x) == tangled
-
-
-def test_sharing_out_anew_gives_the_same_polynomial():
-    rng = np.random.default_rng(5)
-    for _ in range(50):
-        r = -rng.uniform(0, 3, 4)
-        if np.diff(np.sort(r)).min() < 0.02:
-            continue  # so close that they may be meant to be one
-        whole = np.poly(r)
-        for order in permutations(range(4)):
-            _, x = shared_out([r[list(order[:2])], r[list(order[2:])]])
-            assert np.polymul([1, *x[:2]], [1, *x[2:]]) == pytest.approx(whole, abs=1e-12)
-        ordered = np.sort(r)[::-1]
-        nlp, x = shared_out([ordered[:2], ordered[2:]])
-        assert not nlp.tangled(x)
-
-
-def test_a_complex_pair_is_never_tangled():
-    nlp, _ = shared_out([(0, 0), (0, 0)])
-    assert not nlp.tangled(np.array([1.0, 5.0, 3.0, 1.0]))
 
 
 @pytest.mark.parametrize("chi_B", [1.25, 1.55])

@@ -1,20 +1,18 @@
 """The sample of the whole box: what it looks at, how it comes nearer to limits, and basins that starts alone miss."""
 
-import math
 from importlib import import_module
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from helpers.oracles import polynomial_floats
+from helpers import hunt
 
 import tmsopt
 from tmsopt.models import from_coefficients
 
 sampling = import_module("tmsopt.search.sample")
-workspaces = import_module("tmsopt.search.workspace")
-Cube, Sampler, Looked = sampling.Cube, sampling.Sampler, sampling.Looked
+Cube, Sampler = sampling.Cube, sampling.Sampler
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 SQUARE = {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}
@@ -59,14 +57,6 @@ def test_ranges_end_exactly_and_are_run_through_in_order() -> None:
         assert np.all(np.diff(columns[name]) > 0)
 
 
-def test_what_is_even_in_the_cube() -> None:
-    """Tangents; logarithms of positive ranges over more than two decades; all else as it is."""
-    middle = {n: float(v) for n, v in cube().designs(np.full(5, 0.5)).items()}
-    assert math.tan(middle["lambda_s"]) == pytest.approx((math.tan(-1.2) + math.tan(1.5)) / 2, rel=1e-12)
-    assert middle["mu"] == pytest.approx(math.sqrt(0.01 * 50), rel=1e-12)
-    assert (middle["Fr"], middle["chi_B"], middle["zeta_B"]) == pytest.approx((5.0, 50.0, -4.505), rel=1e-12)
-
-
 # What is looked at
 
 
@@ -100,36 +90,10 @@ def test_the_sample_fills_the_box_to_its_faces_and_corners() -> None:
             assert np.diff(face).max() < 0.1
 
 
-def test_all_corners_of_a_box_of_many_parameters() -> None:
-    names = [f"p{k}" for k in range(8)]
-    model = from_coefficients([1, 9 + sum(ca.SX.sym(n) for n in names)])
-    drawn = Sampler(problem(model=model, free=dict.fromkeys(names, (-1.0, 1.0))), 0).draw()
-    corners = drawn.u[np.all((drawn.u == 0) | (drawn.u == 1), axis=1)]
-    assert len(np.unique(corners, axis=0)) == 2**8
-
-
-def test_limits_come_before_worth() -> None:
-    seen = Looked(np.zeros((4, 1)), np.array([3.0, 1.0, 2.0, -9.0]), np.array([0.0, 0.5, 0.0, np.inf]))
-    assert seen.ranked.tolist() == [2, 0, 1, 3]
-
-
 def test_the_sample_stands_for_its_seed() -> None:
     first, again, other = (Sampler(problem(("x*y >= 0.1",)), seed).sample() for seed in (5, 5, 6))
     assert np.array_equal(first.refined.u, again.refined.u)
     assert not np.array_equal(first.refined.u, other.refined.u)
-
-
-def test_leaders_lie_apart_and_leave_nobody_out() -> None:
-    rng = np.random.default_rng(1)
-    seen = Looked(rng.random((500, 3)), np.zeros(500), np.zeros(500))
-    rows = sampling.apart(seen, 1000, 0.3)
-    distances = np.abs(seen.u[:, None] - seen.u[rows][None]).max(axis=2)
-    chosen = distances[rows]
-    assert rows[0] == 0
-    assert chosen[~np.eye(len(rows), dtype=bool)].min() >= 0.3
-    for k in range(len(seen)):  # whoever is not chosen is too close to one that comes before
-        assert k in rows or np.any((distances[k] < 0.3) & (rows < k))
-    assert sampling.apart(seen, 4, 0.3).tolist() == rows[:4].tolist()
 
 
 # Nearer to limits, and better
@@ -171,13 +135,6 @@ def test_limits_are_met_by_the_way_of_newton(limits: tuple[str, ...], share: flo
                 assert np.max(off) <= 1e-9  # excess of 1e-10 of what is usual, which is 1 or so
 
 
-def test_what_cannot_be_met_is_not_left_for_worse() -> None:
-    """sin(20 x) is 1 at most; beside its crests Newton's steps lead anywhere."""
-    _, start, ends = sought(problem(("sin(20*x) >= 1.5",)), count=200)
-    assert np.all(ends.violation <= start.violation)
-    assert np.mean(ends.violation < start.violation) > 0.8
-
-
 def test_a_pole_is_approached_from_its_own_side() -> None:
     """1/(x − y) ≥ 1000 is met for 0 < x − y ≤ 0.001, and from x < y by no small step."""
     sampler = Sampler(problem(("1/(x - y) >= 1000",)), 0)
@@ -206,17 +163,6 @@ def test_what_is_refined_is_no_worse_limits_first() -> None:
     assert np.array_equal(again.violation, ends.violation)
 
 
-def test_what_starts_are_made_of_meets_equalities() -> None:
-    """Which no design that is only drawn does."""
-    sampler = Sampler(problem(("x**2 + y**2 == 0.5", "x*y <= 0.1")), 0)
-    seen = sampler.sample()
-    at = sampler.space.designs(seen.refined.u[:8])  # the best; one may be left between the two limits
-    assert seen.met == 0
-    assert len(at["x"]) >= 4
-    assert at["x"] ** 2 + at["y"] ** 2 == pytest.approx(0.5, abs=1e-9)
-    assert np.all(at["x"] * at["y"] <= 0.1 + 1e-9)
-
-
 def test_the_neighbourhood_of_a_design_reaches_from_a_hair_to_the_other_end_of_the_box() -> None:
     """Best of all is (−1, −1), a corner; or, of a well 2e-4 wide, its bottom."""
     far = problem(minimize="x + 0.1*abs(y - 0.3)")
@@ -239,15 +185,6 @@ def test_the_deep_basin_is_found_though_it_is_narrow(asked: dict[str, int]) -> N
     design = tmsopt.solve(problem(model=WELLS), **asked)
     assert design.value == pytest.approx(-1, abs=1e-12)
     assert dict(design.parameters) == pytest.approx({"x": 0.71, "y": -0.37}, abs=1e-7)
-
-
-def test_a_dozen_starts_agree_on_the_other_basin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """So that the test before this one asks for something: without a sample, this is where it ends."""
-    monkeypatch.setattr(workspaces.Workspace, "sampler", None)
-    monkeypatch.setattr(workspaces.Workspace, "sample", None)
-    design = tmsopt.solve(problem(model=WELLS))
-    assert design.starts.at_best >= 5
-    assert design.value > -0.01
 
 
 def test_limits_between_wells() -> None:
@@ -285,42 +222,19 @@ KNOWN = {
 """By differential evolution on eigenvalues, 20 000 designs for each of 500 rounds; of four runs one found no stable design."""
 
 
-def robot_abscissa(d: dict[str, Any]) -> Any:
-    """Per √(g/w), by NumPy's eigenvalues of the paper's matrices."""
-    w, g = ROBOT["w"], 9.81
-    lengths = (d["x_B"] / w, d["x_H"] / w, d["z_B"] / w, d["z_H"] / w)
-    a = np.stack(polynomial_floats(ROBOT["v"] / math.sqrt(g * w), d["m_H"] / ROBOT["m_B"], *lengths, d["lambda_s"]), -1)
-    companion = np.zeros((*a.shape[:-1], 4, 4))
-    companion[..., 0, :] = -a[..., 1:] / a[..., :1]
-    companion[..., [1, 2, 3], [0, 1, 2]] = 1
-    return np.linalg.eigvals(companion).real.max(axis=-1)
-
-
-def robot_holds(d: dict[str, Any], off: float = 0.0) -> Any:
-    """Whether both wheels stay down and the steer arm is long enough, but for a share."""
-    front = 9.81 * (12 * d["x_B"] + d["m_H"] * d["x_H"]) / 0.25
-    arm = (d["x_H"] - 0.25) * np.cos(d["lambda_s"]) - d["z_H"] * np.sin(d["lambda_s"])
-    down = np.minimum(front, 9.81 * (12 + d["m_H"]) - front) >= 20 * (1 - off)
-    return down & (np.abs(arm) >= 0.005 * (1 - off))
-
-
-def test_a_stable_robot_is_rare() -> None:
-    """At most one in 10 000 random ones is stable and meets all limits, yet one is known."""
-    rng = np.random.default_rng(0)
-    drawn = {n: rng.uniform(lo, hi, 20000) for n, (lo, hi) in PARTS.items()}
-    assert np.sum((robot_abscissa(drawn) < 0) & robot_holds(drawn)) <= 2
-    assert robot_abscissa(KNOWN) < -0.79
-    assert robot_holds(KNOWN, 1e-3)
-    assert all(lo <= KNOWN[n] <= hi for n, (lo, hi) in PARTS.items())
+def robot_holds(d: dict[str, Any]) -> Any:
+    """Whether both wheels stay down and the steer arm is long enough, but for 1e-8."""
+    weight, front = 9.81 * (12 + d["m_H"]), hunt.centre(d)
+    return min(weight * front, weight * (1 - front)) >= 20 - 2e-7 and abs(hunt.arm(d)) * 0.25 >= 0.005 * (1 - 1e-8)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 8))])
+@pytest.mark.parametrize("seed", range(8))
 def test_the_stable_robot_is_found(seed: int) -> None:
     stated = tmsopt.Problem(tmsopt.models.tms, fixed=ROBOT, free=PARTS, constraints=HOLDS, minimize="abscissa")
     design = tmsopt.solve(stated, seed=seed, stability=0.0)
     assert design.stable
-    assert design.value <= robot_abscissa(KNOWN)
-    assert robot_holds(dict(design.parameters), 1e-8)
+    assert design.value <= hunt.abscissa({**ROBOT, **KNOWN}) < -0.79
+    assert robot_holds(design.parameters)
     # A pair or more may meet on the line, where numeric roots are off by the fourth root of 1e-16 at most.
-    assert robot_abscissa(dict(design.parameters)) == pytest.approx(design.value, abs=2e-3)
+    assert hunt.abscissa(design.parameters) == pytest.approx(design.value, abs=2e-3)

@@ -84,38 +84,3 @@ def test_the_words_follow_from_the_numbers() -> None:
     assert words(0, 0, 0) == ""
     assert not is_enough(4, 1)
     assert tmsopt.Starts(3, 3, 3, optima=1).expected_unseen == float("inf")
-
-
-def led(objective: str, box: tuple[float, float], places: list[tuple[float, ...]], end: tuple[float, ...]) -> list[int]:
-    """Which of these leaders no way leads from to where a start ended."""
-    free = dict.fromkeys(("x", "y")[: len(end)], box)
-    model = from_coefficients([1, 2 + sum(map(ca.SX.sym, free), ca.SX(0))])
-    problem = tmsopt.Problem(model, free=free, minimize=objective)
-    sampler = import_module("tmsopt.search.sample").Sampler(problem, 0)
-    sampler.draw()
-    u = np.array([sampler.space.points(dict(zip(free, place, strict=True))) for place in places])
-    ended = SimpleNamespace(feasible=True, objective=0.0, nlp=SimpleNamespace(size=1.0), run=SimpleNamespace(x=end))
-    work = SimpleNamespace(
-        part=problem,
-        sampler=sampler,
-        sample=SimpleNamespace(leaders=sampler.look(u)),
-        design_at=lambda x: dict(zip(free, x, strict=True)),
-    )
-    left = [*range(len(places))]
-    count = import_module("tmsopt.search.basins.leaders").led(work, ended, left)
-    assert count == len(places) - len(left)
-    return left
-
-
-VALLEY = "100*(y - x**2)**2 + (1 - x)**2"  # Rosenbrock's, least at (1, 1)
-
-
-def test_only_a_straight_way_down_counts() -> None:
-    """From the far end of the valley it goes up at first; from beside the end it goes down."""
-    assert led(VALLEY, (-2.0, 2.0), [(-0.9, 0.81), (0.9, 0.81), (1.1, 1.21)], (1.0, 1.0)) == [0]
-
-
-def test_no_way_leads_over_a_ridge_whatever_lies_beyond() -> None:
-    """(x² − 1)² + (x + 1)/10 has its ridge at 0.025: leaders to the right of it are of a basin of their own."""
-    places = [(x,) for x in (-1.4, -0.6, -0.2, 0.2, 0.6, 0.95, 1.4)]
-    assert led("(x**2 - 1)**2 + (x + 1)/10", (-2.0, 2.0), places, (-1.0,)) == [3, 4, 5, 6]

@@ -118,13 +118,3 @@ def test_a_limit_that_cannot_be_met_though_designs_are_stable() -> None:
 def test_seconds_must_be_a_number(stability: Any) -> None:
     with pytest.raises(tmsopt.InputError, match=r"stability: found .*; accepted: seconds, 0 or more"):
         found(1.0, stability=stability)
-
-
-@pytest.mark.parametrize(("rest", "some"), [(X - 0.99, True), (X - 1.5, False)])
-def test_designs_left_of_the_axis_are_started_from_where_there_are_any(rest: Any, some: bool) -> None:
-    """s + x − c: stable where x > c, one in a hundred designs or none."""
-    stated = tmsopt.Problem(from_coefficients([1, rest]), free={"x": (0.0, 1.0)}, minimize="abscissa")
-    work = import_module("tmsopt.search.workspace").workspace(stated)
-    ended = import_module("tmsopt.search.search")._left_of_the_axis(work, work.formulate(()), 64)
-    assert bool(ended) is some
-    assert all(c.objective == pytest.approx(-0.01, abs=1e-9) for c in ended if c.feasible)

@@ -37,9 +37,7 @@ def placed(parameters: dict[str, float], root: float) -> Array:
     ],
 )
 @pytest.mark.slow
-def test_gains_that_place_all_roots_are_not_overlooked(
-    speed: float, ends: tuple[tuple[float, float], ...], limits: dict[str, str], root: float, seed: int
-) -> None:
+def test_gains_that_place_all_roots_are_not_overlooked(speed, ends, limits, root, seed) -> None:
     bicycle = {"g": 9.81, **tmsopt.read_bicycle("problems/bicycles/browser-rider.txt").parameters, "v": speed}
     known = placed(bicycle, root)
     assert all(low <= k <= high for (low, high), k in zip(ends, known, strict=True))

@@ -171,19 +171,6 @@ def on_law():
     return planes.tilt_plane(points=(20, 20))
 
 
-def test_the_plane_on_the_law_has_one_corner_the_EP4(on_law):
-    (corner,) = on_law.chart.domain.corners
-    assert corner.name == "EP4"
-    assert (corner.parameters["Fr"], corner.parameters["lambda_s"]) == pytest.approx((EP4[0], EP4[2]), abs=1e-12)
-    assert on_law.marked["EP4"] == pytest.approx((EP4[0], EP4[2]), abs=1e-14)
-
-
-def test_the_traced_weave_boundary_is_the_law(on_law):
-    (arc,) = on_law.chart.domain.stability
-    law = np.sqrt(laws.Frc1(math.sqrt(2), -0.4, -0.2, arc.points["lambda_s"]))
-    assert np.abs(arc.points["Fr"] - law).max() < 1e-13  # values of order 1, well conditioned
-
-
 def test_heavy_damping_on_the_law_is_bounded_by_the_EP_set_and_a_double_root_omega0(on_law):
     """At chi_B = sqrt(2) the polynomial is reciprocal about |omega0|, so a double root is omega0 or one of two."""
     epset, omega0 = [], []

@@ -13,8 +13,7 @@ import pytest
 import sympy
 from helpers import curves
 from helpers.curves import certified, distance, epset_Fr, equations, exact_polynomial
-from helpers.oracles import certified_roots, polynomial_60, roots_60, routh_exact
-from hypothesis import given, settings, strategies as st
+from helpers.oracles import certified_roots, routh_exact
 from mpmath import mp
 
 from tmsopt import laws
@@ -158,6 +157,7 @@ def test_ep_set_has_its_ep4_and_its_fold_where_the_paper_and_calculus_put_them(e
     assert p["chi_B"] == pytest.approx(SQRT2, abs=EXACT)
     assert math.tan(p["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
     assert p["Fr"] == pytest.approx(FR_EP4, abs=EXACT)
+    check_every_point(found, stride=7)
     (fold,) = (e for e in events(found, "fold") if "Fr" in e.detail)
     # Fr² = ρ² 4T²/(w⁴ζ_B + 4Tρ) is least at T = −w⁴ζ_B/(2ρ), where Fr² = −w⁴ζ_B: 12.5 · 0.4 = 5
     w2 = math.sqrt(12.5)
@@ -183,44 +183,6 @@ def test_ep_set_is_2EP2_below_ep4_and_CEP2_above(ep_set):
     law = np.where(b * b > 4 * c, -b / 2 + np.sqrt(np.maximum(b * b / 4 - c, 0)), -b / 2)
     assert branch.abscissa[others] == pytest.approx(law[others], abs=1e-7)  # the root of a difference near EP4
     assert branch.abscissa[at] == pytest.approx(-(12.5**0.25), abs=1e-7)
-
-
-def test_ep_set_points_match_coefficients_and_tangents(ep_set):
-    found, free = ep_set
-    check_every_point(found, stride=7, limit=2e-14)
-    check_tangents(found.branches[0], free)
-
-
-def test_the_file_of_the_ep_set_is_the_same_curve():
-    from tmsopt.problem import load
-
-    found = trace(load("problems/ep_set.toml"))
-    (branch,) = found.branches
-    law = laws.epset(-0.4, -0.2, branch.parameters["lambda_s"])
-    # near 85 degrees dFr/dlambda is 60: rounding of the stored angle alone
-    assert np.abs(branch.parameters["Fr"] - law).max() <= 2e-13
-    assert len(events(found, "EP4")) == 1
-
-
-@settings(max_examples=3, deadline=None, derandomize=True)
-@given(st.floats(-1.0, -0.15), st.floats(1.3, 3.0), st.booleans())
-def test_ep4_of_any_heights_lies_on_its_traced_ep_set(upper, ratio, mirrored):
-    """Either class: lambda_s > 0 for |zeta_B| > |zeta_H|, else lambda_s < 0."""
-    zeta_B, zeta_H = (upper, upper * ratio) if mirrored else (upper * ratio, upper)
-    law = laws.ep4_chi_H_1(zeta_B, zeta_H)
-    free = {
-        "Fr": (0.3 * float(law.Fr), 2.5 * float(law.Fr)),
-        "chi_B": (0.5 * float(law.chi_B), 1.7 * float(law.chi_B)),
-        "lambda_s": (-1.3, -0.005) if mirrored else (0.005, 1.3),
-    }
-    found = traced("2EP2", {**BASE, "zeta_B": zeta_B, "zeta_H": zeta_H}, free)
-    (ep4,) = events(found, "EP4")
-    assert ep4.parameters["Fr"] == pytest.approx(float(law.Fr), rel=EXACT)
-    assert ep4.parameters["chi_B"] == pytest.approx(float(law.chi_B), rel=EXACT)
-    assert math.tan(ep4.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), rel=EXACT)
-    for branch in found.branches:
-        curve_law = laws.epset(zeta_B, zeta_H, branch.parameters["lambda_s"])
-        assert branch.parameters["Fr"] == pytest.approx(curve_law, rel=1e-12)
 
 
 # EP4 as a curve in chi_H: both classes, mu fixed or free
@@ -320,18 +282,6 @@ def test_cusps_are_certified_ep3(planes, name):
         assert "cusp" in event.detail
         for n in free:
             assert branch.tangent[n][k - 1] * branch.tangent[n][k + 1] < 0
-        assert_multiplicity(true, BASE | fixed, 3)
-
-
-def assert_multiplicity(true, fixed, count):
-    """Among the certified 40-digit roots exactly `count` are together: as close as 40 digits allow."""
-    with mp.workdps(curves.DIGITS):
-        values = {n: mp.mpf(v) for n, v in fixed.items()} | {n: v for n, v in true.items() if n not in ("s", "T")}
-        values["lambda_s"] = true.lambda_s if "T" in true else mp.mpf(fixed["lambda_s"])
-        distances = sorted(abs(root - true["s"]) for root in roots_60(polynomial_60(**values)))
-    # parameters rounded at 1e-40 move a root of multiplicity m by 1e-40/m: 1e-13 for 3
-    assert distances[count - 1] < 1e-12
-    assert distances[count] > 1e-3
 
 
 @pytest.mark.parametrize("name", PLANES)
@@ -416,36 +366,13 @@ def relative_discriminant(values):
     return float(abs(4 * i**3 - j**2) / (4 * size_i**3 + size_j**2))
 
 
-@pytest.mark.parametrize("name", PLANES)
-def test_along_a_discriminant_curve_the_plane_is_tangent_to_p_at_the_double_root(planes, name):
-    """p(r; θ) = p′(r; θ) = 0 along the curve, so Σ ∂p/∂θ dθ = 0 at s = r: an envelope of lines."""
-    free = PLANES[name][1]
-    for branch in planes[name].branches:
-        for k in range(3, len(branch), 37):
-            values, r = design(branch, k), float(branch.unknowns["r"][k])
-            slopes = {n: slope(values, n, r) for n in free}
-            terms = [slopes[n] * float(branch.tangent[n][k]) for n in free]
-            # slope by differences of 1e-12 at 40 digits; the tangent to rounding by the distance to a cusp
-            assert abs(sum(terms)) <= 1e-7 * max(map(abs, terms))
-
-
-def slope(values, name, r):
-    with mp.workdps(curves.DIGITS):
-        h, s = mp.mpf(10) ** -12, mp.mpf(r)
-        plus = {n: mp.mpf(v) + (h if n == name else 0) for n, v in values.items()}
-        minus = {n: mp.mpf(v) - (h if n == name else 0) for n, v in values.items()}
-        return float((mp.polyval(polynomial_60(**plus), s) - mp.polyval(polynomial_60(**minus), s)) / (2 * h))
-
-
 def test_folds_of_the_discriminant_curves_in_speed_are_at_the_closed_form(planes):
     """p is linear in T, and its slope ζ_B(−ζ_H ζ_B s⁴ − (ζ_B + ζ_H) s² − 1) vanishes at s² = 5 and s² = 5/2 alone.
 
     There dFr = 0, and p = 0 gives Fr = √5 for s² = 5 and any chi_B, Fr = chi_B √(5/2) for s² = 5/2.
     """
-    for name in ("fig2 left",):
-        folds = [e for e in events(planes[name], "fold") if "Fr" in e.detail]
-        assert len(folds) == 1
-        assert folds[0].parameters["Fr"] == pytest.approx(math.sqrt(5), abs=EXACT)
+    (fold,) = (e for e in events(planes["fig2 left"], "fold") if "Fr" in e.detail)
+    assert fold.parameters["Fr"] == pytest.approx(math.sqrt(5), abs=EXACT)
     on_law = traced("EP2", BASE | {"chi_B": SQRT2}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)})
     assert events(on_law, "EP4")
     for event in events(on_law, "EP4"):  # where symmetry makes the traced equations singular
@@ -464,17 +391,6 @@ def test_ep3_curve_through_space_is_a_cuspidal_edge_ending_in_ep4():
         assert e.parameters["chi_B"] == pytest.approx(SQRT2, abs=EXACT)
         assert math.tan(e.parameters["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
     check_every_point(found, stride=17)
-    for branch in found.branches:
-        for k in range(0, len(branch), 60):
-            values = design(branch, k)
-            if abs(branch.unknowns["r"][k] - branch.unknowns["t"][k]) < 0.05:
-                continue  # beside EP4 the point is right to a root of rounding along the edge
-            if abs(branch.tangent["Fr"][k]) < 0.05:
-                continue  # a fold in Fr, which is held below
-            start = {n: values[n] for n in ("chi_B", "lambda_s")} | {"s": float(branch.unknowns["r"][k])}
-            true = certified(equations("EP3"), start, {n: values[n] for n in NAMES if n not in start})
-            assert values["chi_B"] == pytest.approx(float(true["chi_B"]), abs=1e-11)
-            assert values["lambda_s"] == pytest.approx(float(true.lambda_s), abs=1e-11)
 
 
 # Stability boundaries
@@ -486,13 +402,6 @@ def test_weave_curve_is_the_critical_froude_number(chi_B):
     (branch,) = found.branches
     Fr, angle = branch.parameters["Fr"], branch.parameters["lambda_s"]
     assert Fr**2 == pytest.approx(laws.Frc1(chi_B, -0.4, -0.2, angle), rel=1e-13)
-    with mp.workdps(curves.DIGITS):
-        for k in range(0, len(branch), 29):
-            T = mp.tan(mp.mpf(float(angle[k])))
-            x = mp.mpf(chi_B)
-            zB, zH = mp.mpf(-0.4), mp.mpf(-0.2)
-            true = mp.sqrt((zB - zH) / (zB - x * zH) * x / (x - 1) * T)  # `Frc1`
-            assert float(abs(true - mp.mpf(float(Fr[k])))) <= 1e-13
     W = branch.unknowns["W"]
     assert np.all(W > 0)
     # ω² = a3/a1 on the axis; here it does not depend on speed or tilt
@@ -557,13 +466,6 @@ def test_patterns_elsewhere_match_exactly_and_their_flags_are_the_roots(fixed, f
     for branch in found.branches:
         for k in range(5, len(branch), max(1, len(branch) // 9)):
             check_flags(branch, k)
-    for event in events(found, "EP3"):
-        start = {n: event.parameters[n] for n in free}
-        r = next(float(b.unknowns["r"][event.index]) for b in found.branches if event in b.events)
-        true = certified(equations("EP3"), start | {"s": r}, fixed)
-        for n in free:
-            exact = true.lambda_s if n == "lambda_s" else true[n]
-            assert event.parameters[n] == pytest.approx(float(exact), abs=1e-11)
 
 
 def test_a_branch_that_comes_from_infinity_keeps_its_own_kind():
@@ -669,26 +571,6 @@ def test_equalities_are_kept_along_the_curve():
 
 
 # Invariants of the whole
-
-
-def test_duality_maps_branches_onto_branches():
-    """Exchange of the heights, chi_B → 1/chi_B, T → −T/chi_B², Fr → Fr/chi_B keeps the spectrum (chi_H = 1)."""
-    normal = traced("EP2", BASE | {"chi_B": 1.3}, {"Fr": (0.5, 5.0), "lambda_s": (0.05, 1.0)})
-    for branch in normal.branches:
-        for k in range(0, len(branch), 31):
-            p = design(branch, k)
-            other = laws.dual(p["Fr"], p["chi_B"], p["zeta_B"], p["zeta_H"], p["lambda_s"])
-            values = {n: float(v) for n, v in other.items()} | {"mu": 0.1, "chi_H": 1.0}
-            assert relative_discriminant(values) <= 1e-13
-    mirrored = traced(
-        "EP2",
-        MIRRORED | {"chi_H": 1.0, "mu": 0.1, "chi_B": 1 / 1.3},
-        {"Fr": (0.5 / 1.3, 5 / 1.3), "lambda_s": (math.atan(-math.tan(1.0) / 1.69), math.atan(-math.tan(0.05) / 1.69))},
-    )
-    ours = sorted(float(b.arclength[-1]) for b in normal.branches)
-    theirs = sorted(float(b.arclength[-1]) for b in mirrored.branches)
-    assert ours == pytest.approx(theirs, rel=1e-4)  # the maps of Fr and T are linear: polylines of one curve
-    assert len(events(normal, "EP3")) == len(events(mirrored, "EP3")) == 1
 
 
 @pytest.mark.parametrize("seed", [1, 2])

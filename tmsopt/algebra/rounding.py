@@ -1,6 +1,5 @@
 """Arrays of numbers with bounds of their errors, which every operation carries on."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -166,8 +165,3 @@ def greater(a: Any, b: Any) -> Bounded:
     """The greater of two numbers: it is no farther off than the farther one."""
     one, other = as_bounded(a), as_bounded(b)
     return Bounded(np.maximum(one.value, other.value), np.maximum(one.error, other.error))
-
-
-def beside(parts: Sequence[Bounded]) -> Bounded:
-    """Columns side by side."""
-    return Bounded(np.concatenate([p.value for p in parts], 1), np.concatenate([p.error for p in parts], 1))

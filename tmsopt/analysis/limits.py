@@ -1,11 +1,12 @@
 """What each limit that binds is worth: its multiplier, checked by solving again with the limit moved."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tmsopt.analysis.again import LimitResolver, moved
+from tmsopt.analysis.again import moved, solve_again
 from tmsopt.analysis.steps import natural_step, step_within
 from tmsopt.errors import InputError
 from tmsopt.problem.expression import written_sides
@@ -96,10 +97,10 @@ def levers(solution: Solution, resolve: bool = True, progress: Counts | None = N
     found = [
         _of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name) for name in solution.active
     ]
-    again = LimitResolver(solution, {lever.name: lever.step for lever in found if lever.step})
+    look = resolve and (len(found) == 1 or _lets_in(solution, found))
     checked = []
     for lever in found:
-        checked.append(_resolved(again, lever) if resolve and lever.step else lever)
+        checked.append(_resolved(solution, lever, look) if resolve and lever.step else lever)
         if progress:
             progress(len(checked), len(solution.active))
     return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
@@ -158,26 +159,33 @@ def _size(solution: Solution, text: str) -> float:
     return max((size for size in sides if math.isfinite(size)), default=1.0)
 
 
-def _resolved(again: LimitResolver, lever: Lever) -> Lever:
+def _lets_in(solution: Solution, found: Sequence[Lever]) -> bool:
+    """Whether a better design than the optimum leads to is let in elsewhere where all limits are moved at once."""
+    problem = solution.problem
+    for lever in found:
+        with suppress(InputError):
+            problem = moved(problem, lever.name, lever.step)
+    near, whole = (solve_again(solution, problem, 1, look) for look in (False, True))
+    return near.status != "optimal" or problem.sign * (near.value - whole.value) > _NOISE * (1 + abs(solution.value))
+
+
+def _resolved(solution: Solution, lever: Lever, look: bool) -> Lever:
     """A lever with the gain found by solving again from the optimum."""
-    solution = again.solution
     try:
         asked = moved(solution.problem, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
     gain, found = math.nan, None
     for starts in (1, _RETRY):
-        ended = again.solved(asked, lever.name, starts)
+        ended = solve_again(solution, asked, starts, look or starts > 1)
         better = -solution.problem.sign * (ended.value - solution.value)
         if ended.status == "optimal" and not better <= gain:
             gain, found = better, ended
-        if found and gain >= -_NOISE * (1 + abs(solution.value)):
-            break
+            checked = replace(lever, resolved=gain, structure=found.structure)
+            if abs(checked.relative) <= DIFFERS:
+                return checked
     if found is None:
         return replace(lever, reason=f"the moved problem is {ended.status.replace('_', ' ')}")
-    checked = replace(lever, resolved=gain, structure=found.structure)
-    if abs(checked.relative) <= DIFFERS:
-        return checked
     return replace(checked, reason=", ".join(_reasons(solution, lever, found)))
 
 

@@ -6,12 +6,12 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from tmsopt.boundaries.boundaries import Edge
-from tmsopt.boundaries.curvature import curvature
 from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.models import Model
 from tmsopt.program.ipopt import Point, Run, ipopt, polisher
@@ -25,6 +25,7 @@ _ITERATIONS, _UNFINISHED = 200, "Maximum_Iterations_Exceeded"
 _FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
 _STATIONARY = 1e-8
 _SHIFTED = 1e-8  # share by which what is left of a violation shifts the square of the distance, times its multiplier
+_LARGE = 50_000  # operations times displacements: the expression of a Hessian would take too many
 _KEPT = 64  # solvers, of so many edges and models
 
 
@@ -112,23 +113,22 @@ def _nlp(place: WeightedDesign, edge: Edge) -> NLP:
     model, of = place.problem.model, place.problem.parameter_set
     n, extra = len(place.weights), len(edge.unknowns)
     around = _around(model, of.name, tuple(place.weights))
-    x, p = ca.SX.sym("x", n + extra), ca.SX.sym("p", around.size1_in(1))
+    kind: Any = ca.MX if around.n_instructions() * n >= _LARGE else ca.SX
+    x, p = kind.sym("x", n + extra), kind.sym("p", around.size1_in(1))
     y, unknowns = x[:n], [x[n + k] for k in range(extra)]
     c, sizes = (ca.vertsplit(column) for column in around(y, p))
     equations = [e / sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
     others = edge.nonnegative(c, unknowns)
-    f, g = ca.sumsqr(y), ca.vertcat(*equations, *others)
     return NLP(
         formulation="nearest",
         variables=(*place.weights, *edge.unknowns),
-        functions=ca.Function("nlp", [x, p], [f, g]),
+        functions=ca.Function("nlp", [x, p], [ca.sumsqr(y), ca.vertcat(*equations, *others)]),
         lower=(-np.inf,) * n + (0.0,) * extra,
         upper=(np.inf,) * n + edge.upper,
         rows=(*[edge.name] * len(equations), *["others"] * len(others)),
         row_lower=(0.0,) * (len(equations) + len(others)),
         row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
         settings=(np.nan,) * p.numel(),
-        hessian=curvature(model, of, tuple(place.weights), edge, around.n_instructions()),
     )
 
 
@@ -144,4 +144,4 @@ def _around(model: Model, set_name: str, weighted: tuple[str, ...]) -> ca.Functi
     moved = {name: parameters[name] + weights[k] * size * y[k] for k, name in enumerate(weighted)}
     a = model.coefficients({**parameters, **moved}, of)
     c = [sign * coefficient / unit for coefficient, unit in zip(a, scale, strict=True)]
-    return ca.Function("around", [y, p], [ca.vertcat(*c), ca.vertcat(*sizes)])
+    return ca.Function("around", [y, p], [ca.vertcat(*c), ca.vertcat(*sizes)], {"max_num_dir": 1})

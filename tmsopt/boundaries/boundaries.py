@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.records import Array, Truth
-from tmsopt.roots import discriminant, hurwitz_minors, is_stable, may_be_real, product, real_roots, rebuilt, roots
+from tmsopt.roots import discriminant, hurwitz_minors, is_stable, product, real_roots, rebuilt, roots
 
 MATCHED = 1e-10
 """Relative change of a coefficient up to which a polynomial counts as on an edge."""
@@ -179,7 +179,7 @@ def heavily_damped(c: Array) -> Truth:
     """Whether all roots are real, negative and different, for coefficients of shape (…, n + 1), up to rounding.
 
     A quartic has four different real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
-    16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted (Sturm).
+    16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted.
     """
     n = c.shape[-1] - 1
     stable = is_stable(c, exact=False)
@@ -201,7 +201,6 @@ def _counted(c: Array, stable: Truth) -> Truth:
     k = np.arange(1, n)
     newton = c[..., 1:-1] ** 2 > (1 - 1e-9) * (1 + 1 / k) * (1 + 1 / (n - k)) * c[..., :-2] * c[..., 2:]
     damped = np.asarray(stable & np.all(newton, axis=-1))
-    damped[damped] = may_be_real(c[damped])
     damped[damped] = real_roots(c[damped], exact=False)[0] == n
     return damped
 

@@ -5,14 +5,12 @@ a definite real number, enclosed in a ball that is narrowed until only one doubl
 """
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
 import flint
-import numpy as np
 
 from tmsopt.algebra.elementary import exact, greater, lesser
 from tmsopt.evaluation.recheck import Evaluation
@@ -196,22 +194,8 @@ class _Design:
             return ()
         coefficients = self.values(case).coefficients
         if found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots):
-            return self.located(coefficients, found.roots) or stored or enclosed_roots(coefficients)
-        return nearest_roots(found.name, coefficients, found.roots)
-
-    def located(self, coefficients: Sequence[Any], found: Sequence[Root]) -> _Several | None:
-        """Roots of the nearest polynomial with the multiple real root that is located, where it is not rightmost."""
-        pattern = self.problem.pattern
-        order = re.fullmatch(r"EP(\d+)", pattern.form) if pattern else None
-        if pattern is None or order is None or pattern.name in self.checked.violations:
-            return None
-        z = np.array([complex(r.re, r.im) for r in found])
-        nearest = np.argsort(np.abs(z[:, None] - z), axis=1)[:, : int(order[1])]
-        together = min(nearest, key=lambda which: float(np.ptp(z[which].real) + np.ptp(z[which].imag)))
-        multiple = Root(float(z[together].real.mean()), 0.0, len(together))
-        return nearest_roots(
-            pattern.form, coefficients, [multiple, *(r for k, r in enumerate(found) if k not in together)]
-        )
+            return stored or enclosed_roots(coefficients)
+        return nearest_roots(coefficients, found.roots)
 
     def values(self, case: Case) -> Values:
         """Everything derived from the exact parameters in a case, root quantities excluded."""

@@ -280,7 +280,7 @@ def _structured(problem: Problem, design: Mapping[str, float], checked: Evaluati
         with flint.ctx.workdps(_DIGITS):
             exact = {n: flint.arb(x) for n, x in checked.worst.applied(design).items()}
             a = problem.model.coefficients(exact, problem.parameter_set)
-            found = nearest_roots(checked.structure.name, a, checked.structure.roots) or ()
+            found = nearest_roots(a, checked.structure.roots) or ()
         roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in found) or checked.structure.roots
         structure = Structure(checked.structure.name, roots, checked.structure.distance)
     return replace(again, structure=structure, violations=checked.violations, amounts=checked.amounts)

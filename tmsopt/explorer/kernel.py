@@ -14,7 +14,7 @@ import numpy as np
 from tmsopt.explorer import javascript as js
 from tmsopt.explorer.javascript import Spelling, Step
 from tmsopt.roots import lienard_chipart
-from tmsopt.roots.quartics import degenerate, factors, signs
+from tmsopt.roots.quartics import factors, quartic, signs
 
 _QUARTIC = 4
 
@@ -36,7 +36,7 @@ def kernel_script(degree: int) -> str:
     if degree < _QUARTIC:
         parts.append(_traced("stableBySigns", a, lambda *c: [_stable(c)]))
     if degree == _QUARTIC:
-        rules = f"good: {degenerate.GOOD}, accepted: {degenerate.ACCEPTED}, steps: {degenerate.STEPS}"
+        rules = f"good: {quartic.GOOD}, accepted: {quartic.ACCEPTED}, steps: {quartic.STEPS}"
         b = ["b1", "b2", "b3", "b4", "p1", "q1", "p2", "q2"]
         parts += [
             f"const QUARTIC = {{{rules}}};",

@@ -122,8 +122,8 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
 def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
     """A function that refines runs of one NLP under given limits; the better of refined and raw point is returned."""
     _, derivatives = nlp.derived
-    symbol: Any = (ca.MX if nlp.hessian else ca.SX).sym
-    x, rows, p = (symbol(name, len(of)) for name, of in (("x", nlp.variables), ("m", nlp.rows), ("p", nlp.settings)))
+    sizes = {"x": len(nlp.variables), "m": len(nlp.rows), "p": len(nlp.settings)}
+    x, rows, p = (nlp.symbol(name, size) for name, size in sizes.items())
     first = [e for name in ("grad_f", "jac_g") for e in derivatives[name](x, p)]
     expand = ca.Function("kkt", [x, rows, p], [*first, ca.triu2symm(derivatives["hess_lag"](x, p, 1, rows))])
 

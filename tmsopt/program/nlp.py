@@ -118,7 +118,6 @@ class NLP:
         size: of the objective, as far as it is known beforehand.
         units: of the first variables, the free parameters, in which a solver of absolute tolerances moves them.
         objective_unit: likewise, of the objective where it is small.
-        hessian: (x, p, λ of f, λ of g) → that of the Lagrangian, its upper half, where it need not be derived.
     """
 
     formulation: str
@@ -140,7 +139,6 @@ class NLP:
     size: float = 1.0
     units: tuple[float, ...] = ()
     objective_unit: float = 1.0
-    hessian: ca.Function | None = field(repr=False, default=None)
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
@@ -149,15 +147,18 @@ class NLP:
             return self.functions(x)
         return self.functions(x, self.settings if settings is None else settings)
 
+    @property
+    def symbol(self) -> Any:
+        """What makes a symbol for the functions: a matrix where they call others, an array of expressions elsewhere."""
+        return (ca.MX if self.functions.is_a("MXFunction") else ca.SX).sym
+
     @cached_property
     def derived(self) -> tuple[ca.Function, dict[str, ca.Function]]:
         """(x, p) → (f, g), and what CasADi else derives of it anew for every solver."""
-        x, p = ca.SX.sym("x", len(self.variables)), ca.SX.sym("p", len(self.settings))
+        x, p = self.symbol("x", len(self.variables)), self.symbol("p", len(self.settings))
         function = ca.Function("nlp", [x, p], self.at(x, p), ["x", "p"], ["f", "g"])
         first = {of: function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
-        second = self.hessian or function.factory(
-            "dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]}
-        )
+        second = function.factory("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
         return function, {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
 
     @property

@@ -28,7 +28,6 @@ from tmsopt.records import Printable, Table, plain
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots.patterns.doubled import complex_shown
 from tmsopt.roots.patterns.naming import implies, shown_patterns
-from tmsopt.roots.patterns.pattern import LINES
 from tmsopt.search.solve import solve_any_status
 
 DIGITS = 30
@@ -37,10 +36,9 @@ DIGITS = 30
 MOST = 1000
 """Digits at most."""
 
+_QUARTIC = 4  # degree of the patterns that a name alone tells
 _EXTRA = 50  # decimal digits carried beyond twice those asked for, where a design is taken as it is
 
-_IMPLIES = {"EP4": ("EP3", "2EP2", "CEP2", "EP2"), "EP3": ("EP2",), "2EP2": ("EP2",)}
-_QUARTIC = 4  # of which every structure has a pattern of its own
 _SIMPLE = {
     "pair": "the rightmost roots are a simple complex pair",
     "real": "the rightmost root is real and simple",
@@ -255,13 +253,11 @@ def _proved(
 def _patterns(problem: Problem, structure: str, roots: Sequence[Root]) -> list[Pattern]:
     """Patterns to prove: that of the structure, if it has the one that is located, and then the latter."""
     located = problem.pattern
-    if problem.model.degree == _QUARTIC:
-        known = {**PATTERNS, **LINES}.get(structure)
-        named = [known] if known and (not located or located.form in _IMPLIES.get(structure, ())) else []
-    elif roots and (not located or implies(roots, located.form)):
-        named = shown_patterns(roots)
-    else:
-        named = []
+    quartic = PATTERNS if problem.model.degree == _QUARTIC else {}
+    shown = shown_patterns(roots) if roots else [quartic[structure]] if structure in quartic else []
+    if located and not (implies(roots, located.form) if roots else located.form == structure):
+        shown = []
+    named = [quartic.get(p.name, p) for p in shown]
     if problem.model.carrier is not None:
         named = [complex_shown(p) for p in named]
     return list({p.name: p for p in [*named, *([located] if located else [])]}.values())

@@ -4,15 +4,14 @@ In: coefficients, highest power first. Out: roots, verdicts on stability, counts
 first; `patterns` says which roots meet, `quartics` takes millions at once.
 """
 
-from tmsopt.roots.count import may_be_real, real_roots
+from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
 from tmsopt.roots.many import classify, find_motion
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
-from tmsopt.roots.patterns.multiplicity import multiple_real_roots
 from tmsopt.roots.patterns.pattern import Pattern
-from tmsopt.roots.patterns.structure import Structure, pattern_distance, structure
+from tmsopt.roots.patterns.structure import Structure, multiple_real_roots, pattern_distance, structure
 from tmsopt.roots.polynomial import Root, determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.quartics.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
 from tmsopt.roots.quartics.quartic import Factors, Motion, abscissa_and_damping, quartic_factors
@@ -46,7 +45,6 @@ __all__ = [
     "is_stable",
     "jordan",
     "lienard_chipart",
-    "may_be_real",
     "multiple_real_roots",
     "pattern",
     "pattern_distance",

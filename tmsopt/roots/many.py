@@ -1,4 +1,4 @@
-"""Classes and motion of many polynomials of one degree: quartics by formulas, others by Sturm and eigenvalues."""
+"""Classes and motion of many polynomials of one degree: quartics by formulas, others by numeric roots in discs."""
 
 from collections.abc import Sequence
 

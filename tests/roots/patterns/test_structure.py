@@ -1,10 +1,10 @@
-"""The multiplicity structure against exact multiplicities, and distances against linear programming.
+"""The multiplicity structure against exact multiplicities, and distances against linear least squares.
 
 Nothing is judged by recomputed roots: multiplicities come from FLINT's certified isolation of the exact
-coefficients, distances from a linear programme in the exact derivatives of the pattern.
+coefficients, distances from least squares in the exact derivatives of the pattern.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 
@@ -14,7 +14,6 @@ import sympy
 from helpers.oracles import abscissa_60, certified_roots, exact_multiplicities, roots_60
 from hypothesis import given, settings, strategies as st
 from mpmath import mp
-from scipy.optimize import linprog
 
 from tmsopt.roots import PATTERNS, exact_abscissa, exact_roots, pattern_distance, product, structure
 
@@ -125,22 +124,9 @@ def test_random_integer_roots_are_named_by_their_exact_multiplicities(
         assert {(round(r.re / unit), round(r.im / unit)): r.multiplicity for r in found.roots} == multiset
 
 
-@pytest.mark.parametrize(("name", "factors"), EVERY)
-def test_roots_of_a_named_structure_have_exact_multiplicities(name: str, factors: list[list[int]]) -> None:
-    if name in ("real", "pair"):
-        return
-    coefficients = product(*factors)
-    exact = {(round(float(z.real)), round(float(z.imag))): m for z, m in certified_roots(coefficients)}
-    found = structure(coefficients).roots
-    assert {(round(r.re), round(r.im)): r.multiplicity for r in found} == exact
-    # well separated simple roots, and multiple ones by their factor: a few hundred roundings
-    assert all(abs(complex(r.re, r.im) - complex(round(r.re), round(r.im))) <= 1e-13 for r in found)
-
-
 # Tolerance
 
 
-Norm = Callable[[np.ndarray, np.ndarray], float]
 LINEAR = ["EP4", "EP3", "2EP2", "CEP2", "EP2"]
 UNKNOWNS = {"EP4": [-1], "EP3": [-1, -3], "2EP2": [5, 4], "CEP2": [2, 2], "EP2": [-1, 7, 12]}
 """Unknowns of (s+1)⁴, (s+1)³(s+3), (s+1)²(s+4)², (s²+2s+2)² and (s+1)²(s+3)(s+4)."""
@@ -162,53 +148,28 @@ def relative_derivatives(name: str) -> tuple[np.ndarray, np.ndarray]:
     return p, jacobian[1:] / size[1:, None]
 
 
-def chebyshev_distance(jacobian: np.ndarray, change: np.ndarray) -> float:
-    """min over u of max |change − jacobian u|: the smallest largest change that leads back to the pattern."""
-    rows, columns = jacobian.shape
-    cost = np.r_[np.zeros(columns), 1.0]
-    within = np.r_[np.c_[jacobian, -np.ones(rows)], np.c_[-jacobian, -np.ones(rows)]]
-    return float(linprog(cost, within, np.r_[change, -change], bounds=[(None, None)] * columns + [(0, None)]).fun)
-
-
 def euclidean_distance(jacobian: np.ndarray, change: np.ndarray) -> float:
     """The smallest root sum of squares of relative changes that leads back to the pattern."""
     return float(np.linalg.norm(change - jacobian @ np.linalg.lstsq(jacobian, change, rcond=None)[0]))
 
 
-def perturbed(name: str, seed: int, distance: float, norm: Norm = chebyshev_distance) -> list[float]:
+def perturbed(name: str, seed: int, distance: float) -> list[float]:
     """A quartic at a known relative distance from a pattern, to first order."""
     p, jacobian = relative_derivatives(name)
     size = np.abs(p[1:]) if name != "CEP2" else np.array([4, 6, 4, 1]) * 2.0 ** np.array([0.5, 1, 1.5, 2])
     rng = np.random.default_rng(seed)
     while True:
         change = rng.choice([-1, 1], 4) * rng.uniform(0.5, 1, 4)
-        reach = norm(jacobian, change)
+        reach = euclidean_distance(jacobian, change)
         if reach > 0.05:
             return [1.0, *(p[1:] + size * change * distance / reach)]
-
-
-@pytest.mark.parametrize("tolerance", [1e-12, 1e-10, 1e-8])
-@pytest.mark.parametrize("name", LINEAR)
-def test_ten_tolerances_away_it_is_not_named(name: str, tolerance: float) -> None:
-    for seed in range(4):
-        found = structure(perturbed(name, seed, 10 * tolerance), tolerance)
-        assert found.name not in (name, "undecided"), seed
-
-
-@pytest.mark.parametrize("tolerance", [1e-12, 1e-10, 1e-8])
-@pytest.mark.parametrize("name", LINEAR)
-def test_a_tenth_of_the_tolerance_away_it_is_named(name: str, tolerance: float) -> None:
-    for seed in range(4):
-        found = structure(perturbed(name, seed, tolerance / 10), tolerance)
-        assert found.name == name, seed
-        assert found.distance <= tolerance
 
 
 @pytest.mark.parametrize("name", LINEAR)
 def test_the_definition_of_the_tolerance(name: str) -> None:
     """Named when a polynomial that has the structure lies within the tolerance, and not otherwise."""
-    inside = [structure(perturbed(name, seed, 0.99e-9, euclidean_distance), 1e-9).name for seed in range(8)]
-    outside = [structure(perturbed(name, seed, 1.01e-9, euclidean_distance), 1e-9).name for seed in range(8)]
+    inside = [structure(perturbed(name, seed, 0.99e-9), 1e-9).name for seed in range(8)]
+    outside = [structure(perturbed(name, seed, 1.01e-9), 1e-9).name for seed in range(8)]
     assert inside == [name] * 8
     assert name not in outside
 
@@ -218,7 +179,7 @@ def test_the_definition_of_the_tolerance(name: str) -> None:
 def test_pattern_distance_is_the_least_root_sum_of_squares(name: str, seed: int) -> None:
     """Against linear least squares in exact derivatives; 1e-3 is left for the second order of a change of 1e-6."""
     for distance in (1e-6, 1e-8):
-        found = pattern_distance(PATTERNS[name], perturbed(name, seed, distance, euclidean_distance))
+        found = pattern_distance(PATTERNS[name], perturbed(name, seed, distance))
         assert found == pytest.approx(distance, rel=1e-3)
 
 

@@ -5,8 +5,6 @@ Roots are judged by the coefficients that they rebuild, in the longest doubles o
 """
 
 from collections.abc import Callable
-from fractions import Fraction
-from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -16,11 +14,10 @@ from helpers.designs import wide_designs
 from helpers.oracles import routh_exact
 
 from tmsopt import laws
-from tmsopt.models import copo, tms
+from tmsopt.models import tms
 from tmsopt.roots import (
     CLASSES,
     abscissa_and_damping,
-    backward_error,
     exact_abscissa,
     is_stable,
     quartic_classes,
@@ -28,7 +25,6 @@ from tmsopt.roots import (
     quartic_is_stable,
     real_roots,
 )
-from tmsopt.roots.quartics import hard_factors, largest_root
 
 JOINTLY_RIGHT = 1e-13
 """The accuracy promised of rebuilt coefficients."""
@@ -198,8 +194,6 @@ def test_the_factors_give_the_coefficients_back(family: str) -> None:
     error = joint_error(a, found.roots)
     worst = int(np.argmax(error))
     assert error[worst] <= JOINTLY_RIGHT, f"{error[worst]} of {a[worst].tolist()}"
-    # eigenvalues are the last resort: none of these should need them
-    assert found.fallbacks == 0
 
 
 def test_abscissa_is_that_of_ball_arithmetic() -> None:
@@ -250,16 +244,6 @@ def test_abscissa_and_damping_by_hand(factors: list[list[float]], abscissa: floa
     assert found.damping_ratio == pytest.approx(ratio, rel=1e-14, abs=1e-320)
 
 
-def test_the_factors_of_ep4_are_its_closed_form() -> None:
-    """(s − ω0)⁴ within rounding of the coefficients; the roots themselves scatter by the fourth root of it."""
-    Fr, chi_B, T = laws.frep4(-0.4, -0.2)[0], laws.chib1(-0.4, -0.2), laws.tls(-0.4, -0.2)
-    a = copo(Fr, 0.1, chi_B, 1.0, -0.4, -0.2, T)
-    found = quartic_factors(*a)
-    (p1, p2), (q1, q2) = found.p, found.q
-    rebuilt = np.polymul([1, p1, q1], [1, p2, q2])
-    assert rebuilt == pytest.approx(np.poly([float(laws.w01(-0.4, -0.2))] * 4), rel=1e-13)
-
-
 def test_options_of_earlier_versions_are_accepted() -> None:
     with pytest.warns(DeprecationWarning, match="compiled= is no longer needed"):
         assert quartic_is_stable(1, 4, 6, 4, 1, compiled=False)  # type: ignore[call-arg]
@@ -275,16 +259,6 @@ def test_eigenvalues_are_the_last_resort_and_are_counted() -> None:
     assert found.fallbacks == 2
     # two roots are those of s² + 0.39 s + 5.9, and the others are smaller than 1e-100
     assert found.abscissa[1] == pytest.approx(0, abs=1e-100)
-
-
-def test_eigenvalues_give_the_factors_when_every_other_way_is_shut(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tmsopt.roots.quartics.degenerate._WAYS", ())
-    a = made("normal", 50)
-    found, unit, fallbacks = hard_factors(np.ascontiguousarray(a.T))
-    assert fallbacks == 50
-    p, q = np.ldexp(found[::2], unit), np.ldexp(found[1::2], 2 * unit)
-    rebuilt = [np.polymul([1, p[0, k], q[0, k]], [1, p[1, k], q[1, k]]) for k in range(50)]
-    assert np.allclose(rebuilt, a / a[:, :1], rtol=1e-11)
 
 
 @pytest.mark.filterwarnings("error")
@@ -325,16 +299,6 @@ def test_coefficients_broadcast() -> None:
     assert quartic_classes(1, 4, 6, 4, empty).kind.shape == (0, 2)
     with pytest.raises(ValueError, match="broadcast"):
         quartic_factors(1.0, np.ones(2), np.ones(3), 1.0, 1.0)
-
-
-def test_largest_root_of_a_cubic_to_seven_digits_of_the_spread() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(200):
-        z = rng.normal(size=3)
-        z -= z.mean()
-        _, _, minus_three_q, minus_two_r = np.poly(z)
-        found = largest_root(np.array([-minus_three_q / 3]), np.array([-minus_two_r / 2]))[0]
-        assert abs(found - z.max()) < 4e-7 * np.ptp(z)
 
 
 # Classes
@@ -396,30 +360,5 @@ def test_real_roots_beside_a_double_one_are_counted_exactly() -> None:
     a = np.concatenate([double, twice, np.array([np.poly([-x] * 4) for x in r])])
     a = a * (1 + rng.integers(-2, 3, a.shape) * np.finfo(float).eps)
     found = quartic_classes(*a.T)
-    assert found.real_roots.tolist() == [_different_real_roots(row) for row in a]
+    assert found.real_roots.tolist() == [sum(curves.sturm(row.tolist())) for row in a]
     assert found.doubtful > len(a) / 3
-
-
-def _different_real_roots(a: np.ndarray) -> int:
-    """By the chain of Sturm in Fractions."""
-    p = [Fraction(float(x)) for x in a]
-    chain = [p, [x * (4 - k) for k, x in enumerate(p[:-1])]]
-    while True:
-        rest = list(chain[-2])
-        while len(rest) >= len(chain[-1]):
-            share = rest[0] / chain[-1][0]
-            rest = [x - share * y for x, y in zip(rest[1:], [*chain[-1][1:], *[Fraction(0)] * len(rest)], strict=False)]
-        while rest and rest[0] == 0:
-            rest = rest[1:]
-        if not rest:
-            break
-        chain.append([-x for x in rest])
-    ends = [[q[0] * (-1) ** (len(q) - 1) > 0 for q in chain], [q[0] > 0 for q in chain]]
-    left, right = (sum(x != y for x, y in pairwise(signs)) for signs in ends)
-    return left - right
-
-
-def test_the_program_judges_roots_as_the_test_does() -> None:
-    a = made("two-mass-skate designs")
-    z = quartic_factors(*a.T).roots
-    assert np.abs(backward_error(a, z) - joint_error(a, z)).max() < 2e-15  # the rounding of its own sums

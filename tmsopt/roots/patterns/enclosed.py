@@ -4,20 +4,16 @@ Everything here works at the precision of `flint.ctx`.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from typing import Any
 
 import flint
-import numpy as np
 
 from tmsopt.algebra.elementary import as_ball, rational
 from tmsopt.roots.exact import isolated_roots
-from tmsopt.roots.patterns.composed import PATTERNS
-from tmsopt.roots.patterns.fitting import Form
 from tmsopt.roots.patterns.naming import shown
-from tmsopt.roots.patterns.pattern import LINES, Pattern
 from tmsopt.roots.patterns.shape import Shape
 from tmsopt.roots.polynomial import Root, evaluate, product
 
@@ -81,7 +77,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     return _sorted(found)
 
 
-def nearest_roots(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
+def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
     """Roots of the polynomial nearest to a given one among those of a structure; None where the fit does not converge.
 
     Nearest is: least in the sum over k = 1 … n of (Δₖ/wₖ)², where Δₖ is the change of the k-th coefficient of the
@@ -92,43 +88,31 @@ def nearest_roots(name: str, coefficients: Sequence[Any], roots: Sequence[Root])
 
     Gauss–Newton steps, from the roots of a fit in double precision, until they change nothing; half of the digits
     carried count as certain.
-
-    Args:
-        name: of a quartic, its structure. Of other degrees the roots alone tell the structure: by multiplicities, and
-            by real parts that equal the largest.
     """
     terms = [flint.arb(as_ball(c)) for c in coefficients]
     monic = [c / terms[0] for c in terms]
     if not all(c.is_finite() for c in monic):
         return None
-    if len(monic) == 5:
-        pattern = {**PATTERNS, **LINES}[name]
-        target = [c.mid() for c in monic]
-        u = _start(pattern, [float(c) for c in target], roots)
-        return _converged(pattern, u, target, lambda u: _roots_of(pattern, u))
     unit = flint.arb(2) ** round(math.log2(max(1e-300, *(abs(complex(r.re, r.im)) for r in roots))))
     shape, places = shown([Root(float(r.re / unit), float(r.im / unit), r.multiplicity) for r in roots])
     start = [flint.arb(x) for x in places]
     target = [(c / unit**k).mid() for k, c in enumerate(monic)]
-    found = _converged(shape, start, target, lambda u: _roots_of_shape(shape, u))
+    found = _converged(shape, start, target)
     return None if found is None else tuple(Enclosed(z.re * unit, z.im * unit, z.multiplicity) for z in found)
 
 
-_Rooted = Callable[[Sequence[Any]], "list[Enclosed] | None"]
-
-
-def _converged(form: Form, u: list[Any], target: Sequence[Any], roots_at: _Rooted) -> tuple[Enclosed, ...] | None:
-    """Roots of the nearest polynomial of a form, from a start."""
+def _converged(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[Enclosed, ...] | None:
+    """Roots of the nearest polynomial of a shape, from a start."""
     small = flint.arb(2) ** (_LOST * (len(target) - 1) - flint.ctx.prec)
     sure = flint.arb(2) ** (-flint.ctx.prec // _HALF)
     for _ in range(_STEPS):
-        step = _step(form, u, target, roots_at)
+        step = _step(shape, u, target)
         if step is None:
             return None
         u = [(x + d).mid() for x, d in zip(u, step, strict=True)]
         size = max(abs(x) for x in u)
         if all(abs(d) <= small * size for d in step):
-            found = roots_at([x + flint.arb(0, (size * sure).upper()) for x in u])
+            found = _roots_of(shape, [x + flint.arb(0, (size * sure).upper()) for x in u])
             return None if found is None else _sorted(found)
     return None
 
@@ -178,21 +162,7 @@ def _sorted(roots: Sequence[Enclosed]) -> tuple[Enclosed, ...]:
     return tuple(sorted(roots, key=lambda r: (-float(r.re), -float(r.im))))
 
 
-def _start(pattern: Pattern, target: list[float], roots: Sequence[Root]) -> list[Any]:
-    """The guess from the roots of a fit that rebuilds the coefficients best."""
-    z = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity)])
-    scale = np.abs(z).max() or 1.0
-
-    def error(u: list[float]) -> float:
-        off: list[float] = [
-            (float(a) - b) / scale**k for k, (a, b) in enumerate(zip(pattern.monic(u), target, strict=True))
-        ]
-        return sum((x * x for x in off), 0.0)
-
-    return [flint.arb(x) for x in min(pattern.guesses(z), key=error)]
-
-
-def _roots_of_shape(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:
+def _roots_of(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:
     """Roots of each group, and those of the rest; None where these are not decided."""
     found: list[Enclosed] = []
     for factor, group in zip(shape.group_factors(u), shape.groups, strict=True):
@@ -201,16 +171,16 @@ def _roots_of_shape(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:
     return None if rest is None else [*found, *rest]
 
 
-def _step(form: Form, u: Sequence[Any], target: Sequence[Any], roots_at: _Rooted) -> list[Any] | None:
+def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | None:
     """Gauss–Newton step of the weighted least squares, with the weights of where it starts."""
-    found = roots_at(u)
+    found = _roots_of(shape, u)
     if found is None:
         return None
     weights = _weights(found)
-    offs = [(a - b) / w for a, b, w in zip(form.monic(u), target, weights, strict=True)]
+    offs = [(a - b) / w for a, b, w in zip(shape.monic(u), target, weights, strict=True)]
     columns = []
     for j in range(len(u)):
-        moved = form.monic([flint.arb_series([x, 1], prec=2) if k == j else x for k, x in enumerate(u)])
+        moved = shape.monic([flint.arb_series([x, 1], prec=2) if k == j else x for k, x in enumerate(u)])
         columns.append(
             [(m[1] if isinstance(m, flint.arb_series) else 0) / w for m, w in zip(moved, weights, strict=True)]
         )
@@ -229,18 +199,6 @@ def _weights(roots: Sequence[Enclosed]) -> list[Any]:
     median = (sizes[(n - 1) // 2] + sizes[n // 2]) / 2
     floor = (sizes[-1] if median == 0 else median) / _FLOOR
     return [as_ball(c) for c in product(*([flint.arb(1), size.max(floor).mid()] for size in sizes))]
-
-
-def _roots_of(pattern: Pattern, u: Sequence[Any]) -> list[Enclosed]:
-    """Roots of the linear and quadratic factors, equal factors counted as multiplicity."""
-    counted: dict[tuple[Any, ...], tuple[list[Any], int]] = {}
-    for factor in pattern.factors(u):
-        key = tuple((int(p), int(q)) for p, q in (flint.arb(c).mid().man_exp() for c in factor))
-        counted[key] = (factor, counted[key][1] + 1 if key in counted else 1)
-    found: list[Enclosed] = []
-    for factor, count in counted.values():
-        found += [Enclosed(re, im, count) for re, im in _factor_roots(factor)]
-    return found
 
 
 def _factor_roots(factor: Sequence[Any]) -> list[tuple[Any, Any]]:

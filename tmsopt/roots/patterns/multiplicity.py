@@ -10,13 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from tmsopt.records import Array
-from tmsopt.roots.numeric import rebuilt, roots as numeric_roots
+from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.shape import Group, Shape
-from tmsopt.roots.polynomial import Root
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a polynomial within any sensible tolerance
 _NEARLY_REAL = 1e-2  # |Im z|/|z| up to which a root of a derivative may stand for a real one
@@ -165,36 +163,3 @@ def _upper(factor: Sequence[float]) -> complex:
         return complex(-factor[1], 0.0)
     half = -factor[1] / 2
     return complex(half, np.sqrt(max(factor[2] - half * half, 0.0)))
-
-
-def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root, ...] | None:
-    """Roots of the nearest polynomial whose roots are all real and two of them equal; None where none is near.
-
-    Numeric roots are gathered from the closest neighbours on, the most degenerate first, and ∏ (s − rᵢ)^mᵢ is fitted
-    to the coefficients, descending, shape (n + 1,), with a leading one other than 0. It is near within `tolerance`:
-    the root sum of squares of the changes, each relative to the terms that make up a coefficient.
-
-    Example:
-        >>> found = tmsopt.roots.multiple_real_roots([1, 5, 9, 7, 2 + 1e-13], 1e-9)  # near (s + 1)³ (s + 2)
-        >>> [(round(root.re, 6), root.multiplicity) for root in found]
-        [(-1.0, 3), (-2.0, 1)]
-
-    More: docs/explanation/exceptional_points.md
-    """
-    c = np.asarray(coefficients, dtype=float)
-    z = numeric_roots(c)
-    z = z[np.lexsort((z.imag, z.real))]
-    size = np.maximum(rebuilt(-np.abs(z).astype(complex)), 1e-100)
-    gaps = np.abs(np.diff(z)) / (np.abs(z[1:]) + np.abs(z[:-1]) + 1e-300)
-    for cuts in range(len(z) - 1):
-        ends = np.sort(np.argsort(-gaps, kind="stable")[:cuts]) + 1
-        groups = np.split(z, ends)
-        shape = Shape(tuple(Group(len(g), real=True) for g in groups), 0)
-        means = np.array([g.mean().real for g in groups])
-        if relative_distance(shape, means, c / c[0], size) > _NEAR:
-            continue
-        fitted = gauss_newton(shape, means, c / c[0], size)
-        if relative_distance(shape, fitted, c / c[0], size) <= tolerance:
-            found = [Root(float(r), 0.0, len(g)) for r, g in zip(fitted, groups, strict=True)]
-            return tuple(sorted(found, key=lambda r: -r.re))
-    return None

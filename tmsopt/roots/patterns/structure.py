@@ -1,6 +1,5 @@
 """The multiplicity structure of a polynomial within a stated tolerance, decided on coefficients."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,10 +8,9 @@ from numpy.typing import ArrayLike
 
 from tmsopt.records import Array
 from tmsopt.roots.numeric import roots as numeric_roots
-from tmsopt.roots.patterns.composed import PATTERNS
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.multiplicity import Fit, decided
-from tmsopt.roots.patterns.pattern import LINES, Pattern, Roots
+from tmsopt.roots.patterns.pattern import Pattern, Roots
 from tmsopt.roots.polynomial import Root
 
 ROUNDING = 8 * np.finfo(float).eps
@@ -21,21 +19,7 @@ ROUNDING = 8 * np.finfo(float).eps
 HIGHEST = 12
 """Degree of a polynomial whose structure can be decided."""
 
-# Of a quartic, most degenerate first: pattern, multiplicity of its rightmost root, roots on its rightmost line.
-_CANDIDATES = (
-    (PATTERNS["EP4"], 4, 4),
-    (PATTERNS["2EP2"], 2, 2),
-    (PATTERNS["CEP2"], 2, 4),
-    (PATTERNS["EP3"], 3, 3),
-    (LINES["EP2+pair"], 1, 4),
-    (PATTERNS["EP2"], 2, 2),
-    (LINES["pair+real"], 1, 3),
-    (LINES["two pairs"], 1, 4),
-)
-
-_NEAR = 0.05  # relative distance of a guess that can still lead to a pattern within any sensible tolerance
 _CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
-_LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact pattern
 
 
 @dataclass(frozen=True)
@@ -46,8 +30,7 @@ class Structure:
         name: ``EPk`` for a k-fold real root, ``CEPk`` for a k-fold complex pair, ``real``, ``pair``, ``two pairs`` …
             for simple ones, joined by ``+`` as in ``EP2+pair``, or ``undecided`` where double precision cannot tell.
             Of a quartic with two real double roots ``2EP2``.
-        roots: all roots with multiplicities, of the nearest polynomial that has the structure. Those of a quartic
-            whose rightmost root is simple and alone are its own.
+        roots: all roots with multiplicities, of the nearest polynomial that has the structure.
         distance: relative change of the coefficients (root sum of squares) that takes the polynomial there.
 
     Example:
@@ -92,7 +75,34 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
     c = _checked(coefficients)
     found = numeric_roots(c)
     size = _sizes(c, found, off, tolerance)
-    return (_of_quartic if len(c) == 5 else _of_any)(c, found, size, tolerance)
+    nonzero = np.abs(found[found != 0])
+    unit = 2.0 ** np.round(np.mean(np.log2(nonzero))) if nonzero.size else 1.0
+    units = unit ** np.arange(len(c))
+    monic = c / c[0] / units
+    size = size / units
+    rounding = ROUNDING * (len(c) - 1) / 4
+    fit = decided(monic, size, tolerance + rounding, rounding)
+    if fit.distance < tolerance - rounding or not fit.shape.groups:
+        return _named(fit, found, unit)
+    definite = _named(decided(monic, size, tolerance - rounding, rounding), found, unit)
+    if definite.name not in ("pair", "real"):
+        return definite
+    return Structure("undecided", _simple(found), fit.distance)
+
+
+def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root, ...] | None:
+    """The roots of the `structure`, rightmost first, if all are real and two of them are equal; else None.
+
+    Example:
+        >>> found = tmsopt.roots.multiple_real_roots([1, 5, 9, 7, 2 + 1e-13], 1e-9)  # near (s + 1)³ (s + 2)
+        >>> [(round(root.re, 6), root.multiplicity) for root in found]
+        [(-1.0, 3), (-2.0, 1)]
+
+    More: docs/explanation/exceptional_points.md
+    """
+    found = structure(coefficients, tolerance).roots
+    multiple = all(root.im == 0 for root in found) and any(root.multiplicity > 1 for root in found)
+    return found if multiple else None
 
 
 def _sizes(c: Array, found: Roots, off: ArrayLike | None, tolerance: float) -> Array:
@@ -122,8 +132,11 @@ def pattern_distance(
     except ValueError:
         return float("inf")
     found = numeric_roots(c)
-    size = _sizes(c, found, off, tolerance)
-    return min((distance for distance, _ in _fits(pattern, c, found, size, np.inf)), default=float("inf"))
+    size, monic = _sizes(c, found, off, tolerance), c / c[0]
+    fits = [gauss_newton(pattern, np.array(guess, dtype=float), monic, size) for guess in pattern.guesses(found)]
+    least = -_CLOSED * np.abs(found).max() ** 2
+    inside = [u for u in fits if all(value >= least for value in pattern.nonnegative(list(u)))]
+    return min((relative_distance(pattern, u, monic, size) for u in inside), default=float("inf"))
 
 
 def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[float, ...]]:
@@ -159,38 +172,6 @@ def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
     return c
 
 
-def _of_quartic(c: Array, found: Roots, size: Array, tolerance: float) -> Structure:
-    undecided: Structure | None = None
-    for pattern, multiplicity, on_line in _CANDIDATES:
-        for distance, unknowns in _fits(pattern, c, found, size, _NEAR):
-            if not distance <= tolerance + ROUNDING:
-                continue
-            candidate = Structure(pattern.name, _roots_of(pattern, unknowns), distance)
-            line = [r for r in candidate.roots if r.re >= candidate.abscissa - _LINE * np.abs(found).max()]
-            if line[0].multiplicity < multiplicity or sum(r.multiplicity for r in line) < on_line:
-                continue
-            if distance < tolerance - ROUNDING:
-                return candidate
-            undecided = undecided or Structure("undecided", _simple(found), distance)
-    return undecided or Structure(_simple_name(found), _simple(found), 0.0)
-
-
-def _of_any(c: Array, found: Roots, size: Array, tolerance: float) -> Structure:
-    nonzero = np.abs(found[found != 0])
-    unit = 2.0 ** np.round(np.mean(np.log2(nonzero))) if nonzero.size else 1.0
-    units = unit ** np.arange(len(c))
-    monic = c / c[0] / units
-    size = size / units
-    rounding = ROUNDING * (len(c) - 1) / 4
-    fit = decided(monic, size, tolerance + rounding, rounding)
-    if fit.distance < tolerance - rounding or not fit.shape.groups:
-        return _named(fit, found, unit)
-    definite = _named(decided(monic, size, tolerance - rounding, rounding), found, unit)
-    if definite.name not in ("pair", "real"):
-        return definite
-    return Structure("undecided", _simple(found), fit.distance)
-
-
 def _named(fit: Fit, found: Roots, unit: float) -> Structure:
     """The structure of a fit, in the unit of the polynomial."""
     if not fit.shape.groups:
@@ -200,7 +181,11 @@ def _named(fit: Fit, found: Roots, unit: float) -> Structure:
     right = max(z.real for z, _ in each)
     line = [(multiplicity, z.imag == 0) for z, multiplicity in each if z.real == right]
     roots = [Root(w.real, w.imag, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,))]
-    return Structure(_line_name(line), _sorted(roots), fit.distance)
+    name = "2EP2" if [(root.im, root.multiplicity) for root in roots] == _TWO_DOUBLE else _line_name(line)
+    return Structure(name, _sorted(roots), fit.distance)
+
+
+_TWO_DOUBLE = [(0.0, 2), (0.0, 2)]  # all roots of a quartic, which have a name of their own
 
 
 def _line_name(line: Sequence[tuple[int, bool]]) -> str:
@@ -225,23 +210,3 @@ def _simple(found: Roots) -> tuple[Root, ...]:
 
 def _sorted(roots: list[Root]) -> tuple[Root, ...]:
     return tuple(sorted(roots, key=lambda r: (-r.re, -r.im)))
-
-
-def _fits(pattern: Pattern, c: Array, found: Roots, size: Array, near: float) -> list[tuple[float, Array]]:
-    """Distance and unknowns of polynomials of a pattern close to c, one per guess within `near`, the nearest first."""
-    fits = []
-    monic = c / c[0]
-    for guess in pattern.guesses(found):
-        if relative_distance(pattern, guess, monic, size) > near:
-            continue
-        unknowns = gauss_newton(pattern, np.array(guess, dtype=float), monic, size)
-        if all(value >= -_CLOSED * np.abs(found).max() ** 2 for value in pattern.nonnegative(list(unknowns))):
-            fits.append((relative_distance(pattern, unknowns, monic, size), unknowns))
-    return sorted(fits, key=lambda fit: fit[0])
-
-
-def _roots_of(pattern: Pattern, unknowns: Array) -> tuple[Root, ...]:
-    """Roots of the factors, equal factors counted as multiplicity."""
-    counted = Counter(tuple(float(x) for x in factor) for factor in pattern.factors(list(unknowns)))
-    found = ((z, m) for factor, m in counted.items() for z in numeric_roots(np.array(factor)))
-    return _sorted([Root(float(z.real), float(z.imag), m) for z, m in found])

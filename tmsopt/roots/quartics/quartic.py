@@ -1,7 +1,8 @@
 """Roots of many real quartics at once, as their two real quadratic factors.
 
 Every quartic is factored in closed form and, where the factors do not give its coefficients back to 4e-15, by Newton's
-method on the factors. The few that this leaves beyond 5e-14 go to `hard_factors`.
+method on the factors. The few that this leaves beyond 5e-14 have roots far apart, tiny or huge, or several at 0: they
+take companion eigenvalues, in a unit near the largest root.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,12 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.deprecated import ignore_option
 from tmsopt.records import Array
+from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics import factors
-from tmsopt.roots.quartics.degenerate import ACCEPTED, GOOD, STEPS, hard_factors, polish
 
 Columns = tuple[Array, Array, Array, Array, Array]
 
 _BLOCK = 2**14  # numbers of an array that stay in the cache between two operations
+
+GOOD = 4e-15
+"""Backward error below which a Newton step is not worth its time."""
+ACCEPTED = 5e-14
+"""Backward error above which companion eigenvalues are taken."""
+STEPS = 4
+"""Newton steps on the closed form, of which one nearly always does."""
 
 
 @dataclass(frozen=True)
@@ -136,17 +144,55 @@ def _fill(results: Sequence[Array], a: Columns, finish: Callable[..., tuple[Arra
             error = factors.error(*monic, *found)
             rows = np.flatnonzero(~(error <= GOOD))
             some, some_error = np.stack([f[rows] for f in found]), error[rows]
-            polish(np.stack([b[rows] for b in monic]), some, some_error, STEPS)
+            _polish(np.stack([b[rows] for b in monic]), some, some_error)
             for whole, part in zip(found, some, strict=True):
                 whole[rows] = part
             for result, values in zip(results, finish(*found, 0), strict=True):
                 result[block] = values
             left.append(block.start + rows[~(some_error <= ACCEPTED)])
         rows = np.concatenate(left)
-        last, unit, fallbacks = hard_factors(np.stack([c[rows] for c in a]))
+        last, unit, fallbacks = _factors_by_eigenvalues(np.stack([c[rows] for c in a]))
         for result, values in zip(results, finish(*last, unit), strict=True):
             result[rows] = values
     return fallbacks
+
+
+def _polish(monic: Array, found: Array, error: Array) -> None:
+    """Newton steps on the columns that need them, in place, while the error falls."""
+    rows = np.flatnonzero(error > GOOD)
+    for _ in range(STEPS):
+        trial = np.stack(factors.newton(*monic[:, rows], *found[:, rows]))
+        left = factors.error(*monic[:, rows], *trial)
+        better = left < error[rows]
+        rows, left = rows[better], left[better]
+        found[:, rows], error[rows] = trial[:, better], left
+        rows = rows[left > GOOD]
+
+
+def _factors_by_eigenvalues(c: Array) -> tuple[Array, NDArray[np.int_], int]:
+    """Factors p1, q1, p2, q2 of quartics with coefficients of shape (5, quartics), in units of 2^unit each.
+
+    Returns:
+        The factors, nan for coefficients that are not finite or a leading 0; the units; how many have factors.
+    """
+    found, unit = np.full((4, c.shape[1]), np.nan), np.zeros(c.shape[1], dtype=int)
+    regular = np.flatnonzero(np.all(np.isfinite(c), axis=0) & (c[0] != 0))
+    if regular.size:
+        monic, unit[regular] = _in_unit(c[:, regular])
+        z = roots(np.concatenate([np.ones_like(monic[:1]), monic]).T).reshape(-1, 2, 2)
+        p, q = -z.sum(axis=2).real, z.prod(axis=2).real
+        found[:, regular] = p[:, 0], q[:, 0], p[:, 1], q[:, 1]
+    return found, unit, regular.size
+
+
+def _in_unit(c: Array) -> tuple[Array, NDArray[np.int_]]:
+    """Monic coefficients in a unit 2^m near the largest root (Fujiwara), without rounding but for the division."""
+    _, exponent = np.frexp(c)
+    power = np.arange(1, 5)[:, None]
+    above = np.where(c[1:] != 0, (exponent[1:] - exponent[0]) / power, -np.inf).max(axis=0)
+    unit = np.where(np.isfinite(above), np.ceil(above), 0).astype(int)
+    lead = np.ldexp(c[0], -exponent[0])
+    return np.ldexp(c[1:], -exponent[0] - unit * power) / lead, unit
 
 
 def _split(p1: Array, q1: Array, p2: Array, q2: Array, unit: Any) -> tuple[Array, Array]:
