@@ -3,7 +3,6 @@
 import gc
 import os
 import signal
-from collections.abc import Iterator
 
 import pytest
 
@@ -34,20 +33,43 @@ LONGEST = (
 """Files that come first: one begun at the end would keep a single worker busy while the others wait."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     """The order between files only; within a file it stays."""
     place = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish():
     """Collected tests and loaded modules stay until the end: no collection of garbage need look at them again."""
     gc.collect()
     gc.freeze()
 
 
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium, or the test is skipped."""
+    from helpers.browser import chromium
+
+    with chromium() as started:
+        yield started
+
+
 @pytest.fixture
-def interruptible() -> Iterator[None]:
+def run(capsys):
+    """A command in this process, to save starting so many: exit status, stdout, stderr."""
+    from tmsopt.cli import main
+
+    def run(*words):
+        with pytest.raises(SystemExit) as stop:
+            main(args=[*map(str, words)], prog_name="tmsopt")
+        written = capsys.readouterr()
+        return stop.value.code, written.out, written.err
+
+    return run
+
+
+@pytest.fixture
+def interruptible():
     """What ends a process ends one that is started now. A suite in the background of a script, or one that nobody is to
     hang up, ignores some of it, and so would that."""
     first = {"SIGINT": signal.default_int_handler, "SIGTERM": signal.SIG_DFL, "SIGHUP": signal.SIG_DFL}

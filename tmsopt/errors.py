@@ -77,6 +77,11 @@ class InputError(ValueError):
         return InputError, (self.faults,)
 
 
+def refusal(message: str, *key: str) -> InputError:
+    """The error for one thing wrong."""
+    return InputError([Fault(message, key)])
+
+
 MOST_STARTS = 10**9  # of a search; what counts them takes no more than sys.maxsize
 MOST_POINTS = 10_000  # of a front, a problem to be solved for each
 

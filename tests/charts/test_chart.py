@@ -4,8 +4,6 @@ import csv
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 from fractions import Fraction
 from math import comb
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers import curves
+from helpers.commands import tmsopt
 from helpers.curves import exact_polynomial, sturm
 from helpers.oracles import abscissa_60, certified_roots, polynomial_60
 
@@ -26,7 +25,6 @@ from tmsopt.roots import CLASSES, classify, find_motion
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
-TAN_EP4 = 15 / 4 - 75 * SQRT2 / 32  # Table 1
 FR_EP4 = 3 * math.sqrt(110 * SQRT2 - 120) / 8  # Table 1
 OMEGA0 = -(12.5**0.25)  # Table 1
 
@@ -244,23 +242,10 @@ def test_what_is_no_plane_is_refused(free, axes, words):
 # The command line
 
 
-def run(capsys, *arguments):
-    """In this process, to save starting so many: exit status, stdout, stderr."""
-    with pytest.raises(SystemExit) as stop:
-        main(args=[*map(str, arguments)], prog_name="tmsopt")
-    written = capsys.readouterr()
-    return stop.value.code, written.out, written.err
-
-
-def tmsopt(*arguments, cwd=None):
-    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
-
-
-def test_trace_writes_table_csv_and_figure(tmp_path, capsys):
+def test_trace_writes_table_csv_and_figure(tmp_path, run):
     table, figure = tmp_path / "branches.csv", tmp_path / "branches.svg"
     asked = ("trace", "problems/ep_set.toml", "--starts", 8, "--csv", table, "--plot", figure, "--axes", "lambda_s,Fr")
-    status, out, err = run(capsys, *asked)
+    status, out, err = run(*asked)
     assert status == 0
     assert err.splitlines() == [f"wrote {table}", f"wrote {figure}"]
     assert "EP4" in out
@@ -297,8 +282,8 @@ def test_trace_writes_table_csv_and_figure(tmp_path, capsys):
     assert "EP4" in ep4["event"]
 
 
-def test_trace_json_is_finite_and_of_another_pattern_where_asked(capsys):
-    status, out, err = run(capsys, "trace", "problems/off_law.toml", "--pattern", "weave", "--starts", 8, "--json")
+def test_trace_json_is_finite_and_of_another_pattern_where_asked(run):
+    status, out, err = run("trace", "problems/off_law.toml", "--pattern", "weave", "--starts", 8, "--json")
     assert (status, err) == (0, "")
     data = json.loads(out, parse_constant=pytest.fail)
     assert data["schema"] == 1
@@ -323,10 +308,10 @@ lambda_s = { min = 1.2, max = 1.3 }
 """
 
 
-def test_nothing_found_ends_with_3_and_says_so(tmp_path, capsys):
+def test_nothing_found_ends_with_3_and_says_so(tmp_path, run):
     path = tmp_path / "nothing.toml"
     path.write_text(NOTHING)
-    status, out, err = run(capsys, "trace", path, "--pattern", "weave", "--json", "--starts", 4)
+    status, out, err = run("trace", path, "--pattern", "weave", "--json", "--starts", 4)
     assert status == 3
     assert "no weave found" in err
     assert json.loads(out)["branches"] == []
@@ -349,8 +334,8 @@ def test_chart_writes_table_archive_and_figure(tmp_path):
         assert (data["lambda_s"][0], data["lambda_s"][-1]) == (0.01, 1.4)
 
 
-def test_chart_json_is_finite(capsys):
-    status, out, err = run(capsys, "chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
+def test_chart_json_is_finite(run):
+    status, out, err = run("chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
     assert (status, err) == (0, "")
     data = json.loads(out, parse_constant=pytest.fail)
     assert data["axes"]["Fr"] == {"min": 0.01, "max": 5.0, "points": 30, "unit": "1"}
@@ -380,8 +365,8 @@ def test_chart_json_is_finite(capsys):
         (["chart", "problems/chart.toml", "--layer", "colour"], "--layer"),
     ],
 )
-def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, capsys):
-    status, out, err = run(capsys, *arguments)
+def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
+    status, out, err = run(*arguments)
     assert (status, out) == (2, "")
     assert words in " ".join(err.split())
 
@@ -410,9 +395,9 @@ def test_an_output_name_that_no_file_system_takes_ends_with_2():
     assert stop.value.code == 2
 
 
-def test_help_shows_examples(capsys):
+def test_help_shows_examples(run):
     for command in ("trace", "chart"):
-        status, out, _ = run(capsys, command, "--help")
+        status, out, _ = run(command, "--help")
         assert status == 0
         assert f"tmsopt {command} problems/" in out
         assert "Exit status" in out

@@ -14,7 +14,6 @@ import pytest
 from helpers.charts import EXTRA, PLANE, SPACE, charted, files
 
 from tmsopt.charts import LAYERS, chart, open_chart
-from tmsopt.cli import main
 from tmsopt.errors import InputError
 from tmsopt.plots import chart_figure
 from tmsopt.problem import load
@@ -340,7 +339,7 @@ def test_bad_input_leaves_nothing_behind(options, words, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_disk_that_fills_up_keeps_what_is_recorded(tmp_path, monkeypatch, capsys):
+def test_a_disk_that_fills_up_keeps_what_is_recorded(tmp_path, monkeypatch, run):
     path = tmp_path / "a.chart"
     arguments = ["problems/chart.toml", "--points", "20x10", "-o", path, "--no-boundaries"]
 
@@ -349,12 +348,12 @@ def test_a_disk_that_fills_up_keeps_what_is_recorded(tmp_path, monkeypatch, caps
 
     with monkeypatch.context() as patch:
         patch.setattr("tmsopt.charts.folder.os.fsync", full)
-        status, _, err = run(capsys, *arguments)
+        status, _, err = run("chart", *arguments)
     assert status == 2
     assert "cannot be written: No space left on device; the same command will go on" in err
     with pytest.raises(InputError, match="not finished: 0 of 200"):
         open_chart(path)
-    assert run(capsys, *arguments)[0] == 0
+    assert run("chart", *arguments)[0] == 0
     assert open_chart(path).counts.designs == 200
 
 
@@ -368,18 +367,10 @@ def test_a_disk_without_room_is_said_before_any_work(tmp_path, monkeypatch):
 # The command line
 
 
-def run(capsys, *arguments):
-    """In this process: exit status, stdout, stderr."""
-    with pytest.raises(SystemExit) as stop:
-        main(args=["chart", *map(str, arguments)], prog_name="tmsopt")
-    written = capsys.readouterr()
-    return stop.value.code, written.out, written.err
-
-
-def test_a_folder_from_the_command_line(tmp_path, capsys):
+def test_a_folder_from_the_command_line(tmp_path, run):
     path, figure = tmp_path / "big.chart", tmp_path / "big.png"
     arguments = ["problems/chart.toml", "--points", "60x40", "-o", path, "--quantity", "tilt=tan(lambda_s)"]
-    status, out, err = run(capsys, *arguments, "--json", "--workers", 2, "--engine", "numpy")
+    status, out, err = run("chart", *arguments, "--json", "--workers", 2, "--engine", "numpy")
     assert status == 0
     assert "--engine is no longer needed" in err
     assert f"wrote {path}" in err
@@ -390,27 +381,27 @@ def test_a_folder_from_the_command_line(tmp_path, capsys):
     small = chart(load("problems/chart.toml"), points=(60, 40), boundaries=False)
     assert data["classes"] == small.shares
     assert data["least_abscissa"] == small.to_json()["least_abscissa"]
-    status, out, err = run(capsys, *arguments, "--plot", figure, "--no-boundaries", "--layer", "tilt")
+    status, out, err = run("chart", *arguments, "--plot", figure, "--no-boundaries", "--layer", "tilt")
     assert status == 0
     assert "heavily damped" in out
     assert f"{data['least_abscissa']['value']:.6g}" in out
     assert figure.read_bytes().startswith(b"\x89PNG")
-    status, _, err = run(capsys, *arguments[:2], "50x40", *arguments[3:])
+    status, _, err = run("chart", *arguments[:2], "50x40", *arguments[3:])
     assert status == 2
     assert "axes.Fr.points: 60 there, 50 asked for" in err
     status, _, _ = run(
-        capsys, *arguments[:2], "50x40", *arguments[3:], "--fresh", "--layers", "kind,margin", "--single"
+        "chart", *arguments[:2], "50x40", *arguments[3:], "--fresh", "--layers", "kind,margin", "--single"
     )
     assert status == 0
     assert {n: a.dtype for n, a in open_chart(path).layers.items()} == {"kind": "i1", "margin": "f4", "tilt": "f4"}
 
 
 @pytest.mark.parametrize("ending", ["npz", "nc"])
-def test_three_axes_in_one_file(ending, tmp_path, capsys):
+def test_three_axes_in_one_file(ending, tmp_path, run):
     path, figure = tmp_path / f"space.{ending}", tmp_path / "slice.svg"
     arguments = ["problems/ep_set.toml", "--points", "7x6x5", "--axes", "Fr,lambda_s,chi_B", "--quantity", "x=Fr*chi_B"]
     status, out, err = run(
-        capsys, *arguments, "-o", path, "--plot", figure, "--slice", "lambda_s=20 deg", "--no-boundaries"
+        "chart", *arguments, "-o", path, "--plot", figure, "--slice", "lambda_s=20 deg", "--no-boundaries"
     )
     assert status == 0, err
     assert "7 × 6 × 5 designs over Fr, lambda_s, chi_B" in out
@@ -453,7 +444,7 @@ def test_three_axes_in_one_file(ending, tmp_path, capsys):
         (["problems/chart.toml", "-o", "no/such/x.chart"], "does not exist"),
     ],
 )
-def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, capsys):
-    status, out, err = run(capsys, *arguments)
+def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
+    status, out, err = run("chart", *arguments)
     assert (status, out) == (2, "")
     assert words in " ".join(err.split())

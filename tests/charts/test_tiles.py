@@ -109,12 +109,12 @@ def test_counts_are_those_of_the_arrays():
     layers = {"kind": rng.integers(0, 5, (6, 10)).astype(np.int8), "satisfied": rng.random((6, 10)) < 0.5}
     layers["abscissa"] = rng.normal(size=(6, 10)).round(1)
     layers["abscissa"][2] = np.nan
-    parts = [count_tile({n: a[k : k + 2] for n, a in layers.items()}, 10 * k, 1, 0.5) for k in (4, 0, 2)]
+    parts = [count_tile({n: a[k : k + 2] for n, a in layers.items()}, 10 * k, 1) for k in (4, 0, 2)]
     found = add_tallies(parts)
     allowed = np.where(layers["satisfied"], layers["abscissa"], np.nan)
     assert (found.least, found.place) == (np.nanmin(allowed), np.nanargmin(allowed))
     assert found.shares == {n: np.mean(layers["kind"] == k) for k, n in enumerate(CLASSES)}
-    assert (found.satisfied, found.designs, found.fallbacks, found.seconds) == (layers["satisfied"].sum(), 60, 3, 1.5)
+    assert (found.satisfied, found.designs, found.fallbacks) == (layers["satisfied"].sum(), 60, 3)
     none = count_tile({"abscissa": np.full((2, 2), np.nan)}, 0)
     assert none.place == -1
 

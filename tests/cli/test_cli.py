@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.commands import tmsopt
 
 from tmsopt.cli import main
 
@@ -42,26 +43,13 @@ KEYS = {
 """Keys of the JSON contract."""
 
 
-def tmsopt(*arguments, cwd=None):
-    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
-
-
-def run(capsys, *arguments):
-    """In this process, to save starting so many: exit status, stdout, stderr."""
-    with pytest.raises(SystemExit) as stop:
-        main(args=[*map(str, arguments)], prog_name="tmsopt")
-    written = capsys.readouterr()
-    return stop.value.code, written.out, written.err
-
-
-def test_help_names_the_commands_and_examples(capsys):
+def test_help_names_the_commands_and_examples(run):
     done = tmsopt("--help")
     assert done.returncode == 0
     assert "solve" in done.stdout
     assert "compare" in done.stdout
     for command in ("solve", "compare"):
-        assert "tmsopt " + command in run(capsys, command, "--help")[1]  # an example
+        assert "tmsopt " + command in run(command, "--help")[1]  # an example
 
 
 def test_json_of_solve_is_the_contract():
@@ -82,8 +70,8 @@ def test_json_of_solve_is_the_contract():
     assert set(data["starts"]) == {"tried", "converged", "at_best", "expected_unseen"}
 
 
-def test_table_of_solve_shows_both_scales(capsys):
-    status, out, err = run(capsys, "solve", "problems/ep4.toml", "--wheelbase", "2 m")
+def test_table_of_solve_shows_both_scales(run):
+    status, out, err = run("solve", "problems/ep4.toml", "--wheelbase", "2 m")
     assert (status, err) == (0, "")
     assert "1.4142  " in out  # chi_B
     assert "x_B = 2.8284 m" in out  # chi_B w
@@ -91,8 +79,8 @@ def test_table_of_solve_shows_both_scales(capsys):
     assert "optimal, proved" in out
 
 
-def test_benchmark_prints_the_published_critical_speed(capsys):
-    _, out, _ = run(capsys, "solve", "problems/benchmark.toml", "--full")
+def test_benchmark_prints_the_published_critical_speed(run):
+    _, out, _ = run("solve", "problems/benchmark.toml", "--full")
     assert "2.84100832337" in out
     assert "0.907064149551" in out
 
@@ -124,7 +112,7 @@ high = "chi_B >= 1.5"
 """
 
 
-def test_infeasible_ends_with_3_and_still_reports(tmp_path, capsys):
+def test_infeasible_ends_with_3_and_still_reports(tmp_path, run):
     path = tmp_path / "x.toml"
     path.write_text(INFEASIBLE)
     done = tmsopt("solve", path, "--json")
@@ -133,7 +121,7 @@ def test_infeasible_ends_with_3_and_still_reports(tmp_path, capsys):
     assert data["status"] == "infeasible"
     assert data["violations"]
     assert data["parameters"]["Fr"] > 0
-    status, out, _ = run(capsys, "solve", path)
+    status, out, _ = run("solve", path)
     assert status == 3
     assert "violated" in out
 
@@ -154,8 +142,8 @@ def test_infeasible_ends_with_3_and_still_reports(tmp_path, capsys):
         ["compare", "pyproject.toml"],
     ],
 )
-def test_bad_usage_ends_with_2_and_one_message(arguments, capsys):
-    status, out, err = run(capsys, *arguments)
+def test_bad_usage_ends_with_2_and_one_message(arguments, run):
+    status, out, err = run(*arguments)
     assert status == 2
     assert out == ""
     assert err.strip()
@@ -170,16 +158,16 @@ def test_bad_usage_ends_a_process_with_2_and_no_traceback():
 
 
 @pytest.mark.parametrize("ending", ["png", *(pytest.param(e, marks=pytest.mark.slow) for e in ("pdf", "svg"))])
-def test_plot_is_written_whole(tmp_path, ending, capsys):
+def test_plot_is_written_whole(tmp_path, ending, run):
     path = tmp_path / f"growth.{ending}"
-    assert run(capsys, "solve", "problems/ep4.toml", "--plot", path)[0] == 0
+    assert run("solve", "problems/ep4.toml", "--plot", path)[0] == 0
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     start = path.read_bytes()[:200]
     assert start.startswith({"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[ending])
 
 
-def test_plot_that_cannot_be_written_leaves_nothing(tmp_path, capsys):
-    assert run(capsys, "solve", tmp_path / "missing.toml", "--plot", tmp_path / "x.png")[0] == 2
+def test_plot_that_cannot_be_written_leaves_nothing(tmp_path, run):
+    assert run("solve", tmp_path / "missing.toml", "--plot", tmp_path / "x.png")[0] == 2
     assert list(tmp_path.iterdir()) == []
 
 
@@ -214,15 +202,15 @@ def test_an_answer_that_cannot_be_written_is_no_traceback():
         (["pareto.toml", "--points", "9999999999"], "9999999999 is not in the range 2<=x<=10000"),
     ],
 )
-def test_what_would_have_no_effect_or_no_end_is_refused(capsys, words, said):
-    status, out, err = run(capsys, "solve", f"problems/{words[0]}", *words[1:])
+def test_what_would_have_no_effect_or_no_end_is_refused(run, words, said):
+    status, out, err = run("solve", f"problems/{words[0]}", *words[1:])
     assert (status, out) == (2, "")
     assert said in err
 
 
 @pytest.mark.parametrize("option", ["--certify", "--full", "--plot=all.png", "--wheelbase=2", "--rear-mass=3"])
-def test_all_designs_are_not_one(capsys, option):
-    code, out, err = run(capsys, "solve", "problems/ep4_matching.toml", "--all", option)
+def test_all_designs_are_not_one(run, option):
+    code, out, err = run("solve", "problems/ep4_matching.toml", "--all", option)
     assert (code, out) == (2, "")
     assert f"{option.partition('=')[0]}: is for one design, and --all looks for all of them" in err
 
@@ -295,14 +283,14 @@ def test_ctrl_c_leaves_the_best_so_far_once_progress_shows(tmp_path):
     assert data["objective"]["value"] == pytest.approx(roots.real.max(), rel=1e-6)
 
 
-def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, capsys):
+def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, run):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(import_module("tmsopt.search.solve"), "explore", stop)
     monkeypatch.setattr(import_module("tmsopt.search.solve"), "_so_far", stop)
     for command in ("solve", "prove", "compare", "speeds"):
-        status, out, err = run(capsys, command, "problems/ep4.toml")
+        status, out, err = run(command, "problems/ep4.toml")
         assert (status, out, err) == (130, "", "stopped; what was printed before stands\n")
 
 
@@ -332,14 +320,14 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
     assert "the user stopped the question whether any design is stable" in sys.stdout.getvalue()
 
 
-def test_the_rows_of_a_study_are_written_in_blocks_as_they_would_be_at_once(capsys, tmp_path, monkeypatch):
+def test_the_rows_of_a_study_are_written_in_blocks_as_they_would_be_at_once(run, tmp_path, monkeypatch):
     common = import_module("tmsopt.cli.common")
     text = 'problem = "{}"\n[study]\nmethod = "monte_carlo"\nrows = 7\n[tolerances]\nmu = 0.01\n'
     (tmp_path / "s.toml").write_text(text.format(Path("problems/ep4.toml").resolve()))
     written = []
     for size in (3, 100):
         monkeypatch.setattr(common, "_BLOCK", size)
-        code, out, _ = run(capsys, "study", tmp_path / "s.toml", "--json", "--store", tmp_path / "s.sqlite")
+        code, out, _ = run("study", tmp_path / "s.toml", "--json", "--store", tmp_path / "s.sqlite")
         assert code == 0
         written.append(json.loads(out))
         assert out == json.dumps(written[-1], indent=2, ensure_ascii=False) + "\n"

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
@@ -17,11 +16,13 @@ from types import SimpleNamespace
 import casadi as ca
 import pytest
 
-from tmsopt.cli import main
 from tmsopt.global_search import SCIP
 from tmsopt.killable import Killable
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and shells of POSIX")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="signals and shells of POSIX"),
+    pytest.mark.usefixtures("interruptible"),
+]
 
 commands = import_module("tmsopt.cli.commands").every.commands
 ending = import_module("tmsopt.cli.ending")
@@ -45,21 +46,6 @@ lambda_s = 0.4
 minimize = "(Fr - 1)**2"
 """
 """Solved at once, and with no bound in closed form."""
-
-Run = Callable[..., tuple[object, str, str]]
-
-
-@pytest.fixture
-def run(capsys, interruptible):
-    """In this process: exit status, stdout, stderr."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            main(args=[*map(str, arguments)], prog_name="tmsopt")
-        written = capsys.readouterr()
-        return stop.value.code, written.out, written.err
-
-    return run
 
 
 def at_work(monkeypatch, work):
@@ -479,7 +465,6 @@ WORK = {
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), TERM])
 @pytest.mark.parametrize("seconds", [0.3, 1.0])
 @pytest.mark.parametrize("name", WORK)

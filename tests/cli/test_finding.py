@@ -1,7 +1,6 @@
 """The commands by which one finds one's way, by their contract: streams, exit status, files never written over."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,21 +8,6 @@ import pytest
 import tmsopt
 from tmsopt.cli import main
 from tmsopt.guide import example, examples, new_problem, schema_text
-
-Run = Callable[..., tuple[object, str, str]]
-
-
-@pytest.fixture
-def run(capsys):
-    """Exit status, stdout, stderr."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            main(args=[*map(str, arguments)], prog_name="tmsopt")
-        written = capsys.readouterr()
-        return stop.value.code, written.out, written.err
-
-    return run
 
 
 @pytest.mark.parametrize("command", ["describe", "schema", "new", "example"])

@@ -18,21 +18,13 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
-def run(capsys, *words):
-    """Exit status, stdout, stderr."""
-    with pytest.raises(SystemExit) as stop:
-        main(args=list(words), prog_name="tmsopt")
-    written = capsys.readouterr()
-    return stop.value.code, written.out, written.err
-
-
-def test_version_is_one_line(capsys):
-    assert run(capsys, "--version") == (0, f"tmsopt, version {tmsopt.__version__}\n", "")
+def test_version_is_one_line(run):
+    assert run("--version") == (0, f"tmsopt, version {tmsopt.__version__}\n", "")
 
 
 @pytest.mark.parametrize("words", ["--version --json", "--json --version", "--version --json solve no_such_file.toml"])
-def test_version_as_json_says_what_is_installed(capsys, words):
-    status, out, err = run(capsys, *words.split())
+def test_version_as_json_says_what_is_installed(run, words):
+    status, out, err = run(*words.split())
     assert (status, err) == (0, "")
     data = json.loads(out)
     assert list(data) == ["schema", "tmsopt", "python", "implementation", "system", "machine", "packages"]
@@ -44,19 +36,19 @@ def test_version_as_json_says_what_is_installed(capsys, words):
             assert version == (there[0] if there else None), name
 
 
-def test_all_that_tmsopt_needs_or_can_use_is_listed(capsys):
+def test_all_that_tmsopt_needs_or_can_use_is_listed(run):
     extras = [PROJECT["optional-dependencies"][name] for name in ("certify", "cluster", "data")]
     stated = {re.split("[<>=!~;\\[ ]", text)[0] for text in sum(extras, PROJECT["dependencies"])}
-    assert set(json.loads(run(capsys, "--version", "--json")[1])["packages"]) == stated | {"ipopt"}
+    assert set(json.loads(run("--version", "--json")[1])["packages"]) == stated | {"ipopt"}
 
 
-def test_what_is_not_installed_is_null(capsys, monkeypatch):
+def test_what_is_not_installed_is_null(run, monkeypatch):
     def missing(name):
         raise metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr("tmsopt.versions.version", missing)
     monkeypatch.setattr("tmsopt.versions.distribution", missing)
-    data = json.loads(run(capsys, "--version", "--json")[1])
+    data = json.loads(run("--version", "--json")[1])
     assert set(data["packages"].values()) == {None}
     assert data["tmsopt"] == tmsopt.__version__
 
@@ -86,13 +78,13 @@ def test_nothing_is_loaded_for_it():
 
 
 @pytest.mark.parametrize("words", ["--json", "--json solve problems/ep4.toml"])
-def test_json_alone_is_no_option_of_the_whole(capsys, words):
-    status, out, err = run(capsys, *words.split())
+def test_json_alone_is_no_option_of_the_whole(run, words):
+    status, out, err = run(*words.split())
     assert (status, out) == (2, "")
     assert "No such option" in err
     assert "--json" in err
 
 
-def test_the_help_says_what_json_is_for(capsys):
-    help_ = " ".join(run(capsys, "--help")[1].split())
+def test_the_help_says_what_json_is_for(run):
+    help_ = " ".join(run("--help")[1].split())
     assert "--json With --version: also those of Python and the libraries" in help_

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.browser import opened
 
 import tmsopt
-from tmsopt.cli import main
 from tmsopt.problem import unit_of
 from tmsopt.roots import CLASSES
 
@@ -444,12 +444,6 @@ def test_what_cannot_be_written_is_said(tmp_path):
         tmsopt.save_report(tmsopt.describe("tms"), tmp_path / "none" / "x.html")
 
 
-def run(*words):
-    with pytest.raises(SystemExit) as stop:
-        main(args=words, prog_name="tmsopt")
-    return stop.value.code
-
-
 COMMANDS = {
     "solve": ["solve", "ep4.toml"],
     "prove": ["prove", "ep4.toml", "--seed", "5"],
@@ -464,14 +458,13 @@ COMMANDS = {
     "name",
     [pytest.param(n, marks=[pytest.mark.slow] if n in ("solve", "prove", "front", "all") else []) for n in COMMANDS],
 )
-def test_a_command_writes_its_page(name, tmp_path, monkeypatch, capsys):
+def test_a_command_writes_its_page(name, tmp_path, monkeypatch, run):
     """With --json too, which is the same as without a page."""
     monkeypatch.chdir(PROBLEMS)
     words, path = COMMANDS[name], tmp_path / "a page.html"
-    assert run(*words, "--json", "--report", str(path)) == 0
-    heard = capsys.readouterr()
-    assert heard.err == f"wrote {path}\n"
-    data = json.loads(heard.out)
+    status, out, err = run(*words, "--json", "--report", path)
+    assert (status, err) == (0, f"wrote {path}\n")
+    data = json.loads(out)
     assert [*data][:3] == ["schema", "title", "model"]
     assert data.get("proved", True)
     read = Page(path.read_text(encoding="utf-8"))
@@ -479,13 +472,13 @@ def test_a_command_writes_its_page(name, tmp_path, monkeypatch, capsys):
     assert read.verbatim[words[1]] == (PROBLEMS / words[1]).read_text(encoding="utf-8")
 
 
-def test_a_study_has_the_file_of_its_problem_too(tmp_path, monkeypatch, capsys):
+def test_a_study_has_the_file_of_its_problem_too(tmp_path, monkeypatch, run):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "ep4.toml").write_text(text_of("ep4"), encoding="utf-8")
     study = 'problem = "ep4.toml"\n[study]\nseed = 7\n[vary]\nmu = [0.1, 0.2]\n'
     (tmp_path / "two.toml").write_text(study, encoding="utf-8")
-    assert run("study", "two.toml", "--workers", "1", "--report", "two.html") == 0
-    assert capsys.readouterr().err.endswith("wrote two.html\n")
+    status, _, err = run("study", "two.toml", "--workers", "1", "--report", "two.html")
+    assert (status, err.splitlines()[-1]) == (0, "wrote two.html")
     text = (tmp_path / "two.html").read_text(encoding="utf-8")
     assert Page(text).verbatim["two.toml"] == study
     assert Page(text).verbatim["ep4.toml"] == text_of("ep4")
@@ -493,19 +486,18 @@ def test_a_study_has_the_file_of_its_problem_too(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("command", ["solve", "prove", "chart", "trace", "study"])
-def test_an_ending_is_refused_before_any_work(command, capsys):
-    assert run(command, "none.toml", "--report", "page.pdf") == 2
-    assert capsys.readouterr().err == "--report: found 'page.pdf'; accepted: a file name ending in html, htm\n"
+def test_an_ending_is_refused_before_any_work(command, run):
+    said = "--report: found 'page.pdf'; accepted: a file name ending in html, htm\n"
+    assert run(command, "none.toml", "--report", "page.pdf") == (2, "", said)
 
 
 @pytest.mark.slow
-def test_an_infeasible_problem_has_a_page(tmp_path, capsys):
+def test_an_infeasible_problem_has_a_page(tmp_path, run):
     """And the status of its command."""
     file = tmp_path / "slow.toml"
     file.write_text(text_of("ep4") + '[constraints]\ndecay = "abscissa <= -1"\nslow = "Fr <= 1"\n', encoding="utf-8")
-    assert run("solve", str(file), "--report", str(tmp_path / "p.html")) == 3
+    assert run("solve", file, "--report", tmp_path / "p.html")[0] == 3
     assert Page((tmp_path / "p.html").read_text(encoding="utf-8")).badges[0] == "infeasible"
-    capsys.readouterr()
 
 
 @pytest.mark.slow
@@ -523,14 +515,6 @@ def test_a_design_so_far_has_a_page(tmp_path):
 # In a browser
 
 
-@pytest.fixture(scope="module")
-def browser():
-    from helpers.browser import chromium
-
-    with chromium() as found:
-        yield found
-
-
 def column(page, table, number):
     """Cells of a column, of the rows that are seen."""
     rows = page.locator("section", has=page.locator("caption", has_text=table)).locator("tbody tr:visible")
@@ -540,8 +524,6 @@ def column(page, table, number):
 @pytest.mark.slow
 def test_rows_are_sorted_and_filtered(browser, tmp_path):
     """By keyboard; the order is that of numbers, and comes back; opened watched, so that nothing fails or is asked for."""
-    from helpers.browser import opened
-
     (tmp_path / "chart.html").write_text(written("chart"), encoding="utf-8")
     with opened(browser, tmp_path / "chart.html") as page:
         before = column(page, "Designs of the grid", 4)
@@ -565,8 +547,6 @@ def test_rows_are_sorted_and_filtered(browser, tmp_path):
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", ["design", "infeasible", "chart", "study"])
 def test_the_page_is_accessible_and_fits(browser, tmp_path, name, scheme):
-    from helpers.browser import opened
-
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed").Axe()
     (tmp_path / "p.html").write_text(written(name), encoding="utf-8")
     for width in (400, 2500):
@@ -578,8 +558,6 @@ def test_the_page_is_accessible_and_fits(browser, tmp_path, name, scheme):
 
 @pytest.mark.slow
 def test_without_scripts_the_page_is_all_there(browser, tmp_path):
-    from helpers.browser import opened
-
     (tmp_path / "p.html").write_text(written("chart"), encoding="utf-8")
     noted = []
     with browser.new_context(java_script_enabled=False) as plain:
@@ -596,8 +574,6 @@ def test_without_scripts_the_page_is_all_there(browser, tmp_path):
 @pytest.mark.parametrize("name", ["design", "chart"])
 def test_the_page_prints(browser, tmp_path, name):
     """On A4; what is folded is open, what moves is left out, nothing is cut at the right; 100 rows of 400."""
-    from helpers.browser import opened
-
     (tmp_path / "p.html").write_text(written(name), encoding="utf-8")
     with opened(browser, tmp_path / "p.html") as page:
         sheets = page.pdf(format="A4", print_background=True)

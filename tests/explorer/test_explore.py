@@ -157,7 +157,7 @@ def test_it_is_saved_whole_under_a_name_of_a_page(ep4, tmp_path):
     assert repr(ep4).startswith("Explorer(")
 
 
-def test_a_solution_is_not_solved_again(monkeypatch, ep4):
+def test_a_solution_is_not_solved_again(ep4):
     assert ep4.solution is not None
     again = tmsopt.explore(ep4.solution)
     assert again.solution is ep4.solution

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.browser import chromium, drawn, opened
+from helpers.browser import drawn
 
 import tmsopt
 from tmsopt.problem import array_function
@@ -32,32 +32,9 @@ minimize = "abscissa"
 """
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def explorers(browser, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("pages")
-    made = {}
-    for name in NAMES:
-        made[name] = tmsopt.explore(PROBLEMS / f"{name}.toml"), folder / f"{name}.html"
-        made[name][0].save(made[name][1])
-    return made
-
-
 @pytest.fixture(params=NAMES)
-def explored(request, explorers):
-    found = explorers[request.param]
-    return found
-
-
-@pytest.fixture
-def ep4(explorers):
-    path = explorers["ep4"][1]
-    return path
+def explored(request, made):
+    return made(request.param)
 
 
 def values_of(page):
@@ -96,18 +73,18 @@ def kind(roots):
     return 1 if (roots[real].real >= 0).any() else 2
 
 
-def test_names_are_given_once(ep4):
+def test_names_are_given_once(made):
     """In one classic script the later of two functions of a name silently replaces the earlier."""
-    written, _, _ = ep4.read_text().partition("const DATA = ")
+    written, _, _ = made("ep4")[0].html.partition("const DATA = ")
     texts = [written, *(p.read_text() for p in sorted(PAGE.glob("*.js")))]
     names = re.findall(r"^(?:async )?function (\w+)", "\n".join(texts), re.MULTILINE)
     assert len(names) > 50
     assert [n for n in names if names.count(n) > 1] == []
 
 
-def test_it_opens_without_a_fault(browser, explored):
+def test_it_opens_without_a_fault(show, explored):
     explorer, path = explored
-    with opened(browser, path) as page:
+    with show(path) as page:
         of = explorer.problem.parameter_set.names
         assert values_of(page) == [explorer.solution.parameters[n] for n in of]
         way, grows = explorer.solution.abscissa, explorer.solution.stability.growth
@@ -116,12 +93,12 @@ def test_it_opens_without_a_fault(browser, explored):
         assert page.title() == explorer.problem.title
 
 
-def test_a_state_is_what_the_package_computes(browser, explored):
+def test_a_state_is_what_the_package_computes(show, explored):
     """Random designs, free and fixed parameters alike: a few typed into the fields, others set at once."""
     explorer, path = explored
     problem, random = explorer.problem, np.random.default_rng(19)
     compared = 0
-    with opened(browser, path) as page:
+    with show(path) as page:
         known = parameters(page)
         for number in range(24):
             texts = [repr(random.uniform(p["low"], p["high"]) / p["one"]) for p in known]
@@ -150,8 +127,8 @@ def test_a_state_is_what_the_package_computes(browser, explored):
     assert compared >= 12  # some bicycles have no roots, but most do
 
 
-def test_sliders_move_the_design(browser, ep4):
-    with opened(browser, ep4) as page:
+def test_sliders_move_the_design(show):
+    with show("ep4") as page:
         first = next(k for k, p in enumerate(parameters(page)) if p["name"] == "Fr")
         low, high = (parameters(page)[first][end] for end in ("low", "high"))
         before, said = values_of(page), verdict(page)
@@ -176,8 +153,8 @@ def test_sliders_move_the_design(browser, ep4):
         assert verdict(page) == said
 
 
-def test_a_drag_is_one_step(browser, ep4):
-    with opened(browser, ep4) as page:
+def test_a_drag_is_one_step(show):
+    with show("ep4") as page:
         before = values_of(page)
         box = page.get_by_role("slider", name=re.compile("^Fr, ")).bounding_box()
         across, down = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -200,8 +177,8 @@ def test_a_drag_is_one_step(browser, ep4):
         assert values_of(page) == after
 
 
-def test_it_says_the_verdict_when_it_changes(browser, ep4):
-    with opened(browser, ep4) as page:
+def test_it_says_the_verdict_when_it_changes(show):
+    with show("ep4") as page:
         typed(page, "Fr", "0.1")
         drawn(page)
         said = page.locator("#said")
@@ -209,10 +186,10 @@ def test_it_says_the_verdict_when_it_changes(browser, ep4):
         assert said.get_attribute("aria-live") == "polite"
 
 
-def test_it_goes_to_known_designs(browser, explored):
+def test_it_goes_to_known_designs(show, explored):
     """There the roots are those that were found, with their multiplicity; and back again."""
     _, path = explored
-    with opened(browser, path) as page:
+    with show(path) as page:
         start = values_of(page)
         for design in page.evaluate("DATA.designs"):
             press(page, design["name"])
@@ -226,8 +203,8 @@ def test_it_goes_to_known_designs(browser, explored):
         assert page.get_by_role("button", name="start", exact=True).count() == 0
 
 
-def test_a_number_field_refuses_nonsense(browser, ep4):
-    with opened(browser, ep4) as page:
+def test_a_number_field_refuses_nonsense(show):
+    with show("ep4") as page:
         before = values_of(page)
         field = page.get_by_role("textbox", name="Fr", exact=True)
         for text in ("abc", "", "1e", "0x10", "NaN", "Infinity", "1 2", "12 34", "2 m/s", "1e999"):
@@ -254,8 +231,8 @@ def test_a_number_field_refuses_nonsense(browser, ep4):
         assert "beyond" in page.locator(f"#{field.get_attribute('aria-describedby')}").inner_text()
 
 
-def test_a_number_field_takes_what_people_write(browser, explorers):
-    with opened(browser, explorers["whipple_ep4"][1]) as page:
+def test_a_number_field_takes_what_people_write(show):
+    with show("whipple_ep4") as page:
         at = {p["name"]: k for k, p in enumerate(parameters(page))}
         for text, value in (("3.5 m/s", 3.5), ("1 234.5", 1234.5), ("1\u202f234", 1234.0), ("2,5m/s", 2.5)):
             typed(page, "v", text)
@@ -264,10 +241,10 @@ def test_a_number_field_takes_what_people_write(browser, explorers):
         assert "a number in m/s is wanted" in page.locator("#controls .message:visible").inner_text()
 
 
-def test_a_number_field_shows_what_it_holds(browser, explored):
+def test_a_number_field_shows_what_it_holds(show, explored):
     """To read with 9 digits; to write with as many as it takes to come back bit for bit."""
     _, path = explored
-    with opened(browser, path) as page:
+    with show(path) as page:
         start = values_of(page)
         of = {p["name"]: p for p in parameters(page)}
         for k, name in enumerate(page.locator(".row b").all_inner_texts()):
@@ -281,9 +258,9 @@ def test_a_number_field_shows_what_it_holds(browser, explored):
         assert values_of(page) == start
 
 
-def test_close_to_a_known_design_it_says_so(browser, ep4):
+def test_close_to_a_known_design_it_says_so(show):
     """Seven digits of an EP4 are none of it: its roots move as the fourth root of what is left out."""
-    with opened(browser, ep4) as page:
+    with show("ep4") as page:
         page.evaluate("change({x: [...state.x].map((value, k) => [k, Number(value.toPrecision(7))])})")
         drawn(page)
         assert "close to optimum, whose roots are sensitive: its button goes there" in verdict(page)
@@ -313,24 +290,22 @@ VERDICTS = {
 
 
 @pytest.mark.parametrize(("stated", "said"), VERDICTS.values(), ids=VERDICTS)
-def test_the_verdict_of_plain_polynomials(browser, tmp_path, stated, said):
+def test_the_verdict_of_plain_polynomials(show, stated, said):
     """At k = 2, by their factors: both grow is (s - 1)(s^2 - 2 s + 5); one grows s^3 + s^2 - s - 2."""
     text = f'title = "t"\n[model]\nname = "m"\ncoefficients = {stated}\n[parameters]\nk = 2\n'
-    (tmp_path / "m.toml").write_text(text)
-    tmsopt.explore(tmp_path / "m.toml").save(tmp_path / "m.html")
-    with opened(browser, tmp_path / "m.html") as page:
+    with show(text) as page:
         assert verdict(page).startswith(said)
 
 
-def test_the_verdict_has_its_unit_and_its_reserve(browser, explorers):
+def test_the_verdict_has_its_unit_and_its_reserve(show, made):
     of = {}
     for name in ("ep4", "whipple_ep4", "point_mass_robot"):
-        with opened(browser, explorers[name][1]) as page:
+        with show(name) as page:
             of[name] = verdict(page)
             assert "--certify" not in page.locator("main").inner_text()
             assert "(equation" not in page.locator("main").inner_text()
             assert ("first it grows" in page.locator("#quantities").inner_text()) == (name != "ep4")
-    robot = explorers["point_mass_robot"][0].solution
+    robot = made("point_mass_robot")[0].solution
     rate = robot.abscissa * math.sqrt(robot.parameters["g"] / robot.parameters["w"])
     shown = re.search(r"slowest as t3 e−([\d.]+) t, t in s", of["point_mass_robot"])
     assert shown is not None
@@ -339,9 +314,9 @@ def test_the_verdict_has_its_unit_and_its_reserve(browser, explorers):
     assert "would lift" not in of["whipple_ep4"]
 
 
-def test_limits_of_shares_are_read_in_percent(browser, explorers):
-    explorer, path = explorers["whipple_ep4"]
-    with opened(browser, path) as page:
+def test_limits_of_shares_are_read_in_percent(show, made):
+    explorer, path = made("whipple_ep4")
+    with show(path) as page:
         rear = page.locator("#limits li", has=page.get_by_text("rear", exact=True)).locator(".margin").inner_text()
         shown = re.fullmatch(r"holds by ([\d.]+) %", rear)
         assert shown is not None
@@ -353,16 +328,16 @@ def test_limits_of_shares_are_read_in_percent(browser, explorers):
         assert page.evaluate("limitsInWords(drawingOf())") == ""
 
 
-def test_it_prints_without_what_is_to_be_pressed(browser, ep4):
-    with opened(browser, ep4, width=794) as page:
+def test_it_prints_without_what_is_to_be_pressed(show):
+    with show("ep4", width=794) as page:
         page.emulate_media(media="print")
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
         assert page.locator("button:visible, select:visible, input[type=range]:visible").count() == 0
         assert page.locator("#sliders input:visible").count() == len(parameters(page))
 
 
-def test_a_phone_shows_pictures_first(browser, ep4):
-    with opened(browser, ep4, width=400, height=800) as page:
+def test_a_phone_shows_pictures_first(show):
+    with show("ep4", width=400, height=800) as page:
         assert page.locator("#controls input:visible").count() == 0
         top = page.locator("#chart").bounding_box()["y"]
         bottom = page.locator("#controls").bounding_box()["y"]
@@ -371,10 +346,10 @@ def test_a_phone_shows_pictures_first(browser, ep4):
         assert page.locator("#controls input:visible").count() > 0  # though there is no button to show them
 
 
-def test_a_link_restores_the_state(browser, explored):
+def test_a_link_restores_the_state(show, explored):
     _, path = explored
     saved = "JSON.stringify([[...state.x], state.plane, state.over, state.layer])"
-    with opened(browser, path) as page:
+    with show(path) as page:
         assert page.evaluate("location.hash") in ("", "#")
         for p in parameters(page)[:2]:
             typed(page, p["name"], repr((p["low"] + p["high"]) / 3 / p["one"]))
@@ -383,7 +358,7 @@ def test_a_link_restores_the_state(browser, explored):
         page.locator("#growth").get_by_role("combobox", name="over").select_option(index=1)
         drawn(page)
         state, link = page.evaluate(saved), page.evaluate("location.hash").removeprefix("#")
-    with opened(browser, path, link=link) as page:
+    with show(path, link=link) as page:
         assert page.evaluate(saved) == state
         assert page.locator("#note").inner_text() == ""
         page.evaluate("location.hash = ''")
@@ -393,7 +368,7 @@ def test_a_link_restores_the_state(browser, explored):
         assert page.evaluate(saved) == state
 
 
-def test_what_a_link_says_wrongly_is_ignored_and_said(browser, ep4):
+def test_what_a_link_says_wrongly_is_ignored_and_said(show):
     wrong = [
         "nobody=1",
         "Fr=abc",
@@ -405,7 +380,7 @@ def test_what_a_link_says_wrongly_is_ignored_and_said(browser, ep4):
         "<b>=1",
         "Fr=1e999",
     ]
-    with opened(browser, ep4, link="&".join(["chi_B=1.75", *wrong, ".over=mu"])) as page:
+    with show("ep4", link="&".join(["chi_B=1.75", *wrong, ".over=mu"])) as page:
         start, names = page.evaluate("DATA.start"), [p["name"] for p in parameters(page)]
         start[names.index("chi_B")] = 1.75
         assert values_of(page) == start
@@ -414,12 +389,12 @@ def test_what_a_link_says_wrongly_is_ignored_and_said(browser, ep4):
         assert all(part.split("%")[0] in note for part in wrong)
 
 
-def test_the_link_is_copied_or_shown(browser, ep4):
-    with opened(browser, ep4) as page:
+def test_the_link_is_copied_or_shown(show, made):
+    with show("ep4") as page:
         typed(page, "Fr", "3.25")
         page.evaluate("Object.defineProperty(navigator, 'clipboard', {value: undefined, configurable: true})")
         press(page, "copy link")
-        assert page.get_by_role("textbox", name="link").input_value() == f"{ep4.resolve().as_uri()}#Fr=3.25"
+        assert page.get_by_role("textbox", name="link").input_value() == f"{made('ep4')[1].resolve().as_uri()}#Fr=3.25"
         press(page, "close")
         page.evaluate(
             "Object.defineProperty(navigator, 'clipboard', {value: {writeText: async (text) => (window.copied = text)}})"
@@ -429,10 +404,10 @@ def test_the_link_is_copied_or_shown(browser, ep4):
         assert page.locator("#note").inner_text() == "Link copied."
 
 
-def test_a_saved_design_is_solved(browser, explored, tmp_path):
+def test_a_saved_design_is_solved(show, explored, tmp_path):
     """With the parameters of the page, to the last digit but one."""
     _, path = explored
-    with opened(browser, path) as page:
+    with show(path) as page:
         for p in parameters(page)[:3]:
             typed(page, p["name"], repr((p["low"] + 2 * p["high"]) / 3 / p["one"]))
         drawn(page)
@@ -451,14 +426,14 @@ def test_a_saved_design_is_solved(browser, explored, tmp_path):
     assert json.loads(solved.stdout)
 
 
-def test_text_is_no_markup(browser, tmp_path):
+def test_text_is_no_markup(show, tmp_path):
     (tmp_path / "hostile.toml").write_text(HOSTILE)
     explorer = tmsopt.explore(tmp_path / "hostile.toml")
     meaning = '"meaning":"\\u003cimg src=x onerror=alert(1)\\u003e"'
     changed = explorer.html.replace('"meaning":"parameter"', meaning)
     assert changed.count(meaning) == 2
     (tmp_path / "hostile.html").write_text(changed)
-    with opened(browser, tmp_path / "hostile.html") as page:
+    with show(tmp_path / "hostile.html") as page:
         assert page.locator("h1").inner_text() == f"{MARKUP} /* script */ <!-- title -->"
         assert page.title() == f"{MARKUP} /* script */ <!-- title -->"
         assert page.locator("#about").inner_text() == MARKUP
@@ -468,10 +443,10 @@ def test_text_is_no_markup(browser, tmp_path):
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 400), ("dark", 1280)])
-def test_it_is_accessible(browser, explored, scheme, width):
+def test_it_is_accessible(show, explored, scheme, width):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
     _, path = explored
-    with opened(browser, path, width=width, color_scheme=scheme) as page:
+    with show(path, width=width, color_scheme=scheme) as page:
         if width == 400:
             press(page, "show")
         typed_wrong = page.get_by_role("textbox").first
@@ -482,8 +457,8 @@ def test_it_is_accessible(browser, explored, scheme, width):
         assert len(found.response["passes"]) > 10
 
 
-def test_the_theme_is_that_of_the_system_until_one_is_chosen(browser, ep4):
-    with opened(browser, ep4, color_scheme="dark") as page:
+def test_the_theme_is_that_of_the_system_until_one_is_chosen(show):
+    with show("ep4", color_scheme="dark") as page:
         ground = "getComputedStyle(document.body).backgroundColor"
         dark = page.evaluate(ground)
         page.emulate_media(color_scheme="light")
@@ -497,7 +472,7 @@ def test_the_theme_is_that_of_the_system_until_one_is_chosen(browser, ep4):
 
 
 @pytest.mark.parametrize("width", [400, 1280])
-def test_nothing_needs_scrolling_sideways(browser, explored, width, tmp_path):
+def test_nothing_needs_scrolling_sideways(show, explored, width, tmp_path):
     explorer, path = explored
     long = tmp_path / "long.html"
     long.write_text(
@@ -506,7 +481,7 @@ def test_nothing_needs_scrolling_sideways(browser, explored, width, tmp_path):
         )
     )
     for shown in (path, long):
-        with opened(browser, shown, width=width) as page:
+        with show(shown, width=width) as page:
             page.evaluate("document.querySelectorAll('details').forEach((d) => (d.open = true))")
             drawn(page)
             assert page.evaluate("document.documentElement.scrollWidth") <= width
@@ -524,8 +499,8 @@ def test_nothing_needs_scrolling_sideways(browser, explored, width, tmp_path):
 
 
 @pytest.mark.parametrize("width", [400, 1280])
-def test_targets_are_large_enough_for_fingers(browser, ep4, width):
-    with opened(browser, ep4, width=width, has_touch=True) as page:
+def test_targets_are_large_enough_for_fingers(show, width):
+    with show("ep4", width=width, has_touch=True) as page:
         boxes = page.evaluate(
             "[...document.querySelectorAll('button, select, input, summary')].map((e) => [e.outerHTML, e.getBoundingClientRect()])"
             ".filter(([, b]) => b.width).map(([text, b]) => [text, b.width, b.height])"
@@ -536,11 +511,11 @@ def test_targets_are_large_enough_for_fingers(browser, ep4, width):
         assert [b for b in main if min(b[1:]) < 44] == []
 
 
-def test_it_works_in_a_sandbox(browser, explorers, tmp_path):
+def test_it_works_in_a_sandbox(show, made, tmp_path):
     """As in a notebook, where it has no address, no storage and no history."""
-    explorer, _ = explorers["ep4"]
+    explorer, _ = made("ep4")
     (tmp_path / "notebook.html").write_text(f"<!DOCTYPE html><title>notebook</title>{explorer._repr_html_()}")
-    with opened(browser, tmp_path / "notebook.html") as host:
+    with show(tmp_path / "notebook.html") as host:
         frame = host.frames[1]
         said = frame.locator("#verdict").inner_text()
         frame.get_by_role("button", name="benchmark", exact=True).click()
@@ -556,9 +531,9 @@ def test_it_works_in_a_sandbox(browser, explorers, tmp_path):
         assert tmsopt.load(waiting.value.path().rename(tmp_path / "saved.toml")).fixed == explorer.solution.parameters
 
 
-def test_a_picture_that_fails_says_so_alone(browser, ep4):
+def test_a_picture_that_fails_says_so_alone(show):
     faults = []
-    with opened(browser, ep4, faults=faults) as page:
+    with show("ep4", faults=faults) as page:
         page.evaluate("() => { survey = () => { throw new Error('out of paper'); }; }")
         typed(page, "chi_B", "1.5")
         drawn(page)
@@ -569,11 +544,11 @@ def test_a_picture_that_fails_says_so_alone(browser, ep4):
     assert all("out of paper" in fault for fault in faults)
 
 
-def test_limits_are_lit(browser, explorers):
+def test_limits_are_lit(show, made):
     """Sign, words and margin of each limit against the problem's own judgement."""
-    explorer, path = explorers["point_mass_robot"]
+    explorer, path = made("point_mass_robot")
     problem, random = explorer.problem, np.random.default_rng(20)
-    with opened(browser, path) as page:
+    with show(path) as page:
         for _ in range(8):
             values = dict(explorer.solution.parameters)
             for p in parameters(page):
@@ -596,9 +571,9 @@ def test_limits_are_lit(browser, explorers):
                 assert float(shown[2]) == pytest.approx(abs(margin) * scale, rel=1e-4)
 
 
-def test_quantities_are_those_of_the_package(browser, explored):
+def test_quantities_are_those_of_the_package(show, explored):
     explorer, path = explored
-    with opened(browser, path) as page:
+    with show(path) as page:
         for p in parameters(page):
             if p["free"]:
                 typed(page, p["name"], repr((2 * p["low"] + p["high"]) / 3 / p["one"]))

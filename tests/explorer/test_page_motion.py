@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.browser import chromium, drawn, opened
+from helpers.browser import drawn
 from scipy.integrate import solve_ivp
 
 import tmsopt
@@ -36,21 +36,6 @@ c = { min = 0, max = 1, start = 0.2 }
 
 CLOSE = 1e-8
 """Of the largest value: the page repeats a step by a rounded exponential 600 times, the integrator works to 1e-12."""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def explorers(tmp_path_factory):
-    folder, made = tmp_path_factory.mktemp("pages"), {}
-    for name in BICYCLES:
-        made[name] = tmsopt.explore(PROBLEMS / f"{name}.toml"), folder / f"{name}.html"
-        made[name][0].save(made[name][1])
-    return made
 
 
 def integrated(A, start, times):
@@ -85,10 +70,10 @@ def shown(page):
 
 @pytest.mark.parametrize("name", BICYCLES)
 @pytest.mark.parametrize(("lean", "push"), [(5, 0), (0, 0.2), (-3, 0.1)])
-def test_the_motion_is_that_of_the_equations(browser, explorers, name, lean, push):
+def test_the_motion_is_that_of_the_equations(show, made, name, lean, push):
     """Where the page opens: ep4 and the robot at fourfold roots."""
-    explorer, path = explorers[name]
-    with opened(browser, path) as page:
+    explorer, path = made(name)
+    with show(path) as page:
         found = page.evaluate(f"tmsopt.motion({{lean: {lean}, push: {push}, seconds: 3}})")
         A, impulse = equations(explorer, shown(page))
     assert found["t"][-1] == pytest.approx(3)
@@ -98,10 +83,10 @@ def test_the_motion_is_that_of_the_equations(browser, explorers, name, lean, pus
 
 
 @pytest.mark.parametrize("name", BICYCLES)
-def test_the_contacts_go_where_the_wheels_point(browser, explorers, name):
+def test_the_contacts_go_where_the_wheels_point(show, made, name):
     """psi' = (v delta + c delta') cos(lambda_s)/w, integrated beside the equations, in the lengths of the file."""
-    explorer, path = explorers[name]
-    with opened(browser, path) as page:
+    explorer, path = made(name)
+    with show(path) as page:
         times, contacts = page.evaluate("""() => {
             const system = systemOf(state.x);
             const motion = motionIn(system, startIn(system, {lean: 5, push: 0.1}), 3 * system.rate);
@@ -125,10 +110,10 @@ def test_the_contacts_go_where_the_wheels_point(browser, explorers, name):
         )
 
 
-def test_a_slow_bicycle_falls_and_the_page_says_so(browser, explorers):
+def test_a_slow_bicycle_falls_and_the_page_says_so(show, made):
     """The moment by the integrator; the page takes it between two of its 601 times, which is good to 1e-4."""
-    explorer, path = explorers["whipple_benchmark"]
-    with opened(browser, path, reduced_motion="reduce") as page:
+    explorer, path = made("whipple_benchmark")
+    with show(path, reduced_motion="reduce") as page:
         page.evaluate("tmsopt.set({v: 0.5})")
         drawn(page)
         assert "It falls" in page.locator("#bicycle .reading").inner_text()
@@ -157,17 +142,17 @@ def test_a_slow_bicycle_falls_and_the_page_says_so(browser, explorers):
         assert "It falls" not in page.locator("#bicycle").inner_text()
 
 
-def test_a_start_is_typed_and_kept(browser, explorers):
-    _, path = explorers["whipple_benchmark"]
+def test_a_start_is_typed_and_kept(show, made):
+    _, path = made("whipple_benchmark")
     start = "[state.lean, state.push]"
-    with opened(browser, path, reduced_motion="reduce") as page:
+    with show(path, reduced_motion="reduce") as page:
         for words, text in (("start lean", "−2,5°"), ("steer push", "1.5 N·m·s")):
             field = page.locator("#bicycle").get_by_role("textbox", name=re.compile(words))
             field.fill(text)
             field.press("Enter")
         drawn(page)
         assert page.evaluate(start) == [-2.5, 1.5]
-        A, impulse = equations(explorers["whipple_benchmark"][0], shown(page))
+        A, impulse = equations(made("whipple_benchmark")[0], shown(page))
         last = page.evaluate("(() => {const m = motionFrom(state, drawingOf()); return [m.end, m.at(0, m.end)]})()")
         truth = integrated(A, [np.radians(-2.5), 0, *(1.5 * impulse)], [0, last[0]])[-1, 0]
         assert last[1] == pytest.approx(truth, abs=1e-5)  # where it falls, between two of 601 times
@@ -181,22 +166,22 @@ def test_a_start_is_typed_and_kept(browser, explorers):
         page.keyboard.press("Tab")
         page.get_by_role("button", name="undo (Ctrl+Z)").click()
         assert page.evaluate(start) == [-2.5, 0]
-    with opened(browser, path, link=link) as page:
+    with show(path, link=link) as page:
         assert page.evaluate(start) == [-2.5, 1.5]
-    with opened(browser, path, link=".lean=30&.push=x&.lean=") as page:
+    with show(path, link=".lean=30&.push=x&.lean=") as page:
         assert page.evaluate(start) == [5, 0]
         assert page.locator("#note").inner_text().startswith("Ignored in the link: ")
 
 
-def test_play_pause_restart_and_the_slider_by_keys(browser, explorers):
-    _, path = explorers["ep4"]
-    with opened(browser, path, reduced_motion="reduce") as page:
+def test_play_pause_restart_and_the_slider_by_keys(show, made):
+    _, path = made("ep4")
+    with show(path, reduced_motion="reduce") as page:
         before = page.evaluate("motionFrom(state, drawingOf()).at(0, 1)")
         slider = page.get_by_role("slider", name=re.compile("^Fr, "))
         for _ in range(20):
             slider.press("ArrowRight")
         drawn(page)
-        A, _ = equations(explorers["ep4"][0], shown(page))
+        A, _ = equations(made("ep4")[0], shown(page))
         found = page.evaluate("motionKept.found.at(0, 1)")  # what is drawn
         truth = integrated(A, [np.radians(5), 0, 0, 0], [0, 1])[-1, 0]
         assert found == pytest.approx(truth, abs=1e-5)  # between two of 601 times
@@ -219,10 +204,8 @@ def test_play_pause_restart_and_the_slider_by_keys(browser, explorers):
         assert page.evaluate(plane) != tracks
 
 
-def test_a_stated_system_starts_from_each_of_its_states(browser, tmp_path):
-    (tmp_path / "pair.toml").write_text(PAIR)
-    tmsopt.explore(tmp_path / "pair.toml").save(tmp_path / "pair.html")
-    with opened(browser, tmp_path / "pair.html") as page:
+def test_a_stated_system_starts_from_each_of_its_states(show):
+    with show(PAIR) as page:
         assert not page.locator("#bicycle").is_visible()
         assert page.evaluate("tmsopt.motion({lean: 5})") is None
         c = shown(page)["c"]
@@ -237,17 +220,13 @@ def test_a_stated_system_starts_from_each_of_its_states(browser, tmp_path):
             np.testing.assert_allclose(values, truth, atol=CLOSE * np.abs(truth).max())
 
 
-def test_a_model_by_its_coefficients_has_no_motion(browser, tmp_path):
-    (tmp_path / "k.toml").write_text(
-        '[model]\ncoefficients = ["1", "c", "1"]\n[parameters]\nc = { min = 0, max = 1 }\n'
-    )
-    tmsopt.explore(tmp_path / "k.toml").save(tmp_path / "k.html")
-    with opened(browser, tmp_path / "k.html") as page:
+def test_a_model_by_its_coefficients_has_no_motion(show):
+    with show('[model]\ncoefficients = ["1", "c", "1"]\n[parameters]\nc = { min = 0, max = 1 }\n') as page:
         assert not page.locator("#motion").is_visible()
         assert page.evaluate("tmsopt.motion()") is None
 
 
-def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser, tmp_path):
+def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(show, tmp_path):
     """T' = (-k phidot - T)/lag on the steering: five states, whose matrices I, -A have no mass in them."""
     lag, gain = 0.2, 8.0
     whipple = tmsopt.models.whipple
@@ -271,7 +250,7 @@ def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser, t
     model = replace(whipple, name="lagged", pencil=pencil, feedback=feedback)
     explorer = tmsopt.explore(replace(posed, model=model))
     explorer.save(tmp_path / "lag.html")
-    with opened(browser, tmp_path / "lag.html") as page:
+    with show(tmp_path / "lag.html") as page:
         found = page.evaluate("tmsopt.motion({lean: 2, push: 0.3, seconds: 2})")
         plain, impulse = equations(explorer, shown(page))
     A = np.zeros((5, 5))
@@ -282,9 +261,9 @@ def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser, t
     np.testing.assert_allclose([found["phi"], found["delta"]], truth[:, :2].T, atol=CLOSE * np.abs(truth[:, :2]).max())
 
 
-def test_programs_set_and_get_the_design(browser, explorers):
-    explorer, path = explorers["ep4"]
-    with opened(browser, path) as page:
+def test_programs_set_and_get_the_design(show, made):
+    explorer, path = made("ep4")
+    with show(path) as page:
         at_start = page.evaluate("tmsopt.get()")
         assert at_start["abscissa"] == explorer.solution.abscissa
         assert len(at_start["roots"]) == 4
@@ -303,7 +282,7 @@ def test_programs_set_and_get_the_design(browser, explorers):
         assert shown(page) == values
 
 
-def test_a_page_is_small_and_its_texts_are_whole(explorers):
+def test_a_page_is_small_and_its_texts_are_whole():
     """What the documentation promises; and taking blanks out of a script takes none out of its texts."""
     html = tmsopt.explore(PROBLEMS / "whipple_ep4.toml").html
     assert len(html.encode()) < 150_000

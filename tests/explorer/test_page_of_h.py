@@ -66,7 +66,7 @@ def test_a_size_below_what_files_take_is_0(tmp_path):
     assert dict(tmsopt.load(tmp_path / "saved.toml").fixed) == {"a": 0.0, "b": 2.0}
 
 
-def test_the_plane_is_around_the_frequencies(tmp_path):
+def test_the_plane_is_around_the_frequencies():
     """A path of size 1e-14 about an EP at 0 is no picture of it, nor is one of 200 about frequencies 1 apart."""
     solution = tmsopt.solve(PROBLEMS / "pt_trimer.toml")
     reach = said_by(page_of(solution), "planeReach([[0, 0, 3]], [{re: 1, im: 1}, {re: -1, im: 0.5}], null).reach")

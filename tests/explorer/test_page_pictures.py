@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.browser import chromium, drawn, opened
+from helpers.browser import drawn
 
 import tmsopt
 
@@ -67,24 +67,6 @@ PIXELS = """(grid) => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as started:
-        yield started
-
-
-def saved(problem, tmp_path):
-    path = tmp_path / "page.html"
-    tmsopt.explore(problem).save(path)
-    return path
-
-
-def stated(text, tmp_path):
-    path = tmp_path / "stated.toml"
-    path.write_text(text)
-    return saved(path, tmp_path)
-
-
 def plot_of(page, panel):
     """The corner and the size of a plot, in pixels of the window."""
     canvas = page.locator(f"#{panel} canvas").first
@@ -112,10 +94,9 @@ def uniform(kind):
 
 
 @pytest.mark.parametrize("name", ["chart", "ep_set"])
-def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser, tmp_path, name):
+def test_colours_of_the_chart_are_the_classes_of_the_same_designs(show, name):
     """What a reader takes from the picture and its legend, against `tmsopt.chart`; without what is drawn above."""
-    page_path = saved(PROBLEMS / f"{name}.toml", tmp_path)
-    with opened(browser, page_path) as page:
+    with show(name) as page:
         page.evaluate("DATA.curves.length = DATA.designs.length = 0")
         page.evaluate("change({ x: state.plane.map((k) => [k, rangeOf(k)[0]]) })")
         drawn(page)
@@ -139,8 +120,8 @@ def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser, tmp_p
     assert np.array_equal(seen[inner], found.kind[inner])
 
 
-def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(browser, tmp_path):
-    with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path)) as page:
+def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(show):
+    with show("chart") as page:
         before = page.evaluate("[...state.x]")
         i, j = page.evaluate("state.plane")
         (low_i, high_i), (low_j, high_j) = page.evaluate("state.plane.map(rangeOf)")
@@ -160,8 +141,8 @@ def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(browse
         assert page.evaluate("[...state.x]") == before
 
 
-def test_a_finger_moves_the_design_too(browser, tmp_path):
-    with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path), width=400, has_touch=True) as page:
+def test_a_finger_moves_the_design_too(show):
+    with show("chart", width=400, has_touch=True) as page:
         page.evaluate("document.getElementById('controls').hidden = true")  # they cover the chart until folded up
         low, high = page.evaluate("rangeOf(state.plane[0])")
         corner, size = plot_of(page, "chart")
@@ -172,8 +153,8 @@ def test_a_finger_moves_the_design_too(browser, tmp_path):
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
-def test_arrow_keys_move_the_design_over_the_grid(browser, tmp_path):
-    with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path)) as page:
+def test_arrow_keys_move_the_design_over_the_grid(show):
+    with show("chart") as page:
         before = np.array(page.evaluate("state.plane.map((k) => state.x[k])"))
         steps = np.array([(high - low) / (GRID - 1) for low, high in page.evaluate("state.plane.map(rangeOf)")])
         page.locator("#chart canvas").first.focus()
@@ -188,14 +169,12 @@ def test_arrow_keys_move_the_design_over_the_grid(browser, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["whipple_benchmark", "ep4"])
-def test_events_are_the_speeds_of_the_package(browser, tmp_path, name):
+def test_events_are_the_speeds_of_the_package(show, made, name):
     """Bisected signs, against exact roots of polynomials in the speed; of meetings those on the real axis."""
-    explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
-    explorer.save(tmp_path / "page.html")
-    with opened(browser, tmp_path / "page.html") as page:
+    explorer, path = made(name)
+    with show(path) as page:
         events = page.evaluate("sweepOf(state).events")
         over, low, high = page.evaluate("[DATA.parameters[state.over].name, ...rangeOf(state.over)]")
-    assert explorer.solution is not None
     truth = tmsopt.speeds(explorer.solution, over, between=(low, high))
     changes = [(c.kind, c.at) for c in truth.found if c.changes and c.kind in ("weave", "capsize")]
     assert changes
@@ -207,9 +186,9 @@ def test_events_are_the_speeds_of_the_package(browser, tmp_path, name):
     np.testing.assert_allclose([e["at"] for e in events if e["kind"] == "meeting"], meetings, rtol=1e-3)
 
 
-def test_a_window_that_the_design_stands_in_is_found(browser, tmp_path):
+def test_a_window_that_the_design_stands_in_is_found(show):
     """Of s² + ((1e-4)² - (b - 1/3 - 1/1000)²) s + 1, where damping is positive for 2e-4 of the range."""
-    with opened(browser, stated(WINDOW, tmp_path)) as page:
+    with show(WINDOW) as page:
         middle = 1 / 3 + 1e-3
         assert growth_sentence(page) == "Unstable throughout; no crossing was found at 301 values."
         page.evaluate(f"change({{ x: [[0, {middle!r}]] }})")
@@ -219,22 +198,22 @@ def test_a_window_that_the_design_stands_in_is_found(browser, tmp_path):
         np.testing.assert_allclose([at for _, _, at in found], [middle - 1e-4, middle + 1e-4], atol=2e-10)
 
 
-def test_tiny_numbers_are_told_from_0(browser, tmp_path):
+def test_tiny_numbers_are_told_from_0(show):
     """Their products underflow; one of two masses may be 1e-15 of the other."""
-    with opened(browser, stated(CAR, tmp_path)) as page:
+    with show(CAR) as page:
         assert page.evaluate(
             "[[1e-170, 1e-170, 1e-170], [1e-170, -1e-170, 1e-170]]"
             ".map((a) => crossingKind([1e-170, 1e-170, 1e-170], a))"
         ) == ["weave", "weave"]
         assert page.evaluate("crossingKind([1e-170, 1, 1e-170], [1e-170, 1, -1e-170])") == "capsize"
     light = '[model]\nM = [["1", "0"], ["0", "m"]]\nK = [["1", "0"], ["0", "1e-15"]]\n[parameters]\nm = 1e-15\n'
-    with opened(browser, stated(light, tmp_path)) as page:
+    with show(light) as page:
         end = page.evaluate("[...response(state.x, [1, 1, 0, 0], [Math.PI])]")
         np.testing.assert_allclose(end, [-1, -1, 0, 0], atol=1e-10)
 
 
-def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser, tmp_path):
-    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(show):
+    with show("whipple_benchmark") as page:
         low, high = page.evaluate("rangeOf(state.over)")
         corner, size = plot_of(page, "growth")
         page.mouse.move(*(corner + [0.5, 0.5] * size))
@@ -249,13 +228,11 @@ def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser, t
 
 
 @pytest.mark.parametrize("name", ["ep4", "point_mass_robot", "whipple_ep4"])
-def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser, tmp_path, name):
+def test_the_bicycle_is_to_scale_and_moves_as_a_body(show, made, name):
     """The distance of H from the drawn axis is the quantity of the model; leaning and steering keep all distances."""
-    explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
-    explorer.save(tmp_path / "page.html")
-    assert explorer.solution is not None
+    explorer, path = made(name)
     values = explorer.problem.values(explorer.solution.parameters)
-    with opened(browser, tmp_path / "page.html") as page:
+    with show(path) as page:
         H, turned, foot, on_axis, moved, B, leaned, ahead = np.array(
             page.evaluate("""() => {
             const shape = bicycleShape(state.x);
@@ -274,9 +251,8 @@ def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser, tmp_path, name):
     assert ahead[1] > 0  # a steer to the right
 
 
-def test_motion_waits_where_the_reader_wants_none(browser, tmp_path):
-    path = saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)
-    with opened(browser, path, reduced_motion="reduce") as page:
+def test_motion_waits_where_the_reader_wants_none(show):
+    with show("whipple_benchmark", reduced_motion="reduce") as page:
         page.wait_for_timeout(1200)
         assert page.evaluate("clock.time") == 0
         page.get_by_role("button", name="Play", exact=True).click()
@@ -285,11 +261,11 @@ def test_motion_waits_where_the_reader_wants_none(browser, tmp_path):
         paused = page.evaluate("clock.time")
         page.wait_for_timeout(200)
         assert page.evaluate("clock.time") == paused
-    with opened(browser, path) as page:
+    with show("whipple_benchmark") as page:
         wait_until(page, "clock.time > 0.2")
 
 
-def test_time_of_the_motion_is_real(browser, tmp_path):
+def test_time_of_the_motion_is_real(show):
     """From frame to frame by the moments of the frames, so that a busy machine does not matter; one frame of slack."""
     watch = """() => new Promise((done) => {
         const frames = [];
@@ -301,7 +277,7 @@ def test_time_of_the_motion_is_real(browser, tmp_path):
         };
         requestAnimationFrame(look);
     })"""
-    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+    with show("whipple_benchmark") as page:
         wait_until(page, "clock.time > 0.1")
         assert page.evaluate(watch) == pytest.approx(1, abs=0.05)
         page.locator("#bicycle select").last.select_option("10")
@@ -309,9 +285,9 @@ def test_time_of_the_motion_is_real(browser, tmp_path):
 
 
 @pytest.mark.parametrize("layer", ["kind", "abscissa", "damping"])
-def test_pictures_stand_undefined_designs(browser, tmp_path, layer):
+def test_pictures_stand_undefined_designs(show, layer):
     """A leading coefficient 0: no roots, no class. A page with faults or errors in its console fails in `opened`."""
-    with opened(browser, stated(POLE, tmp_path)) as page:
+    with show(POLE) as page:
         page.evaluate(f"change({{x: [[0, 0]], layer: '{layer}'}})")
         drawn(page)
         page.wait_for_timeout(600)
@@ -320,14 +296,14 @@ def test_pictures_stand_undefined_designs(browser, tmp_path, layer):
         assert not page.locator("#bicycle").is_visible()
 
 
-def test_a_model_of_one_parameter_has_no_chart_and_says_so(browser, tmp_path):
-    with opened(browser, stated(ALONE, tmp_path)) as page:
+def test_a_model_of_one_parameter_has_no_chart_and_says_so(show):
+    with show(ALONE) as page:
         assert "needs two parameters" in page.locator("#chart").inner_text()
         assert page.locator("#growth canvas").first.is_visible()
 
 
-def test_pictures_say_what_they_show(browser, tmp_path):
-    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+def test_pictures_say_what_they_show(show):
+    with show("whipple_benchmark") as page:
         pictures = page.locator("canvas[aria-label]")
         assert pictures.count() == 6
         for k in range(6):
@@ -345,10 +321,10 @@ def growth_sentence(page, change="{}"):
     return str(page.locator("#growth .reading").nth(1).inner_text())
 
 
-def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(browser, tmp_path):
+def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(show):
     """A mass from 0 on, where its matrix is singular; the three roots that meet at the optimum; an undamped car."""
     index = "DATA.parameters.findIndex(({ name }) => name === '%s')"
-    with opened(browser, stated(CAR, tmp_path)) as page:
+    with show(CAR) as page:
         over_mass = growth_sentence(page, f"{{over: {index % 'ms'}}}")
         assert over_mass.startswith("Stable throughout")
         assert "a 3-fold root at 250 (this design)" in over_mass
@@ -358,9 +334,9 @@ def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(browser, 
         assert "within a multiple" not in page.locator("#motion").inner_text()
 
 
-def test_roots_that_cross_0_are_told_where_all_is_unstable(browser, tmp_path):
+def test_roots_that_cross_0_are_told_where_all_is_unstable(show):
     """The number of growing roots, by NumPy, changes there by as many as are said to cross."""
-    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+    with show("whipple_benchmark") as page:
         tilt = "DATA.parameters.findIndex(({ name }) => name === 'lambda_s')"
         assert growth_sentence(page, f"{{x: [[{tilt}, -0.3]]}}").startswith("Unstable throughout; ")
         events = page.evaluate("""sweepOf(state).events.filter(({ kind }) => kind === "crossing")
@@ -373,18 +349,18 @@ def test_roots_that_cross_0_are_told_where_all_is_unstable(browser, tmp_path):
         assert abs(after - before) == event["roots"]
 
 
-def test_an_envelope_is_drawn_where_it_is_one(browser, tmp_path):
+def test_an_envelope_is_drawn_where_it_is_one(show):
     """Where four roots meet a push goes as t^3 e^(abscissa t), which no multiple of e^(abscissa t) bounds."""
-    with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path)) as page:
+    with show("ep4") as page:
         assert "within a multiple" not in page.locator("#motion").inner_text()
         page.get_by_role("button", name="benchmark").click()
         drawn(page)
         assert "within a multiple" in page.locator("#motion").inner_text()
 
 
-def test_one_pole_does_not_set_the_scale_of_the_growth_rates(browser, tmp_path):
+def test_one_pole_does_not_set_the_scale_of_the_growth_rates(show):
     """Robot, wheelbase: a root passes infinity beside the optimum, whose roots are at -11 1/s."""
-    with opened(browser, saved(PROBLEMS / "point_mass_robot.toml", tmp_path)) as page:
+    with show("point_mass_robot") as page:
         wheelbase = page.evaluate("DATA.parameters.findIndex(({ name }) => name === 'w')")
         low, high = page.evaluate(f"""() => {{
             change({{ over: {wheelbase} }});
@@ -401,9 +377,9 @@ def test_one_pole_does_not_set_the_scale_of_the_growth_rates(browser, tmp_path):
         assert max(fork) <= 0  # none of it in the ground
 
 
-def test_unstable_classes_are_told_apart_in_the_dark(browser, tmp_path):
+def test_unstable_classes_are_told_apart_in_the_dark(show):
     """Relative luminance of the swatches, as WCAG has it: twice as bright at least."""
-    with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path), color_scheme="dark") as page:
+    with show("ep4", color_scheme="dark") as page:
         colours = {
             words: np.array(colour.split(","), dtype=float) / 255 for colour, words in page.evaluate(SWATCHES).items()
         }
@@ -412,7 +388,7 @@ def test_unstable_classes_are_told_apart_in_the_dark(browser, tmp_path):
     assert capsize >= 2 * weave
 
 
-def test_pictures_with_keys_are_no_mere_images(browser, tmp_path):
-    with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path)) as page:
+def test_pictures_with_keys_are_no_mere_images(show):
+    with show("ep4") as page:
         roles = page.evaluate("[...document.querySelectorAll('canvas[aria-label]')].map((c) => [c.tabIndex, c.role])")
         assert sorted(roles) == [[-1, "img"]] * 3 + [[0, "application"]] * 3

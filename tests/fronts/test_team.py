@@ -5,7 +5,6 @@ import threading
 from dataclasses import replace
 from importlib import import_module
 
-import numpy as np
 import pytest
 from helpers import shares
 
@@ -17,7 +16,6 @@ from tmsopt.models import tms
 curve = import_module("tmsopt.fronts.curve")
 options = import_module("tmsopt.program.options")
 pareto = import_module("tmsopt.fronts.pareto")
-sample = import_module("tmsopt.search.sample")
 subproblems = import_module("tmsopt.fronts.subproblems")
 team = import_module("tmsopt.fronts.team")
 
@@ -53,18 +51,6 @@ def test_an_item_that_ends_its_processes_is_an_error():
 def test_what_cannot_be_sent_is_solved_here():
     assert team.can_send(ASK)
     assert not team.can_send(replace(ASK, easier={0: threading.Lock()}))
-
-
-@pytest.mark.parametrize("processes", [1, 2])
-def test_a_round_knows_what_the_rounds_before_met_and_nothing_else(processes):
-    with team.Team(processes) as side_by_side:
-        first = dict(side_by_side.each(shares.meeting, ASK, range(4)))
-        known = side_by_side._known
-        second = dict(side_by_side.each(shares.meeting, ASK, [7, 8]))
-    assert set(map(str, first.values())) == {str(({}, 0))}
-    assert np.array_equal(known.refined["here"], [[0], [1], [2], [3]])
-    assert known.leads == {"box": {"EP4": [{"x": 1.0}] * 2}}  # the first of those that have most
-    assert set(map(str, second.values())) == {str(({"here": 4}, 2))}
 
 
 def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():

@@ -7,19 +7,13 @@ solver of another kind, from another start, on another formulation, leaves littl
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
 from math import pi
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.optimize import differential_evolution
 
 from tmsopt import laws
-
-Design = Mapping[str, Any]
-Merit = Callable[[dict[str, Any]], tuple[Any, Any]]
-"""Design, each free parameter an array → what is to be least, and by how much the constraints are violated (≤ 0: not)."""
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "kg": 1.0, "m/s": 1.0, "deg": pi / 180}

@@ -3,8 +3,6 @@
 import os
 import time
 
-import numpy as np
-
 
 def squared(ask, item):
     """The square of a number, and the process that made it."""
@@ -22,16 +20,6 @@ def dying_at_two(ask, item):
     if item == 2:
         os._exit(3)
     return item
-
-
-def meeting(ask, item):
-    """How much was known before; a design is met, and one that leads to a pattern, which depends on the number."""
-    known = ask.shop.known
-    before = {place: len(u) for place, u in known.refined.items()}, len(known.leads.get("box", {}).get("EP4", []))
-    old = known.refined.get("here", np.empty((0, 1)))
-    known.refined["here"] = np.concatenate([[[float(item)]], old])
-    known.leads.setdefault("box", {})["EP4"] = [{"x": float(item)}] * (1 + item % 2)
-    return before
 
 
 def interrupted_at_two(ask, item):

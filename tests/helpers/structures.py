@@ -1,13 +1,9 @@
 """Factored forms of every structure of four roots, and the dimensionless design, in mpmath."""
 
-from collections.abc import Callable
-from typing import Any
-
 from mpmath import mp
 
 NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
 LENGTHS = {"chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
-Factors = Callable[..., list[list[Any]]]
 
 
 def native_60(p):

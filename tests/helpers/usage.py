@@ -59,7 +59,7 @@ assert_type(best.abscissa, float)
 print(len(assert_type(tmsopt.explore(best), tmsopt.Explorer).html))
 
 
-def pictures():
+def pictures() -> Axes:
     """What is drawn is Axes, whoever draws."""
     assert_type(curves.plot(), Axes)
     return design.plot()

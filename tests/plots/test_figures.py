@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import mpmath
@@ -11,6 +9,7 @@ import numpy as np
 import pytest
 import sympy
 from click.testing import CliRunner
+from helpers.commands import tmsopt
 from helpers.oracles import is_stable_60, polynomial_60, weave_Fr_60
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -373,11 +372,6 @@ def test_drawn_paths_are_those_of_table_1():
 
 
 # The command
-
-
-def tmsopt(*arguments, cwd=None):
-    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
 
 
 def test_list_and_names():

@@ -231,7 +231,7 @@ def test_colours_of_the_abscissa_are_centred_at_0(chart, robot):
 
 
 @pytest.mark.slow
-def test_the_star_says_whether_it_is_the_optimum(chart, robot, robot_file, tmp_path):
+def test_the_star_says_whether_it_is_the_optimum(chart, robot, tmp_path):
     def star(found):
         ax = plots.draw_chart(found, ax_of(), "abscissa")
         (line,) = (line for line in ax.lines if line.get_marker() == "*")
@@ -318,11 +318,6 @@ def test_the_unstable_part_of_a_front_is_dashed_and_hollow():
         for xy in line.get_xydata().tolist()
     }
     assert hollow == {tuple(v) for v, s in zip(values, stable, strict=True) if not s}
-
-
-def built(rows, problem="problems/ep4.toml", tolerances=None):
-    design = tmsopt.solve(problem)
-    return tmsopt.run_study(tmsopt.monte_carlo(design, rows, tolerances=tolerances), workers=1)
 
 
 def test_a_histogram_counts_every_row_once():

@@ -16,7 +16,7 @@ from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_fold
 from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, survey
 from tmsopt.charts.tally import Tally, add_tallies
 from tmsopt.deprecated import ignore_option
-from tmsopt.errors import Fault, InputError, call_faults, count_faults
+from tmsopt.errors import InputError, call_faults, count_faults, refusal
 from tmsopt.executor import Crash, here, processes
 from tmsopt.files import path_of
 from tmsopt.problem.files import Given
@@ -97,7 +97,7 @@ class Chart(Printable):
         """
         if self.asked is None:
             name = self.about["problem"]["model"]
-            raise InputError([Fault(f"'{self.path}' does not hold its model {name!r}, only numbers; chart it again")])
+            raise refusal(f"'{self.path}' does not hold its model {name!r}, only numbers; chart it again")
         return self.asked
 
     @property
@@ -219,7 +219,7 @@ def chart(
     path, grid = None if folder is None else path_of(folder, "a folder"), work.grid
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or {LARGEST:.0e} or less"
-        raise InputError([Fault(message, ("points",))])
+        raise refusal(message, "points")
     about = _describe(work, tile)
     grid.tiles(tile)  # refuses too many
     memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in work.dtypes.items()}
@@ -233,7 +233,7 @@ def chart(
         for place, found in executor.map(work.compute, left):
             if isinstance(found, Crash):
                 message = f"a process that computed {tile} designs ended ({found.cause}); give fewer workers"
-                raise InputError([Fault(message, ("workers",))])
+                raise refusal(message, "workers")
             target.write(left[place], *found)
             done += found[1].designs
             if steps:
@@ -265,7 +265,7 @@ def open_chart(path: str | Path) -> Chart:
     grid, counts = grid_of(about), add_tallies(tiles.done.values())
     if counts.designs < grid.size:
         message = f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to go on"
-        raise InputError([Fault(message)])
+        raise refusal(message)
     return Chart(about, grid.values, tiles.layers, counts, path=path, asked=problem)
 
 

@@ -29,7 +29,7 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid
 from tmsopt.charts.tally import Tally
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import InputError, refusal
 from tmsopt.files import differences, from_json, move_aside, read_lines, read_text, write_text
 from tmsopt.models import MODELS
 from tmsopt.problem.problem import Problem
@@ -128,7 +128,7 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
             message = (
                 f"holds another chart ({'; '.join(changed)}); give another name, or --fresh to move this one aside"
             )
-            raise InputError([Fault(message, (str(path),))])
+            raise refusal(message, str(path))
         try:
             yield tiles
         finally:
@@ -141,7 +141,7 @@ def _locked(path: Path) -> Iterator[None]:
         held = FileLock(path / _LOCK, timeout=0).acquire()
     except Timeout:
         message = f"'{path}' is being written by another process; wait for it, or give another name"
-        raise InputError([Fault(message, ("--output",))]) from None
+        raise refusal(message, "--output") from None
     except OSError as error:
         raise _unwritten(path, error) from None
     with held:
@@ -153,14 +153,14 @@ def _layer(name: str) -> str:
 
 
 def _unwritten(path: Path, error: OSError) -> InputError:
-    return InputError([Fault(f"'{path}' cannot be written: {error.strerror or error}", ("--output",))])
+    return refusal(f"'{path}' cannot be written: {error.strerror or error}", "--output")
 
 
 def _no_chart(path: Path) -> InputError:
     message = (
         f"'{path}' is no chart: it has no {_ABOUT}; give the folder that tmsopt chart FILE --output NAME.chart wrote"
     )
-    return InputError([Fault(message)])
+    return refusal(message)
 
 
 def _check_room(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
@@ -239,7 +239,7 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         done, end = _read_record(record, about["tile"], grid)
     except (OSError, ValueError, LookupError, TypeError, OverflowError, EOFError, TokenError) as error:
         message = f"'{path}' is damaged: {name}: {error!s:.300}; give --fresh to chart anew and move this one aside"
-        raise InputError([Fault(message)]) from None
+        raise refusal(message) from None
     return about, problem, Tiles(layers, about["tile"], done, (record, end))
 
 

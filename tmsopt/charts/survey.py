@@ -1,7 +1,6 @@
 """Grids over two or three parameters, and what is computed of their designs, a few rows at a time."""
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.tally import Tally, count_tile
-from tmsopt.errors import Fault, InputError, list_faults, short, suggest, table_faults
+from tmsopt.errors import Fault, InputError, list_faults, refusal, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
 from tmsopt.problem.array_function import ArrayFunction, array_function, parse_all
 from tmsopt.problem.files import Given, as_problem
@@ -92,7 +91,7 @@ class Grid:
         """
         each, rows = max(1, points // self.shape[-1]), range(self.size // self.shape[-1])
         if (count := len(rows[::each])) > MOST_TILES:
-            raise InputError([Fault(f"found {points}, which makes {count} tiles; accepted: {MOST_TILES}", ("tile",))])
+            raise refusal(f"found {points}, which makes {count} tiles; accepted: {MOST_TILES}", "tile")
         return [rows[k : k + each] for k in rows[::each]]
 
 
@@ -123,7 +122,6 @@ class Survey:
 
     def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
         """The layers of a few rows, shape (len(rows), n), and their counts."""
-        began = time.perf_counter()
         model, shape = self.problem.model, (len(rows), self.grid.shape[-1])
         columns, fallbacks = {**self.problem.fixed, **self.grid.columns(rows)}, 0
         with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
@@ -145,7 +143,7 @@ class Survey:
             values |= {n: values[_QUANTITY + n] for n in self.quantities}
             given = {n: (np.broadcast_to(values[n], shape), dtype) for n, dtype in self.dtypes.items()}
             layers = {n: np.ascontiguousarray(*array) for n, array in given.items()}
-        return layers, count_tile(layers, rows.start * shape[1], fallbacks, time.perf_counter() - began)
+        return layers, count_tile(layers, rows.start * shape[1], fallbacks)
 
 
 _QUANTITY, _LIMIT = "quantity ", "limit "
@@ -223,9 +221,9 @@ def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, .
         message = f"a grid has two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
         fixed = [n for n in ("Fr", "v", *problem.fixed) if n in problem.fixed]
         freed = f"; write e.g. {example_of(problem.parameter_set[fixed[0]])[1]}" if fixed else ""
-        raise InputError([Fault(message + ("; fix the others" if len(free) > 3 else freed), ("parameters",))])
+        raise refusal(message + ("; fix the others" if len(free) > 3 else freed), "parameters")
     if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free)):
-        raise InputError([Fault(f"found {axes!r}; accepted: {' and '.join(free)}", ("axes",))])
+        raise refusal(f"found {axes!r}; accepted: {' and '.join(free)}", "axes")
     return tuple(axes or free)
 
 
@@ -238,5 +236,5 @@ def _sizes(points: Any, count: int) -> tuple[int, ...]:
         accepted = (
             f"{('two', 'three')[count - 2]} whole numbers, each from 2 to {LONGEST}, their product {MOST:.0e} or less"
         )
-        raise InputError([Fault(f"found {points!r}; accepted: {accepted}", ("points",))])
+        raise refusal(f"found {points!r}; accepted: {accepted}", "points")
     return sizes

@@ -22,7 +22,6 @@ class Tally:
         least: least abscissa of those; nan where there is none.
         place: its place in the flat arrays, the first of equals; -1 where there is none.
         fallbacks: number of designs whose roots came from companion eigenvalues.
-        seconds: of computing.
     """
 
     designs: int = 0
@@ -31,7 +30,6 @@ class Tally:
     least: float = math.nan
     place: int = -1
     fallbacks: int = 0
-    seconds: float = 0.0
 
     @property
     def shares(self) -> dict[str, float]:
@@ -39,7 +37,7 @@ class Tally:
         return {n: count / self.designs for n, count in zip(CLASSES, self.classes, strict=False)}
 
 
-def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0, seconds: float = 0.0) -> Tally:
+def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0) -> Tally:
     """Counts over a tile whose first design has the place `first`."""
     kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
     least, place = math.nan, -1
@@ -55,7 +53,6 @@ def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 
         least,
         place,
         fallbacks,
-        seconds,
     )
 
 
@@ -71,5 +68,4 @@ def add_tallies(tallies: Iterable[Tally]) -> Tally:
         least,
         place,
         sum(t.fallbacks for t in every),
-        sum(t.seconds for t in every),
     )

@@ -13,11 +13,11 @@ import click
 
 from tmsopt.cli.common import (
     answer,
-    bad_input,
     check_output,
     file_argument,
     json_option,
     nominal_of,
+    number,
     plane,
     plot_option,
     report_option,
@@ -27,6 +27,7 @@ from tmsopt.cli.common import (
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.cli.terminal import shown
 from tmsopt.deprecated import no_longer_needed
+from tmsopt.errors import refusal, suggest
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -130,7 +131,7 @@ def chart(
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
     if engine is not None:
         click.echo(no_longer_needed("--engine"), err=True)
-    with bad_input(), _stopped(output):
+    with _stopped(output):
         import tmsopt
         from tmsopt.charts import USUAL, axes_of
 
@@ -167,11 +168,10 @@ def chart(
     if folder is not None:
         click.echo(f"wrote {folder}", err=True)
     if plot is not None:
-        with bad_input():
-            how |= {"boundaries": boundaries, "progress": shown()}
-            drawn = found if whole else tmsopt.chart(**_shown(found, held), **how)
-            with saving("--plot", plot):
-                tmsopt.plots.save(tmsopt.plots.chart_figure(drawn, layer), plot)
+        how |= {"boundaries": boundaries, "progress": shown()}
+        drawn = found if whole else tmsopt.chart(**_shown(found, held), **how)
+        with saving("--plot", plot):
+            tmsopt.plots.save(tmsopt.plots.chart_figure(drawn, layer), plot)
     write_report(found, report, file)
 
 
@@ -190,7 +190,6 @@ def _stopped(output: Path | None) -> Iterator[None]:
 @contextmanager
 def _moved_aside(folder: Path | None) -> Iterator[None]:
     """Say where an old folder of that name went, or why the new one cannot be written."""
-    from tmsopt.errors import Fault, InputError
 
     there = set(folder.parent.glob("*.chart")) if folder is not None else set()
     try:
@@ -199,7 +198,7 @@ def _moved_aside(folder: Path | None) -> Iterator[None]:
         if folder is None:
             raise
         message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
-        raise InputError([Fault(message, ("--output",))]) from None
+        raise refusal(message, "--output") from None
     if folder is not None:
         for aside in sorted(set(folder.parent.glob("*.chart")) - there - {folder}):
             click.echo(f"moved the old folder to {aside}", err=True)
@@ -219,68 +218,56 @@ def _shown(found: "Chart", held: dict[str, float]) -> dict[str, Any]:
 
 
 def _space(free: tuple[str, ...], axes: str | None) -> tuple[str, ...]:
-    from tmsopt.errors import Fault, InputError
 
     names = tuple(n.strip() for n in axes.split(",")) if axes is not None else free
     if sorted(names) != sorted(free):
-        raise InputError([Fault(f"found {axes}; accepted: {', '.join(free)} in any order", ("--axes",))])
+        raise refusal(f"found {axes}; accepted: {', '.join(free)} in any order", "--axes")
     return names
 
 
 def _sizes(points: tuple[int, ...] | None, axes: int) -> tuple[int, ...]:
     from tmsopt.charts import USUAL_POINTS
-    from tmsopt.errors import Fault, InputError
 
     if points is None:
         return USUAL_POINTS[axes]
     sizes = points * axes if len(points) == 1 else points
     if len(sizes) != axes:
         message = f"found {'x'.join(map(str, points))}; accepted: one number, or one for each of the {axes} axes"
-        raise InputError([Fault(message, ("--points",))])
+        raise refusal(message, "--points")
     return sizes
 
 
 def _check_memory(sizes: tuple[int, ...], output: Path | None) -> None:
     """Refuse what could not be held or written, before any work is done."""
     from tmsopt.charts import LARGEST, check_netcdf
-    from tmsopt.errors import Fault, InputError
 
     if (designs := math.prod(sizes)) > LARGEST:
         message = f"{designs:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
-        raise InputError([Fault(message, ("--points",))])
+        raise refusal(message, "--points")
     if output is not None and output.suffix.lower() == ".nc":
         check_netcdf()
 
 
 def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: int, cut: dict[str, str]) -> None:
-    from tmsopt.errors import Fault, InputError, suggest
 
     if layer not in accepted:
-        raise InputError([Fault(f"found '{layer}'; {suggest(layer, accepted)}", ("--layer",))])
+        raise refusal(f"found '{layer}'; {suggest(layer, accepted)}", "--layer")
     if plot is not None and axes == 3 and not cut:
         message = "three parameters are free, and a figure shows two; hold one, as in --slice lambda_s=0.4"
-        raise InputError([Fault(message, ("--plot",))])
+        raise refusal(message, "--plot")
     if cut and axes == 2:
-        raise InputError([Fault("two parameters are free, so there is nothing to hold; leave it out", ("--slice",))])
+        raise refusal("two parameters are free, so there is nothing to hold; leave it out", "--slice")
 
 
 def _held(problem: "Problem", cut: dict[str, str]) -> dict[str, float]:
     """The parameter that a figure holds, as a number in its box."""
-    from tmsopt.errors import Fault, InputError, suggest
-    from tmsopt.problem.units import with_unit
 
     held = {}
     for name, text in cut.items():
         if name not in problem.free:
-            raise InputError([Fault(f"found '{name}'; {suggest(name, problem.free)}", ("--slice",))])
+            raise refusal(f"found '{name}'; {suggest(name, problem.free)}", "--slice")
         low, high = problem.free[name]
-        try:
-            held[name] = float(text)
-        except ValueError:
-            try:
-                held[name] = with_unit(text, problem.parameter_set[name].unit)
-            except ValueError as error:
-                raise InputError([Fault(str(error), ("--slice", name))]) from None
+        held[name] = number(text, problem.parameter_set[name].unit, "--slice", name)
         if not low <= held[name] <= high:
-            raise InputError([Fault(f"found {text}; accepted: {low:.6g} to {high:.6g}", ("--slice", name))])
+            raise refusal(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
     return held

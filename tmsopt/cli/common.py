@@ -12,7 +12,7 @@ import click
 
 from tmsopt.cli.ending import BAD_INPUT, answering
 from tmsopt.cli.terminal import doing, quiet, shown
-from tmsopt.errors import MOST_STARTS, Fault, InputError
+from tmsopt.errors import MOST_STARTS, Fault, InputError, refusal
 
 if TYPE_CHECKING:
     from tmsopt import Problem
@@ -56,11 +56,6 @@ def bad_input() -> Iterator[None]:
         sys.exit(INFEASIBLE if status == "infeasible" else NOT_CONVERGED)
 
 
-def refusal(message: str, *key: str) -> InputError:
-    """The error for one thing wrong with a command line."""
-    return InputError([Fault(message, key)])
-
-
 def named(option: str, given: Sequence[str], example: str) -> dict[str, str]:
     """What an option that may be repeated gives as NAME=VALUE, by name."""
     pairs = [text.partition("=") for text in given]
@@ -68,6 +63,19 @@ def named(option: str, given: Sequence[str], example: str) -> dict[str, str]:
     if faults:
         raise InputError(faults)
     return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def number(text: str, unit: str, *key: str) -> float:
+    """A number of the command line, plain or with a unit."""
+    from tmsopt.problem.units import with_unit
+
+    try:
+        return float(text)
+    except ValueError:
+        try:
+            return with_unit(text, unit)
+        except ValueError as error:
+            raise refusal(str(error), *key) from None
 
 
 def check_output(option: str, path: Path | None, endings: Sequence[str], folders: Sequence[str] = ()) -> None:

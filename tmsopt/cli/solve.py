@@ -19,9 +19,9 @@ from tmsopt.cli.common import (
     file_argument,
     json_option,
     nominal_of,
+    number,
     options,
     plot_option,
-    refusal,
     report_option,
     seed_option,
     starts_option,
@@ -30,7 +30,7 @@ from tmsopt.cli.common import (
 )
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import MOST_POINTS, Fault, InputError
+from tmsopt.errors import MOST_POINTS, Fault, InputError, refusal
 
 if TYPE_CHECKING:
     from tmsopt.report import Findings
@@ -283,17 +283,9 @@ def _given(context: click.Context) -> list[str]:
 
 def _scale(option: str, text: str, unit: str) -> float:
     """A positive length or mass of the command line."""
-    from tmsopt.problem.units import with_unit
-
-    try:
-        try:
-            value = float(text)
-        except ValueError:
-            value = with_unit(text, unit)
-        if not 0 < value < math.inf:
-            raise ValueError(f"found {text}; accepted: a positive number of {unit}")
-    except ValueError as error:
-        raise refusal(str(error), option) from None
+    value = number(text, unit, option)
+    if not 0 < value < math.inf:
+        raise refusal(f"found {text}; accepted: a positive number of {unit}", option)
     return value
 
 

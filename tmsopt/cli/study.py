@@ -10,20 +10,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import tmsopt
 from tmsopt.cli.common import (
-    bad_input,
     check_output,
     file_argument,
     json_option,
     plot_option,
     report_option,
     saving,
+    write_file,
     write_json,
     write_json_rows,
     write_report,
 )
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, answering
 from tmsopt.cli.terminal import doing, quiet, shown
+from tmsopt.errors import refusal
 from tmsopt.files import read_text
 from tmsopt.progress import Progress
 
@@ -96,38 +98,31 @@ def study(
     as_json: bool,
 ) -> None:
     """Solve the problem of the study FILE for every row of what varies in it."""
-    with bad_input():
-        from tmsopt.studies import check_unchanged, load_study
+    from tmsopt.studies import check_export, check_unchanged, load_study
 
-        kept = {"--store": store, "--fresh": fresh, "--export": exports, "--plot": plot, "--report": report}
-        _check_together(row, scheduler, workers, kept)
-        for target in exports:
-            from tmsopt.studies import check_export
-
-            check_export(target)
-        path = store or Path(f"{file.stem}.sqlite")
-        if row is None:
-            check_output("--store", path, (path.suffix.lstrip(".").lower(),))
-        stated = load_study(file)
-        if row is None and not fresh:
-            check_unchanged(stated, path)
-        asked = _planned(stated)
-        if row is not None:
-            _show_row(asked, row, as_json)
-            return
-        path = path.resolve()
-        results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
-        with answering():
-            _show(results, path, stopped, as_json)
-        for target in exports if len(results.rows) else ():
-            with saving("--export", target):
-                results.export(target, shown())
-        if plot is not None:
-            from tmsopt.plots import save
-
-            with saving("--plot", plot):
-                save(results.plot(), plot)
-        write_report(results, report, *_files(file))
+    kept = {"--store": store, "--fresh": fresh, "--export": exports, "--plot": plot, "--report": report}
+    _check_together(row, scheduler, workers, kept)
+    for target in exports:
+        check_export(target)
+    path = store or Path(f"{file.stem}.sqlite")
+    if row is None:
+        check_output("--store", path, (path.suffix.lstrip(".").lower(),))
+    stated = load_study(file)
+    if row is None and not fresh:
+        check_unchanged(stated, path)
+    asked = _planned(stated)
+    if row is not None:
+        _show_row(asked, row, as_json)
+        return
+    path = path.resolve()
+    results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
+    with answering():
+        _show(results, path, stopped, as_json)
+    for target in exports if len(results.rows) else ():
+        with saving("--export", target):
+            results.export(target, shown())
+    write_file("--plot", plot, lambda path: tmsopt.plots.save(results.plot(), path))
+    write_report(results, report, *_files(file))
     if stopped:
         click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         sys.exit(INTERRUPTED)
@@ -141,15 +136,13 @@ def _files(file: Path) -> list[Path]:
 
 def _check_together(row: int | None, scheduler: str | None, workers: int | None, kept: Mapping[str, object]) -> None:
     """Refuse options that would have no effect."""
-    from tmsopt import Fault, InputError
-
     given = [*(name for name, value in kept.items() if value)]
     given += [name for name, value in (("--scheduler", scheduler), ("--workers", workers)) if value is not None]
     if row is not None and given:
         message = f"solves one row in this process and keeps nothing; leave out {', '.join(given)}"
-        raise InputError([Fault(message, ("--row",))])
+        raise refusal(message, "--row")
     if scheduler is not None and workers is not None:
-        raise InputError([Fault("is for processes of this machine; leave it out with --scheduler", ("--workers",))])
+        raise refusal("is for processes of this machine; leave it out with --scheduler", "--workers")
 
 
 def _planned(asked: "Study | Sampling") -> "Study":

@@ -14,7 +14,6 @@ from tmsopt.cli.common import (
     nominal_of,
     plane,
     plot_option,
-    refusal,
     report_option,
     seed_option,
     starts_option,
@@ -22,6 +21,7 @@ from tmsopt.cli.common import (
     write_report,
 )
 from tmsopt.cli.terminal import shown
+from tmsopt.errors import refusal
 
 _EXAMPLES = """
 \b

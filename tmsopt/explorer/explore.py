@@ -6,7 +6,7 @@ from html import escape
 from os import PathLike
 from typing import Any, Unpack
 
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import refusal
 from tmsopt.explorer.known import known_designs
 from tmsopt.explorer.page import html_of
 from tmsopt.files import path_of, write_text
@@ -50,7 +50,7 @@ class Explorer:
         """
         path = path_of(path, "the file to write")
         if path.suffix.lower() not in _ENDINGS:
-            raise InputError([Fault(f"found '{path}'; accepted: a file name ending in html, htm", ("path",))])
+            raise refusal(f"found '{path}'; accepted: a file name ending in html, htm", "path")
         write_text(path, self.html)
 
     def __repr__(self) -> str:

@@ -114,9 +114,7 @@ def _exceptional(problem: Problem) -> Known | None:
     order = min(problem.model.degree, len(problem.free) + 1, _ORDER)
     if order < 2:
         return None
-    asked = replace(
-        problem.nominal, locate=f"EP{order}", constraints={}, minimize=None, maximize=None, pareto=(), start={}
-    )
+    asked = Problem(problem.model, problem.nominal.fixed, problem.free, locate=f"EP{order}")
     if degrees_of_freedom(asked).count < 0:
         return None
     found = solve(asked, throw=False, starts=_STARTS, stability=0.0, alone=False)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,7 +45,7 @@ def subject(
     """
     of, solved = problem.parameter_set, bool(designs) and designs[0].is_answer
     start = {n: float(v) for n, v in (designs[0].parameters if solved else _middle(problem)).items()}
-    plane, quantities = _plane(problem), {q.name: q for q in (*problem.model.quantities, *of.quantities)}
+    plane, quantities = _by_interest(problem)[:2], {q.name: q for q in (*problem.model.quantities, *of.quantities)}
     asked = problem.minimize or problem.maximize or problem.locate or ""
     return {
         "title": problem.title,
@@ -158,16 +157,10 @@ def _by_interest(problem: Problem) -> list[str]:
     return sorted(names, key=lambda n: (n not in problem.free, rank.get(n, 2)))
 
 
-def _plane(problem: Problem) -> list[str]:
-    return _by_interest(problem)[:2]
-
-
 def _over(problem: Problem) -> str:
     """The speed of a bicycle, or else what comes first."""
-    return next(
-        (n for n in problem.parameter_set.names if n in _SPEEDS and problem.model.statement is None),
-        _by_interest(problem)[0],
-    )
+    speeds = [n for n in problem.parameter_set.names if n in _SPEEDS and problem.model.statement is None]
+    return (speeds or _by_interest(problem))[0]
 
 
 def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) -> Iterator[dict[str, Any]]:
@@ -183,18 +176,7 @@ def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) 
     if len(plane) < 2 or not set(plane) <= set(problem.free):
         return
     others = {n: v for n, v in start.items() if n not in plane}
-    flat = replace(
-        problem.nominal,
-        fixed=others,
-        free={n: problem.free[n] for n in plane},
-        locate=None,
-        minimize=None,
-        maximize=None,
-        pareto=(),
-        constraints={},
-        start={},
-    )
-    found = domain(flat, starts=_STARTS)
+    found = domain(Problem(problem.model, others, {n: problem.free[n] for n in plane}), starts=_STARTS)
     for title, arcs in (("stability", found.stability), ("heavy damping", found.heavy_damping)):
         for arc in arcs:
             yield {"kind": arc.kind, "set": title, "axes": axes, "along": []} | _points(arc.points, plane)

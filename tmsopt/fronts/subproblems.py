@@ -24,27 +24,23 @@ _WORTH = 1e-4  # gain at an end that its slack does not explain: at a smooth opt
 
 
 class Workshop:
-    """What one process has built for sub-problems and met in solving them; never sent to another.
-
-    Attributes:
-        known: what was met.
-    """
+    """What one process has built for sub-problems, and met in solving the present one; never sent to another."""
 
     def __init__(self) -> None:
-        self.known, self._families = SampleCache(), dict[Hashable, Family]()
+        self._known, self._families = SampleCache(), dict[Hashable, Family]()
 
     def __reduce__(self) -> tuple[type["Workshop"], tuple[()]]:
         return Workshop, ()
 
-    def know(self, known: SampleCache) -> None:
-        """Know what another does, and nothing else."""
-        self.known.refined = dict(known.refined)
-        self.known.leads = {box: dict(leads) for box, leads in known.leads.items()}
+    def forget(self) -> None:
+        """Forget what was met."""
+        self._known.refined.clear()
+        self._known.leads.clear()
 
     def family(self, problem: Problem, limits: Sequence[str]) -> Family:
         """Of the sub-problems that differ in these limits alone."""
         name = problem.minimize, *limits, *problem.fixed.items()
-        return self._families.setdefault(name, Family([n + LIMIT for n in limits], self.known, name))
+        return self._families.setdefault(name, Family([n + LIMIT for n in limits], self._known, name))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.guide.problem_text import toml_problem
@@ -91,22 +92,15 @@ def convert(
                 limits[_new(f"box_{name}", limits)] = f"{name} == {share:.12g}*{mass}"
             else:
                 fixed[name] = _rounded(share * problem.fixed[mass])
-    return Problem(
+    return replace(
+        problem,
         model=whipple,
         fixed=fixed,
         free=free,
         constraints=limits,
-        start=problem.start,
-        title=problem.title,
         minimize=_objective(problem, problem.minimize),
         maximize=_objective(problem, problem.maximize),
-        locate=problem.locate,
         pareto=tuple(str(_objective(problem, text)) for text in problem.pareto),
-        scenarios=problem.scenarios,
-        tolerances=problem.tolerances,
-        weights=problem.weights,
-        units=problem.units,
-        written=problem.written,
     )
 
 

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from tmsopt.errors import Fault, InputError, short
+from tmsopt.errors import Fault, InputError, refusal, short
 from tmsopt.guide.description import Description, Word, Words
 from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
 from tmsopt.models.built_in import controlled, gain_names
@@ -43,7 +43,7 @@ def describe(given: str | PathLike[str] | Model | Problem | Solution) -> Descrip
         return _described(problem.model, problem, {})
     if not isinstance(given, str | PathLike):
         accepted = f"the name of a model ({', '.join(MODELS)}), the path of a file, a Model, a Problem, or a Solution"
-        raise InputError([Fault(f"found {short(given)}; accepted: {accepted}", ("given",))])
+        raise refusal(f"found {short(given)}; accepted: {accepted}", "given")
     try:
         problem, typed = _read(given)
     except InputError as error:

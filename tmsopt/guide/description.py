@@ -1,11 +1,11 @@
 """A description as data: the symbols of a model or problem, each with unit, meaning and range."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.guide.text import matrix, table, wrapped
-from tmsopt.records import Printable, Table
+from tmsopt.records import Printable, Table, plain
 from tmsopt.versions import SCHEMA
 
 
@@ -38,11 +38,6 @@ class Words:
     name: str
     parameters: tuple[Word, ...]
     quantities: tuple[Word, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``."""
-        tables = {"parameters": self.parameters, "quantities": self.quantities}
-        return {"name": self.name} | {name: [asdict(w) for w in words] for name, words in tables.items()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,22 +80,8 @@ class Description(Printable):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        return {
-            "schema": SCHEMA,
-            "title": self.title,
-            "model": self.model,
-            "meaning": self.meaning,
-            "degree": self.degree,
-            "omits": self.omits,
-            "sets": [of.to_json() for of in self.sets],
-            "patterns": dict(self.patterns),
-            "functions": list(self.functions),
-            "conventions": list(self.conventions),
-            "sketch": self.sketch,
-            "matrices": {name: [list(row) for row in rows] for name, rows in self.matrices.items()},
-            "asked": {section: dict(keys) for section, keys in self.asked.items()},
-            "feedback": [of.to_json() for of in self.feedback],
-        }
+        names = "title model meaning degree omits sets patterns functions conventions sketch matrices asked feedback"
+        return {"schema": SCHEMA} | plain(self, names)
 
 
 def description_text(found: Description) -> str:

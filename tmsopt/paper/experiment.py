@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -17,19 +18,11 @@ TILT = np.deg2rad(20.0)
 MASS_RATIOS = (0.1, 1.0, 3.0)
 """Assumed mass ratios, likewise."""
 
+SLACK = 0.01
+"""Of the least Fr_c: what is as good."""
+
 _POINTS = 601
 _JUST_ABOVE = 1 + 1e-6  # of Fr_c: where a bicycle that gains stability at Fr_c must have it
-
-
-@dataclass(frozen=True)
-class ExperimentPoint:
-    """A bicycle in the plane of the law: χ_B over ζ_B/ζ_H; ω0 where it fulfils the law for any χ_H (equation chib)."""
-
-    name: str
-    ratio: float
-    chi_B: float
-    chi_H: float
-    omega0: float
 
 
 @dataclass(frozen=True)
@@ -42,7 +35,7 @@ class CriticalSpeed:
         chi_H, mu: of this curve; at χ_H = 1 the mass ratio has no influence and is nan.
         best: (χ_B, Fr_c) at the minimum, nan where no χ_B is stable.
         own: Fr_c at the χ_B that was built, likewise.
-        flat: range of χ_B where Fr_c exceeds the minimum by at most `slack`, as a fraction.
+        flat: range of χ_B where Fr_c exceeds the minimum by at most `SLACK`.
     """
 
     chi_B: Array
@@ -52,87 +45,66 @@ class CriticalSpeed:
     best: tuple[float, float]
     own: float
     flat: tuple[float, float]
-    slack: float
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Attributes: the law's curve, shape (n,); bicycles beside it; Fr_c over χ_B at `lambda_s` (rad)."""
+    """The law's curve, shape (n,); bicycles beside it, the built one first; Fr_c over χ_B at `lambda_s` (rad)."""
 
     ratio: Array
     law: Array
-    points: tuple[ExperimentPoint, ...]
-    chi_B: float
+    bicycles: tuple[ReferenceBicycle, ...]
     lambda_s: float
     least_tilt: float
     critical: tuple[CriticalSpeed, ...]
 
 
-def experiment(lambda_s: float = TILT, mass_ratios: tuple[float, ...] = MASS_RATIOS) -> Experiment:
+def experiment(lambda_s: float = TILT) -> Experiment:
     """The law χ_B = √(ζ_B/ζ_H) with three bicycles, and Fr_c over χ_B for the experimental one.
 
     The first critical curve is that of the law, χ_H = 1; the others have the measured χ_H. `least_tilt` is the
     tilt in rad above which H stands in front of the steer axis, as self-stability needs (equation lscf).
     """
     built = experimental()
-    p = built.parameters
-    ratio = np.linspace(1.0, 3.0, _POINTS)
-    curves = [_critical(1.0, np.nan, lambda_s), *(_critical(p["chi_H"], mu, lambda_s) for mu in mass_ratios)]
+    p, ratio = built.parameters, np.linspace(1.0, 3.0, _POINTS)
+    shapes = [(1.0, np.nan), *((p["chi_H"], mu) for mu in MASS_RATIOS)]
     return Experiment(
         ratio=ratio,
         law=np.asarray(laws.chib1(-ratio, np.full_like(ratio, -1.0))),
-        points=tuple(_point(bicycle) for bicycle in (built, benchmark(), optimised())),
-        chi_B=p["chi_B"],
+        bicycles=(built, benchmark(), optimised()),
         lambda_s=lambda_s,
         least_tilt=float(np.arctan((p["chi_H"] - 1) / p["zeta_H"])),
-        critical=tuple(curves),
+        critical=tuple(_critical(chi_H, mu, lambda_s) for chi_H, mu in shapes),
     )
 
 
-def _point(bicycle: ReferenceBicycle) -> ExperimentPoint:
-    p = bicycle.parameters
-    return ExperimentPoint(bicycle.name, p["zeta_B"] / p["zeta_H"], p["chi_B"], p["chi_H"], bicycle.omega0)
-
-
-def _critical(chi_H: float, mu: float, lambda_s: float, slack: float = 0.01) -> CriticalSpeed:
+def _critical(chi_H: float, mu: float, lambda_s: float) -> CriticalSpeed:
     """Fr_c between its poles χ_B = χ_H and χ_B = χ_H ζ_B/ζ_H."""
     p = experimental().parameters
     low, high = chi_H, chi_H * p["zeta_B"] / p["zeta_H"]
-    weight = 0.0 if np.isnan(mu) else mu
 
-    def value(chi_B: Array) -> Array:
-        geometry = (weight, chi_B, chi_H, p["zeta_B"], p["zeta_H"], lambda_s)
-        critical = laws.Fr_c(*geometry)
-        a = np.moveaxis(laws.copo(critical * _JUST_ABOVE, *geometry), 0, -1)
-        return np.where(is_stable(np.nan_to_num(a)), critical, np.nan)
+    def geometry(chi_B: Any) -> tuple[Any, ...]:
+        return np.nan_to_num(mu), chi_B, chi_H, p["zeta_B"], p["zeta_H"], lambda_s
+
+    def value(chi_B: Any) -> Any:
+        critical = laws.Fr_c(*geometry(chi_B))
+        a = np.moveaxis(laws.copo(critical * _JUST_ABOVE, *geometry(chi_B)), 0, -1)
+        return np.where(is_stable(np.nan_to_num(a)), critical, np.nan)[()]
 
     def square(chi_B: float) -> float:
-        return float(laws.flus(weight, chi_B, chi_H, p["zeta_B"], p["zeta_H"], lambda_s))
+        return float(laws.flus(*geometry(chi_B)))
 
-    def level(chi_B: float) -> float:
-        return float(value(np.asarray(chi_B)))
-
-    margin = 1e-3 * (high - low)
-    chi_B = np.linspace(low, high, _POINTS)[1:-1]
-    least = minimize_scalar(square, bounds=(low + margin, high - margin), method="bounded", options={"xatol": 1e-10})
-    stable = bool(np.isfinite(level(float(least.x))))
-    best = float(least.x) if stable else np.nan
-    return CriticalSpeed(
-        chi_B=chi_B,
-        Fr_c=value(chi_B),
-        chi_H=chi_H,
-        mu=mu,
-        best=(best, level(best)),
-        own=level(p["chi_B"]),
-        flat=_flat(square, best, (low + margin, high - margin), (1 + slack) ** 2) if stable else (np.nan, np.nan),
-        slack=slack,
-    )
+    chi_B, margin = np.linspace(low, high, _POINTS)[1:-1], 1e-3 * (high - low)
+    ends = low + margin, high - margin
+    best = float(minimize_scalar(square, bounds=ends, method="bounded", options={"xatol": 1e-10}).x)
+    if not np.isfinite(value(best)):
+        best = np.nan
+    flat = (np.nan, np.nan) if np.isnan(best) else _flat(square, best, ends)
+    return CriticalSpeed(chi_B, value(chi_B), chi_H, mu, (best, value(best)), value(p["chi_B"]), flat)
 
 
-def _flat(
-    square: Callable[[float], float], best: float, ends: tuple[float, float], factor: float
-) -> tuple[float, float]:
-    """Where a function with one minimum between two poles exceeds it by a factor, on either side."""
-    level = factor * square(best)
+def _flat(square: Callable[[float], float], best: float, ends: tuple[float, float]) -> tuple[float, float]:
+    """Where Fr_c, given by its square with one minimum between two poles, exceeds it by the slack, on either side."""
+    level = (1 + SLACK) ** 2 * square(best)
     low, high = (float(brentq(lambda x: square(x) - level, best, end)) for end in ends)
     return low, high

@@ -49,26 +49,22 @@ def ep4() -> Table[float]:
 
 def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
     """(Fr, λ_s) at a distance from the law `chib1`; with the EP set where it lies there, unless without curves."""
-    at = ep4()
+    at, tilt = ep4(), np.linspace(*TILT, 1200)
     chi_B = at["chi_B"] + chi_B_offset
+    curves, marked = {"Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), tilt)}, {}
+    if not chi_B_offset:
+        curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
+        curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
+        marked = {"EP4": (at["Fr"], at["lambda_s"])}
     problem = bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT})
-    tilt = np.linspace(*TILT, 1200)
-    curves = {"Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), tilt)}
-    if chi_B_offset:
-        return Plane(chart(problem, points=points, boundaries=boundaries), None, curves, {})
-    curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
-    curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
-    marked = {"EP4": (at["Fr"], at["lambda_s"])}
-    traced = ep_set() if boundaries else None
+    traced = None if chi_B_offset or not boundaries else ep_set()
     return Plane(chart(problem, points=points, boundaries=boundaries), traced, curves, marked)
 
 
 def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
     """(Fr, χ_B) at a distance in rad from the tilt `tls`."""
-    at = ep4()
+    at, chi_B = ep4(), np.linspace(*CHI_B, 1200)
     tilt = at["lambda_s"] + tilt_offset
-    problem = bicycle({"lambda_s": tilt}, {"Fr": FR, "chi_B": CHI_B})
-    chi_B = np.linspace(*CHI_B, 1200)
     curves = {
         "Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), chi_B),
         "chib1": (np.array(FR), np.full(2, at["chi_B"])),
@@ -76,18 +72,16 @@ def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), 
     marked = {"least Fr_c": (float(laws.frm(ZETA_B, ZETA_H, tilt)), at["chi_B"])}
     if not tilt_offset:
         marked["EP4"] = (at["Fr"], at["chi_B"])
+    problem = bicycle({"lambda_s": tilt}, {"Fr": FR, "chi_B": CHI_B})
     return Plane(chart(problem, points=points, boundaries=boundaries), None, curves, marked)
 
 
 def section(Fr_offset: float, points: tuple[int, int] = (240, 200)) -> Plane:
     """(χ_B, λ_s) at a distance from the Froude number of EP4."""
     at = ep4()
-    Fr = at["Fr"] + Fr_offset
-    problem = bicycle({"Fr": Fr}, {"chi_B": CHI_B, "lambda_s": (0.01, 1.2)})
-    chi_B = np.linspace(*CHI_B, 1200)
-    onset = np.arctan(Fr**2 / laws.Frc1(chi_B, ZETA_B, ZETA_H, np.pi / 4))  # Frc1 is linear in tan λ_s
+    problem = bicycle({"Fr": at["Fr"] + Fr_offset}, {"chi_B": CHI_B, "lambda_s": (0.01, 1.2)})
     marked = {} if Fr_offset else {"EP4": (at["chi_B"], at["lambda_s"])}
-    return Plane(chart(problem, points=points), None, {"Frc1": (chi_B, np.asarray(onset))}, marked)
+    return Plane(chart(problem, points=points), None, {}, marked)
 
 
 def surface() -> Swallowtail:

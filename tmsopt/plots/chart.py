@@ -17,7 +17,7 @@ from matplotlib.typing import LineStyleType
 from numpy.typing import NDArray
 
 from tmsopt.charts.chart import Chart
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import refusal, suggest
 from tmsopt.models import Model, in_words_of
 from tmsopt.plots.labels import AxisScale, Name, abscissa_label, events_of, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, entry, figure_of, on_axes
@@ -120,7 +120,7 @@ def plane_of(chart: Chart) -> Plane:
     """
     if len(chart.axes) != 2:
         message = f"found {len(chart.axes)} parameters; a picture shows a plane: chart two, with the third one fixed"
-        raise InputError([Fault(message, ("axes",))])
+        raise refusal(message, "axes")
     first, second = chart.axes
     return scale_of(chart.problem, first), scale_of(chart.problem, second)
 
@@ -186,7 +186,7 @@ def draw_chart(
     """
     plane = plane_of(data)
     if layer not in data.layers:
-        raise InputError([Fault(f"found '{layer}'; {suggest(layer, data.layers)}", ("layer",))])
+        raise refusal(f"found '{layer}'; {suggest(layer, data.layers)}", "layer")
     drawn = on_axes(ax, 6.4, 5.4, data.problem.title)
     handles: list[Artist] = []
     if layer == "kind":

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import check_output, file_argument, output_option, refusal, saving, write_json
+from tmsopt.cli.common import check_output, file_argument, output_option, saving, write_json
+from tmsopt.errors import refusal
 from tmsopt.files import write_text
 
 _OF_NEW = """

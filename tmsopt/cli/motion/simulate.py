@@ -14,13 +14,13 @@ from tmsopt.cli.common import (
     named,
     options,
     plot_option,
-    refusal,
     report_option,
     say_nominal,
     write_file,
     write_report,
 )
 from tmsopt.cli.terminal import shown
+from tmsopt.errors import refusal
 
 _EXAMPLES = """
 \b

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tmsopt.cli.common import FIGURES, PATH, check_output, refusal, saving, write_json
+from tmsopt.cli.common import FIGURES, PATH, check_output, saving, write_json
 from tmsopt.cli.terminal import shown
+from tmsopt.errors import refusal
 from tmsopt.progress import start_steps
 
 if TYPE_CHECKING:

@@ -42,12 +42,12 @@ def find(name: str) -> Item:
     Raises:
         InputError: for an unknown name, with a suggestion.
     """
-    from tmsopt.errors import Fault, InputError, suggest
+    from tmsopt.errors import refusal, suggest
 
     for item in GALLERY.values():
         if name in (item.name, item.alias):
             return item
-    raise InputError([Fault(f"found '{name}'; {suggest(name, _names())}", ("NAME",))])
+    raise refusal(f"found '{name}'; {suggest(name, _names())}", "NAME")
 
 
 def _names() -> Iterator[str]:
