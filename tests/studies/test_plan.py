@@ -18,6 +18,7 @@ from tmsopt.problem import ExpressionError, limit_of, with_limit
 from tmsopt.records import Column, Table
 from tmsopt.studies import (
     Row,
+    RowTable,
     Sampling,
     Share,
     Span,
@@ -29,6 +30,7 @@ from tmsopt.studies import (
     load_study,
     monte_carlo,
     over_grid,
+    part_of,
     planned,
     read_csv,
     sobol,
@@ -705,13 +707,14 @@ def test_wilson_interval_of_newcombe(count, of, low, high):
 
 def test_yield_counts_rows_by_what_they_are():
     kinds = [("optimal", -1.0), ("optimal", 0.5), ("infeasible", -2.0), ("infeasible", math.nan), ("failed", math.nan)]
+    study = Study(PROBLEM, {"mu": [0.1] * 5})
     rows = [Row(k, 0, Table(), status, abscissa=abscissa) for k, (status, abscissa) in enumerate(kinds)]
-    found = yield_of(rows)
+    found = yield_of(RowTable(study, [part_of(rows)]))
     assert (found.stable, found.feasible, found.good) == (Share(2, 4), Share(2, 4), Share(1, 4))
     assert found.failed == 1
     assert dict(found.abscissa) == {"0.05": -2.0, "0.25": -2.0, "0.5": -1.0, "0.75": 0.5, "0.95": math.inf}
     assert json.loads(json.dumps(found.to_json(), allow_nan=False))["stable"]["share"] == 0.5
-    assert math.isnan(yield_of([]).stable.share)
+    assert math.isnan(yield_of(RowTable(study, [])).stable.share)
 
 
 # The studies in problems/

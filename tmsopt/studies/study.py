@@ -19,8 +19,6 @@ from tmsopt.errors import (
     table_faults,
     text_faults,
 )
-from tmsopt.evaluation.law_rows import LAWS
-from tmsopt.models import tms
 from tmsopt.problem.cases import Band
 from tmsopt.problem.expression import ExpressionError
 from tmsopt.problem.files import Given, as_problem
@@ -168,19 +166,6 @@ def over_grid(
         grid_shape={name: len(values) for name, values in axes.items()},
         method="grid",
     )
-
-
-def names_of(study: Study) -> dict[str, tuple[str, ...]]:
-    """Table of a row, such as ``laws`` → the names that rows of a study may have in it."""
-    problem = study.problem
-    pattern = (problem.pattern.name,) if problem.pattern else ()
-    return {
-        "varied": tuple(study.columns),
-        "parameters": problem.parameter_set.names,
-        "reports": tuple(study.report),
-        "laws": LAWS if problem.model is tms else (),
-        "violations": (*problem.constraints, *pattern, "a0", "coefficients"),
-    }
 
 
 def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
