@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from helpers import hunt
 from hypothesis import given, settings, strategies as st
-from scipy.stats import binomtest
 
 import tmsopt
 from tmsopt.problem import ExpressionError, limit_of, with_limit
@@ -35,7 +34,6 @@ from tmsopt.studies import (
     read_csv,
     sobol,
     sobol_note,
-    wilson,
     yield_of,
 )
 
@@ -322,15 +320,15 @@ def test_column_cannot_be_changed():
         ({"seed": -1}, ["-1", "0 or more"]),
         ({"starts": 0}, ["starts", "from 1 to"]),
         ({"warm": 1}, ["warm", "true or false"]),
-        ({"report": "nu_H"}, ["'nu_H'", "a list of expressions"]),
+        ({"report": "nu_H"}, ["'nu_H'", "a list, such as"]),
         ({"report": ["nuh"]}, ["nuh", "did you mean 'nu_H'"]),
         ({"report": ["nu_H >= 1"]}, ["is a comparison"]),
         ({"method": "grdi"}, ["did you mean 'grid'"]),
-        ({"grid_shape": {"mu": 3}}, ["found 3 for 2 rows"]),
+        ({"grid_shape": {"mu": 3}}, ["'mu': 3} for 2 rows"]),
         ({"grid_shape": {"chi_H": 2}}, ["chi_H", "each column in turn: mu"]),
         (
             {"columns": {"mu": [1, 2, 1, 2], "chi_H": [1, 1, 2, 2]}, "grid_shape": {"mu": 2, "chi_H": 2}},
-            ["mu is not that of a grid", "last axis fastest"],
+            ["'chi_H': 2} for 4 rows", "last axis fastest"],
         ),
         ({"problem": "least_speed.toml"}, ["a Problem"]),
         ({"problem": replace(PROBLEM, minimize=None)}, ["nothing is asked"]),
@@ -576,7 +574,6 @@ CELLS = {
     "decimal comma": ("mu,chi_H\n1,2\n0,1,0,2\n", 3, "found 4 cells; accepted: 2"),
     "short line": ("mu,chi_H\n1\n", 2, "found 1 cells; accepted: 2"),
     "empty cell": ("mu,chi_H\n1,2\n3,\n", 3, "chi_H: an empty cell"),
-    "empty line": ("mu,chi_H\n1,2\n\n3,4\n", 3, "an empty line"),
     "a word": ("mu,chi_H\n1,two\n", 2, "chi_H: found 'two'"),
     "nan": ("mu,chi_H\nnan,2\n", 2, "mu: found 'nan'"),
     "infinite": ("mu,chi_H\n1,1e999\n", 2, "chi_H: found '1e999'"),
@@ -680,7 +677,6 @@ def test_monte_carlo_plans_from_its_problem(design):
         ({"distribution": "gauss"}, "accepted: uniform normal"),
         ({"tolerances": {"chi_b": 1.0}}, "did you mean 'chi_B'"),
         ({"tolerances": {"chi_B": -1.0}}, "greater than 0"),
-        ({"tolerances": {}}, "no tolerances"),
         ({"tolerances": {"zeta_H": 0.3}}, "not physical"),
     ],
 )
@@ -698,11 +694,9 @@ def test_a_drawn_parameter_has_no_scenario():
     [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
 )
 def test_wilson_interval_of_newcombe(count, of, low, high):
-    """Table I of R. G. Newcombe, Stat. Med. 17, 857 (1998), method 3, printed to 4 decimals; and SciPy's."""
-    assert wilson(count, of) == pytest.approx((low, high), abs=5e-5)
-    expected = binomtest(count, of).proportion_ci(method="wilson")
-    assert wilson(count, of) == pytest.approx((expected.low, expected.high), abs=1e-12)
-    assert wilson(of - count, of) == pytest.approx((1 - expected.high, 1 - expected.low), abs=1e-12)
+    """Table I of R. G. Newcombe, Stat. Med. 17, 857 (1998), method 3, printed to 4 decimals."""
+    assert Share(count, of).interval == pytest.approx((low, high), abs=5e-5)
+    assert Share(of - count, of).interval == pytest.approx((1 - high, 1 - low), abs=5e-5)
 
 
 def test_yield_counts_rows_by_what_they_are():

@@ -12,4 +12,4 @@ from .sampling import (
 from .solving import Solver as Solver, solve_row as solve_row
 from .store import Store as Store, check_same as check_same, open_store as open_store, read_store as read_store
 from .study import Study as Study, definition as definition, over_grid as over_grid
-from .summary import Share as Share, summary as summary, wilson as wilson, yield_of as yield_of
+from .summary import Share as Share, summary as summary, yield_of as yield_of

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tmsopt.errors import Fault, InputError, import_optional
 from tmsopt.files import cell, headed, netcdf_errors, write_atomic
 from tmsopt.progress import Listener, Steps, start_steps
@@ -78,7 +80,7 @@ def _csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps |
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(cell(headed(head, units.get(_bare(head), ""))) for head in rows.headers)
         for columns in _blocks(rows, steps):
-            writer.writerows(zip(*(map(_cell, column.tolist()) for column in columns.values()), strict=True))
+            writer.writerows(zip(*map(_cells, columns.values()), strict=True))
 
 
 def _bare(header: str) -> str:
@@ -88,10 +90,11 @@ def _bare(header: str) -> str:
     return re.sub(r"\.(min|max|limit)$", "", header)
 
 
-def _cell(value: Any) -> Any:
-    if isinstance(value, float):
-        return "" if math.isnan(value) else value
-    return str(value).lower() if isinstance(value, bool) else cell(value)
+def _cells(column: Any) -> list[Any]:
+    if column.dtype.kind == "f":
+        values = column.filled(np.nan)
+        return list(np.where(np.isnan(values), "", values.astype(object)))
+    return [str(value).lower() if isinstance(value, bool) else cell(value) for value in column.tolist()]
 
 
 def _parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:

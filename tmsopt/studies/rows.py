@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tmsopt.errors import short
 from tmsopt.evaluation.law_rows import LAWS
 from tmsopt.models import tms
+from tmsopt.problem.problem import Problem
 from tmsopt.problem.unit_system import unit_of
 from tmsopt.records import Table
 from tmsopt.search.solve import UNSTABLE
@@ -102,8 +103,8 @@ class Row:
             ValueError: for data that no row becomes.
         """
         try:
-            given = {f: _from_json(data[f.name], _ABSENT.get(f.name, math.nan)) for f in _FIELDS if f.name in data}
-            row = Row(**{f.name: f.type(value) for f, value in given.items()})
+            given = [(f, _from_json(data[f.name], _ABSENT.get(f.name, math.nan))) for f in _FIELDS if f.name in data]
+            row = Row(**{f.name: f.type(value) for f, value in given})
         except (AttributeError, OverflowError, TypeError) as error:
             raise ValueError(f"{error}") from error
         if row.status not in STATUSES:
@@ -198,11 +199,25 @@ def _merged(parts: Sequence[Part]) -> Part:
     }
 
 
+def _causes(problem: Problem, judged: Part) -> NDArray[Any]:
+    """Why rows are infeasible that were judged without a solver."""
+    texts, unstable = judged["cause"], np.zeros(len(judged["cause"]), dtype=bool)
+    for name, condition in problem.conditions.items():
+        unit, amounts = unit_of(problem, name), judged.get(header("violations", name), np.empty(0))
+        violated = np.flatnonzero(~np.isnan(amounts))
+        for k, amount in zip(violated.tolist(), amounts[violated].tolist(), strict=True):
+            texts[k] += f"{', ' if texts[k] else 'violated: '}{name} by {unit.show(amount, 3)}"
+        if "abscissa" in condition.names:
+            unstable[violated] |= judged["abscissa"][violated] >= 0
+    texts[unstable] += f"; {UNSTABLE}"
+    return texts
+
+
 class RowTable(Sequence[Row]):
     """Rows of a study by ascending number.
 
     What the study gives a row is not kept: its seed and what varies; of rows that were judged without a solver the
-    parameters, and why they are infeasible, too.
+    parameters too.
 
     Args:
         parts: columns of some rows each, which are taken over.
@@ -218,7 +233,8 @@ class RowTable(Sequence[Row]):
         self.numbers: NDArray[np.int64] = self._kept["number"]
         status = self._kept["status"]
         self._unsolved = (status == "failed") | (status == "quarantined")
-        self._judged = (status == "infeasible") & (self._kept["cause"] == "")
+        judged = np.flatnonzero((status == "infeasible") & (self._kept["cause"] == ""))
+        self._kept["cause"][judged] = _causes(study.problem, {head: x[judged] for head, x in self._kept.items()})
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -275,8 +291,6 @@ class RowTable(Sequence[Row]):
         match name:
             case "seed":
                 values = column_of([self.study.seed_of(number) for number in numbers.tolist()], int)
-            case "cause":
-                values = self._causes(np.arange(len(self))[at])
             case "stable":
                 ideal, realised = self._kept["abscissa"][at], self._kept["abscissa_realised"][at]
                 values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)
@@ -291,34 +305,3 @@ class RowTable(Sequence[Row]):
             case "laws" | "violations":
                 absent = np.isnan(values)
         return np.ma.array(values, mask=absent)
-
-    def _violations(self) -> dict[str, NDArray[np.float64]]:
-        """Constraint → by how much rows violate it, nan where they do not."""
-        heads = {name: header("violations", name) for name in self.study.problem.constraints}
-        return {name: self._kept[head] for name, head in heads.items() if head in self._kept}
-
-    def _causes(self, places: NDArray[np.int64]) -> NDArray[Any]:
-        """Why rows are not optimal."""
-        problem, texts, judged = self.study.problem, self._kept["cause"][places], self._judged[places]
-        unstable = np.zeros(len(places), dtype=bool)
-        for name, amounts in self._violations().items():
-            unit, violated = unit_of(problem, name), judged & ~np.isnan(amounts[places])
-            for k in np.flatnonzero(violated).tolist():
-                amount = unit.show(float(amounts[places[k]]), 3)
-                texts[k] += f"{', ' if texts[k] else 'violated: '}{name} by {amount}"
-            if "abscissa" in problem.conditions[name].names:
-                unstable |= violated & (self._kept["abscissa"][places] >= 0)
-        texts[unstable] += f"; {UNSTABLE}"
-        return texts
-
-    def causes(self) -> list[tuple[str, int]]:
-        """Why rows are not optimal, and how many there are: one text for all judged ones that violate the same."""
-        wrong = np.flatnonzero(self._kept["status"] != "optimal")
-        if not wrong.size:
-            return []
-        marks = [np.where(self._judged, -1, np.arange(len(self))), self._kept["abscissa"] >= 0]
-        marks += [np.isnan(amounts) for amounts in self._violations().values()]
-        kinds = np.unique(np.column_stack(marks)[wrong], axis=0, return_index=True, return_counts=True)
-        found = sorted(zip(wrong[kinds[1]].tolist(), kinds[2].tolist(), strict=True))
-        texts = self._causes(np.array([place for place, _ in found]))
-        return [(text, count) for text, (_, count) in zip(texts.tolist(), found, strict=True)]

@@ -168,7 +168,7 @@ def run_study(
         return _completed(asked, None, workers, scheduler, note, progress)
     start_steps(progress, "waiting for the store")
     with open_store(path_of(store, "an SQLite file"), asked, fresh=fresh) as opened:
-        for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
+        for line in opened.warnings:
             note(line)
         return _completed(asked, opened, workers, scheduler, note, progress)
 
@@ -248,10 +248,10 @@ def _completed(
                 keep(part)
                 show(len(part["number"]))
     if lacks.any():
-        rows, engine = _solved(study, set(np.flatnonzero(lacks).tolist()), workers, scheduler, note)
-        fresh, last = list[Row](), time.perf_counter()
+        left, fresh, last = set(np.flatnonzero(lacks).tolist()), list[Row](), time.perf_counter()
+        executor, engine = _engine(len(left), workers, scheduler, note)
         try:
-            with closing(rows):
+            with closing(_rows(study, left, executor, note)) as rows:
                 for row in rows:
                     if lacks[row.number]:  # a block may be stored in part
                         fresh.append(row)
@@ -267,18 +267,12 @@ def _completed(
     return Results(study, RowTable(study, parts), count - found, seconds, engine, found, about)
 
 
-def _solved(
-    study: Study, left: set[int], workers: int | None, scheduler: str | None, note: Note
-) -> tuple[Generator[Row], str]:
-    """Rows as they come, and the name of the engine."""
-    count = workers or (1 if len(left) <= _FEW else cores())
+def _engine(count: int, workers: int | None, scheduler: str | None, note: Note) -> tuple[Executor, str]:
+    """Who solves so many rows, and its name."""
+    workers = workers or (1 if count <= _FEW else cores())
     if scheduler is not None:
-        executor, engine = cluster(scheduler, note), scheduler
-    elif count == 1:
-        executor, engine = here(), "in process"
-    else:
-        executor, engine = processes(count, note), f"{count} processes"
-    return _rows(study, left, executor, note), engine
+        return cluster(scheduler, note), scheduler
+    return (here(), "in process") if workers == 1 else (processes(workers, note), f"{workers} processes")
 
 
 def _rows(study: Study, left: set[int], executor: Executor, note: Note) -> Generator[Row]:

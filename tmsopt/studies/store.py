@@ -107,13 +107,12 @@ class Store:
 
     Attributes:
         path: of the file.
-        warnings: what the user should know, one line each, such as other versions of the libraries.
-        moved: where ``fresh`` put the store that was there before.
+        warnings: what the user should know, one line each: other versions of the libraries, and where ``fresh`` put the
+            store that was there before.
     """
 
     def __init__(self, path: Path, connection: sqlite3.Connection, lock: FileLock | None = None) -> None:
         self.path, self.warnings = path, tuple[str, ...]()
-        self.moved: Path | None = None
         self._connection, self._session, self._lock = connection, 0, lock
 
     def __enter__(self) -> Self:
@@ -225,14 +224,14 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
     """
     path, schema = _examined(path)
     with explained(path), ExitStack() as undo:
-        lock, moved = FileLock(f"{path}.lock", timeout=0), None
+        lock, moved = FileLock(f"{path}.lock", timeout=0), list[str]()
         try:
             lock.acquire()
         except Timeout:
             raise refuse(path, _holder(path) if os.path.lexists(lock.lock_file) else _PLACE) from None
         undo.callback(_release, lock)
         if (fresh and schema) or (not schema and any(Path(f"{path}{ending}").exists() for ending in _COMPANIONS)):
-            moved, schema = _move_aside(path), 0
+            moved, schema = [f"moved the old store to {_move_aside(path)}"], 0
         if not schema:
             with _written(path) as new:
                 _create(new, *_described(study))
@@ -246,8 +245,7 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
         connection.execute("PRAGMA synchronous=NORMAL")  # safe from kill -9
         store, today = Store(path, connection, lock), _versions()
         earlier = [session["versions"] for session in store.sessions() if session["rows"] > 0]
-        store.warnings = tuple(dict.fromkeys(line for then in earlier for line in _changed(then, today)))
-        store.moved = moved
+        store.warnings = tuple(dict.fromkeys([line for then in earlier for line in _changed(then, today)] + moved))
         line = (_now(), os.getpid(), platform.node(), json.dumps(today))
         query = "INSERT INTO sessions (started, pid, host, versions) VALUES (?, ?, ?, ?)"
         store._session = connection.execute(query, line).lastrowid or 0
@@ -285,16 +283,12 @@ def check_same(path: Path | str, study: Study) -> None:
     if not schema:
         return
     with read_store(path) as store, explained(path):
-        about, kept = _pairs(store._connection, "study"), _pairs(store._connection, "columns")
-        asked, wanted = _described(study)
-        rows = [min(map(len, columns.values()), default=0) // 8 for columns in (kept, wanted)]
-
-        def plain(definition: str, columns: Mapping[str, bytes], count: int) -> dict[str, Any]:
-            common = {name: array("d", doubles[: 8 * min(rows)]) for name, doubles in columns.items()}
-            return {"rows": count, **from_json(definition), "columns": common}
-
-        there, here = plain(about["definition"], kept, rows[0]), plain(asked["definition"], wanted, rows[1])
-        found = list(differences(there, here, ("in the store", "in the file")))
+        there = _pairs(store._connection, "study"), _pairs(store._connection, "columns")
+        known, asked = (
+            from_json(about["definition"]) | {"columns": {name: array("d", x) for name, x in columns.items()}}
+            for about, columns in (there, _described(study))
+        )
+        found = list(differences(known, asked, ("in the store", "in the file")))
     if found:
         more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
         advice = "to keep it and start a new store, add --fresh, which moves this one aside; or give another --store"

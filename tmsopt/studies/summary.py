@@ -14,7 +14,6 @@ from tmsopt.records import Array, Table, plain
 from tmsopt.studies.rows import STATUSES, Row, RowTable, header
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-_Z = 1.959963984540054  # of the normal distribution, 97.5 % below
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,12 @@ class Share:
     @property
     def interval(self) -> tuple[float, float]:
         """Least and greatest share that the count speaks for."""
-        return wilson(self.count, self.of)
+        from scipy.stats import binomtest
+
+        if not self.of:
+            return 0.0, 1.0
+        found = binomtest(self.count, self.of).proportion_ci(method="wilson")
+        return float(found.low), float(found.high)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -156,12 +160,11 @@ def _clocked(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _causes(rows: RowTable) -> Table[int]:
-    alike: dict[str, list[tuple[str, int]]] = {}
-    for text, count in rows.causes():
-        alike.setdefault(_NUMBER.sub("#", text), []).append((text, count))
-    counted = [(same[0][0], sum(count for _, count in same)) for same in alike.values()]
-    ranked = sorted(counted, key=lambda pair: pair[1], reverse=True)
-    return Table({text if count == 1 else _AMOUNT.sub("", text): count for text, count in ranked})
+    alike: dict[str, list[str]] = {}
+    for text in rows.values("cause")[rows.values("status") != "optimal"].tolist():
+        alike.setdefault(_NUMBER.sub("#", text), []).append(text)
+    ranked = sorted(alike.values(), key=len, reverse=True)
+    return Table({texts[0] if len(texts) == 1 else _AMOUNT.sub("", texts[0]): len(texts) for texts in ranked})
 
 
 def _ends(values: Array) -> tuple[float, float, float] | None:
@@ -183,13 +186,3 @@ def yield_of(rows: RowTable) -> Yield:
 def _quantiles(abscissa: Array) -> tuple[float, ...]:
     known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa))
     return tuple(float(known[max(math.ceil(q * len(known)) - 1, 0)]) for q in QUANTILES if len(known))
-
-
-def wilson(count: int, of: int, z: float = _Z) -> tuple[float, float]:
-    """The score interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 209, 1927); 0 to 1 of none."""
-    if of == 0:
-        return 0.0, 1.0
-    share, square = count / of, z * z
-    middle = (share + square / (2 * of)) / (1 + square / of)
-    half = z / (1 + square / of) * math.sqrt(share * (1 - share) / of + square / (4 * of * of))
-    return (0.0 if count == 0 else middle - half), (1.0 if count == of else middle + half)
