@@ -1,11 +1,12 @@
 """Rows of a study for tests of its store, also in processes that load nothing else."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tmsopt.errors import InputError
 from tmsopt.problem import load
 from tmsopt.records import Table
 from tmsopt.studies import Row, Study, part_of
@@ -28,6 +29,13 @@ def row(number: int, study: Study = STUDY, **given: Any) -> Row:
 def part(*rows: Row) -> dict[str, Any]:
     """Rows as a store takes them."""
     return part_of(rows)
+
+
+def faults(call: Callable[..., Any], *given: Any, **options: Any) -> str:
+    """What is wrong with a call."""
+    with pytest.raises(InputError) as caught:
+        call(*given, **options)
+    return str(caught.value)
 
 
 def flat(row: Row) -> dict[str, Any]:

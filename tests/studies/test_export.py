@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.rows import faults
 
 from tmsopt import Problem, Progress, load, models
-from tmsopt.errors import InputError
 from tmsopt.files import headed, write_csv
 from tmsopt.records import Table
 from tmsopt.studies import FORMATS, Row, RowTable, Study, check_export, export, header, part_of
@@ -208,25 +208,19 @@ def test_no_rows_are_a_table_too(ending: str, tmp_path: Path) -> None:
         assert path.read_text().startswith("number,seed,varied.mu,status")
 
 
-def refusal(call: Callable[[], Any]) -> str:
-    with pytest.raises(InputError) as caught:
-        call()
-    return str(caught.value)
-
-
 @pytest.mark.parametrize(("ending", "module"), [("parquet", "pyarrow"), ("nc", "xarray"), ("nc", "netCDF4")])
 def test_a_missing_package_is_named(ending: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, module, None)
-    message = refusal(lambda: export(ROWS, tmp_path / f"rows.{ending}"))
+    message = faults(export, ROWS, tmp_path / f"rows.{ending}")
     assert f'{module} is not installed; pip install "tmsopt[data]"' in message
     assert list(tmp_path.iterdir()) == []
 
 
 def test_files_that_cannot_be_written(tmp_path: Path) -> None:
-    assert "accepted: a file name ending in .csv, .parquet, .nc" in refusal(lambda: export(ROWS, tmp_path / "rows.xls"))
-    assert "does not exist" in refusal(lambda: check_export(tmp_path / "no" / "rows.csv"))
+    assert "accepted: a file name ending in .csv, .parquet, .nc" in faults(export, ROWS, tmp_path / "rows.xls")
+    assert "does not exist" in faults(check_export, tmp_path / "no" / "rows.csv")
     (tmp_path / "folder.csv").mkdir()
-    assert "no regular file" in refusal(lambda: export(ROWS, tmp_path / "folder.csv"))
+    assert "no regular file" in faults(export, ROWS, tmp_path / "folder.csv")
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.rows import STUDY, part, row
+from helpers.rows import STUDY, faults, part, row
 
 from tmsopt.errors import InputError
 from tmsopt.models import tms
@@ -28,12 +28,6 @@ from tmsopt.studies import Row, RowTable, Study, check_same, open_store, read_st
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 OLD = Path(__file__).parent / "stores"
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
-
-
-def refusal(call: Callable[[], Any]) -> str:
-    with pytest.raises(InputError) as caught:
-        call()
-    return str(caught.value)
 
 
 def rows_of(path: Path, study: Study = STUDY) -> list[Row]:
@@ -119,15 +113,15 @@ def test_reading_while_another_process_writes(path: Path) -> None:
 
 def test_a_second_writer_is_refused_until_the_first_is_gone(path: Path) -> None:
     with writer(path, "hold") as (process, number):
-        message = refusal(lambda: open_store(path, STUDY))
+        message = faults(open_store, path, STUDY)
         assert f"process {number} on " in message
         assert "another --store" in message
-        refusal(lambda: open_store(path, STUDY, fresh=True))
+        faults(open_store, path, STUDY, fresh=True)
         process.kill()
         process.wait()
         with open_store(path, STUDY) as opened:
             opened.add(part(row(0)))
-            assert str(os.getpid()) in refusal(lambda: open_store(path, STUDY))  # within one process too
+            assert str(os.getpid()) in faults(open_store, path, STUDY)  # within one process too
     with open_store(path, STUDY) as opened:
         assert opened.done().tolist() == [0]
     assert [p.name for p in path.parent.iterdir()] == [path.name]  # one plain file, which can be copied
@@ -229,7 +223,7 @@ def test_the_store_of_a_changed_study_is_refused(path: Path, change: dict[str, A
     with open_store(path, SMALL) as opened:
         opened.add(part(row(0)))
     before = path.read_bytes()
-    message = refusal(lambda: open_store(path, replace(SMALL, **change)))
+    message = faults(open_store, path, replace(SMALL, **change))
     assert message.splitlines()[1] == f"  {line}"
     assert len(message.splitlines()) == (3 if "2 in the file" in line else 2)
     assert "--fresh" in message
@@ -316,19 +310,19 @@ def test_a_file_that_is_no_store_is_not_touched(path: Path, make: Callable[[Path
     before = path.read_bytes()
     calls = (lambda: read_store(path), lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True))
     for call in calls:
-        assert expected in refusal(call)
+        assert expected in faults(call)
     assert path.read_bytes() == before
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
 
 def test_places_where_no_store_can_be(tmp_path: Path) -> None:
-    assert "no regular file" in refusal(lambda: open_store(tmp_path, STUDY))
-    assert "does not exist" in refusal(lambda: open_store(tmp_path / "no" / "a.sqlite", STUDY))
-    assert "no such file" in refusal(lambda: read_store(tmp_path / "a.sqlite"))
-    assert "name" in refusal(lambda: open_store(tmp_path / ("x" * 300), STUDY))
+    assert "no regular file" in faults(open_store, tmp_path, STUDY)
+    assert "does not exist" in faults(open_store, tmp_path / "no" / "a.sqlite", STUDY)
+    assert "no such file" in faults(read_store, tmp_path / "a.sqlite")
+    assert "name" in faults(open_store, tmp_path / ("x" * 300), STUDY)
     if sys.platform == "linux":
-        assert "written" in refusal(lambda: open_store("/proc/a.sqlite", STUDY))
-        assert "no regular file" in refusal(lambda: open_store("/dev/null", STUDY))
+        assert "written" in faults(open_store, "/proc/a.sqlite", STUDY)
+        assert "no regular file" in faults(open_store, "/dev/null", STUDY)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -376,7 +370,7 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script: str, path: 
     with open_store(path, STUDY) as opened:
         opened.add(part(row(0)))
     spoil(path, script)
-    for message in (refusal(read_whole), refusal(go_on)):
+    for message in (faults(read_whole), faults(go_on)):
         assert "damaged" in message or "another study" in message
         assert "--fresh" in message
         assert len(message) < 2000
@@ -391,8 +385,8 @@ def test_a_damaged_file_is_said_to_be(path: Path) -> None:
     whole = path.read_bytes()
     for damaged in (whole[:4096] + b"\xa5" * (len(whole) - 4096), whole[: len(whole) // 2]):
         path.write_bytes(damaged)
-        assert "is damaged" in refusal(lambda: open_store(path, STUDY))
-        assert "is damaged" in refusal(lambda: rows_of(path))
+        assert "is damaged" in faults(open_store, path, STUDY)
+        assert "is damaged" in faults(rows_of, path)
         assert path.read_bytes() == damaged
     with open_store(path, STUDY, fresh=True) as opened:
         opened.add(part(row(0)))
@@ -492,5 +486,5 @@ def test_a_damaged_store_of_version_1_is_refused(path: Path) -> None:
         spoil(path, script)
         before = path.read_bytes()
         for call in (lambda: stored(STUDIES[name], path), lambda: open_store(path, STUDIES[name])):  # noqa: B023
-            assert "is damaged" in refusal(call)
+            assert "is damaged" in faults(call)
         assert path.read_bytes() == before

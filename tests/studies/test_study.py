@@ -243,25 +243,29 @@ TWO = Problem(
 """Two valleys, at Fr = 1 and 3; over mu the second overtakes the first at one half: least value 0.1 min(mu, 1 − mu)."""
 
 
-def test_a_valley_that_is_overtaken_on_the_way_is_left() -> None:
-    values = np.linspace(0.0, 1.0, 16)
-    warm = run_study(over_grid(TWO, {"mu": values.tolist()}, warm=True), workers=1).rows
-    assert sum(row.warm for row in warm) >= 10
-    for row, mu in zip(warm, values.tolist(), strict=True):
-        assert row.objective == pytest.approx(0.1 * min(mu, 1 - mu), abs=1e-12)
-    middle = [row.parameters["Fr"] for row in warm]
-    assert middle[0] == pytest.approx(1, abs=1e-6)
-    assert middle[-1] == pytest.approx(3, abs=1e-6)
+THREE = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1*(1 - mu)))"
+"""A third valley at Fr = 2, of least value 0.03, is the best from mu = 0.3 to 0.7 and nowhere else."""
 
 
-def test_a_valley_that_neither_end_knows_is_found_on_the_way_and_carried_both_ways() -> None:
-    """A third valley at Fr = 2, of least value 0.03, is the best from mu = 0.3 to 0.7 and nowhere else."""
-    third = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1*(1 - mu)))"
+@pytest.mark.parametrize(
+    ("asked", "sign", "most"),
+    [
+        ({}, 1, 1.0),
+        ({"minimize": THREE}, 1, 0.03),
+        ({"minimize": None, "maximize": f"-({TWO.minimize})"}, -1, 1.0),
+    ],
+    ids=["overtaken by the far end", "found on the way and carried both ways", "hills"],
+)
+def test_the_best_valley_is_kept(asked: dict[str, Any], sign: int, most: float) -> None:
+    """What is better follows the sense of the objective."""
     values = np.linspace(0.0, 1.0, 16).tolist()
-    warm = run_study(over_grid(replace(TWO, minimize=third), {"mu": values}, warm=True), workers=1).rows
-    assert sum(row.warm for row in warm) >= 10
-    for row, mu in zip(warm, values, strict=True):
-        assert row.objective == pytest.approx(min(0.1 * mu, 0.03, 0.1 * (1 - mu)), abs=1e-12)
+    rows = run_study(over_grid(replace(TWO, **asked), {"mu": values}, warm=True), workers=1).rows
+    assert sum(row.warm for row in rows) >= 10
+    for row, mu in zip(rows, values, strict=True):
+        assert sign * row.objective == pytest.approx(min(0.1 * mu, 0.1 * (1 - mu), most), abs=1e-12)
+    best = summary(rows).best
+    assert best is not None
+    assert best.objective == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.slow
@@ -281,19 +285,6 @@ def test_warm_starts_find_the_optima_of_cold_ones() -> None:
     assert any(row.warm for row in warm)
     for a, b in zip(warm, cold, strict=True):
         assert a.objective == pytest.approx(b.objective, rel=1e-10)
-
-
-def test_the_greatest_of_several_valleys_upside_down_is_kept() -> None:
-    """The same two valleys as hills: what is better follows the sense of the objective."""
-    hills = replace(TWO, minimize=None, maximize=f"-({TWO.minimize})")
-    values = np.linspace(0.0, 1.0, 16).tolist()
-    study = over_grid(hills, {"mu": values}, warm=True)
-    rows = run_study(study, workers=1).rows
-    for row, mu in zip(rows, values, strict=True):
-        assert row.objective == pytest.approx(-0.1 * min(mu, 1 - mu), abs=1e-12)
-    best = summary(rows).best
-    assert best is not None
-    assert best.objective == pytest.approx(0.0, abs=1e-12)
 
 
 def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch: pytest.MonkeyPatch) -> None:

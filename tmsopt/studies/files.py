@@ -94,17 +94,15 @@ def _read_vary(problem: Problem, written: "_StudyFile", faults: list[Fault]) -> 
 
 def _range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
     """A span; of a grid with the number of its points."""
-    found = list[Fault]()
-    accepted = ("min", "max", "points", "log") if method == "grid" else ("min", "max", "log")
-    for end in spec.keys() - set(accepted):
-        message = f"unknown key {short(end)} of {name}; {suggest(end, accepted)}"
+    found, needed = list[Fault](), {"min": "…", "max": "…"} | ({"points": "10"} if method == "grid" else {})
+    for end in spec.keys() - {*needed, "log"}:
+        message = f"unknown key {short(end)} of {name}; {suggest(end, (*needed, 'log'))}"
         if end == "points":
             message = "points are those of a grid; a sample has rows, under [study]"
         found.append(Fault(message, (*key, end)))
-    ends = "min = …, max = …, points = 10" if method == "grid" else "min = …, max = …"
-    for end in accepted[:-1]:
-        if end not in spec:
-            found.append(Fault(f"missing {end} of {name}; write {name} = {{ {ends} }}", key))
+    example = ", ".join(f"{end} = {value}" for end, value in needed.items())
+    missing = [end for end in needed if end not in spec]
+    found += [Fault(f"missing {end} of {name}; write {name} = {{ {example} }}", key) for end in missing]
     low, high = (_number(spec.get(end, 0.0), unit, (*key, end), found) for end in ("min", "max"))
     log, count = spec.get("log", False), spec.get("points", 2)
     if not isinstance(log, bool):
