@@ -95,7 +95,7 @@ def _read_vary(problem: Problem, written: "_StudyFile", faults: list[Fault]) -> 
 def _range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
     """A span; of a grid with the number of its points."""
     found, needed = list[Fault](), {"min": "…", "max": "…"} | ({"points": "10"} if method == "grid" else {})
-    for end in spec.keys() - {*needed, "log"}:
+    for end in (end for end in spec if end not in (*needed, "log")):
         message = f"unknown key {short(end)} of {name}; {suggest(end, (*needed, 'log'))}"
         if end == "points":
             message = "points are those of a grid; a sample has rows, under [study]"

@@ -65,8 +65,6 @@ _MEANINGS = {
     sqlite3.SQLITE_READONLY: _PLACE,
     sqlite3.SQLITE_PERM: _PLACE,
     sqlite3.SQLITE_CANTOPEN: _PLACE,
-    sqlite3.SQLITE_CORRUPT: DAMAGED,
-    sqlite3.SQLITE_TOOBIG: DAMAGED,
     sqlite3.SQLITE_NOTADB: "is no store of tmsopt; give another file",
     sqlite3.SQLITE_BUSY: f"another program kept it locked for {_PATIENCE:g} s; end that and run the same command again",
     sqlite3.SQLITE_PROTOCOL: "locks do not work on this file system; give a --store on another disk",
@@ -90,12 +88,8 @@ def explained(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except sqlite3.DatabaseError as error:
-        code = getattr(error, "sqlite_errorcode", None)
-        if code is None or "no such" in str(error):  # text that is none, a table that is gone
-            code = sqlite3.SQLITE_CORRUPT
-        if code & 0xFF not in _MEANINGS:
-            raise
-        raise refuse(path, f"{_MEANINGS[code & 0xFF]} ({error!s:.200})") from error  # it may quote the file at length
+        meaning = _MEANINGS.get(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF, DAMAGED)
+        raise refuse(path, f"{meaning} ({error!s:.200})") from error  # it may quote the file at length
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise refuse(path, f"{DAMAGED} ({error!s:.200})") from error
     except OSError as error:
@@ -230,8 +224,11 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
         except Timeout:
             raise refuse(path, _holder(path) if os.path.lexists(lock.lock_file) else _PLACE) from None
         undo.callback(_release, lock)
+        if fresh and schema:
+            with suppress(sqlite3.Error), closing(_connect(path, "rw")) as old:  # a damaged one is moved as it is
+                old.execute("PRAGMA journal_mode=DELETE")
         if (fresh and schema) or (not schema and any(Path(f"{path}{ending}").exists() for ending in _COMPANIONS)):
-            moved, schema = [f"moved the old store to {_move_aside(path)}"], 0
+            moved, schema = [f"moved the old store to {files.move_aside(path, _COMPANIONS)}"], 0
         if not schema:
             with _written(path) as new:
                 _create(new, *_described(study))
@@ -384,14 +381,6 @@ def _check_content(connection: sqlite3.Connection, path: Path) -> None:
     ((whole,),) = connection.execute("PRAGMA quick_check(1)")
     if whole != "ok":
         raise refuse(path, f"{DAMAGED} ({whole!s:.200})")
-
-
-def _move_aside(path: Path) -> Path:
-    """Move a store to ``name.1.sqlite``, or the first number that is free; the lock must be held."""
-    if path.exists():
-        with suppress(sqlite3.Error), closing(_connect(path, "rw")) as connection:  # a damaged one is moved as it is
-            connection.execute("PRAGMA journal_mode=DELETE")
-    return files.move_aside(path, _COMPANIONS)
 
 
 def _holder(path: Path) -> str:

@@ -111,8 +111,8 @@ class Study:
         Raises:
             InputError: for a row that cannot be posed, such as one with lambda_s.min above lambda_s.max.
         """
-        fixed, constraints = dict(self.problem.fixed), dict(self.problem.constraints)
-        ends = {name: list(pair) for name, pair in self.problem.free.items()}
+        problem = self.problem
+        fixed, free, constraints = dict(problem.fixed), dict(problem.free), dict(problem.constraints)
         for name, value in self.varied(row).items():
             stem, _, end = name.rpartition(".")
             if not stem:
@@ -120,10 +120,10 @@ class Study:
             elif end == "limit":
                 constraints[stem] = with_limit(constraints[stem], value)
             else:
-                ends[stem][("min", "max").index(end)] = value
-        free = {name: (low, high) for name, (low, high) in ends.items()}
-        start = {name: min(max(value, free[name][0]), free[name][1]) for name, value in self.problem.start.items()}
-        return replace(self.problem, fixed=fixed, free=free, constraints=constraints, start=start)
+                low, high = free[stem]
+                free[stem] = (value, high) if end == "min" else (low, value)
+        start = {name: min(max(value, free[name][0]), free[name][1]) for name, value in problem.start.items()}
+        return replace(problem, fixed=fixed, free=free, constraints=constraints, start=start)
 
     def seed_of(self, row: int) -> int:
         """The seed of a row's starts, by which the row can be solved alone."""
