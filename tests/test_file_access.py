@@ -15,7 +15,7 @@ from tmsopt.errors import InputError
 from tmsopt.files import from_json, write_atomic, write_csv, write_text
 from tmsopt.plots import chart_figure, save
 from tmsopt.records import Table
-from tmsopt.studies import FORMATS, Row, export
+from tmsopt.studies import FORMATS, Row, RowTable, export, part_of
 
 posix = pytest.mark.skipif(os.name != "posix", reason="devices, pipes and limits of POSIX")
 
@@ -25,7 +25,8 @@ def plane() -> Any:
     return tmsopt.chart("problems/chart.toml", points=(60, 50), boundaries=False)
 
 
-ROWS = [Row(k, k, Table({"mu": 0.1 * k}), "failed", cause=f"{k} " * 500) for k in range(100)]
+FAILED = [Row(k, 0, Table({"mu": 0.1}), "failed", cause=f"{k} " * 500) for k in range(100)]
+ROWS = RowTable(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1] * 100}), [part_of(FAILED)])
 WRITERS: dict[str, Callable[[Path, Any], None]] = {
     "a.txt": lambda path, _: write_text(path, "a line\n" * 10_000),
     "a.csv": lambda path, _: write_csv(path, [{"x": k, "y": 0.1} for k in range(10_000)], {"x": "m"}),
