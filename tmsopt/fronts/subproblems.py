@@ -12,7 +12,6 @@ from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import LIMIT
 from tmsopt.program.options import STARTS, Options
-from tmsopt.search.sample import SampleCache
 from tmsopt.search.solve import solve_any_status
 from tmsopt.search.workspace import Family
 
@@ -24,23 +23,18 @@ _WORTH = 1e-4  # gain at an end that its slack does not explain: at a smooth opt
 
 
 class Workshop:
-    """What one process has built for sub-problems, and met in solving the present one; never sent to another."""
+    """What one process has built for sub-problems; never sent to another."""
 
     def __init__(self) -> None:
-        self._known, self._families = SampleCache(), dict[Hashable, Family]()
+        self._families = dict[Hashable, Family]()
 
     def __reduce__(self) -> tuple[type["Workshop"], tuple[()]]:
         return Workshop, ()
 
-    def forget(self) -> None:
-        """Forget what was met."""
-        self._known.refined.clear()
-        self._known.leads.clear()
-
     def family(self, problem: Problem, limits: Sequence[str]) -> Family:
         """Of the sub-problems that differ in these limits alone."""
         name = problem.minimize, *limits, *problem.fixed.items()
-        return self._families.setdefault(name, Family([n + LIMIT for n in limits], self._known, name))
+        return self._families.setdefault(name, Family([n + LIMIT for n in limits]))
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,6 @@ class _Worker:
 
     def __call__(self, task: tuple[Callable[[FrontSolver, T], R], FrontSolver, T]) -> R:
         function, ask, item = task
-        self.shop.forget()
         return function(replace(ask, shop=self.shop), item)
 
 

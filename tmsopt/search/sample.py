@@ -1,14 +1,13 @@
 """A quasi-random sample of the whole box, judged by arrays and refined: where to start, and the referee of claims."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from tmsopt.algebra.sequence import golden_steps
-from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Problem
 from tmsopt.program.cube import Cube
 from tmsopt.program.judgement import Judged, evaluate
@@ -30,9 +29,7 @@ _BASINS, _DEEPEST = 64, 24  # basins that are refined, and the best of those, to
 _ROUNDS, _FEWER = (0.6, 0.3, 0.15, 0.07, 0.03, 0.01), 16
 """Steps by which those are refined, of the way to their neighbours, and designs looked at around each of them."""
 
-_SOUGHT, _SOUGHT_AGAIN, _HALF = 256, 32, 0.5  # designs from which limits are approached; beside remembered ones
-REMEMBERED = 256  # refined ones
-_NO_ROWS = np.arange(0)
+_SOUGHT = 256  # designs from which limits are approached
 NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
 _LOCAL = 40  # designs looked at around each that is refined, in each round
 
@@ -44,23 +41,6 @@ _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeri
 _STEPS, _STEPS_AFAR = 12, 4  # of Newton's method towards what violated limits allow; where all stay far away
 _STEP = 1e-7  # of the box, for differences
 _SHARES = (1.0, 0.5, 0.1, 0.01, 1e-3)  # of a step, the best of which is taken
-
-
-Leads = dict[str, list[dict[str, float]]]
-"""Designs with the roots of each pattern."""
-
-
-@dataclass
-class SampleCache:
-    """What problems that differ in their limits met, for those that come later. Its values are never changed.
-
-    Attributes:
-        refined: designs, as points of the unit cube, by what they were refined for and the box.
-        leads: designs with the roots of a pattern, by the box.
-    """
-
-    refined: dict[Hashable, Array] = field(default_factory=dict)
-    leads: dict[Hashable, Leads] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -93,39 +73,8 @@ class Sample:
         return self.refined.far_off
 
 
-@dataclass
-class Remembered:
-    """What was seen of one box, for problems that differ in the numbers of their limits alone.
-
-    Attributes:
-        known: what such problems met, here or elsewhere.
-        place, box: under which it has designs that were refined for another of them, and such as lead to a pattern.
-        drawn: the first designs, what they are with 0 for the numbers of all limits, and the constraints without those.
-    """
-
-    known: SampleCache = field(default_factory=SampleCache)
-    place: Hashable = None
-    box: Hashable = None
-    drawn: tuple[Array, Judged, tuple[str, ...]] | None = None
-
-    @property
-    def leads(self) -> Leads:
-        return self.known.leads.setdefault(self.box, {})
-
-    @property
-    def u(self) -> Array | None:
-        return self.known.refined.get(self.place)
-
-    def keep(self, u: Array) -> None:
-        """Remember designs, the latest ones."""
-        self.known.refined[self.place] = u if self.u is None else np.concatenate([u, self.u])[:REMEMBERED]
-
-
 class Sampler:
     """Looks at designs of one box, and counts them.
-
-    Args:
-        memory: of the same box under other limits.
 
     Attributes:
         scales: of each limit's excess.
@@ -133,12 +82,11 @@ class Sampler:
         drawn: the first ones, and what they are.
     """
 
-    def __init__(self, problem: Problem, seed: int, memory: Remembered | None = None) -> None:
+    def __init__(self, problem: Problem, seed: int) -> None:
         self.space, self.rng = Cube(problem), np.random.default_rng([seed, 16])
-        self.count, self.memory = 0, memory
+        self.count = 0
         self.scales = np.ones(len(problem.conditions))
-        # What is kept for others must not depend on which of them came first.
-        self._offset = np.random.default_rng(0 if memory else seed).random(self.space.size)
+        self._offset = np.random.default_rng(seed).random(self.space.size)
 
     @property
     def problem(self) -> Problem:
@@ -156,15 +104,10 @@ class Sampler:
         leaders = ranked.take(apart(ranked, _LEADERS))
         met = int(np.sum(drawn.violation == 0))
         if met < NARROW * len(drawn):
-            sought = self.look(self.memory.u) if self.memory and self.memory.u is not None else drawn.take(_NO_ROWS)
-            if np.sum(sought.violation == 0) < _LEADERS:
-                few = scattered(ranked, _SOUGHT_AGAIN if len(sought) else _SOUGHT)
-                sought = self.nearer(ranked.take(few), _HALF if len(sought) else 1.0).joined(sought)
+            sought = self.nearer(ranked.take(scattered(ranked, _SOUGHT)))
             sought = sought.take(sought.ranked)
             leaders = sought.take(apart(sought, 2 * _LEADERS))
         refined = self._with_basins(leaders, drawn) if met >= NARROW * len(drawn) else self.refined(leaders)
-        if self.memory:
-            self.memory.keep(refined.u[: len(leaders)])
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
         known = drawn.worth[np.isfinite(drawn.worth)]
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
@@ -183,26 +126,15 @@ class Sampler:
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
-        u, found = self.drawn = self.recalled(self.memory) if self.memory else self._first(self.problem)
+        u, found = self.drawn = self._first()
         self.count += len(u)
         for k, beyond in enumerate(found.beyond):
             known = np.abs(beyond[np.isfinite(beyond)])
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
         return self._standing(u, found)
 
-    def recalled(self, memory: Remembered) -> tuple[Array, Judged]:
-        """The first designs for this problem's limits, as if looked at anew, to the bit."""
-        pairs = [split_limit(text) for text in self.problem.constraints.values()]
-        texts = tuple(text for text, _ in pairs)
-        if memory.drawn is None:
-            names = self.problem.constraints
-            memory.drawn = *self._first(replace(self.problem, constraints=dict(zip(names, texts, strict=True)))), texts
-        u, found, before = memory.drawn
-        assert texts == before, f"{texts} and {before} differ in more than their limits"
-        return u, replace(found, beyond=found.beyond - np.array([number for _, number in pairs])[:, None])
-
-    def _first(self, problem: Problem) -> tuple[Array, Judged]:
-        size = self.space.size
+    def _first(self) -> tuple[Array, Judged]:
+        problem, size = self.problem, self.space.size
         cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= _QUICK else _SLOWER)
         count = max(min(_FIRST * _EACH ** min(size, _MANY), _MOST) // cost, _LEAST)
         u = (self._offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
@@ -245,11 +177,8 @@ class Sampler:
         others = found.take(np.arange(count, len(found)))
         return found.take(np.arange(count)).joined(others.take(others.ranked[:_DEEPEST]))
 
-    def nearer(self, start: Looked, share: float = 1.0) -> Looked:
-        """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way.
-
-        One that a step leaves with more than a share of its violation is moved no further.
-        """
+    def nearer(self, start: Looked) -> Looked:
+        """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way."""
         kept = start
         moving = np.isfinite(kept.violation)
         for step in range(_STEPS):
@@ -261,7 +190,7 @@ class Sampler:
             ends = self.look(tried.reshape(-1, self.space.size))
             best = np.argmin(ends.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(_SHARES)
             before, after = kept.violation[rows], ends.violation[best]
-            better, moving[rows] = after < before, after < share * before
+            better = moving[rows] = after < before
             joined = kept.joined(ends)
             places = np.arange(len(kept))
             places[rows[better]] = len(kept) + best[better]

@@ -24,7 +24,7 @@ from tmsopt.program.ipopt import Point, Run, ipopt, polisher
 from tmsopt.program.nlp import NLP, objective_unit, scale_of, units_of
 from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
-from tmsopt.search.sample import Remembered, Sample, SampleCache, Sampler
+from tmsopt.search.sample import Sample, Sampler
 
 _KEPT = 32
 """NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
@@ -43,19 +43,10 @@ class Family:
     Args:
         varied: names of the numbers that differ: fixed parameters, and ``trail.limit`` for the number that the
             constraint ``trail`` compares with. They are parameters of the NLPs; the box may differ too.
-        known: what other such problems met, which families of other objectives may share; given where all but limits
-            is the same.
-        name: under which this family has designs there.
     """
 
-    def __init__(
-        self,
-        varied: Collection[str] = (),
-        known: SampleCache | None = None,
-        name: Hashable = None,
-    ) -> None:
-        self.varied, self._known, self._name = tuple(varied), known, name
-        self._memories: OrderedDict[Hashable, Remembered] = OrderedDict()
+    def __init__(self, varied: Collection[str] = ()) -> None:
+        self.varied = tuple(varied)
         self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
         self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
         self._around: OrderedDict[Hashable, Robustness] = OrderedDict()
@@ -88,13 +79,6 @@ class Family:
             return None
         key = (tuple(parameters.items()), tuple(problem.weights.items()))
         return _kept(self._around, key, lambda: robustness_at(problem, parameters))
-
-    def memory(self, part: Problem) -> Remembered | None:
-        """What was seen of a part of the box."""
-        if (known := self._known) is None:
-            return None
-        box = tuple(part.free.items())
-        return _kept(self._memories, box, lambda: Remembered(known, (self._name, box), box))
 
     def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
         """Something made of an NLP's functions, which are kept with it lest another gets their address."""
@@ -159,7 +143,7 @@ class Workspace:
     def sampler(self) -> Sampler | None:
         """Looks at designs of this part; None where arrays cannot tell what is asked of them."""
         told = self.part.pattern is None and not self.part.asks_radius and not self.without_sample
-        return Sampler(self.part, self.options.seed, self.family.memory(self.part)) if told else None
+        return Sampler(self.part, self.options.seed) if told else None
 
     @cached_property
     def sample(self) -> Sample | None:

@@ -1,7 +1,7 @@
 """Where to start from beside a sample: designs with one root, or one pair, of full multiplicity."""
 
 from dataclasses import replace
-from itertools import chain, zip_longest
+from itertools import zip_longest
 
 from tmsopt.models.user_spectrum import full_patterns
 from tmsopt.problem.problem import degrees_of_freedom
@@ -27,7 +27,6 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
     if sampler is None or sample is None or degree == 1:
         return []
     most = HOPELESS_AFAR if sample.far_off else _LEADLESS
-    memory = work.family.memory(part)
     for pattern in full_patterns(part.model):
         asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
         asked = replace(asked, scenarios={}, tolerances={})
@@ -35,16 +34,12 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
             continue
         leading = matching(asked)
         lead, ended = ipopt(leading, work.options), list[LocalEnd]()
-        before = memory.leads.get(pattern, []) if memory else []
         turns = zip_longest(*([(seen, k) for k in range(len(seen))] for seen in (sample.boldest, sample.refined)))
-        afar = (sampler.design(seen, k) for seen, k in (turn for pair in turns for turn in pair if turn))
-        for count, design in enumerate(chain(before, afar), 1):
+        starts = (sampler.design(seen, k) for seen, k in (turn for pair in turns for turn in pair if turn))
+        for count, design in enumerate(starts, 1):
             ended.append(candidate_of(asked, leading, lead(initial_point(leading, asked, design))))
             led = any(c.feasible for c in ended)
-            enough = count >= len(before) + most and (sample.refined.out_of_reach(degree) or not led)
-            if enough or (led and count == len(before)):
+            if count >= most and (sample.refined.out_of_reach(degree) or not led):
                 break
-        if memory and len(ended) > len(before):
-            memory.leads[pattern] = [*before, *(work.design_at(c.run.x) for c in distinct(ended)[:_LEADS])]
         found += distinct(ended, found)[:_LEADS]
     return [work.design_at(c.run.x) for c in found]
