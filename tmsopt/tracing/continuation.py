@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.records import Array, Truth
-from tmsopt.tracing.solving import Rows, crossing, evaluated, rows_of
+from tmsopt.tracing.solving import MappedFunction, crossing, evaluated, rows_of
 
 _CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
 _CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
@@ -142,7 +142,7 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
         new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), origin[None])
         return new[0], tangent[0], *checks[0].tolist()
 
-    origin, ys, ts, step_from = y, [y], [t], Rows(on.advance, 1)
+    origin, ys, ts, step_from = y, [y], [t], MappedFunction(on.advance, 1)
     s, reach = step / 4, advance(y, t, 0.0)[6]
     while len(ys) < most:
         s = min(s, step * reach)

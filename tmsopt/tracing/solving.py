@@ -112,10 +112,10 @@ def evaluated(system: ca.Function, y: Array) -> tuple[Array, Array]:
 def rows_of(function: ca.Function, *arguments: Array) -> list[Array]:
     """A function of dense columns at every row of its arguments."""
     room = 1 << max(len(arguments[0]) - 1, 0).bit_length()  # few sizes, for a map costs more to make than to call
-    return Rows(function, room)(*arguments)
+    return MappedFunction(function, room)(*arguments)
 
 
-class Rows:
+class MappedFunction:
     """A function of dense columns at up to so many rows, without the cost of converting its arguments."""
 
     def __init__(self, function: ca.Function, count: int) -> None:
