@@ -207,32 +207,32 @@ def callers_of_ipopt(modules: Mapping[str, str]) -> list[str]:
 PACKAGES = sorted({m for m in SOURCES if any(other.startswith(f"{m}.") for other in SOURCES)} - {PACKAGE})
 
 
-def test_the_package_is_there() -> None:
+def test_the_package_is_there():
     """So that nothing below passes because nothing was read."""
     assert len(SOURCES) > 150
     assert {stage(m) for m in SOURCES} - {"", "__main__"} == set(FLOOR)
     assert "tmsopt.roots.numeric" in set(imports("tmsopt.roots", SOURCES))
 
 
-def test_no_import_runs_up() -> None:
+def test_no_import_runs_up():
     assert breaches(SOURCES) == []
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_a_package_has_a_face(package: str) -> None:
+def test_a_package_has_a_face(package):
     """Its docstring says in two to five lines what it is for, what goes in and comes out, and what to open first."""
     face = ast.get_docstring(ast.parse(SOURCES[package])) or ""
     assert 2 <= len([line for line in face.splitlines() if line]) <= 5, face
 
 
-def test_what_is_asked_above_is_asked_when_it_is_needed() -> None:
+def test_what_is_asked_above_is_asked_when_it_is_needed():
     """By name and inside a function, so that a result carries nobody who shows it."""
     script = "import sys, tmsopt.problem.solution, tmsopt.tracing.branch; print(*sys.modules)"
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, check=True)
     assert not {"tmsopt.display", "tmsopt.report", "tmsopt.plots", "matplotlib"} & set(ended.stdout.split())
 
 
-def test_a_class_name_has_one_meaning() -> None:
+def test_a_class_name_has_one_meaning():
     homes: dict[str, list[str]] = {}
     for module, source in SOURCES.items():
         for node in nodes(source):
@@ -241,12 +241,12 @@ def test_a_class_name_has_one_meaning() -> None:
     assert {name: found for name, found in homes.items() if len(found) > 1} == {}
 
 
-def test_no_package_has_the_name_of_a_public_function() -> None:
+def test_no_package_has_the_name_of_a_public_function():
     """A package tmsopt/solve would take the place of tmsopt.solve; some are public as packages."""
     assert set(FLOOR) & set(import_module(PACKAGE).__all__) == {"laws", "models", "plots", "report", "roots"}
 
 
-def test_tests_open_packages_by_their_faces() -> None:
+def test_tests_open_packages_by_their_faces():
     """Rooms may be rebuilt and tests stay; what replaces a part of a room names it in import_module."""
     inner = {m for m in SOURCES if m.count(".") > 1} - set(PACKAGES)
     found = []
@@ -257,16 +257,16 @@ def test_tests_open_packages_by_their_faces() -> None:
     assert found == []
 
 
-def test_laws_stand_alone() -> None:
+def test_laws_stand_alone():
     """An oracle must not share code with what it checks."""
     assert [t for t in imports("tmsopt.laws", SOURCES) if t.split(".")[0] == PACKAGE] == []
 
 
-def test_there_are_no_import_cycles() -> None:
+def test_there_are_no_import_cycles():
     assert cycles(SOURCES) == []
 
 
-def test_commands_call_the_public_functions() -> None:
+def test_commands_call_the_public_functions():
     """A command and its function are one path: commands open tmsopt, faces of packages and each other, no rooms."""
     rooms = {m for m in SOURCES if m.count(".") > 1 and stage(m) != "cli"} - set(PACKAGES)
     taken = {(m, t) for m in SOURCES if stage(m) == "cli" for t in imports(m, SOURCES) if t in rooms}
@@ -281,7 +281,7 @@ def exported(package: str, name: str) -> bool:
     return any(alias.name == name for node in listed for alias in node.names)
 
 
-def test_public_names_are_declared_once() -> None:
+def test_public_names_are_declared_once():
     """In the stub, which type checkers read and the lazy loader too."""
     stub = ast.parse((ROOT / PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
     declared = [alias.name for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names]
@@ -290,19 +290,19 @@ def test_public_names_are_declared_once() -> None:
     assert all(hasattr(import_module(PACKAGE), name) for name in declared)
 
 
-def test_nothing_prints_below_the_command_line() -> None:
+def test_nothing_prints_below_the_command_line():
     assert {m: writes(s) for m, s in SOURCES.items() if stage(m) != "cli" and writes(s)} == {}
 
 
-def test_ipopt_has_one_caller() -> None:
+def test_ipopt_has_one_caller():
     assert callers_of_ipopt(SOURCES) == ["tmsopt.program.ipopt"]
 
 
-def test_no_text_is_run_as_python() -> None:
+def test_no_text_is_run_as_python():
     assert {m: found for m, s in SOURCES.items() if (found := calls(s, "eval", "exec", "compile", "__import__"))} == {}
 
 
-def test_files_are_written_whole() -> None:
+def test_files_are_written_whole():
     """A full disk or Ctrl-C leaves the earlier file; each exception says why it may."""
     found = {place for m, s in SOURCES.items() for place in written(m, s)}
     assert found == {
@@ -321,21 +321,21 @@ def test_files_are_written_whole() -> None:
     }
 
 
-def test_pint_is_named_in_one_module_and_inside_a_function() -> None:
+def test_pint_is_named_in_one_module_and_inside_a_function():
     """Imported only when an unusual unit is written; that it is not before is tested in a fresh process in test_units."""
     assert [m for m in SOURCES if "pint" in set(imports(m, SOURCES))] == ["tmsopt.problem.units.text"]
     top = ast.parse(SOURCES["tmsopt.problem.units.text"]).body
     assert not any("pint" in ast.unparse(n) for n in top if isinstance(n, ast.Import | ast.ImportFrom))
 
 
-def test_no_formula_is_written_twice() -> None:
+def test_no_formula_is_written_twice():
     """One formula has one home: a function named after an equation of the paper appears in laws and one other place."""
     homes = [m for m, s in SOURCES.items() if "def copo(" in s]
     assert homes == ["tmsopt.laws", "tmsopt.models.bicycles.tms_equations"]
 
 
 @pytest.mark.parametrize("heavy", ["casadi", "numpy", "scipy", "matplotlib", "pint", "pydantic", "flint"])
-def test_import_and_help_are_light(heavy: str, modules_loaded: set[str]) -> None:
+def test_import_and_help_are_light(heavy, modules_loaded):
     """`tmsopt --help` answers in 0.15 s; CasADi alone takes longer to load."""
     assert PACKAGE in modules_loaded
     assert heavy not in modules_loaded
@@ -353,7 +353,7 @@ def modules_loaded(request: pytest.FixtureRequest) -> set[str]:
 
 @pytest.mark.parametrize("command", ["solve", "prove", "compare", "speeds"])
 @pytest.mark.slow
-def test_everyday_commands_load_what_they_need_alone(command: str) -> None:
+def test_everyday_commands_load_what_they_need_alone(command):
     """Half a second: pint reads unusual units, SciPy decides what few problems ask, branch and bound what is not known."""
     words = [command, "problems/ep4.toml"]
     script = f"from tmsopt.cli.commands import every; every({words!r}, standalone_mode=False)"
@@ -367,7 +367,7 @@ def test_everyday_commands_load_what_they_need_alone(command: str) -> None:
 @pytest.mark.parametrize(
     "name", ["laws", "models", "roots", "Problem", "load", "solve", "Solution", "NotSolved", "InputError"]
 )
-def test_the_public_list_is_reachable(name: str) -> None:
+def test_the_public_list_is_reachable(name):
     script = f"import tmsopt; assert {name!r} in dir(tmsopt) and {name!r} in tmsopt.__all__; tmsopt.{name}"
     subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=True)
 
@@ -397,7 +397,7 @@ SMALL = dict.fromkeys(["tmsopt", *(f"tmsopt.{name}" for name in FLOOR), "tmsopt.
         ("tmsopt.files", "from tmsopt.roots import product"),
     ],
 )
-def test_a_breach_is_seen(module: str, source: str) -> None:
+def test_a_breach_is_seen(module, source):
     assert breaches({**SMALL, module: source}) != []
 
 
@@ -412,11 +412,11 @@ def test_a_breach_is_seen(module: str, source: str) -> None:
         ("tmsopt.search.b", "from .solve import x"),
     ],
 )
-def test_what_the_floors_allow_is_no_breach(module: str, source: str) -> None:
+def test_what_the_floors_allow_is_no_breach(module, source):
     assert breaches({**SMALL, module: source}) == []
 
 
-def test_the_other_checks_see_what_they_look_for() -> None:
+def test_the_other_checks_see_what_they_look_for():
     assert cycles({"tmsopt": "", "tmsopt.a": "import tmsopt.b", "tmsopt.b": "def f():\n    from tmsopt import a"})
     assert not cycles({"tmsopt": "", "tmsopt.a": "import tmsopt.b", "tmsopt.b": ""})
     assert writes("def f():\n    print(1)") == [2]

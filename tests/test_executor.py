@@ -9,7 +9,6 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -58,7 +57,7 @@ def values(results: dict[int, Any]) -> dict[int, Any]:
 # Results
 
 
-def test_results_are_those_of_this_process(start: Start, tmp_path: Path) -> None:
+def test_results_are_those_of_this_process(start, tmp_path):
     work = Fake(tmp_path)
     with here() as one, start() as many:
         alone, shared = dict(one.map(work, range(300))), dict(many.map(work, range(300)))
@@ -68,7 +67,7 @@ def test_results_are_those_of_this_process(start: Start, tmp_path: Path) -> None
     assert os.getpid() not in {process for _, process in shared.values()}
 
 
-def test_what_a_worker_builds_stays(start: Start) -> None:
+def test_what_a_worker_builds_stays(start):
     """One function, loaded once in each worker, also from one map to the next."""
     loaded = _Counter()
     with start() as executor:
@@ -85,14 +84,14 @@ class _Counter:
         return self.calls
 
 
-def test_an_exception_is_raised_here(start: Start, tmp_path: Path) -> None:
+def test_an_exception_is_raised_here(start, tmp_path):
     with start() as executor:
         with pytest.raises(KeyError, match="7"):
             list(executor.map(Fake(tmp_path, raises=[7]), range(60)))
         assert len(list(executor.map(Fake(tmp_path), range(5)))) == 5
 
 
-def test_work_that_cannot_be_loaded_is_an_end_with_a_reason(start: Start, tmp_path: Path) -> None:
+def test_work_that_cannot_be_loaded_is_an_end_with_a_reason(start, tmp_path):
     with start() as executor, pytest.raises(EngineError, match=r"cannot load the work: ValueError.*not a number"):
         list(executor.map(Unloadable(tmp_path), range(3)))
 
@@ -101,7 +100,7 @@ def test_work_that_cannot_be_loaded_is_an_end_with_a_reason(start: Start, tmp_pa
 
 
 @pytest.mark.slow
-def test_a_crash_costs_its_item_alone(start: Start, tmp_path: Path) -> None:
+def test_a_crash_costs_its_item_alone(start, tmp_path):
     """Item 11 kills once and comes when it is tried again, item 23 kills whenever it is tried."""
     notes: list[str] = []
     with start(notes.append) as executor:
@@ -112,7 +111,7 @@ def test_a_crash_costs_its_item_alone(start: Start, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_process_tells_how_it_ended(tmp_path: Path) -> None:
+def test_a_process_tells_how_it_ended(tmp_path):
     notes: list[str] = []
     with processes(2, notes.append) as executor:
         found = dict(executor.map(Fake(tmp_path, always=[1], leaves=[2]), range(3)))
@@ -122,7 +121,7 @@ def test_a_process_tells_how_it_ended(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_kills_from_outside_cost_nothing(tmp_path: Path) -> None:
+def test_kills_from_outside_cost_nothing(tmp_path):
     """Also where a worker is killed while it writes an answer that fills the pipe."""
     chance = random.Random(0)
     with processes(2) as executor:
@@ -136,12 +135,12 @@ def test_kills_from_outside_cost_nothing(tmp_path: Path) -> None:
     assert values(found) == {n: len(str(n / 7)) * 1e5 for n in range(3000)}
 
 
-def test_no_worker_at_all_is_refused() -> None:
+def test_no_worker_at_all_is_refused():
     with pytest.raises(InputError, match="workers: 0; accepted: 1 or more"):
         processes(0)
 
 
-def test_workers_that_cannot_start_are_an_end_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_cannot_start_are_an_end_with_a_reason(monkeypatch):
     monkeypatch.setattr("tmsopt.executor._begin", os._exit)
     with processes(2) as executor, pytest.raises(EngineError, match="end before they start"):
         list(executor.map(abs, range(3)))
@@ -150,7 +149,7 @@ def test_workers_that_cannot_start_are_an_end_with_a_reason(monkeypatch: pytest.
 # Ends
 
 
-def test_nothing_is_left_when_nobody_listens(tmp_path: Path) -> None:
+def test_nothing_is_left_when_nobody_listens(tmp_path):
     with processes(2) as executor:
         results = executor.map(Fake(tmp_path, 0.01), range(10**5))
         workers = {next(results)[1][1] for _ in range(20)}
@@ -162,7 +161,7 @@ def test_nothing_is_left_when_nobody_listens(tmp_path: Path) -> None:
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 @pytest.mark.skipif(sys.platform == "win32", reason="signals to process groups")
 @pytest.mark.usefixtures("interruptible")
-def test_workers_end_with_the_program(how: signal.Signals, tmp_path: Path) -> None:
+def test_workers_end_with_the_program(how, tmp_path):
     """Ctrl-C reaches all processes of a terminal at once, kill -9 only the program; neither leaves anything."""
     program = subprocess.Popen(
         [sys.executable, works.__file__, str(tmp_path)],
@@ -197,7 +196,7 @@ def running(pid: int) -> bool:
     return bool(ended.stdout.strip()) and not ended.stdout.startswith("Z")
 
 
-def test_a_killable_process_answers_raises_and_ends() -> None:
+def test_a_killable_process_answers_raises_and_ends():
     process = Killable()
     try:
         assert process.call(abs, -3).result(timeout=60) == 3
@@ -213,7 +212,7 @@ def test_a_killable_process_answers_raises_and_ends() -> None:
 # Clusters that are refused
 
 
-def test_workers_of_two_threads_are_refused(tmp_path: Path) -> None:
+def test_workers_of_two_threads_are_refused(tmp_path):
     distributed = pytest.importorskip("distributed")
     with (
         distributed.LocalCluster(
@@ -227,21 +226,21 @@ def test_workers_of_two_threads_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("wrong", ["nowhere", "tcp://127.0.0.1:99999", "http://127.0.0.1:1"])
-def test_an_address_without_a_scheduler_is_refused(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_address_without_a_scheduler_is_refused(wrong, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("tmsopt.executor.PATIENCE", 0.5)
     with cluster(wrong) as executor, pytest.raises(InputError, match=f"no Dask scheduler answers at '{wrong}'"):
         list(executor.map(abs, range(3)))
 
 
-def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with cluster("tcp://127.0.0.1:1") as executor, pytest.raises(InputError, match=r'pip install "tmsopt\[cluster\]"'):
         list(executor.map(abs, range(3)))
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_is_lost_is_an_end_with_a_reason(tmp_path: Path) -> None:
+def test_a_scheduler_that_is_lost_is_an_end_with_a_reason(tmp_path):
     """What has come by then stands."""
     distributed = pytest.importorskip("distributed")
     started = distributed.LocalCluster(
@@ -257,5 +256,5 @@ def test_a_scheduler_that_is_lost_is_an_end_with_a_reason(tmp_path: Path) -> Non
     assert len(found) >= 5
 
 
-def test_there_is_a_core() -> None:
+def test_there_is_a_core():
     assert cores() >= 1

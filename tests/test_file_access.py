@@ -15,7 +15,7 @@ from tmsopt.errors import InputError
 from tmsopt.files import from_json, write_atomic, write_csv, write_text
 from tmsopt.plots import chart_figure, save
 from tmsopt.records import Table
-from tmsopt.studies import FORMATS, Row, export
+from tmsopt.studies import FORMATS, Row, RowTable, export, part_of
 
 posix = pytest.mark.skipif(os.name != "posix", reason="devices, pipes and limits of POSIX")
 
@@ -25,7 +25,8 @@ def plane() -> Any:
     return tmsopt.chart("problems/chart.toml", points=(60, 50), boundaries=False)
 
 
-ROWS = [Row(k, k, Table({"mu": 0.1 * k}), "failed", cause=f"{k} " * 500) for k in range(100)]
+FAILED = [Row(k, 0, Table({"mu": 0.1}), "failed", cause=f"{k} " * 500) for k in range(100)]
+ROWS = RowTable(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1] * 100}), [part_of(FAILED)])
 WRITERS: dict[str, Callable[[Path, Any], None]] = {
     "a.txt": lambda path, _: write_text(path, "a line\n" * 10_000),
     "a.csv": lambda path, _: write_csv(path, [{"x": k, "y": 0.1} for k in range(10_000)], {"x": "m"}),
@@ -51,7 +52,7 @@ def little_room() -> Iterator[None]:
 
 @posix
 @pytest.mark.parametrize("name", WRITERS)
-def test_a_full_disk_leaves_the_earlier_file(name: str, plane: Any, tmp_path: Path, little_room: None) -> None:
+def test_a_full_disk_leaves_the_earlier_file(name, plane, tmp_path, little_room):
     """One error with the name of the file; nothing else stays there, no temporary one either."""
     if name.endswith((".nc", ".parquet")):
         pytest.importorskip("netCDF4"), pytest.importorskip("pyarrow")
@@ -67,7 +68,7 @@ def test_a_full_disk_leaves_the_earlier_file(name: str, plane: Any, tmp_path: Pa
 
 @posix
 @pytest.mark.parametrize("name", [name for name in WRITERS if not name.startswith("rows")])
-def test_a_device_without_room_is_named(name: str, plane: Any, tmp_path: Path) -> None:
+def test_a_device_without_room_is_named(name, plane, tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("no such device")
     (tmp_path / name).symlink_to("/dev/full")
@@ -76,7 +77,7 @@ def test_a_device_without_room_is_named(name: str, plane: Any, tmp_path: Path) -
     assert refused.value.filename == str(tmp_path / name)
 
 
-def test_an_interruption_leaves_the_earlier_file(tmp_path: Path) -> None:
+def test_an_interruption_leaves_the_earlier_file(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("before")
 
@@ -92,7 +93,7 @@ def test_an_interruption_leaves_the_earlier_file(tmp_path: Path) -> None:
 
 
 @posix
-def test_a_pipe_gets_what_is_finished(tmp_path: Path) -> None:
+def test_a_pipe_gets_what_is_finished(tmp_path):
     """The whole text, and the pipe stays one; a link to a file stays one too, and a new file is for all to read."""
     os.mkfifo(tmp_path / "pipe")
     reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
@@ -110,7 +111,7 @@ def test_a_pipe_gets_what_is_finished(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("there", ["file", "link to nothing"])
-def test_a_new_file_takes_no_other_ones_place(there: str, tmp_path: Path) -> None:
+def test_a_new_file_takes_no_other_ones_place(there, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text("mine") if there == "file" else path.symlink_to(tmp_path / "nothing")
     with pytest.raises(FileExistsError) as refused:
@@ -120,7 +121,7 @@ def test_a_new_file_takes_no_other_ones_place(there: str, tmp_path: Path) -> Non
 
 
 @posix
-def test_links_in_a_circle_lead_nowhere(plane: Any, tmp_path: Path) -> None:
+def test_links_in_a_circle_lead_nowhere(plane, tmp_path):
     for name in ("a.npz", "a.chart"):
         (tmp_path / name).symlink_to(name)
     with pytest.raises(OSError, match=r"a\.npz"):
@@ -130,7 +131,7 @@ def test_links_in_a_circle_lead_nowhere(plane: Any, tmp_path: Path) -> None:
 
 
 @posix
-def test_what_a_folder_is_made_under_is_no_link(tmp_path: Path) -> None:
+def test_what_a_folder_is_made_under_is_no_link(tmp_path):
     kept = tmp_path / "kept"
     kept.mkdir()
     (tmp_path / ".a.chart.unfinished").symlink_to(kept)
@@ -152,12 +153,12 @@ def test_what_a_folder_is_made_under_is_no_link(tmp_path: Path) -> None:
         ("1" * 5000, "integer string conversion"),
     ],
 )
-def test_json_from_anybody_has_limits(text: str, words: str) -> None:
+def test_json_from_anybody_has_limits(text, words):
     with pytest.raises(ValueError, match=words):
         from_json(text, 40) if "40" in words else from_json(text)
 
 
-def test_json_within_the_limits_is_read() -> None:
+def test_json_within_the_limits_is_read():
     nested = json.loads("[" * 100 + "]" * 100)
     assert from_json(json.dumps(nested)) == nested
     assert from_json('{"a": [1, "x[[{", null, NaN]}')["a"][:3] == [1, "x[[{", None]

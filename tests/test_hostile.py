@@ -149,7 +149,7 @@ def answered(ask: Callable[[], object]) -> None:
 
 @FUZZ
 @given(data=st.data())
-def test_problem_files_are_read_or_refused(data: st.DataObject, tmp_path: Path) -> None:
+def test_problem_files_are_read_or_refused(data, tmp_path):
     file = tmp_path / "p.toml"
     file.write_bytes(data.draw(spoiled(data.draw(st.sampled_from(PROBLEMS)).read_text(encoding="utf-8"))))
     answered(lambda: tmsopt.load(file))
@@ -157,7 +157,7 @@ def test_problem_files_are_read_or_refused(data: st.DataObject, tmp_path: Path) 
 
 @FUZZ
 @given(data=st.data())
-def test_study_files_are_read_or_refused(data: st.DataObject, tmp_path: Path) -> None:
+def test_study_files_are_read_or_refused(data, tmp_path):
     for beside in PROBLEMS:
         shutil.copy(beside, tmp_path)
     (tmp_path / "rows.csv").write_bytes(data.draw(spoiled("mu,zeta_B\n0.1,-0.4\n0.2,-0.5\n")))
@@ -170,7 +170,7 @@ def test_study_files_are_read_or_refused(data: st.DataObject, tmp_path: Path) ->
 
 @FUZZ
 @given(data=st.data(), ending=st.sampled_from(["txt", "yml"]))
-def test_bicycle_files_are_read_or_refused(data: st.DataObject, ending: str, tmp_path: Path) -> None:
+def test_bicycle_files_are_read_or_refused(data, ending, tmp_path):
     text = BICYCLE if ending == "txt" else "values:\n  " + BICYCLE.replace(" =", ":").replace("\n", "\n  ")
     (file := tmp_path / f"b.{ending}").write_bytes(data.draw(spoiled(text)))
     answered(lambda: tmsopt.read_bicycle(file))
@@ -189,7 +189,7 @@ def test_bicycle_files_are_read_or_refused(data: st.DataObject, ending: str, tmp
     | st.sampled_from(FORMULAS),
     sense=st.sampled_from(["minimize", "maximize"]),
 )
-def test_formulas_are_computed_or_refused(text: str, sense: str) -> None:
+def test_formulas_are_computed_or_refused(text, sense):
     def ask() -> None:
         problem = tmsopt.Problem(
             model=tmsopt.models.tms,
@@ -218,7 +218,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @FUZZ
 @given(data=st.data())
-def test_charts_are_opened_or_refused(data: st.DataObject, tmp_path: Path, made: Path) -> None:
+def test_charts_are_opened_or_refused(data, tmp_path, made):
     shutil.rmtree(tmp_path / "c.chart", ignore_errors=True)
     shutil.copytree(made / "c.chart", tmp_path / "c.chart")
     file = data.draw(st.sampled_from(sorted(p for p in (tmp_path / "c.chart").rglob("*") if p.is_file())))
@@ -243,7 +243,7 @@ def test_charts_are_opened_or_refused(data: st.DataObject, tmp_path: Path, made:
 
 @FUZZ
 @given(data=st.data())
-def test_stores_are_read_or_refused(data: st.DataObject, tmp_path: Path, made: Path) -> None:
+def test_stores_are_read_or_refused(data, tmp_path, made):
     for left in tmp_path.glob("s.*"):
         left.unlink()
     shutil.copy(made / "s.toml", tmp_path)
@@ -274,7 +274,7 @@ def test_stores_are_read_or_refused(data: st.DataObject, tmp_path: Path, made: P
 
 @FUZZ
 @given(data=st.data())
-def test_the_command_ends_with_a_status_that_is_promised(data: st.DataObject, tmp_path: Path) -> None:
+def test_the_command_ends_with_a_status_that_is_promised(data, tmp_path):
     (tmp_path / "p.toml").write_bytes(data.draw(spoiled((ROOT / "problems" / "ep4.toml").read_text(encoding="utf-8"))))
     asked = st.tuples(
         st.sampled_from(["--wheelbase", "--over", "--plot", "--starts", "--certify"]),

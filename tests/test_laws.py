@@ -4,7 +4,6 @@ An EP4 or EP2 is judged by its coefficients, in exact arithmetic on the very flo
 recomputed roots: those scatter by 4e-4 around a four-fold root.
 """
 
-import ast
 import inspect
 from fractions import Fraction
 from math import comb
@@ -85,7 +84,7 @@ def ep4_defect(design: laws.EP4, mu: float, chi_H: float, zeta_B: float, zeta_H:
 # The polynomial
 
 
-def test_the_printed_coefficients_are_the_determinant() -> None:
+def test_the_printed_coefficients_are_the_determinant():
     """`copo` against det(M s^2 + V s + P)/(mu nu_H cos) from the printed matrices, at 60 digits."""
     parameters = designs(200, seed=1)
     a = laws.copo(**parameters)
@@ -97,19 +96,7 @@ def test_the_printed_coefficients_are_the_determinant() -> None:
             assert abs(float(mine - true)) <= 16 * np.finfo(float).eps * size
 
 
-def test_the_printed_coefficients_are_the_determinant_symbolically() -> None:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = SYMBOLS.values()
-    printed = [
-        -(zeta_H * T - chi_H + 1) * zeta_B**2,
-        Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
-        Fr**2 * (zeta_B - zeta_H) * zeta_B - zeta_B * (zeta_B + zeta_H) * T - (chi_H - 1) * (mu * zeta_H - zeta_B),
-        -Fr * (chi_B - chi_H) * zeta_B,
-        -zeta_B * T - mu * (chi_H - 1),
-    ]
-    assert [sympy.expand(p - e) for p, e in zip(printed, EXPRESSIONS, strict=True)] == [0] * 5
-
-
-def test_matrices_give_copo() -> None:
+def test_matrices_give_copo():
     parameters = designs(50, seed=2)
     M, V, P = laws.matrices(**parameters)
     assert M.shape == V.shape == P.shape == (50, 2, 2)
@@ -123,7 +110,7 @@ def test_matrices_give_copo() -> None:
         assert np.all(abs(determinant - value) < 1e-13 * scale)
 
 
-def test_poly4_is_the_product_of_its_roots() -> None:
+def test_poly4_is_the_product_of_its_roots():
     assert np.array_equal(laws.poly4(-1.5), [complex(c).real for c in oracles.elementary([-1.5] * 4)])
 
 
@@ -147,7 +134,7 @@ PRINTED = [
 
 
 @pytest.mark.parametrize(("value", "printed", "units"), [row[1:] for row in PRINTED], ids=[row[0] for row in PRINTED])
-def test_printed_decimals(value: float, printed: str, units: float) -> None:
+def test_printed_decimals(value, printed, units):
     unit = 10.0 ** -len(printed.partition(".")[2])
     assert abs(value - float(printed)) <= units * unit
 
@@ -164,12 +151,12 @@ def test_printed_decimals(value: float, printed: str, units: float) -> None:
     ],
     ids=["omega0", "chi_B", "tan lambda_s", "Fr_c", "Fr_EP4", "EP4 on the EP set"],
 )
-def test_printed_radicals(value: float, printed: float) -> None:
+def test_printed_radicals(value, printed):
     """Table 1, first row."""
     assert value == pytest.approx(printed, rel=1e-14)  # some ten roundings
 
 
-def test_the_benchmark_equations_are_the_general_ones() -> None:
+def test_the_benchmark_equations_are_the_general_ones():
     """`e1`, `e2`, `e3` are a2 - 6 a0, a4 - a0, p(-1) with exact decimals: they differ by rounding only."""
     rng = np.random.default_rng(3)
     Fr, mu, lambda_s = rng.uniform(0, 4, 20), rng.uniform(0, 30, 20), rng.uniform(0, 1.2, 20)
@@ -183,7 +170,7 @@ def test_the_benchmark_equations_are_the_general_ones() -> None:
     assert np.allclose(laws.e1(Fr, mu, lambda_s), ZB * laws.a2(Fr, mu, 1.02, ZB, ZH, lambda_s, -1), atol=1e-14)
 
 
-def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio() -> None:
+def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio():
     """The paper's uniqueness claim, by exact elimination; `ep4` returns both solutions."""
     Fr, mu, T = sympy.symbols("Fr mu T")
     decimal = sympy.Rational
@@ -203,18 +190,10 @@ def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio
             assert value == pytest.approx(float(solution[true].evalf(30)), rel=2e-14)
 
 
-def test_the_optimised_benchmark_to_twelve_digits() -> None:
-    """Digits beyond the paper's ten, from the exact solution of its equations (the test above)."""
-    design, other = laws.ep4(omega0=-1, zeta_B=ZB, zeta_H=ZH, chi_H=1.02)
-    values = (design.Fr, design.mu, design.lambda_s, design.chi_B)
-    assert values == pytest.approx((2.337214016650773, 20.8462670127613, 0.8514403685251676, 1.19), rel=1e-13)
-    assert other.mu < 0
-
-
 # Stability
 
 
-def test_flus_is_where_the_60_digit_determinant_vanishes() -> None:
+def test_flus_is_where_the_60_digit_determinant_vanishes():
     """Every chi_H, both signs of lambda_s; where the square is negative there is no root to find."""
     parameters = designs(60, seed=4)
     del parameters["Fr"]
@@ -229,7 +208,7 @@ def test_flus_is_where_the_60_digit_determinant_vanishes() -> None:
             assert found is None
 
 
-def test_stability_begins_at_Fr_c() -> None:
+def test_stability_begins_at_Fr_c():
     """The paper's claim, decided by 60-digit roots 1e-8 of it below and above; both classes of design."""
     parameters = designs(4000, seed=5)
     above = laws.lscf_complete(**parameters)
@@ -250,20 +229,20 @@ def judged():
     return parameters, routh
 
 
-def test_the_complete_conditions_are_exact(judged) -> None:
+def test_the_complete_conditions_are_exact(judged):
     parameters, routh = judged
     assert routh.sum() > 100
     assert np.array_equal(laws.lscf_complete(**parameters), routh)
 
 
-def test_the_printed_conditions_hold_for_positive_tilt_and_chi_H_from_1(judged) -> None:
+def test_the_printed_conditions_hold_for_positive_tilt_and_chi_H_from_1(judged):
     parameters, routh = judged
     regime = (parameters["lambda_s"] > 0) & (parameters["chi_H"] >= 1)
     assert routh[regime].sum() > 20
     assert np.array_equal(laws.lscf(**parameters).all(axis=0)[regime], routh[regime])
 
 
-def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged) -> None:
+def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged):
     """Necessary, not sufficient: a third of the designs they admit are unstable. With a1 > 0 none is."""
     parameters, routh = judged
     regime = (parameters["lambda_s"] > 0) & (parameters["chi_H"] < 1)
@@ -276,7 +255,7 @@ def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged) -> None:
     assert np.array_equal((printed & (a1 > 0))[regime], routh[regime])
 
 
-def test_the_printed_conditions_mirrored_hold_for_negative_tilt(judged) -> None:
+def test_the_printed_conditions_mirrored_hold_for_negative_tilt(judged):
     """As printed they admit no design there; with the first four and a1 reversed, just the stable ones."""
     parameters, routh = judged
     regime = parameters["lambda_s"] < 0
@@ -287,7 +266,7 @@ def test_the_printed_conditions_mirrored_hold_for_negative_tilt(judged) -> None:
     assert np.array_equal(mirrored[regime], routh[regime])
 
 
-def test_flus_is_positive_where_a0_a1_a3_a4_agree_and_chi_H_is_positive(judged) -> None:
+def test_flus_is_positive_where_a0_a1_a3_a4_agree_and_chi_H_is_positive(judged):
     parameters, _ = judged
     a = laws.copo(**parameters)
     agree = (np.abs(np.sign(a[[0, 1, 3, 4]]).sum(axis=0)) == 4) & (parameters["chi_H"] > 0)
@@ -296,7 +275,7 @@ def test_flus_is_positive_where_a0_a1_a3_a4_agree_and_chi_H_is_positive(judged) 
     assert (laws.flus(**without)[agree] > 0).all()
 
 
-def test_a_design_the_printed_conditions_wrongly_admit() -> None:
+def test_a_design_the_printed_conditions_wrongly_admit():
     """All rational: Fr_c = 1 exactly, Fr = 2, and a1 = -3/100."""
     design = {"Fr": 2.0, "mu": 5.0, "chi_B": 1.2, "chi_H": 0.9, "zeta_B": -0.5, "zeta_H": -0.4}
     assert laws.lscf(**design, lambda_s=np.arctan(0.5)).all()
@@ -308,7 +287,7 @@ def test_a_design_the_printed_conditions_wrongly_admit() -> None:
     assert at_1[1] * at_1[2] * at_1[3] - at_1[0] * at_1[3] ** 2 - at_1[1] ** 2 * at_1[4] == 0
 
 
-def test_w0_bounds_the_abscissa() -> None:
+def test_w0_bounds_the_abscissa():
     """The product of the roots is a4/a0: no abscissa lies left of `w0`, nan where that is negative."""
     parameters = designs(300, seed=7)
     bound = laws.w0(*(parameters[name] for name in ("mu", "chi_H", "zeta_B", "zeta_H", "lambda_s")))
@@ -325,7 +304,7 @@ def test_w0_bounds_the_abscissa() -> None:
 
 @repeatable
 @given(omega0=st.floats(-5, -0.2), zeta_B=depth, zeta_H=depth, chi_H=st.floats(0.2, 3))
-def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H) -> None:
+def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H):
     assume(abs(chi_H - 1) > 1e-6 and abs(zeta_B - zeta_H) > 1e-6)
     first, second = laws.ep4(omega0, zeta_B, zeta_H, chi_H)
     for design in (first, second):
@@ -347,7 +326,7 @@ def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H) 
         (-1, -0.2, -0.4, 0.9, -1),
     ],
 )
-def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign) -> None:
+def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign):
     """chi_H on either side of 1, either sign of lambda_s: a stable bicycle with mu > 0 and just this EP4."""
     design, other = laws.ep4(omega0, zeta_B, zeta_H, chi_H)
     assert design.mu > 0 > other.mu
@@ -364,7 +343,7 @@ def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign) -> No
     assert laws.w0(design.mu, **geometry) == pytest.approx(omega0, rel=1e-12)
 
 
-def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists() -> None:
+def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists():
     for omega0, zeta_B, zeta_H, chi_H in ((-1, ZB, ZH, 1), (laws.w01(ZB, ZH), ZB, ZH, 1), (-1, ZB, ZB, 1.02)):
         for design in laws.ep4(omega0, zeta_B, zeta_H, chi_H):
             assert np.isnan([design.Fr, design.mu, design.tan_lambda_s]).all()
@@ -372,21 +351,12 @@ def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists() -> None:
     assert np.isnan(laws.ep4(-1, ZB, 0.5, 0.5)[0].Fr)
 
 
-def test_ep4_tends_to_the_compact_form() -> None:
-    """At omega0 = `w01` the first branch reaches the chi_H = 1 design, at a rate linear in chi_H - 1."""
-    limit = laws.ep4_chi_H_1(ZB, ZH)
-    for step in (1e-3, -1e-3, 1e-6, -1e-6):
-        near = laws.ep4(laws.w01(ZB, ZH), ZB, ZH, 1 + step)[0]
-        for value, true in zip(near[:4], limit[:4], strict=True):
-            assert abs(value - true) < 10 * abs(step)
-
-
 # EP4, chi_H = 1
 
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth, mu=st.floats(0.01, 30))
-def test_compact_ep4_is_a_fourfold_root_for_any_mass_ratio(zeta_B, zeta_H, mu) -> None:
+def test_compact_ep4_is_a_fourfold_root_for_any_mass_ratio(zeta_B, zeta_H, mu):
     assume(abs(zeta_B - zeta_H) > 1e-6)
     design = laws.ep4_chi_H_1(zeta_B, zeta_H)
     assert ep4_defect(design, mu, 1.0, zeta_B, zeta_H) < 1e-14
@@ -397,7 +367,7 @@ def test_compact_ep4_is_a_fourfold_root_for_any_mass_ratio(zeta_B, zeta_H, mu) -
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth)
-def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H) -> None:
+def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H):
     assume(abs(zeta_B / zeta_H - 1) > 1e-2)
     true, spurious = laws.frep4(zeta_B, zeta_H)
     design = laws.ep4_chi_H_1(zeta_B, zeta_H)
@@ -414,7 +384,7 @@ def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H) -> None:
     assert ep4_defect(design._replace(Fr=spurious), 0.1, 1.0, zeta_B, zeta_H) > 1e-4
 
 
-def test_compact_ep4_needs_unequal_heights() -> None:
+def test_compact_ep4_needs_unequal_heights():
     design = laws.ep4_chi_H_1(ZB, ZB)
     assert np.isnan([design.Fr, design.tan_lambda_s]).all()
 
@@ -424,7 +394,7 @@ def test_compact_ep4_needs_unequal_heights() -> None:
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth, chi_B=st.floats(0.2, 5), T=tangent, mu=st.floats(0.01, 30))
-def test_Frc1_is_flus(zeta_B, zeta_H, chi_B, T, mu) -> None:
+def test_Frc1_is_flus(zeta_B, zeta_H, chi_B, T, mu):
     assume(abs(chi_B - 1) > 1e-3 and abs(zeta_B - zeta_H * chi_B) > 1e-3 and abs(zeta_B - zeta_H) > 1e-3)
     lambda_s = np.arctan(T)
     general = laws.flus(mu, chi_B, 1, zeta_B, zeta_H, lambda_s)
@@ -433,7 +403,7 @@ def test_Frc1_is_flus(zeta_B, zeta_H, chi_B, T, mu) -> None:
 
 @repeatable
 @given(zeta_B=depth, ratio=st.floats(0.05, 0.95), T=tangent)
-def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T) -> None:
+def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T):
     zeta_H, lambda_s = zeta_B * ratio, np.arctan(T)
     least = laws.frm(zeta_B, zeta_H, lambda_s)
     best = laws.chibm(zeta_B, zeta_H)
@@ -452,7 +422,7 @@ def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T) -> None:
 
 @repeatable
 @given(zeta_B=depth, zeta_H=depth, excess=st.floats(1.1, 30))
-def test_epset_is_a_squared_quadratic(zeta_B, zeta_H, excess) -> None:
+def test_epset_is_a_squared_quadratic(zeta_B, zeta_H, excess):
     """p/a0 = (s^2 + b s + c)^2, stable; real roots below the EP4 tilt, complex above."""
     assume(abs(zeta_B / zeta_H - 1) > 1e-2)
     r, h = np.sqrt(zeta_B / zeta_H), np.sqrt(zeta_B * zeta_H)
@@ -473,7 +443,7 @@ def test_epset_is_a_squared_quadratic(zeta_B, zeta_H, excess) -> None:
         assert (b**2 > 4 * c) == (tilt_ratio < 1)
 
 
-def test_epset_ends_at_its_pole() -> None:
+def test_epset_ends_at_its_pole():
     """No EP set below |tan| = (r - 1)/(r + 1) r/(4 h), and none for the wrong sign of lambda_s."""
     r, h = np.sqrt(2), np.sqrt(0.08)
     pole = (r - 1) / (r + 1) * r / (4 * h)
@@ -482,7 +452,7 @@ def test_epset_ends_at_its_pole() -> None:
 
 
 @pytest.mark.parametrize(("zeta_B", "zeta_H"), [(-0.4, -0.2), (-1.3, -0.3), (-0.2, -0.4)])
-def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H) -> None:
+def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H):
     """Below the bound some speed makes all roots real and negative, above none does; certified roots."""
     chi_B, bound = laws.dp(zeta_B, zeta_H)
     design = laws.ep4_chi_H_1(zeta_B, zeta_H)
@@ -503,7 +473,7 @@ def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H) -> None:
     assert not heavily_damped(-0.5 * bound)
 
 
-def test_complex_roots_run_on_a_circle() -> None:
+def test_complex_roots_run_on_a_circle():
     """For chi_B = `chib1` every complex root below the EP set has modulus |omega0| (text)."""
     lambda_s, chi_B, radius = EP4_TILT + 0.8, laws.chib1(ZB, ZH), -laws.w01(ZB, ZH)
     for Fr in (2.0, laws.frm(ZB, ZH, lambda_s), 4.0):
@@ -526,7 +496,7 @@ def test_complex_roots_run_on_a_circle() -> None:
     T=st.floats(-5, 5),
     mu=st.floats(0.1, 10),
 )
-def test_the_dual_has_the_same_spectrum(Fr, chi_B, zeta_B, zeta_H, T, mu) -> None:
+def test_the_dual_has_the_same_spectrum(Fr, chi_B, zeta_B, zeta_H, T, mu):
     assume(abs(T) > 1e-3)
     design = {"Fr": Fr, "chi_B": chi_B, "zeta_B": zeta_B, "zeta_H": zeta_H, "lambda_s": np.arctan(T)}
     dual = laws.dual(**design)
@@ -540,7 +510,7 @@ def test_the_dual_has_the_same_spectrum(Fr, chi_B, zeta_B, zeta_H, T, mu) -> Non
     assert [again[name] for name in design] == pytest.approx(list(design.values()), rel=1e-12)
 
 
-def test_the_dual_of_EP4_is_EP4() -> None:
+def test_the_dual_of_EP4_is_EP4():
     """It maps the lambda_s > 0 class onto the lambda_s < 0 class."""
     ours, theirs = laws.ep4_chi_H_1(ZB, ZH), laws.ep4_chi_H_1(ZH, ZB)
     dual = laws.dual(ours.Fr, ours.chi_B, ZB, ZH, ours.lambda_s)
@@ -575,7 +545,7 @@ def _leaves(answer):
 
 
 @pytest.mark.parametrize(("law", "arguments"), list(_calls()))
-def test_every_law_broadcasts(law, arguments) -> None:
+def test_every_law_broadcasts(law, arguments):
     """An array for one argument gives, entry by entry, what the floats give; lists are taken too."""
     plain = _leaves(law(**arguments))
     for leaf in plain:
@@ -594,7 +564,7 @@ def test_every_law_broadcasts(law, arguments) -> None:
         assert np.array_equal(np.squeeze(leaf), part, equal_nan=True)
 
 
-def test_poles_are_silent() -> None:
+def test_poles_are_silent():
     """Division by zero and roots of negative numbers answer inf and nan; any warning is an error here."""
     assert np.isinf(laws.Frc1(1, ZB, ZH, 0.3))
     assert not np.isfinite(laws.flus(0.1, 1.02, 1.02, ZB, ZH, 0.3))
@@ -605,17 +575,9 @@ def test_poles_are_silent() -> None:
     assert not laws.lscf(1, 0.1, 0.5, 1, ZB, ZH, 0.3)[4]
 
 
-def test_every_label_is_a_law() -> None:
+def test_every_label_is_a_law():
     for label in laws.LABELS:
         assert hasattr(laws, {"4poly": "poly4"}.get(label, label))
-
-
-def test_laws_stand_alone() -> None:
-    """An oracle shares no code with what it checks."""
-    tree = ast.parse(inspect.getsource(laws))
-    imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert imported == {"numpy", "numpy.typing", "functools", "typing", "collections.abc"}
 
 
 # The oracles themselves
@@ -625,27 +587,6 @@ def _fraction(number) -> Fraction:
     """An mpf as it is stored, a dyadic rational."""
     sign, mantissa, exponent, _ = number._mpf_
     return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent
-
-
-def test_the_oracles_agree_with_each_other() -> None:
-    """mpmath with FLINT's balls, roots with coefficients, Routh with roots, Sylvester with SymPy."""
-    rng = np.random.default_rng(9)
-    s = sympy.Symbol("s")
-    verdicts = []
-    for degree in (1, 2, 3, 4, 4, 4, 5, 6) * 2:
-        a = [int(c) for c in rng.integers(1, 30, degree + 1)]
-        a = a if rng.uniform() < 0.7 else [-c for c in a]
-        roots = oracles.roots_60(a)
-        certified = [root for root, count in oracles.certified_roots(a) for _ in range(count)]
-        for root in roots:
-            assert min(abs(root - other) for other in certified) < mp.mpf(10) ** -55
-        assert all(abs(c * a[0] - d) < 1e-55 for c, d in zip(oracles.elementary(roots), a, strict=True))
-        verdicts.append(oracles.routh_exact(a))
-        assert verdicts[-1] == oracles.is_stable_60(a)
-        if degree > 1:
-            true = sympy.discriminant(sympy.Poly(a, s))
-            assert oracles.discriminant_exact(a) == Fraction(int(true))
-    assert {True, False} == set(verdicts)
 
 
 @pytest.mark.parametrize(
@@ -659,20 +600,9 @@ def test_the_oracles_agree_with_each_other() -> None:
     ],
     ids=["EP4", "double imaginary pair", "EP3 with a0 < 0", "zeros and a triple", "on the axis"],
 )
-def test_the_oracles_on_multiple_roots(coefficients, structure, stable) -> None:
+def test_the_oracles_on_multiple_roots(coefficients, structure, stable):
     assert oracles.exact_multiplicities(coefficients) == structure
     assert oracles.routh_exact(coefficients) is stable
     rebuilt = oracles.elementary(oracles.roots_60(coefficients))
     assert all(abs(c * coefficients[0] - d) < 1e-55 for c, d in zip(rebuilt, coefficients, strict=True))
     assert (oracles.discriminant_exact(coefficients) == 0) == (structure[-1][0] > 1)
-
-
-def test_the_exact_polynomial_is_the_60_digit_one() -> None:
-    parameters = designs(20, seed=10)
-    for i in range(20):
-        design = one(parameters, i)
-        with mp.workdps(60):
-            T = _fraction(mp.tan(mp.mpf(design["lambda_s"])))
-        rational = oracles.polynomial_exact(*list(design.values())[:-1], T)
-        for a, b in zip(rational, oracles.polynomial_60(**design), strict=True):
-            assert abs(a - _fraction(b)) < Fraction(1, 10**55)

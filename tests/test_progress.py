@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -64,9 +63,7 @@ def _space() -> tmsopt.Problem:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("what", "verb"), VERBS, ids=[f"{k}-{what}" for k, (what, _) in enumerate(VERBS)])
-def test_every_verb_tells_the_same_content(
-    what: str, verb: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_verb_tells_the_same_content(what, verb, monkeypatch):
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
     told: list[tmsopt.Progress] = []
     verb(progress=told.append)
@@ -85,18 +82,18 @@ def test_every_verb_tells_the_same_content(
 
 
 @pytest.mark.parametrize(("what", "verb"), VERBS, ids=[f"{k}-{what}" for k, (what, _) in enumerate(VERBS)])
-def test_what_cannot_be_called_is_refused(what: str, verb: Callable[..., Any]) -> None:
+def test_what_cannot_be_called_is_refused(what, verb):
     with pytest.raises(tmsopt.InputError, match="progress: found 3; accepted: a function"):
         verb(progress=3)
 
 
-def test_a_page_is_told_of(tmp_path: Path) -> None:
+def test_a_page_is_told_of(tmp_path):
     told: list[tmsopt.Progress] = []
     tmsopt.save_report(optimum(), tmp_path / "design.html", progress=told.append)
     assert "writing the page" in {t.what for t in told}
 
 
-def test_an_infeasible_problem_tells_of_its_limits() -> None:
+def test_an_infeasible_problem_tells_of_its_limits():
     told: list[tmsopt.Progress] = []
     asked = tmsopt.Problem(
         model=EP4.model, fixed=EP4.fixed, free=EP4.free, constraints={"no": "abscissa <= -100"}, minimize="Fr"
@@ -122,7 +119,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return made
 
 
-def test_time_left_is_that_of_the_rate_since_the_first_count(clock: Clock) -> None:
+def test_time_left_is_that_of_the_rate_since_the_first_count(clock):
     """40 rows of 100 were there; 20 more took 4 s, so the other 40 take 8."""
     told: list[tmsopt.Progress] = []
     steps = start_steps(told.append, "solving rows", "row")
@@ -150,9 +147,7 @@ def test_time_left_is_that_of_the_rate_since_the_first_count(clock: Clock) -> No
         (0, 0, 5.0, None),
     ],
 )
-def test_time_left_is_told_once_the_rate_is_one(
-    clock: Clock, steps: int, most: int, seconds: float, left: float | None
-) -> None:
+def test_time_left_is_told_once_the_rate_is_one(clock, steps, most, seconds, left):
     told: list[tmsopt.Progress] = []
     counts = start_steps(told.append, "solving rows", "row")
     assert counts is not None
@@ -162,7 +157,7 @@ def test_time_left_is_told_once_the_rate_is_one(
     assert told[-1].left == pytest.approx(math.nan if left is None else left, nan_ok=True)
 
 
-def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock: Clock) -> None:
+def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock):
     told: list[tmsopt.Progress] = []
     steps = start_steps(told.append, "bounding the optimum", "s")
     assert steps is not None
@@ -170,7 +165,7 @@ def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock: Clock) ->
     assert told[-1].left == 58.0
 
 
-def test_nobody_is_told_oftener_than_he_can_read(clock: Clock) -> None:
+def test_nobody_is_told_oftener_than_he_can_read(clock):
     """A million rows in a second, and a callback every 50 ms; the first and the last are told whenever they are."""
     told: list[tmsopt.Progress] = []
     steps = start_steps(told.append, "solving rows", "row")
@@ -182,7 +177,7 @@ def test_nobody_is_told_oftener_than_he_can_read(clock: Clock) -> None:
     assert 15 <= len(told) <= 25
 
 
-def test_beginnings_first_counts_and_ends_are_told_at_once(clock: Clock) -> None:
+def test_beginnings_first_counts_and_ends_are_told_at_once(clock):
     """Three pieces of work in no time: nine records, whatever else is counted."""
     told: list[tmsopt.Progress] = []
     steps = Steps(told.append)
@@ -193,7 +188,7 @@ def test_beginnings_first_counts_and_ends_are_told_at_once(clock: Clock) -> None
     assert [t.done for t in told] == [0, 1, 48] * 3
 
 
-def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock: Clock) -> None:
+def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock):
     """A hundred steps of 0.1 s, and a listener that takes as long: it is left alone for nine times that."""
     called: list[float] = []
 
@@ -209,7 +204,7 @@ def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock: Clock) -> None
     assert 5 <= len(called) <= 14
 
 
-def test_work_that_is_begun_anew_goes_on_counting(clock: Clock) -> None:
+def test_work_that_is_begun_anew_goes_on_counting(clock):
     """12 of 64 starts on one side of the box, then 3 of 64 on the other; and after another piece of work, 5 of 8."""
     told: list[tmsopt.Progress] = []
     steps = Steps(told.append)

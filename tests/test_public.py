@@ -45,7 +45,7 @@ DRAWN: dict[str, Callable[[Any], Any]] = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("verb", ASKED)
-def test_a_design_may_be_given_as_problem_file_or_solution(verb: str) -> None:
+def test_a_design_may_be_given_as_problem_file_or_solution(verb):
     if verb == "certify":
         pytest.importorskip("pyscipopt")
     asked = ASKED[verb]
@@ -56,13 +56,13 @@ def test_a_design_may_be_given_as_problem_file_or_solution(verb: str) -> None:
 
 
 @pytest.mark.parametrize("verb", DRAWN)
-def test_a_box_may_be_given_as_problem_or_file(verb: str) -> None:
+def test_a_box_may_be_given_as_problem_or_file(verb):
     assert DRAWN[verb](PLANE) == DRAWN[verb](tmsopt.load(PLANE))
 
 
 @pytest.mark.parametrize("verb", [*ASKED, *DRAWN])
 @pytest.mark.parametrize("wrong", [3, None, ["Fr"], b"problems/ep4.toml"], ids=repr)
-def test_anything_else_is_refused_in_words(verb: str, wrong: object) -> None:
+def test_anything_else_is_refused_in_words(verb, wrong):
     if verb == "certify":
         pytest.importorskip("pyscipopt")
     with pytest.raises(tmsopt.InputError, match="accepted: a Problem, the path of a problem file, or a Solution"):
@@ -71,13 +71,13 @@ def test_anything_else_is_refused_in_words(verb: str, wrong: object) -> None:
 
 @pytest.mark.parametrize("reader", ["load", "load_study", "open_chart", "read_bicycle"])
 @pytest.mark.parametrize("wrong", [3, None, ["Fr"], b"problems/ep4.toml"], ids=repr)
-def test_what_is_no_path_is_refused_in_words(reader: str, wrong: object) -> None:
+def test_what_is_no_path_is_refused_in_words(reader, wrong):
     with pytest.raises(tmsopt.InputError, match="accepted: the path of a"):
         getattr(tmsopt, reader)(wrong)
 
 
 @pytest.mark.parametrize("wrong", [5, b"x"], ids=repr)
-def test_what_is_no_file_to_write_is_refused_in_words(wrong: Any) -> None:
+def test_what_is_no_file_to_write_is_refused_in_words(wrong):
     study = tmsopt.over_grid(tmsopt.load(EP4), {"mu": [0.1]})
     calls: list[Callable[[], Any]] = [
         lambda: tmsopt.run_study(study, wrong),
@@ -93,19 +93,19 @@ def test_what_is_no_file_to_write_is_refused_in_words(wrong: Any) -> None:
     ("name", "wrong"),
     [("starts", x) for x in (0, "5", 2.5, True, 10**30)] + [("seed", -1), ("seed", "a"), ("near", 5)],
 )
-def test_an_option_says_what_it_accepts(name: str, wrong: object) -> None:
+def test_an_option_says_what_it_accepts(name, wrong):
     with pytest.raises(tmsopt.InputError, match=f"{name}: found .*accepted: a"):
         tmsopt.solve(EP4, **{name: wrong})  # type: ignore[arg-type]
 
 
-def test_a_near_design_may_be_given_in_part() -> None:
+def test_a_near_design_may_be_given_in_part():
     assert tmsopt.solve(EP4, near={"Fr": 2.0}).structure == "EP4"
     with pytest.raises(tmsopt.InputError, match=r"near: unknown parameter 'bogus'(.|\n)*near\.Fr: found nan"):
         tmsopt.solve(EP4, near={"bogus": 1.0, "Fr": math.nan})
 
 
 @pytest.mark.slow
-def test_whole_numbers_of_numpy_are_whole_numbers(tmp_path: Path) -> None:
+def test_whole_numbers_of_numpy_are_whole_numbers(tmp_path):
     assert tmsopt.solve(EP4, starts=np.int64(8), seed=np.int32(3)).structure == "EP4"
     assert tmsopt.prove(EP4, digits=np.int64(20)).proved
     study = replace(tmsopt.over_grid(tmsopt.load(EP4), {"mu": [0.1]}), starts=np.int64(8))
@@ -113,12 +113,12 @@ def test_whole_numbers_of_numpy_are_whole_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["ep4", "physical_machine", "chocolate"])
-def test_a_solution_can_be_pickled(name: str) -> None:
+def test_a_solution_can_be_pickled(name):
     design = tmsopt.solve(PROBLEMS / f"{name}.toml")
     assert repr(pickle.loads(pickle.dumps(design))) == repr(design)  # a growth time that is nan equals nothing
 
 
-def test_a_complete_store_is_read_without_its_engine(tmp_path: Path) -> None:
+def test_a_complete_store_is_read_without_its_engine(tmp_path):
     study = tmsopt.over_grid(tmsopt.load(EP4), {"mu": [0.1, 0.2]})
     rows = tmsopt.run_study(study, tmp_path / "s.sqlite", workers=1).rows
     again = tmsopt.run_study(study, tmp_path / "s.sqlite", scheduler="tcp://127.0.0.1:1")
@@ -128,7 +128,7 @@ def test_a_complete_store_is_read_without_its_engine(tmp_path: Path) -> None:
         stored(study, tmp_path / "none.sqlite")
 
 
-def test_parameters_of_a_design_must_be_numbers_and_all_there() -> None:
+def test_parameters_of_a_design_must_be_numbers_and_all_there():
     problem = tmsopt.load(EP4)
     with pytest.raises(tmsopt.InputError, match=r"chi_B: missing(.|\n)*lambda_s: found 'steep'; accepted: a finite"):
         tmsopt.speeds({"Fr": 1.0, "lambda_s": "steep"}, problem=problem)  # type: ignore[dict-item]
@@ -142,7 +142,7 @@ def test_parameters_of_a_design_must_be_numbers_and_all_there() -> None:
     assert tmsopt.speeds(own, problem=EP4).found == tmsopt.speeds(doubles, problem=problem).found  # type: ignore[arg-type]
 
 
-def test_a_file_must_ask_where_the_verb_needs_a_question() -> None:
+def test_a_file_must_ask_where_the_verb_needs_a_question():
     """At the line of the file where there is one."""
     assert not tmsopt.load(PLANE).minimize
     with pytest.raises(tmsopt.InputError, match=r"chart\.toml:\d+: .*nothing is asked"):
@@ -153,7 +153,7 @@ def test_a_file_must_ask_where_the_verb_needs_a_question() -> None:
         tmsopt.prove(PROBLEMS / "pareto.toml")
 
 
-def test_what_arguments_and_results_are_made_of_is_public() -> None:
+def test_what_arguments_and_results_are_made_of_is_public():
     with pytest.raises(tmsopt.InputError) as caught:
         tmsopt.load(PROBLEMS / "nothing.toml")
     assert all(isinstance(fault, tmsopt.Fault) for fault in caught.value.faults)
@@ -211,13 +211,13 @@ def posed(**changed: Any) -> tmsopt.Problem:
 
 
 @pytest.mark.parametrize(("call", "said"), WRONG, ids=[said for _, said in WRONG])
-def test_a_wrong_type_is_answered_in_words(call: Callable[[], Any], said: str) -> None:
+def test_a_wrong_type_is_answered_in_words(call, said):
     with pytest.raises(tmsopt.InputError, match=said):
         call()
 
 
 @pytest.mark.parametrize("verb", ["solve", "prove", "compare", "solve_all", "pareto"])
-def test_the_options_of_a_verb_are_in_its_signature(verb: str) -> None:
+def test_the_options_of_a_verb_are_in_its_signature(verb):
     """With their defaults: what `help` and the completion of a notebook read."""
     parameters = inspect.signature(getattr(tmsopt, verb)).parameters
     assert {"starts", "seed", "linear_solver", "progress"} <= set(parameters)
@@ -225,18 +225,18 @@ def test_the_options_of_a_verb_are_in_its_signature(verb: str) -> None:
     assert inspect.signature(tmsopt.solve).parameters["stability"].default == 5
 
 
-def test_help_begins_with_the_verbs() -> None:
+def test_help_begins_with_the_verbs():
     verbs = re.findall(r"^    (\w+)  .*tmsopt\.(\w+)\(", tmsopt.__doc__ or "", re.MULTILINE)
     assert len(verbs) == 8
     assert all(name == called and callable(getattr(tmsopt, name)) for name, called in verbs)
 
 
-def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+def test_a_name_that_is_not_there_is_an_attribute_error():
     with pytest.raises(AttributeError, match="solves"):
         _ = tmsopt.solves  # type: ignore[attr-defined]
 
 
-def test_names_are_functions_whatever_was_imported_before() -> None:
+def test_names_are_functions_whatever_was_imported_before():
     """`tmsopt.search.solve` is a room and a function; the public name is the function, in any order of imports."""
     script = (
         "import tmsopt.search.solve, tmsopt.charts.chart; import tmsopt; assert callable(tmsopt.solve); tmsopt.chart"
@@ -245,7 +245,7 @@ def test_names_are_functions_whatever_was_imported_before() -> None:
 
 
 @pytest.mark.slow
-def test_a_study_may_be_given_by_its_file(tmp_path: Path) -> None:
+def test_a_study_may_be_given_by_its_file(tmp_path):
     file = tmp_path / "two.toml"
     file.write_text(f'problem = "{EP4}"\n[vary]\nmu = [0.1, 0.2]\n')
     results = tmsopt.run_study(file, workers=1)

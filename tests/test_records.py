@@ -40,7 +40,7 @@ class Said:
 OUTER = Outer("x", Inner(-math.inf, (1 / 3, 2 + 1j / 3)), Table({"b": math.nan, "a": 2.0}), np.array([1.0, np.inf]))
 
 
-def test_fields_stand_in_their_order_and_what_is_not_finite_is_none() -> None:
+def test_fields_stand_in_their_order_and_what_is_not_finite_is_none():
     assert json.dumps(plain(OUTER), allow_nan=False) == json.dumps(
         {
             "name": "x",
@@ -52,15 +52,15 @@ def test_fields_stand_in_their_order_and_what_is_not_finite_is_none() -> None:
     )
 
 
-def test_names_choose_attributes_and_their_order() -> None:
+def test_names_choose_attributes_and_their_order():
     assert list(plain(OUTER, "size name").items()) == [("size", 2.0), ("name", "x")]
 
 
-def test_digits_reach_the_numbers_inside() -> None:
+def test_digits_reach_the_numbers_inside():
     assert plain(OUTER, "inner", digits=3) == {"inner": {"re": None, "pair": [0.333, {"re": 2.0, "im": 0.333}]}}
 
 
-def test_a_record_inside_is_written_as_it_says() -> None:
+def test_a_record_inside_is_written_as_it_says():
     assert plain(
         {"said": Said(1.0), "flags": (True, None), "column": Column([1, math.nan]), "truth": np.bool_(True)}
     ) == {

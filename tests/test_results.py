@@ -153,7 +153,7 @@ class Page(HTMLParser):
 
 
 @pytest.mark.slow
-def test_every_result_is_here() -> None:
+def test_every_result_is_here():
     """Every public class that shows itself, and no writer without a class; an Explorer is a page already."""
     shown = {n for n in tmsopt.__all__ if inspect.isclass(c := getattr(tmsopt, n)) and hasattr(c, "_repr_html_")}
     shown -= {"Explorer"}
@@ -161,7 +161,7 @@ def test_every_result_is_here() -> None:
 
 
 @each
-def test_its_repr_is_one_short_line(name: str) -> None:
+def test_its_repr_is_one_short_line(name):
     line = repr(made(name))
     assert len(line.splitlines()) == 1
     assert len(line) <= 100
@@ -170,7 +170,7 @@ def test_its_repr_is_one_short_line(name: str) -> None:
 
 
 @each
-def test_its_text_is_its_report(name: str) -> None:
+def test_its_text_is_its_report(name):
     result = made(name)
     assert str(result) == result.report() != repr(result)
     assert len(result.report(full=True).splitlines()) >= len(str(result).splitlines()) > 0
@@ -178,7 +178,7 @@ def test_its_text_is_its_report(name: str) -> None:
 
 @each
 @pytest.mark.slow
-def test_it_is_drawn_into_axes(name: str) -> None:
+def test_it_is_drawn_into_axes(name):
     result = made(name)
     if name in ("Branch", "Description"):
         with pytest.raises(tmsopt.InputError, match=f"no picture of a {name} alone"):
@@ -197,7 +197,7 @@ def test_it_is_drawn_into_axes(name: str) -> None:
 
 @pytest.mark.slow
 @each
-def test_its_page_is_whole_and_escaped(name: str) -> None:
+def test_its_page_is_whole_and_escaped(name):
     page = Page(made(name)._repr_html_())
     assert page.open == []
     assert "script" not in page.tags
@@ -206,7 +206,7 @@ def test_its_page_is_whole_and_escaped(name: str) -> None:
     assert any(str(made(name)).splitlines()[-1] in text for text in page.said)
 
 
-def test_new_figures_are_shown_by_pyplot(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_new_figures_are_shown_by_pyplot(monkeypatch):
     """In a notebook, and by plt.show(); those of the page are not, nor those of the user again."""
 
     def draws(data: object, ax: Axes | None = None) -> Axes:
@@ -226,7 +226,7 @@ def test_new_figures_are_shown_by_pyplot(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.slow
-def test_the_page_of_a_design_has_badges_and_parameters() -> None:
+def test_the_page_of_a_design_has_badges_and_parameters():
     said = Page(design()._repr_html_()).said
     assert {"optimal", "proved", "stable", "EP4"} <= set(said)
     for parameter in tmsopt.models.tms.sets[0].parameters:
@@ -235,7 +235,7 @@ def test_the_page_of_a_design_has_badges_and_parameters() -> None:
 
 
 @pytest.mark.slow
-def test_a_picture_that_fails_does_not_break_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_picture_that_fails_does_not_break_the_page(monkeypatch):
     def fails(*_: object, **__: object) -> None:
         raise RuntimeError
 
@@ -246,27 +246,27 @@ def test_a_picture_that_fails_does_not_break_the_page(monkeypatch: pytest.Monkey
 
 
 @each
-def test_its_json_comes_back(name: str) -> None:
+def test_its_json_comes_back(name):
     data = made(name).to_json()
     assert json.loads(json.dumps(data, allow_nan=False)) == data
 
 
 @each
-def test_it_is_pickled_with_all_that_it_shows(name: str) -> None:
+def test_it_is_pickled_with_all_that_it_shows(name):
     result = made(name)
     again = pickle.loads(pickle.dumps(result))
     assert (repr(again), str(again)) == (repr(result), str(result))
 
 
 @pytest.mark.parametrize("name", [n for n in RESULTS if hasattr(getattr(tmsopt, n.split(",")[0]), "to_frame")])
-def test_its_table_has_a_row_for_each_record(name: str) -> None:
+def test_its_table_has_a_row_for_each_record(name):
     pytest.importorskip("pandas")
     result, frame = made(name), made(name).to_frame()
     assert len(frame) == len(result.rows if name == "Results" else list(result.records()))
     assert all(isinstance(column, str) for column in frame.columns)
 
 
-def test_tables_hold_the_numbers() -> None:
+def test_tables_hold_the_numbers():
     pytest.importorskip("pandas")
     assert studied().to_frame()["varied.mu"].tolist() == [0.1, 0.2]
     assert studied().to_frame()["abscissa"].tolist() == [row.abscissa for row in studied().rows]
@@ -274,7 +274,7 @@ def test_tables_hold_the_numbers() -> None:
     assert made("Front").to_frame()["stable"].tolist() == [p.stable for p in made("Front").points]
 
 
-def test_grids_are_datasets() -> None:
+def test_grids_are_datasets():
     pytest.importorskip("xarray")
     chart = charted().to_xarray()
     assert dict(chart.sizes) == {"c": 7, "b": 9}
@@ -285,7 +285,7 @@ def test_grids_are_datasets() -> None:
         replace(studied(), study=one, rows=studied().rows[:1] * 2).to_xarray()
 
 
-def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_missing_is_named(monkeypatch):
     for module in ("pandas", "xarray"):
         monkeypatch.setitem(__import__("sys").modules, module, None)
     with pytest.raises(tmsopt.InputError, match=r'pandas is not installed; pip install "tmsopt\[data\]"'):

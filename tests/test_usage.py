@@ -27,7 +27,7 @@ def said(checker: str, *paths: Path) -> tuple[int, str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("checker", CHECKERS)
-def test_type_checkers_understand_the_usual(checker: str) -> None:
+def test_type_checkers_understand_the_usual(checker):
     assert said(checker, USAGE)[0] == 0, said(checker, USAGE)[1]
 
 
@@ -42,7 +42,7 @@ def test_type_checkers_understand_the_usual(checker: str) -> None:
         "design.plots()",
     ],
 )
-def test_type_checkers_find_what_is_wrong(checker: str, line: str, tmp_path: Path) -> None:
+def test_type_checkers_find_what_is_wrong(checker, line, tmp_path):
     wrong = tmp_path / "wrong.py"
     wrong.write_text(f"import tmsopt\n\nproblem = tmsopt.load('a.toml')\ndesign = tmsopt.solve(problem)\n{line}\n")
     code, words = said(checker, wrong)
@@ -51,18 +51,18 @@ def test_type_checkers_find_what_is_wrong(checker: str, line: str, tmp_path: Pat
 
 
 @pytest.mark.slow
-def test_the_usual_runs() -> None:
+def test_the_usual_runs():
     ended = subprocess.run([sys.executable, str(USAGE)], cwd=ROOT, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
 
 
-def test_the_notebooks_are_there() -> None:
+def test_the_notebooks_are_there():
     """So that nothing below passes because nothing was read."""
     assert {"first_bicycle", "exceptional_point", "lesson"} <= {path.stem for path in NOTEBOOKS}
 
 
 @each_notebook
-def test_a_notebook_is_kept_without_answers(notebook: Path) -> None:
+def test_a_notebook_is_kept_without_answers(notebook):
     """Small, and the same whoever ran it; it says by itself whether what it found is true."""
     data = json.loads(notebook.read_text(encoding="utf-8"))
     code = [cell for cell in data["cells"] if cell["cell_type"] == "code"]
@@ -78,7 +78,7 @@ def test_a_notebook_is_kept_without_answers(notebook: Path) -> None:
     "alone", [False, pytest.param(True, marks=pytest.mark.long)], ids=["from the root", "in a folder of its own"]
 )
 @each_notebook
-def test_a_notebook_runs(notebook: Path, alone: bool, tmp_path: Path) -> None:
+def test_a_notebook_runs(notebook, alone, tmp_path):
     """Each result that ends a cell has its page, of which the picture and the text that `print` gives are parts.
 
     So it does in its own folder, where `jupyter lab` runs it, and where nothing else was fetched.

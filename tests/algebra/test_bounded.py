@@ -30,7 +30,7 @@ FORMULAS: dict[str, Callable[[Any, Any], Any]] = {
 
 @pytest.mark.parametrize("name", FORMULAS)
 @pytest.mark.parametrize("share", [0.0, 1e-12])
-def test_no_number_is_farther_off_than_it_says(name: str, share: float) -> None:
+def test_no_number_is_farther_off_than_it_says(name, share):
     rng = np.random.default_rng(0)
     a, b = rng.uniform(-3, 3, (2, 400))
     found = FORMULAS[name](Bounded(a, share * np.abs(a)), Bounded(b, share * np.abs(b)))
@@ -47,7 +47,7 @@ def test_no_number_is_farther_off_than_it_says(name: str, share: float) -> None:
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 7])
-def test_roots_of_a_degree(degree: int) -> None:
+def test_roots_of_a_degree(degree):
     x = np.random.default_rng(1).uniform(-3, 3, 200)
     found = Bounded(x, 1e-13 * np.abs(x)).root(degree)
     with flint.ctx.workprec(300):
@@ -58,7 +58,7 @@ def test_roots_of_a_degree(degree: int) -> None:
                 assert abs(flint.arb(float(found.value[k])) - true) <= flint.arb(float(found.error[k]))
 
 
-def test_what_does_not_exist_is_never_known() -> None:
+def test_what_does_not_exist_is_never_known():
     zero, one = Bounded(np.zeros(1), np.zeros(1)), Bounded(np.ones(1), np.zeros(1))
     near = Bounded(np.ones(1), 2 * np.ones(1))
     with np.errstate(all="ignore"):
@@ -79,7 +79,7 @@ def test_what_does_not_exist_is_never_known() -> None:
                 assert not choice.holds(1.0).any()
 
 
-def test_exact_fractions_and_balls_keep_their_digits() -> None:
+def test_exact_fractions_and_balls_keep_their_digits():
     for number, value in ((flint.fmpq(1, 3), 1 / 3), (flint.arb.pi(), np.pi), (flint.fmpq(2**70 + 1), 2.0**70)):
         found = as_bounded(number)
         assert found.value == value

@@ -65,13 +65,13 @@ OPERATIONS: dict[int, tuple[ca.SX, Callable[[float, float], float]]] = {
 POINTS = [(0.7, 1.3), (2.6, 1.3), (1.3, 1.3), (3.1, 0.4)]
 
 
-def test_no_operation_is_left_out() -> None:
+def test_no_operation_is_left_out():
     """But handing a value on, which no expression can be made of."""
     assert {*OPERATIONS, ca.OP_ASSIGN} == {*ARRAYS} > {*BALLS}
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=operation_name)
-def test_operations_are_those_of_python(operation: int) -> None:
+def test_operations_are_those_of_python(operation):
     """Each function of the two libraries is right to a few units of its last digit; balls have 53 bits."""
     expression, truth = OPERATIONS[operation]
     formula = Formulas(("x", "y"), ca.Function("formula", [ca.vertcat(x, y)], [expression]))

@@ -93,7 +93,7 @@ def gains_60(data: Mapping[str, Any], problem: tmsopt.Problem) -> dict[str, Any]
 @pytest.mark.parametrize(
     "name", ["ballast_free", "childs_bicycle", pytest.param("point_mass_robot", marks=pytest.mark.slow), "least_speed"]
 )
-def test_printed_gains_are_right_to_the_last_of_their_six_digits(name: str) -> None:
+def test_printed_gains_are_right_to_the_last_of_their_six_digits(name):
     """At optima with a pair, an EP4 and three roots on a line; one limit is on the kink of a quantity that is 0."""
     problem = tmsopt.load(PROBLEMS / f"{name}.toml")
     data = json.loads(json.dumps(tmsopt.solve(problem).to_json()))
@@ -102,14 +102,14 @@ def test_printed_gains_are_right_to_the_last_of_their_six_digits(name: str) -> N
         assert data["active"] == {n: float(mp.nstr(gain, 6)) for n, gain in gains_60(data, problem).items()}
 
 
-def test_a_limit_that_one_design_alone_meets_buys_what_that_design_may_move() -> None:
+def test_a_limit_that_one_design_alone_meets_buys_what_that_design_may_move():
     """s² + 2xs + 1: abscissa −x up to x = 1, and more beyond; the least x with abscissa ≤ −1 + t is 1 − t."""
     oscillator, edge = from_coefficients([1, "2*x", 1]), {"c": "abscissa <= -1"}
     design = tmsopt.solve(tmsopt.Problem(oscillator, free={"x": (0, 5)}, minimize="x", constraints=edge))
     assert design.active == pytest.approx({"c": 1}, abs=1e-6)
 
 
-def test_limits_that_say_the_same_buy_nothing_alone() -> None:
+def test_limits_that_say_the_same_buy_nothing_alone():
     """Of x ≥ 1, 2x ≥ 2 and, at y = 0, x + y ≥ 1 any two remain when one is moved."""
     limits = {"c": "x >= 1", "d": "2*x >= 2", "e": "x + y >= 1"}
     box = {"x": (0, 5), "y": (0, 5)}

@@ -113,7 +113,7 @@ def test_a_model_without_a_speed_has_no_bands_of_it():
     assert stable_speeds(tmsopt.solve(tmsopt.Problem(model, free={"Fr": (0.5, 1)}, minimize="abscissa"))) is None
 
 
-def test_a_band_over_another_parameter_ends_where_stability_does() -> None:
+def test_a_band_over_another_parameter_ends_where_stability_does():
     """Of the EP4 over the tilt: Fr_c² = tan(lambda_s) (chi_B + 1)/(chi_B − 1) for chi_H = 1 reaches Fr²."""
     design = tmsopt.solve("problems/ep4.toml")
     Fr, chi_B = design.parameters["Fr"], design.parameters["chi_B"]

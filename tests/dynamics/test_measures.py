@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,11 @@ PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK = PROBLEMS / "whipple_benchmark.toml"
 
 
+@cache
+def ep4() -> tmsopt.Solution:
+    return tmsopt.solve(PROBLEMS / "ep4.toml")
+
+
 def spring(damping: float) -> tmsopt.Problem:
     """q″ + 2 ζ q′ + q = 0."""
     return tmsopt.Problem(from_matrices(M=[[1]], D=[["2*zeta"]], K=[[1]]), fixed={"zeta": damping})
@@ -31,7 +37,7 @@ def spring(damping: float) -> tmsopt.Problem:
 
 
 @pytest.mark.parametrize("damping", [0.05, 0.3, 0.7])
-def test_the_overshoot_of_an_oscillator_is_that_of_every_textbook(damping: float) -> None:
+def test_the_overshoot_of_an_oscillator_is_that_of_every_textbook(damping):
     """Released from 1: e^(−πζ/√(1−ζ²)); it settles when |q| falls below 0.02 for the last time."""
     (found,) = tmsopt.simulate(spring(damping), start={"q1": 1}).measures
     root = math.sqrt(1 - damping**2)
@@ -48,7 +54,7 @@ def test_the_overshoot_of_an_oscillator_is_that_of_every_textbook(damping: float
     assert found.settling == pytest.approx(float(settling), rel=1e-11)
 
 
-def test_a_critically_damped_push_peaks_at_1_over_e() -> None:
+def test_a_critically_damped_push_peaks_at_1_over_e():
     """EP2: q = t e^(−t), which settles where t e^(−t) = 0.02/e, by Lambert's W."""
     motion = tmsopt.simulate(spring(1.0), start={"q1dot": 1})
     (found,) = motion.measures
@@ -60,14 +66,14 @@ def test_a_critically_damped_push_peaks_at_1_over_e() -> None:
     assert np.array(motion["q1"]) == pytest.approx(np.array(motion["t"]) * np.exp(-np.array(motion["t"])), abs=1e-14)
 
 
-def test_measures_do_not_know_the_step_nor_how_long_is_shown() -> None:
+def test_measures_do_not_know_the_step_nor_how_long_is_shown():
     whole = tmsopt.simulate(BENCHMARK, lean=5, push=1)
     for asked in ({"seconds": 0.5}, {"points": 3}, {"points": 77, "seconds": 9.0}):
         assert tmsopt.simulate(BENCHMARK, lean=5, push=1, **asked).measures == whole.measures  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_measures_of_random_systems_are_those_of_brute_force(seed: int) -> None:
+def test_measures_of_random_systems_are_those_of_brute_force(seed):
     """50 001 points by eigenvectors: no sample beats the peak, none is outside 2 % after the settling time."""
     rng = np.random.default_rng(seed)
     n = 4
@@ -90,7 +96,7 @@ def test_measures_of_random_systems_are_those_of_brute_force(seed: int) -> None:
         assert np.abs(q[times <= m.settling][-2:]).max() >= 0.019 * abs(m.peak)
 
 
-def test_a_root_far_to_the_left_hides_no_peak() -> None:
+def test_a_root_far_to_the_left_hides_no_peak():
     """q″ + 1001 q′ + 1000 q = 0 pushed: the peak is at log(1000)/999, long before the first point of the table."""
     fast = tmsopt.Problem(from_matrices(M=[[1]], D=[["c"]], K=[[1000]]), fixed={"c": 1001.0})
     (found,) = tmsopt.simulate(fast, start={"q1dot": 1}, points=5).measures
@@ -100,7 +106,7 @@ def test_a_root_far_to_the_left_hides_no_peak() -> None:
 
 
 @pytest.mark.parametrize("damping", [1e-4, 50.0, 1e3])
-def test_slow_decay_is_followed_to_its_end(damping: float) -> None:
+def test_slow_decay_is_followed_to_its_end(damping):
     """Of an overdamped one the slow root alone is left, e^(s t)/(1 − s/f): s = −ζ + √(ζ² − 1), f the fast one."""
     (found,) = tmsopt.simulate(spring(damping), start={"q1": 1}).measures
     if damping < 1:  # within half a period of its envelope
@@ -111,7 +117,7 @@ def test_slow_decay_is_followed_to_its_end(damping: float) -> None:
     assert found.settling == pytest.approx(math.log(50 * amplitude) / -slow, rel=1e-8)  # rounding is relative to f
 
 
-def test_what_dies_out_too_slowly_is_said() -> None:
+def test_what_dies_out_too_slowly_is_said():
     motion = tmsopt.simulate(spring(1e-9), start={"q1": 1})
     assert motion.stable
     assert math.isnan(motion.measures[0].settling)
@@ -122,7 +128,7 @@ def test_what_dies_out_too_slowly_is_said() -> None:
 # White noise
 
 
-def test_an_oscillator_in_noise_has_the_variance_of_the_closed_form() -> None:
+def test_an_oscillator_in_noise_has_the_variance_of_the_closed_form():
     """q″ + c q′ + k q = σ ẇ: var q = σ²/(2 c k), var q′ = σ²/(2 c), uncorrelated."""
     c, k, sigma = 0.3, 2.0, 1.7
     A, force = np.array([[0, 1], [-k, -c]]), np.array([0, sigma])
@@ -133,7 +139,7 @@ def test_an_oscillator_in_noise_has_the_variance_of_the_closed_form() -> None:
     assert path.var(axis=0) == pytest.approx([sigma**2 / (2 * c * k), sigma**2 / (2 * c)], rel=off)
 
 
-def test_the_benchmark_in_noise_has_the_variance_of_its_frequency_response() -> None:
+def test_the_benchmark_in_noise_has_the_variance_of_its_frequency_response():
     """(1/2π) ∫ |H(iω)|² dω σ², H from the matrices of Meijaard et al.; nothing of tmsopt's motion in it."""
     motion = tmsopt.simulate(BENCHMARK, noise=0.2, seed=3)
     p = motion.parameters
@@ -151,7 +157,7 @@ def test_the_benchmark_in_noise_has_the_variance_of_its_frequency_response() -> 
     assert all(math.isnan(m.settling) for m in motion.measures)
 
 
-def test_noise_and_a_push_add_up() -> None:
+def test_noise_and_a_push_add_up():
     """The equations are linear."""
     asked: dict[str, Any] = {"seconds": 4, "points": 101}
     both = tmsopt.simulate(BENCHMARK, lean=5, noise=1.0, **asked)
@@ -164,7 +170,7 @@ def test_noise_and_a_push_add_up() -> None:
 # Shapes of modes
 
 
-def test_modes_are_eigenvectors_where_roots_are_simple() -> None:
+def test_modes_are_eigenvectors_where_roots_are_simple():
     motion = tmsopt.simulate(BENCHMARK)
     p = motion.parameters
     M, C1, K0, K2 = (np.array(m, dtype=float) for m in canonical(p))
@@ -182,7 +188,7 @@ def test_modes_are_eigenvectors_where_roots_are_simple() -> None:
 
 
 @pytest.mark.parametrize("file", ["ep4.toml", "optimised_benchmark.toml", "whipple_ep4.toml"])
-def test_four_modes_merge_in_one_at_an_ep4(file: str) -> None:
+def test_four_modes_merge_in_one_at_an_ep4(file):
     """At the real root: (M s² + D s + K) (1, κ) = 0, κ = −L₁₁/L₁₂ from the first row alone."""
     motion = tmsopt.simulate(PROBLEMS / file)
     (mode,) = motion.modes
@@ -198,7 +204,7 @@ def test_four_modes_merge_in_one_at_an_ep4(file: str) -> None:
     assert "EP4: four modes merge in one shape, a Jordan chain of 4" in str(motion)
 
 
-def test_gain_and_loss_in_balance_are_a_quarter_apart_or_so() -> None:
+def test_gain_and_loss_in_balance_are_a_quarter_apart_or_so():
     """PT pair at its exceptional point: (1 − ω² + iγω) a + ε b = 0, so that b/a has size 1 and a phase known."""
     (mode,) = tmsopt.simulate(PROBLEMS / "pt_pair.toml").modes
     gamma = 0.1
@@ -210,7 +216,7 @@ def test_gain_and_loss_in_balance_are_a_quarter_apart_or_so() -> None:
     assert abs(ratio) == pytest.approx(1, rel=1e-12)
 
 
-def test_modes_that_only_cross_keep_their_shapes() -> None:
+def test_modes_that_only_cross_keep_their_shapes():
     twins = from_matrices(M=[[1, 0], [0, 1]], D=[["c", 0], [0, "c"]], K=[[4, 0], [0, 4]])
     motion = tmsopt.simulate(tmsopt.Problem(twins, fixed={"c": 0.5}))
     assert [(m.multiplicity, m.geometric, m.partial) for m in motion.modes] == [(2, 2, (1, 1))] * 2
@@ -227,7 +233,7 @@ def run(*words: str) -> tuple[int, str, str]:
     return done.exit_code, done.stdout, done.stderr
 
 
-def test_the_command_writes_what_the_function_gives(tmp_path: Path) -> None:
+def test_the_command_writes_what_the_function_gives(tmp_path):
     table, picture = tmp_path / "motion.csv", tmp_path / "motion.png"
     table.write_text("older")  # which is replaced as a whole, as by other commands
     words = f"simulate {BENCHMARK} --lean 5 --push 10 --seconds 3 --csv {table} --plot {picture}".split()
@@ -244,7 +250,7 @@ def test_the_command_writes_what_the_function_gives(tmp_path: Path) -> None:
     assert table.read_text().splitlines()[0] == "t,phi,delta,phidot,deltadot,psi,y_rear,y_front,x"
 
 
-def test_the_command_answers_in_json() -> None:
+def test_the_command_answers_in_json():
     status, out, _ = run("simulate", str(BENCHMARK), "--lean", "5", "--seconds", "3", "--points", "4", "--json")
     data = json.loads(out)
     assert (status, data["schema"], data["model"], data["stable"]) == (0, 1, "whipple", True)
@@ -275,13 +281,13 @@ def test_the_command_answers_in_json() -> None:
         ("{p}/none.toml", 2, "no such file"),
     ],
 )
-def test_bad_words_are_told(words: str, status: int, said: str) -> None:
+def test_bad_words_are_told(words, status, said):
     code, out, err = run("simulate", *words.format(p=PROBLEMS).split())
     assert (code, out) == (status, "")
     assert said in err
 
 
-def test_without_a_design_there_is_no_motion(tmp_path: Path) -> None:
+def test_without_a_design_there_is_no_motion(tmp_path):
     file = tmp_path / "none.toml"
     file.write_text((PROBLEMS / "ep4.toml").read_text() + '[constraints]\ndecay = "abscissa <= -100"\n')
     code, out, err = run("simulate", str(file))
@@ -289,11 +295,11 @@ def test_without_a_design_there_is_no_motion(tmp_path: Path) -> None:
     assert err.endswith("infeasible; there is no design to look at\n")
 
 
-def test_the_default_and_units_are_said() -> None:
-    text = str(tmsopt.simulate(PROBLEMS / "ep4.toml"))
+def test_the_default_and_units_are_said():
+    text = str(tmsopt.simulate(ep4()))
     assert "from lean phi = 1 deg, as nothing else was asked" in text
     assert "√(w/g)" in text
-    pushed = str(tmsopt.simulate(PROBLEMS / "ep4.toml", push=0.001, noise=0.1, seed=5))
+    pushed = str(tmsopt.simulate(ep4(), push=0.001, noise=0.1, seed=5))
     assert "an impulse of steer torque of 0.001 m_B g w √(w/g)" in pushed
     assert "white noise of steer torque of 0.1 m_B g w (w/g)^(1/4) (seed 5)" in pushed
     fast = tmsopt.simulate(tmsopt.Problem(whipple, fixed={**tmsopt.load(BENCHMARK).fixed, "v": 2.0}), lean=1)

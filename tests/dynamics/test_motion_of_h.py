@@ -33,7 +33,7 @@ def omegas(motion: Any) -> list[complex]:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_it_is_the_exponential_of_h(seed: int) -> None:
+def test_it_is_the_exponential_of_h(seed):
     """Of any H, also far from 0 and not symmetric; x is a real parameter in it."""
     rng = np.random.default_rng(seed)
     n = 1 + seed % 5
@@ -62,7 +62,7 @@ def test_it_is_the_exponential_of_h(seed: int) -> None:
         assert psi @ (H.T - omega * np.eye(n)) == pytest.approx(np.zeros(n), abs=1e-8)
 
 
-def test_the_first_mode_begins_at_1_where_nothing_is_asked() -> None:
+def test_the_first_mode_begins_at_1_where_nothing_is_asked():
     """At the EP2 ψ = e^(−iωt) (1 − i N t) (1, 0), N = [[−0.4i, 0.4], [0.4, 0.4i]]."""
     motion = tmsopt.simulate(dimer())
     t = np.asarray(motion["t"])
@@ -83,7 +83,7 @@ def test_the_first_mode_begins_at_1_where_nothing_is_asked() -> None:
         (ring(-3.0, 0.5, -0.7), -3 - 0.5j, [1, 0], [0, math.nan]),
     ],
 )
-def test_all_modes_merge_in_one_shape(problem: Any, omega: complex, amplitudes: list[float], phases: Any) -> None:
+def test_all_modes_merge_in_one_shape(problem, omega, amplitudes, phases):
     motion = tmsopt.simulate(problem)
     (mode,) = motion.modes
     assert mode.eigenfrequency == pytest.approx(omega, abs=1e-12)
@@ -98,7 +98,7 @@ def test_all_modes_merge_in_one_shape(problem: Any, omega: complex, amplitudes: 
 
 
 @pytest.mark.parametrize("frequency", [0.0, 5.0, -5.0])
-def test_on_the_real_axis_an_exceptional_point_grows(frequency: float) -> None:
+def test_on_the_real_axis_an_exceptional_point_grows(frequency):
     """PT symmetric, H² = 0 but for the frequency: |ψ₂| = k t."""
     H = [["w + 1j*g", "k"], ["k", "w - 1j*g"]]
     motion = tmsopt.simulate(tmsopt.Problem(from_hamiltonian(H), fixed={"w": frequency, "g": 0.3, "k": 0.3}))
@@ -109,7 +109,7 @@ def test_on_the_real_axis_an_exceptional_point_grows(frequency: float) -> None:
     assert 1 < motion["t"][-1] < 1e3
 
 
-def test_below_the_point_nothing_dies_out() -> None:
+def test_below_the_point_nothing_dies_out():
     """k > g: ω = ±√(k² − g²), real."""
     motion = tmsopt.simulate(dimer(g1=-0.6, g2=0.6, k=1.0))
     assert sorted(z.real for z in omegas(motion)) == pytest.approx([-0.8, 0.8], abs=1e-12)
@@ -118,7 +118,7 @@ def test_below_the_point_nothing_dies_out() -> None:
     assert "dies out too slowly" not in str(motion)
 
 
-def test_beyond_the_point_one_mode_grows() -> None:
+def test_beyond_the_point_one_mode_grows():
     """g > k: ω = ±i √(g² − k²)."""
     motion = tmsopt.simulate(dimer(g1=-1.0, g2=1.0, k=0.6))
     assert "not stable: it does not settle" in str(motion)
@@ -126,12 +126,12 @@ def test_beyond_the_point_one_mode_grows() -> None:
 
 
 @pytest.mark.parametrize("word", ["lean", "push", "noise"])
-def test_h_has_no_handlebar(word: str) -> None:
+def test_h_has_no_handlebar(word):
     with pytest.raises(tmsopt.InputError, match="psi2_im=1"):
         tmsopt.simulate(dimer(), **{word: 1.0})  # type: ignore[arg-type]
 
 
-def test_a_real_double_pair_on_the_axis_grows_too() -> None:
+def test_a_real_double_pair_on_the_axis_grows_too():
     """q″ = −q twice, coupled one way: (s² + 1)² with one chain, rounding of its real part aside."""
     pair = from_matrices(M=[[1, 0], [0, 1]], K=[[1, "b"], [0, 1]])
     motion = tmsopt.simulate(tmsopt.Problem(pair, fixed={"b": 0.5}))

@@ -1,7 +1,5 @@
 """Every digit that ``solve --json`` prints of a design, from the printed parameters alone: another way, 60 digits.
 
-pytestmark = pytest.mark.slow
-
 Nothing here uses a formula of the package. The polynomial is the determinant of the paper's matrices in mpmath, roots
 are mpmath's, mass margins are eigenvalues, and the weave speed is where the Hurwitz determinant changes sign. The
 numbers compared are equal as doubles, ``==``: the printed one is the double nearest to the 60-digit one.
@@ -250,22 +248,20 @@ FILES = sorted(
 )
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n == "point_mass_robot" else ()) for n in FILES]
-)
+@pytest.mark.parametrize("name", FILES)
 @pytest.mark.slow
-def test_every_digit_of_the_problem_files(name: str) -> None:
+def test_every_digit_of_the_problem_files(name):
     assert wrong_digits(printed(tmsopt.solve(tmsopt.load(PROBLEMS / f"{name}.toml")))) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", range(20))
-def test_every_digit_of_random_problems(index: int) -> None:
+def test_every_digit_of_random_problems(index):
     """Whether or not they are solved: the numbers are those of the design that is shown."""
     assert wrong_digits(printed(tmsopt.solve(random_problem(index), throw=False, starts=4))) == []
 
 
-def test_every_digit_of_designs_with_nothing_free() -> None:
+def test_every_digit_of_designs_with_nothing_free():
     """Random designs in both sets of parameters, tilted either way, stable or not, some at special values."""
     rng = np.random.default_rng(7)
     special = [{}, {"v": 0.0}, {"lambda_s": 0.0}, {"z_B": -0.3, "z_H": -0.3}, {"x_B": 0.8, "x_H": 0.8}, {"w": 1.0}]
@@ -289,7 +285,7 @@ def test_every_digit_of_designs_with_nothing_free() -> None:
         assert wrong_digits(printed(tmsopt.solve(tmsopt.Problem(tms, fixed=p)))) == []
 
 
-def test_the_omega0_bound_is_never_above_the_true_one() -> None:
+def test_the_omega0_bound_is_never_above_the_true_one():
     """A design free in Fr and χ_B alone has ω0 as its bound: at 60 digits, where a0 is a difference that cancels to
     1e-9 of its terms too. It is at most a few roundings below: its own margin is 1e-15."""
     rng = np.random.default_rng(0)
@@ -324,7 +320,7 @@ def test_the_omega0_bound_is_never_above_the_true_one() -> None:
 # Roots by themselves
 
 
-STRUCTURED: dict[str, tuple[complex, ...]] = {
+STRUCTURED = {
     "EP4": (-1.3, -1.3, -1.3, -1.3),
     "EP3": (-0.7, -0.7, -0.7, -2.9),
     "2EP2": (-0.7, -0.7, -1.9, -1.9),
@@ -337,7 +333,7 @@ STRUCTURED: dict[str, tuple[complex, ...]] = {
 
 
 @pytest.mark.parametrize("name", STRUCTURED)
-def test_the_nearest_polynomial_of_every_structure(name: str) -> None:
+def test_the_nearest_polynomial_of_every_structure(name):
     """Coefficients off by 1e-12, where the weights decide the last digits; and with roots 30000 times apart."""
     rng = np.random.default_rng(3)
     for scale in (1.0, 3e4):
@@ -358,7 +354,7 @@ def test_the_nearest_polynomial_of_every_structure(name: str) -> None:
             assert got == sorted((float(mp.re(z)), float(mp.im(z))) for z in true)
 
 
-def test_exact_multiple_roots_are_kept_and_uncertain_ones_refused() -> None:
+def test_exact_multiple_roots_are_kept_and_uncertain_ones_refused():
     with flint.ctx.workprec(212):
         double = enclosed_roots([exact(c) for c in (1, 4, 5, 2, 0)])  # s (s + 1)² (s + 2)
         assert double is not None
@@ -372,7 +368,7 @@ def test_exact_multiple_roots_are_kept_and_uncertain_ones_refused() -> None:
         assert enclosed_roots([exact(1)]) == ()
 
 
-def test_rounding_is_refused_where_a_ball_does_not_settle_it() -> None:
+def test_rounding_is_refused_where_a_ball_does_not_settle_it():
     """Halfway between two doubles, and between two decimals; to 15 digits 1.05 km/h stays 1.05."""
     with flint.ctx.workprec(212):
         half = flint.arb(1) + flint.arb(2) ** -53

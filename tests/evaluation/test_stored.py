@@ -32,7 +32,7 @@ def stored_roots(found: tmsopt.Solution, coefficients: Sequence[Any] | None = No
 
 
 @pytest.mark.parametrize(("n", "decay"), [(2, 1.1), (3, 1.1), (4, 1.1), (4, 0.3), (5, 0.6)])
-def test_a_multiple_root_on_a_limit_is_stored_left_of_it(n: int, decay: float) -> None:
+def test_a_multiple_root_on_a_limit_is_stored_left_of_it(n, decay):
     """(s + decay)ⁿ has the least coefficients; the nearest doubles have roots right of −decay by up to 1e-3."""
     found = least_sum(n, {"fast": f"abscissa <= {-decay}"})
     assert max(z.real for z in stored_roots(found)) <= -decay + KEPT
@@ -43,7 +43,7 @@ def test_a_multiple_root_on_a_limit_is_stored_left_of_it(n: int, decay: float) -
     assert found.abscissa == pytest.approx(-decay, abs=5e-7)
 
 
-def test_a_double_pair_on_a_limit_of_the_damping_ratio() -> None:
+def test_a_double_pair_on_a_limit_of_the_damping_ratio():
     """(s² + 2 ζ s + 1)² among quartics with one product of the roots; ζ² = 0.36."""
     free = dict.fromkeys("abc", (0.0, 30.0))
     limits = {"damped": "damping_ratio >= 0.6", "even": "a == c", "low": "b <= 3.44"}
@@ -54,7 +54,7 @@ def test_a_double_pair_on_a_limit_of_the_damping_ratio() -> None:
     assert found.value == pytest.approx(2.4, abs=1e-6)
 
 
-def test_the_limit_holds_in_every_scenario() -> None:
+def test_the_limit_holds_in_every_scenario():
     """s³ + a s² + b s + c + m is slowest where m is least or greatest."""
     free = dict.fromkeys("abc", (0.0, 20.0))
     problem = tmsopt.Problem(
@@ -70,7 +70,7 @@ def test_the_limit_holds_in_every_scenario() -> None:
     assert worst <= -0.7 + KEPT
 
 
-def test_what_a_given_design_misses_is_told() -> None:
+def test_what_a_given_design_misses_is_told():
     """(s + 1.1)³ in decimals: a triple root as far as a structure tells, at −1.0999… as stored."""
     fixed = {"a": 3.3000000000000003, "b": 3.63, "c": 1.3310000000000002}
     problem = tmsopt.Problem(
@@ -86,7 +86,7 @@ def test_what_a_given_design_misses_is_told() -> None:
     assert told in repr(found)
 
 
-def test_the_headline_has_the_abscissa_of_the_doubles_too() -> None:
+def test_the_headline_has_the_abscissa_of_the_doubles_too():
     """At the EP4 of the benchmark heights rounding alone moves the rightmost root by some 1e-4."""
     found = tmsopt.solve("problems/ep4.toml")
     assert abs(found.abscissa_realised - found.abscissa) > 1e-6
@@ -95,7 +95,7 @@ def test_the_headline_has_the_abscissa_of_the_doubles_too() -> None:
     assert "as stored" not in repr(tmsopt.solve("problems/least_speed.toml"))  # of simple roots
 
 
-def test_roots_near_a_4_fold_one_are_those_of_the_doubles() -> None:
+def test_roots_near_a_4_fold_one_are_those_of_the_doubles():
     """Roots −1 ± 0.005 i and −1.003 ± 0.01 i are no multiple ones to 1e-11; numeric ones are off by 1e-9."""
     a = np.polymul([1, 2, 1 + 2.5e-5], [1, 2.006, 1.003**2 + 1e-4])
     fixed = dict(zip("abcd", a[1:].tolist(), strict=True))
@@ -118,7 +118,7 @@ LOCATED = (
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LOCATED)
-def test_multiple_roots_of_regular_equations_exist(name: str) -> None:
+def test_multiple_roots_of_regular_equations_exist(name):
     """Each of these is proved to exist elsewhere, by Krawczyk's method or in closed form."""
     found = tmsopt.solve(PROBLEMS / f"{name}.toml")
     assert multiple_roots_exist(found.problem, found.parameters)
@@ -127,7 +127,7 @@ def test_multiple_roots_of_regular_equations_exist(name: str) -> None:
 @pytest.mark.parametrize(
     ("off", "there"), [(0.0, True), (1e-5, False), (3e-5, False), (1.0, True)], ids=["triple", "1e-5", "3e-5", "double"]
 )
-def test_a_triple_root_that_is_there_for_rounding_alone_does_not_exist(off: float, there: bool) -> None:
+def test_a_triple_root_that_is_there_for_rounding_alone_does_not_exist(off, there):
     """(s² + 2 z s + 1) (s + c) has a triple root at z = c = 1 alone; with c = 1 + ε, z = 1 − ε²/6 it misses by ε³/27."""
     model = from_coefficients([1, "2*z + c", "1 + 2*z*c", "c"])
     problem = tmsopt.Problem(model, free={"z": (0.05, 3.0), "c": (0.1, 3.0)}, minimize="abscissa")

@@ -30,7 +30,7 @@ def each(function, items, processes):
         return dict(side_by_side.each(function, ASK, items))
 
 
-@pytest.mark.parametrize("processes", [1, 2, 3])
+@pytest.mark.parametrize("processes", [1, 3])
 def test_every_item_has_its_answer(processes):
     found = each(shares.squared, range(9), processes)
     assert {k: square for k, (square, _) in found.items()} == {k: k**2 for k in range(9)}

@@ -56,7 +56,7 @@ def digits() -> Any:
 # Closed forms
 
 
-def test_the_ep4_of_the_paper() -> None:
+def test_the_ep4_of_the_paper():
     """tan λ_s = 15/4 − 75 √2/32, χ_B = √2, Fr = 3 √(110 √2 − 120)/8 (Kirillov 2018)."""
     root = mpmath.sqrt(2)
     tilt = mpmath.atan(mpmath.mpf(15) / 4 - 75 * root / 32)
@@ -65,7 +65,7 @@ def test_the_ep4_of_the_paper() -> None:
     assert agree(found, [[root, 3 * mpmath.sqrt(110 * root - 120) / 8, tilt]])
 
 
-def test_the_four_cep2_of_a_coupled_pair() -> None:
+def test_the_four_cep2_of_a_coupled_pair():
     """c2 = 11/10 with k = 1/8 ∓ √106/20, c2 = −11/10 with k = 9/50 ∓ 3 √435/100."""
     one, other = mpmath.sqrt(106) / 20, 3 * mpmath.sqrt(435) / 100
     tenths = mpmath.mpf(11) / 10
@@ -76,7 +76,7 @@ def test_the_four_cep2_of_a_coupled_pair() -> None:
     assert agree(found, designs)
 
 
-def test_the_optimised_benchmark_is_the_only_bicycle() -> None:
+def test_the_optimised_benchmark_is_the_only_bicycle():
     """χ_B = 119/100 exactly: a1 = 4 a0 and a3 = 4 a4 at s = −1, whatever the others are."""
     found = of_file("optimised_benchmark")
     assert found.complete
@@ -87,7 +87,7 @@ def test_the_optimised_benchmark_is_the_only_bicycle() -> None:
     )
 
 
-def test_the_three_controllers_with_one_root() -> None:
+def test_the_three_controllers_with_one_root():
     """(s⁴ + 2 s²)(s² + x1 s + x0) + y2 s² + y1 s + y0 = (s − r)⁶: x1 = −6r, 15 r² = x0 + 2, 20 r³ = 12 r."""
     r = mpmath.sqrt(mpmath.mpf(3) / 5)
     designs = [
@@ -98,7 +98,7 @@ def test_the_three_controllers_with_one_root() -> None:
     assert agree(found, designs)
 
 
-def test_ten_meetings_of_one_pair() -> None:
+def test_ten_meetings_of_one_pair():
     """s² + 3 T₅(x) s + 1 has a double root where T₅(x) = ±2/3."""
     chebyshev = 16 * x**5 - 20 * x**3 + 5 * x
     angles = [mpmath.acos(s * mpmath.mpf(2) / 3) for s in (-1, 1)]
@@ -112,7 +112,7 @@ def test_ten_meetings_of_one_pair() -> None:
 
 
 @pytest.mark.parametrize("size", [1e-3, 0.4, 50.0])
-def test_roots_of_any_size(size: float) -> None:
+def test_roots_of_any_size(size):
     """(s − size)³ (s − 1), unfolded by x and y."""
     row = np.polymul(np.poly([size] * 3), [1.0, -1.0])
     a = [float(c) for c in row]
@@ -139,7 +139,7 @@ def _by_elimination(conditions: list[Any], box: tuple[int, int]) -> int:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_as_many_as_elimination_finds(seed: int) -> None:
+def test_as_many_as_elimination_finds(seed):
     """s³ + a1 s² + a2 s + a3 is a cube where a1² = 3 a2 and a1 a2 = 9 a3; a_k of degree 2 in x and y."""
     rng = np.random.default_rng(seed)
     weights = rng.integers(-5, 6, (3, 6)).tolist()
@@ -168,7 +168,7 @@ def test_as_many_as_elimination_finds(seed: int) -> None:
         pytest.param("3EP2", [[1, 1], [1, 1], [1, 2], [1, 2], [1, 4], [1, 4]], marks=pytest.mark.slow),
     ],
 )
-def test_a_design_of_each_pattern_is_among_them(pattern: str, factors: list[list[float]]) -> None:
+def test_a_design_of_each_pattern_is_among_them(pattern, factors):
     """The product of the factors, unfolded by linear terms in as many parameters as there are conditions."""
     row = [1.0]
     for factor in factors:
@@ -189,7 +189,7 @@ def test_a_design_of_each_pattern_is_among_them(pattern: str, factors: list[list
 # Limits and constraints
 
 
-def test_inequalities_take_part() -> None:
+def test_inequalities_take_part():
     """s² + x s + 1 has double roots at x = ±2."""
     for text, designs in (
         ("x >= 0", [[2]]),
@@ -205,18 +205,18 @@ def test_inequalities_take_part() -> None:
 @pytest.mark.parametrize(
     ("asked", "limit"), [({"box": (-2.0, 5.0)}, "the least x"), ({"constraints": {"c": "x >= -2"}}, "constraint c")]
 )
-def test_a_design_on_a_limit_is_said_to_be(asked: dict[str, Any], limit: str) -> None:
+def test_a_design_on_a_limit_is_said_to_be(asked, limit):
     found = of_row([1, x, 1], "EP2", **asked)
     assert found.complete
     assert [float(d["x"]) for d in found.designs] == [-2.0, 2.0]
     assert found.limits == (limit, "")
 
 
-def test_what_is_beyond_a_limit_by_a_hair_is_beyond() -> None:
+def test_what_is_beyond_a_limit_by_a_hair_is_beyond():
     assert [float(d["x"]) for d in of_row([1, x, 1], "EP2", (-1.9999999999999, 5.0)).designs] == [2.0]
 
 
-def test_signs_tell_patterns_apart() -> None:
+def test_signs_tell_patterns_apart():
     """(s² + x s + 1)²: two real double roots for x² > 4, a complex pair for x² < 4."""
     row = [1, 2 * x, x * x + 2, 2 * x + (x * x - 9) * (x * x - 1) + y - 1, 1 + y * (y - 1)]
     for pattern, designs in (("2EP2", [[-3, 1], [3, 1]]), ("CEP2", [[-1, 1], [1, 1]])):
@@ -228,7 +228,7 @@ def test_signs_tell_patterns_apart() -> None:
 # What is not decided
 
 
-def test_where_two_designs_meet_stays_undecided() -> None:
+def test_where_two_designs_meet_stays_undecided():
     """(s + 1)² + x²(x − 1): a double root at x = 0, where two designs meet, and at x = 1."""
     found = of_row([1, 2, 1 + x * x * (x - 1)], "EP2")
     assert not found.complete
@@ -239,7 +239,7 @@ def test_where_two_designs_meet_stays_undecided() -> None:
     assert any(lo <= 0 <= hi for lo, hi in (p.ranges["x"] for p in found.undecided))
 
 
-def test_a_curve_of_designs_stays_undecided_and_no_more() -> None:
+def test_a_curve_of_designs_stays_undecided_and_no_more():
     """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, from 1.71 to 2.73 in this box."""
     Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
     model = from_coefficients([1, 0, Om**2 - 1 - k, 0, k])
@@ -251,7 +251,7 @@ def test_a_curve_of_designs_stays_undecided_and_no_more() -> None:
     assert 1 + math.sqrt(3) <= upper < 2.84
 
 
-def test_time_that_is_over() -> None:
+def test_time_that_is_over():
     model = from_coefficients([1, x, 1])
     found = completeness(tmsopt.Problem(model=model, free={"x": (-4, 4)}, locate="EP2"), seconds=1e-6)
     assert not found.complete
@@ -261,14 +261,14 @@ def test_time_that_is_over() -> None:
 
 
 @pytest.mark.parametrize(("last", "limits"), [(ca.power(2.0, x), {}), (1 + 0 * x, {"most": "log(x + 5) <= 2"})])
-def test_what_cannot_be_written_is_said(last: Any, limits: dict[str, str]) -> None:
+def test_what_cannot_be_written_is_said(last, limits):
     """A power that varies; a logarithm, at which codac ends its process."""
     found = of_row([1, x, last], "EP2", constraints=limits)
     assert not found.complete
     assert "cannot take" in found.reason
 
 
-def test_without_codac(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_codac(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     every = tmsopt.solve_all(PROBLEMS / "coupled_pair.toml")
     assert every.completeness
@@ -280,7 +280,7 @@ def test_without_codac(monkeypatch: pytest.MonkeyPatch) -> None:
 # The process
 
 
-def test_doubles_are_rounded_here_as_they_were() -> None:
+def test_doubles_are_rounded_here_as_they_were():
     """Codac has them rounded upwards in a process that imports it."""
     of_row([1, x, 1], "EP2")
     assert "codac" not in sys.modules
@@ -288,14 +288,14 @@ def test_doubles_are_rounded_here_as_they_were() -> None:
     assert math.nextafter(1.0, 2.0) > 1.0 + 1e-17
 
 
-def test_progress_is_told_in_seconds() -> None:
+def test_progress_is_told_in_seconds():
     told: list[tuple[float, float]] = []
     completeness(tmsopt.load(PROBLEMS / "coupled_pair.toml"), 30, lambda done, most, _: told.append((done, most)))
     assert told
     assert all(0 <= done <= most == 30 for done, most in told)
 
 
-def test_limits_on_derived_quantities_take_part() -> None:
+def test_limits_on_derived_quantities_take_part():
     """The optimised benchmark has ω0 = −1, Fr above its weave boundary, and needs 0.61 of ballast at the rear wheel."""
     for text, count in (("omega0 <= -1/2", 1), ("Fr >= Fr_c", 1), ("ballast_rear <= 0.1", 0), ("abscissa <= -1/2", 1)):
         found = of_file("optimised_benchmark", constraints={"decay": "omega0 == -1", "limit": text})
@@ -306,7 +306,7 @@ def test_limits_on_derived_quantities_take_part() -> None:
     assert on.limits == ("constraint limit",)
 
 
-def test_ctrl_c_is_no_end() -> None:
+def test_ctrl_c_is_no_end():
     """Whatever was in hand is undecided."""
 
     def stop(*_: Any) -> None:
@@ -327,7 +327,7 @@ def test_ctrl_c_is_no_end() -> None:
 
 
 @pytest.mark.parametrize(("limit", "kept"), [("x**1.5 <= 5", 2.0), ("1/(x - 2) <= 5", -2.0)])
-def test_a_design_at_which_a_limit_has_no_value_is_none(limit: str, kept: float) -> None:
+def test_a_design_at_which_a_limit_has_no_value_is_none(limit, kept):
     """s² + x s + 1 has its double roots at x = 2 and x = -2."""
     found = of_row([1, x, 1], "EP2", (-3.0, 3.0), constraints={"a": limit})
     assert found.complete

@@ -1,4 +1,4 @@
-"""What branch and prune is made of: formulas multiplied out, and boxes that never lose a zero."""
+"""What branch and prune is made of: boxes that never lose a zero, and identities of angles."""
 
 from fractions import Fraction
 from typing import Any
@@ -32,33 +32,8 @@ def drawn(rng: np.random.Generator, depth: int) -> tuple[Any, Any]:
     return one * other, lambda at: f(at) * g(at)
 
 
-def value(found: Any, at: list[Fraction]) -> Fraction:
-    """A tree of exact numbers at fractions."""
-    match found:
-        case ("x", k):
-            return at[k]
-        case ("c", least, greatest):
-            assert least == greatest
-            return Fraction(least)
-        case ("+", a, b):
-            return value(a, at) + value(b, at)
-        case ("*", a, b):
-            return value(a, at) * value(b, at)
-        case ("^", a, n):
-            return value(a, at) ** int(n)
-    raise AssertionError(found)
-
-
-@pytest.mark.parametrize("seed", range(ROUNDS))
-def test_a_formula_multiplied_out_has_the_same_values(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    formula, function = drawn(rng, 4)
-    at = [Fraction(int(rng.integers(-9, 10)), 2) for _ in NAMES]
-    assert value(tree(formula, NAMES), at) == function(at)
-
-
 @pytest.mark.skipif(not available(), reason="codac is not installed")
-def test_no_box_loses_a_zero() -> None:
+def test_no_box_loses_a_zero():
     """Systems with a zero planted at a fraction, mid in the box or on an end of it, singular ones among them."""
     worker = Killable()
     rng = np.random.default_rng(0)
@@ -79,7 +54,7 @@ def test_no_box_loses_a_zero() -> None:
         worker.end()
 
 
-def test_identities_of_angles() -> None:
+def test_identities_of_angles():
     t = variable("x")
     assert t.atan().tan() == t
     sine, cosine = t.atan().sin(), t.atan().cos()

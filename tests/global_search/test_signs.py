@@ -34,7 +34,7 @@ def least_abscissa(terms: np.ndarray) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, 3, 4, 5])
-def test_never_where_a_grid_has_a_stable_design(degree: int) -> None:
+def test_never_where_a_grid_has_a_stable_design(degree):
     """Random models whose coefficients mostly have one sign, or all but one of them: of either kind of answer many."""
     rng = np.random.default_rng(degree)
     told = {True: 0, False: 0}
@@ -63,7 +63,7 @@ def test_never_where_a_grid_has_a_stable_design(degree: int) -> None:
         ([1, 2, x, -0.1 - x, 1, 1], (-1, 1)),  # one of two is negative: parts of the box tell
     ],
 )
-def test_clearly_unstable(coefficients: Sequence[Any], ends: tuple[float, float], sign: int) -> None:
+def test_clearly_unstable(coefficients, ends, sign):
     assert none_stable(stated([sign * c for c in coefficients], {"x": ends}))
 
 
@@ -78,14 +78,12 @@ def test_clearly_unstable(coefficients: Sequence[Any], ends: tuple[float, float]
         ([x, 1, 2, 1, 1], (0.999, 3)),
     ],
 )
-def test_one_stable_design_in_a_corner_is_enough(
-    coefficients: Sequence[Any], ends: tuple[float, float], sign: int
-) -> None:
+def test_one_stable_design_in_a_corner_is_enough(coefficients, ends, sign):
     """The same up to a hair beyond their edge."""
     assert not none_stable(stated([sign * c for c in coefficients], {"x": ends}))
 
 
-def test_of_several_cases_and_of_no_box_nothing_is_said() -> None:
+def test_of_several_cases_and_of_no_box_nothing_is_said():
     assert not none_stable(stated([1, x - 2, 1 + y], {"x": (0, 1)}, scenarios={"y": [0.0, 1.0]}))
     fixed = tmsopt.Problem(from_coefficients([1, x - 2, 1]), fixed={"x": 1.0}, minimize="abscissa")
     assert not none_stable(fixed)

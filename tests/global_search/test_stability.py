@@ -40,7 +40,7 @@ def problem(coefficients: Any, free: Any, **asked: Any) -> Problem:
     ],
 )
 @pytest.mark.slow
-def test_boxes_without_a_stable_design(coefficients: Any, free: Any, asked: Any) -> None:
+def test_boxes_without_a_stable_design(coefficients, free, asked):
     stated = problem(coefficients, free, **asked)
     assert any_stable(stated, SECONDS).any is False
     assert any_stable(stated, SECONDS, known=stated.ordered({n: hi for n, (_, hi) in free.items()})).any is False
@@ -48,7 +48,7 @@ def test_boxes_without_a_stable_design(coefficients: Any, free: Any, asked: Any)
 
 @scip
 @pytest.mark.parametrize("most", [3.0, 2.001])
-def test_a_stable_design_is_found(most: float) -> None:
+def test_a_stable_design_is_found(most):
     """Be it one in a thousand."""
     found = any_stable(problem(DAMPED, {"x": (0, most)}), SECONDS)
     assert found.any is True
@@ -57,7 +57,7 @@ def test_a_stable_design_is_found(most: float) -> None:
 
 
 @scip
-def test_limits_hold_for_what_is_found() -> None:
+def test_limits_hold_for_what_is_found():
     found = any_stable(
         problem(DAMPED, {"x": (0, 9)}, constraints={"most": "x**2 <= 5", "rest": "abscissa >= 1"}), SECONDS
     )
@@ -75,7 +75,7 @@ def test_limits_hold_for_what_is_found() -> None:
         (DAMPED, 2.0),  # a pair at ± i at the end of the range
     ],
 )
-def test_of_designs_on_the_axis_nothing_is_said(coefficients: Any, most: float) -> None:
+def test_of_designs_on_the_axis_nothing_is_said(coefficients, most):
     """What is refuted is that roots may lie left of the axis or on it, and here they may."""
     began = time.perf_counter()
     assert any_stable(problem(coefficients, {"x": (0, most)}), 60.0).any is None
@@ -83,7 +83,7 @@ def test_of_designs_on_the_axis_nothing_is_said(coefficients: Any, most: float) 
 
 
 @scip
-def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch):
     monkeypatch.setattr(
         SolverPool, "race", lambda self, tasks, tick=None: [Decision(INFEASIBLE, bound=1.0) for _ in tasks]
     )
@@ -92,7 +92,7 @@ def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch: pytest
 
 @scip
 @pytest.mark.parametrize("when", ["asked", "proved"])
-def test_an_interrupt_goes_on(when: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_goes_on(when, monkeypatch):
     """While the question is asked, or while its answer is looked at: the tasks within limits do that."""
 
     def stop(self: SolverPool, tasks: Any, tick: Any = None) -> list[Decision]:
@@ -107,11 +107,11 @@ def test_an_interrupt_goes_on(when: str, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @scip
-def test_what_scip_cannot_take_is_left_undecided() -> None:
+def test_what_scip_cannot_take_is_left_undecided():
     assert any_stable(problem(DAMPED, {"x": (0, 3)}, constraints={"huge": "exp(60*x) >= 1e10"}), SECONDS) == Stability()
 
 
-def test_without_a_global_solver_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_global_solver_nothing_is_asked(monkeypatch):
     monkeypatch.setattr(asking, "SOLVER", replace(SCIP, module="no_such_module"))
     monkeypatch.setattr(asking, "SolverPool", None)
     monkeypatch.setattr(asking, "none_stable", lambda problem: False)

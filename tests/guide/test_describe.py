@@ -21,7 +21,7 @@ def names(found: tmsopt.Description) -> set[str]:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_a_model_is_described_by_its_own_tables(name: str) -> None:
+def test_a_model_is_described_by_its_own_tables(name):
     model = getattr(tmsopt.models, name)
     found = tmsopt.describe(name)
     assert found == tmsopt.describe(model)
@@ -37,7 +37,7 @@ def test_a_model_is_described_by_its_own_tables(name: str) -> None:
 
 
 @pytest.mark.parametrize("path", PROBLEMS, ids=lambda p: p.stem)
-def test_a_file_is_described_by_every_name_that_it_may_use(path: Path) -> None:
+def test_a_file_is_described_by_every_name_that_it_may_use(path):
     found = tmsopt.describe(path)
     if "study" not in path.stem:
         problem = tmsopt.load(path)
@@ -52,7 +52,7 @@ def test_a_file_is_described_by_every_name_that_it_may_use(path: Path) -> None:
     assert json.loads(json.dumps(found.to_json(), allow_nan=False))["model"] == found.model
 
 
-def test_numbers_stand_as_they_were_typed() -> None:
+def test_numbers_stand_as_they_were_typed():
     (of,) = tmsopt.describe("problems/point_mass_robot.toml").sets
     given = {s.name: s.given for s in of.parameters}
     assert given["w"] == "80 cm"
@@ -62,7 +62,7 @@ def test_numbers_stand_as_they_were_typed() -> None:
     assert tmsopt.describe("problems/workshop.toml").asked["tolerances"] == {"x_B": "5 mm", "lambda_s": "0.5 deg"}
 
 
-def test_a_problem_of_python_has_the_units_of_the_model() -> None:
+def test_a_problem_of_python_has_the_units_of_the_model():
     free = {"lambda_s": (0.1, 1.0), "Fr": (1, 2)}
     fixed = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1, "chi_B": 1.5}
     problem = tmsopt.Problem(
@@ -74,7 +74,7 @@ def test_a_problem_of_python_has_the_units_of_the_model() -> None:
     assert found.asked == {"objective": {"minimize": "abscissa"}, "scenarios": {"mu": "0.1, 0.2"}}
 
 
-def test_a_problem_of_python_has_the_units_in_which_it_was_typed() -> None:
+def test_a_problem_of_python_has_the_units_in_which_it_was_typed():
     path = "problems/point_mass_robot.toml"
     assert tmsopt.describe(tmsopt.load(path)) == tmsopt.describe(path)
     problem = replace(tmsopt.load(path), scenarios={"m_B": ("12 kg", "500 g")}, tolerances={"w": 0.005})
@@ -83,7 +83,7 @@ def test_a_problem_of_python_has_the_units_in_which_it_was_typed() -> None:
     assert found.asked["scenarios"] == {"m_B": "12 kg, 0.5 kg"}
 
 
-def test_a_system_of_ones_own_shows_its_matrices() -> None:
+def test_a_system_of_ones_own_shows_its_matrices():
     found = tmsopt.describe("problems/coupled_pair.toml")
     assert found.matrices["K"] == (("1 + k", "-k"), ("-k", "w + k"))
     assert "K = [1 + k     -k]\n    [   -k  w + k]" in str(found)
@@ -95,7 +95,7 @@ def test_a_system_of_ones_own_shows_its_matrices() -> None:
     assert {q.name: q.meaning for q in of.quantities}["ratio"] == "= (k / m)"
 
 
-def test_the_functions_are_those_of_expressions() -> None:
+def test_the_functions_are_those_of_expressions():
     called = {
         name: f"{name}(v, 1)" if name in ("min", "max") else f"{name}(v)" for name in tmsopt.describe("tms").functions
     }
@@ -105,7 +105,7 @@ def test_the_functions_are_those_of_expressions() -> None:
         assert parse_value(text, ["v"]).names == ("v",)
 
 
-def test_the_patterns_are_those_that_a_problem_may_locate() -> None:
+def test_the_patterns_are_those_that_a_problem_may_locate():
     for name, meaning in tmsopt.describe("problems/three_masses.toml").patterns.items():  # degree 6
         assert meaning
         assert tmsopt.roots.pattern(name, 6).name == name
@@ -114,7 +114,7 @@ def test_the_patterns_are_those_that_a_problem_may_locate() -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_the_sketch_has_every_length_mass_and_angle(name: str) -> None:
+def test_the_sketch_has_every_length_mass_and_angle(name):
     """And nothing else that looks like a symbol."""
     found = tmsopt.describe(name)
     drawn = set(re.findall(r"\b[A-Za-z]+_[A-Za-z]+\b|(?<=[ <])[wcvg](?=[ ,;>)])", found.sketch))
@@ -124,7 +124,7 @@ def test_the_sketch_has_every_length_mass_and_angle(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_the_sketch_is_drawn_to_the_signs(name: str) -> None:
+def test_the_sketch_is_drawn_to_the_signs(name):
     """The axis leans back at its top, to the left of a bicycle that goes right, and meets the ground by the trail ahead."""
     lines = tmsopt.describe(name).sketch.strip("\n").splitlines()
     ground = next(k for k, line in enumerate(lines) if line.endswith("ground"))
@@ -137,7 +137,7 @@ def test_the_sketch_is_drawn_to_the_signs(name: str) -> None:
     assert trail is None or trail.start() == front
 
 
-def test_signs_are_said() -> None:
+def test_signs_are_said():
     said = " ".join(tmsopt.describe("tms").conventions)
     assert "z down" in said
     assert "heights are negative" in said
@@ -148,12 +148,12 @@ def test_signs_are_said() -> None:
 
 
 @pytest.mark.parametrize("wrong", [3, None, ["tms"]], ids=repr)
-def test_anything_else_is_refused_in_words(wrong: object) -> None:
+def test_anything_else_is_refused_in_words(wrong):
     with pytest.raises(tmsopt.InputError, match="accepted: the name of a model"):
         tmsopt.describe(wrong)  # type: ignore[arg-type]
 
 
-def test_a_word_that_is_no_file_is_answered_with_the_models(tmp_path: Path) -> None:
+def test_a_word_that_is_no_file_is_answered_with_the_models(tmp_path):
     with pytest.raises(tmsopt.InputError, match="no such file; models: tms whipple"):
         tmsopt.describe("bicycle")
     (tmp_path / "bad.toml").write_text("[parameters]\nw = 1\n")

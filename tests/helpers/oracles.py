@@ -10,7 +10,6 @@ from fractions import Fraction
 from math import prod
 
 import flint
-import numpy as np
 import sympy  # type: ignore[import-untyped]
 from mpmath import mp
 
@@ -39,13 +38,6 @@ def polynomial_exact(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s):
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(Fraction, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s))
     M, V, P, nu_H = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Fraction(1), T)
     return [a / (mu * nu_H) for a in _determinant(M, V, P)]
-
-
-def polynomial_floats(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s):
-    """The same coefficients, but for a common factor, in double precision for arrays."""
-    cos, sin = np.cos(lambda_s), np.sin(lambda_s)
-    M, V, P, _ = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
-    return _determinant(M, V, P)
 
 
 def symbolic_copo():

@@ -5,20 +5,36 @@ from pathlib import Path
 
 import pytest
 
+from tmsopt.errors import InputError
 from tmsopt.problem import load
-from tmsopt.studies import Row, Study
+from tmsopt.records import Table
+from tmsopt.studies import Row, Study, part_of
 
 STUDY = Study(
     load(Path(__file__).parents[2] / "problems" / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7
 )
 
 
-def row(number, **given):
-    return Row(
-        number,
-        1000 + number,
-        **({"varied": STUDY.varied(number), "status": "optimal", "abscissa": -1 / (1 + number)} | given),
-    )
+def row(number, study=STUDY, **given):
+    """A row with what its study gives it."""
+    varied = study.varied(number)
+    told = {"status": "optimal", "abscissa": -1 / (1 + number)} | given
+    if told["status"] not in ("failed", "quarantined"):
+        given = {**study.problem.fixed, **varied}
+        told = {"parameters": Table({n: given.get(n, 1.0) for n in study.problem.parameter_set.names})} | told
+    return Row(number, study.seed_of(number), varied, **told)
+
+
+def part(*rows):
+    """Rows as a store takes them."""
+    return part_of(rows)
+
+
+def faults(call, *given, **options):
+    """What is wrong with a call."""
+    with pytest.raises(InputError) as caught:
+        call(*given, **options)
+    return str(caught.value)
 
 
 def flat(row):

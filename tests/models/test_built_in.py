@@ -6,19 +6,19 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tmsopt.models import MODELS, TAKEN, Model
+from tmsopt.models import MODELS, TAKEN
 
 pytestmark = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
-def test_no_name_means_two_things(model: Model) -> None:
+def test_no_name_means_two_things(model):
     for of in model.sets:
         names = [*of.names, *model.quantity_names(of)]
         assert [n for n, count in Counter(names).items() if count > 1] == []
         assert set(names) & set(TAKEN) == set()
 
 
-def test_the_polynomial_is_the_determinant_of_the_matrices(model: Model) -> None:
+def test_the_polynomial_is_the_determinant_of_the_matrices(model):
     """Up to a factor; both in doubles, the determinant by NumPy at points on a circle."""
     assert model.pencil is not None
     of, rng = model.sets[0], np.random.default_rng(7)
@@ -35,5 +35,5 @@ def test_the_polynomial_is_the_determinant_of_the_matrices(model: Model) -> None
         np.testing.assert_allclose(ratios, ratios[0], rtol=1e-9)  # 1e6 roundings: some draws nearly cancel
 
 
-def test_a_copy_is_the_model_itself(model: Model) -> None:
+def test_a_copy_is_the_model_itself(model):
     assert pickle.loads(pickle.dumps(model)) is model

@@ -32,7 +32,7 @@ def random_text(rng: random.Random, depth: int) -> str:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_random_formulas_hold_the_60_digit_value(seed: int) -> None:
+def test_random_formulas_hold_the_60_digit_value(seed):
     rng = random.Random(seed)
     text = f"{random_text(rng, 4)} + x/3*0.6/0.2 + y - y"
     model = pickle.loads(pickle.dumps(from_coefficients(["1", text, "0.1*x"], quantities={"q": f"{text} - 0.3"})))
@@ -52,7 +52,7 @@ def test_random_formulas_hold_the_60_digit_value(seed: int) -> None:
 @pytest.mark.parametrize(
     "eight_thirds", ["8/3", Fraction(8, 3), "2.6 + 1/15", "(2 + 2/3)"], ids=["text", "Fraction", "sum", "brackets"]
 )
-def test_a_quotient_is_a_fraction_however_it_is_given(eight_thirds: object) -> None:
+def test_a_quotient_is_a_fraction_however_it_is_given(eight_thirds):
     """c = 2 √(8/3), not twice the root of the double nearest to 8/3, which is 9e-17 off."""
     with mp.workdps(60):
         wanted = mp.nstr(2 * mp.sqrt(mp.mpf(8) / 3), 50)
@@ -67,7 +67,7 @@ def test_a_quotient_is_a_fraction_however_it_is_given(eight_thirds: object) -> N
         assert float(proof.parameters["c"].radius) < 1e-30
 
 
-def test_decimals_of_arrays_and_of_casadi_are_decimals() -> None:
+def test_decimals_of_arrays_and_of_casadi_are_decimals():
     """As in [[0.1, 0.7], [0.3, 2.1]], whose determinant is 0 and in binary is not."""
     c = ca.SX.sym("c")
     for rows in ([[0.1, 0.7], ["0.3*c", "2.1*c"]], [[ca.SX(0.1), ca.SX(0.7)], [0.3 * c, 2.1 * c]]):
@@ -76,7 +76,7 @@ def test_decimals_of_arrays_and_of_casadi_are_decimals() -> None:
         assert a[1] == -flint.fmpq(1, 10) - flint.fmpq(7, 10)
 
 
-def test_complex_entries_keep_their_numbers() -> None:
+def test_complex_entries_keep_their_numbers():
     """|g1 − g2|/2 for g1 = 7/10 and g2 = 1/3."""
     model = from_hamiltonian([["d - 0.7j", "k"], ["k", "-1j/3"]])
     problem = tmsopt.Problem(model, free={"d": (-1, 1), "k": (0.01, 3)}, locate="EP2")
@@ -86,7 +86,7 @@ def test_complex_entries_keep_their_numbers() -> None:
     assert proof.parameters["k"].contains(Fraction(11, 60))
 
 
-def test_a_proof_lists_the_numbers_that_it_takes_exactly() -> None:
+def test_a_proof_lists_the_numbers_that_it_takes_exactly():
     proof = tmsopt.prove(
         tmsopt.solve(tmsopt.Problem(from_coefficients([1, "c", "8/3"]), free={"c": (1, 9)}, locate="EP2"))
     )
@@ -103,7 +103,7 @@ def test_a_proof_lists_the_numbers_that_it_takes_exactly() -> None:
         ("k + 1j/7", Fraction(1, 7), "1/7"),
     ],
 )
-def test_numbers_in_complex_entries_are_listed(entry: str, im: Fraction, listed: str) -> None:
+def test_numbers_in_complex_entries_are_listed(entry, im, listed):
     model = tmsopt.models.from_hamiltonian([[entry, "k"], ["k", 0]])
     assert model.numbers == (listed,)
     assert model.pencil is not None

@@ -2,7 +2,6 @@
 
 import math
 import pickle
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -28,7 +27,7 @@ def of_numpy(matrix: Any) -> list[complex]:
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 6])
-def test_eigenfrequencies_are_those_of_the_matrix(size: int) -> None:
+def test_eigenfrequencies_are_those_of_the_matrix(size):
     """Beside LAPACK, for random complex matrices; 1e-9 of rounding in a polynomial of degree 12 with simple roots."""
     rng = np.random.default_rng(size)
     for _ in range(3):
@@ -39,7 +38,7 @@ def test_eigenfrequencies_are_those_of_the_matrix(size: int) -> None:
 
 
 @pytest.mark.parametrize("carrier", [0.0, -3.0, 1e3, 1e6])
-def test_a_carrier_of_the_user_costs_no_digits(carrier: float) -> None:
+def test_a_carrier_of_the_user_costs_no_digits(carrier):
     """Frequencies relative to it are those without it, but for the roundings of the sum: 1e-16 of the carrier."""
     model = from_hamiltonian(DIMER)
     own = {"g1": 0.25, "g2": 0.125, "k": 0.75}
@@ -48,7 +47,7 @@ def test_a_carrier_of_the_user_costs_no_digits(carrier: float) -> None:
     assert np.allclose(np.array(found) - carrier, alone, rtol=0, atol=4e-16 * carrier + 1e-13)
 
 
-def test_a_rotating_frame_has_no_false_meeting() -> None:
+def test_a_rotating_frame_has_no_false_meeting():
     """±a, and i b: the double without a carrier has there double roots that H has not."""
     model = from_hamiltonian(DIMER)
     opposite = {"w1": 0.5, "w2": -0.5, "g1": 0.0, "g2": 0.0, "k": 0.0}
@@ -63,7 +62,7 @@ def test_a_rotating_frame_has_no_false_meeting() -> None:
 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-7, 1e-6])
-def test_uncoupled_resonators_of_little_loss_do_not_meet(apart: float) -> None:
+def test_uncoupled_resonators_of_little_loss_do_not_meet(apart):
     """Losses below 1e-6 of the frequency: written as a real system they pass for one."""
     model = from_hamiltonian([["w1 - 1j*g1", 0], [0, "w2 - 1j*g2"]])
     found = tmsopt.solve(tmsopt.Problem(model, fixed={"w1": 1.0, "w2": 1.0 + apart, "g1": 1e-7, "g2": 3e-7}))
@@ -71,14 +70,14 @@ def test_uncoupled_resonators_of_little_loss_do_not_meet(apart: float) -> None:
     assert [z.im for z in found.eigenfrequencies] == pytest.approx([-1e-7, -3e-7], rel=1e-9)
 
 
-def test_uncoupled_resonators_with_the_same_loss_and_frequency_are_semisimple() -> None:
+def test_uncoupled_resonators_with_the_same_loss_and_frequency_are_semisimple():
     model = from_hamiltonian([["w - 1j*g", "k"], ["k", "w - 1j*g"]])
     (found,) = tmsopt.diagnose(tmsopt.Problem(model, fixed={"w": 1.0, "g": 0.1, "k": 0.0}))
     assert (found.algebraic, found.geometric, found.kind) == (2, 2, "semisimple")
     assert found.eigenfrequency == pytest.approx(1 - 0.1j, abs=1e-14)
 
 
-def test_the_carrier_is_no_part_of_the_problem() -> None:
+def test_the_carrier_is_no_part_of_the_problem():
     """Two problems written the same are equal, whatever model objects were made on the way."""
     free = {"k": (0.1, 2.0)}
 
@@ -95,7 +94,7 @@ def test_the_carrier_is_no_part_of_the_problem() -> None:
     assert not {"a0", "a4"} & set(tmsopt.solve(one).quantities)  # of the double
 
 
-def test_a_carrier_serves_its_ranges_and_grows_with_them() -> None:
+def test_a_carrier_serves_its_ranges_and_grows_with_them():
     """No root of the double comes as near to the real axis as the spread of the eigenfrequencies."""
     model = from_hamiltonian(DIMER)
     box = {"w1": (-1.0, 1.0), "w2": (0.0, 0.0), "g1": (0.0, 2.0), "g2": (0.1, 0.1), "k": (0.0, 3.0)}
@@ -110,13 +109,13 @@ def test_a_carrier_serves_its_ranges_and_grows_with_them() -> None:
     assert model.within({**box, "k": (0.0, 300.0)}).carrier != made.carrier
 
 
-def test_where_an_entry_has_no_bound_a_sample_tells_the_carrier() -> None:
+def test_where_an_entry_has_no_bound_a_sample_tells_the_carrier():
     model = from_hamiltonian([["1/x - 1j*g", "k"], ["k", "-1j*g"]])
     found = tmsopt.solve(tmsopt.Problem(model, fixed={"g": 0.1}, free={"x": (-1, 2), "k": (0.1, 1)}, minimize="k"))
     assert found.parameters["k"] == 0.1
 
 
-def test_entries_of_every_kind_make_the_same() -> None:
+def test_entries_of_every_kind_make_the_same():
     k, g, w = (ca.SX.sym(n) for n in "kgw")
     at = {"w": 0.5, "g": 0.25, "k": 0.75}
     matrix = [[0.5 - 0.25j, 0.75j], [0.75, 2 + 1j]]
@@ -129,7 +128,7 @@ def test_entries_of_every_kind_make_the_same() -> None:
         assert frequencies(from_hamiltonian(H), at) == pytest.approx(of_numpy(matrix), abs=1e-13)
 
 
-def test_functions_of_complex_numbers() -> None:
+def test_functions_of_complex_numbers():
     """Quotients, whole powers and exp, beside Python's own complex numbers; a 1 × 1 matrix is its entry."""
     for text in (
         "(x + 1j)**3",
@@ -160,7 +159,7 @@ def test_functions_of_complex_numbers() -> None:
         ([[(1, 2, 3)]], "accepted: two, the real and the imaginary part"),
     ],
 )
-def test_what_is_refused_is_told(H: Any, words: str) -> None:
+def test_what_is_refused_is_told(H, words):
     with pytest.raises(Unfit) as refused:
         from_hamiltonian(H)
     assert refused.value.key == "H"
@@ -178,7 +177,7 @@ def test_what_is_refused_is_told(H: Any, words: str) -> None:
         ('A = [["1j*w"]]', "a complex matrix goes in H"),
     ],
 )
-def test_a_file_is_refused_at_its_line(tmp_path: Path, table: str, words: str) -> None:
+def test_a_file_is_refused_at_its_line(tmp_path, table, words):
     path = tmp_path / "own.toml"
     path.write_text(f"[model]\n{table}\n[parameters]\nw = 1\n", encoding="utf-8")
     with pytest.raises(tmsopt.InputError, match=r"own\.toml:[23]: model\.[AH]") as refused:
@@ -187,27 +186,27 @@ def test_a_file_is_refused_at_its_line(tmp_path: Path, table: str, words: str) -
 
 
 @pytest.mark.parametrize("asked", ["damping_ratio", "angular_frequency"])
-def test_what_has_no_meaning_in_a_rotating_frame_is_not_offered(asked: str) -> None:
+def test_what_has_no_meaning_in_a_rotating_frame_is_not_offered(asked):
     fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
     with pytest.raises(tmsopt.InputError, match="rotating frame"):
         tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free={"k": (0.1, 2)}, maximize=asked)
 
 
 @pytest.mark.parametrize("name", ["CEP2", "EP3", "capsize"])
-def test_patterns_are_those_of_the_matrix(name: str) -> None:
+def test_patterns_are_those_of_the_matrix(name):
     fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
     with pytest.raises(tmsopt.InputError, match="EP2 weave resonance"):
         tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free={"k": (0.1, 2)}, locate=name)
 
 
 @pytest.mark.parametrize("H", [[["x", 0], [0, 0]], [["x", "x"], [0, "x"]], [[0, 1], [0, "x"]]])
-def test_zero_is_an_eigenfrequency_as_others_are(H: Any) -> None:
+def test_zero_is_an_eigenfrequency_as_others_are(H):
     """Of a zero matrix every carrier is too large; intervals have a rounding even there."""
     found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(H), fixed={"x": 0.0})).eigenfrequencies
     assert [(z.re, z.im, z.multiplicity) for z in found] == [(0.0, 0.0, 2)]
 
 
-def test_a_carrier_is_no_wider_than_the_eigenfrequencies_ask() -> None:
+def test_a_carrier_is_no_wider_than_the_eigenfrequencies_ask():
     """ω = ±√(1 − g²) is within 0.142 of 0 for g from 0.99 to 1.01, and the discs of the matrix reach to 1 and beyond.
 
     A carrier is at most four times the spread, which is at most 1.25 times what is seen: 5 · 0.142.

@@ -19,9 +19,7 @@ from tmsopt import laws
 from tmsopt.models import (
     GRAVITY,
     MODELS,
-    Parameter,
     ParameterSet,
-    Quantity,
     Range,
     Values,
     copo,
@@ -59,13 +57,13 @@ def quantities(parameters: Mapping[str, Any], of: ParameterSet = NATIVE) -> Valu
 # The polynomial
 
 
-def test_copo_is_what_the_oracle_derives_from_the_printed_matrices() -> None:
+def test_copo_is_what_the_oracle_derives_from_the_printed_matrices():
     """The same identity from the oracle's own copy of the matrices, so that neither copy can hide a misprint."""
     expected, symbols = symbolic_copo()
     assert [sympy.expand(a - b) for a, b in zip(copo(**symbols), expected, strict=True)] == [0] * 5
 
 
-def test_coefficients_of_floats_are_right_to_a_few_roundings() -> None:
+def test_coefficients_of_floats_are_right_to_a_few_roundings():
     """Against 60 digits of the very doubles, relative to the terms of each coefficient; tan carries an ulp too."""
     expressions, symbols = symbolic_copo()
     terms = [sympy.lambdify(list(symbols.values()), sum(map(abs, e.args))) for e in expressions]
@@ -105,7 +103,7 @@ def within_ulps(got: float, expected: float, ulps: int) -> bool:
 
 @repeatable
 @given(si_designs())
-def test_si_there_and_back_to_2_ulp(p: dict[str, float]) -> None:
+def test_si_there_and_back_to_2_ulp(p):
     """One division and one product, each rounded once; √(g w) is the same double both ways."""
     back = to_si(from_si(p), w=p["w"], m_B=p["m_B"], g=p["g"])
     assert list(back) == list(SI.names)
@@ -116,7 +114,7 @@ def test_si_there_and_back_to_2_ulp(p: dict[str, float]) -> None:
     assert all(within_ulps(again[name], native[name], 2) for name in native)
 
 
-def test_si_of_a_metre_and_a_kilogram_at_9_81() -> None:
+def test_si_of_a_metre_and_a_kilogram_at_9_81():
     """The defaults of the contract: w = 1 m and g = 9.81 m/s²."""
     native = from_si(BENCHMARK)
     back = to_si(native)
@@ -128,7 +126,7 @@ def test_si_of_a_metre_and_a_kilogram_at_9_81() -> None:
     assert [p.name for p in SI.parameters if p.default is not None] == ["g"]
 
 
-def test_coefficients_for_si_values_are_those_of_their_dimensionless_ones() -> None:
+def test_coefficients_for_si_values_are_those_of_their_dimensionless_ones():
     assert tms.coefficients(BENCHMARK, SI) == tms.coefficients(from_si(BENCHMARK))
     assert tms.parameter_set("SI") is SI
     assert tms.parameter_set("dimensionless") is NATIVE
@@ -158,7 +156,7 @@ SI_UNITS = {
 }
 
 
-def test_nu_H_is_the_distance_from_the_steer_axis() -> None:
+def test_nu_H_is_the_distance_from_the_steer_axis():
     for p in designs(50):
         with mp.workdps(60):
             lam = mp.mpf(p["lambda_s"])
@@ -166,7 +164,7 @@ def test_nu_H_is_the_distance_from_the_steer_axis() -> None:
         assert abs(quantities(p)["nu_H"] - sum(terms)) <= 8 * np.finfo(float).eps * sum(map(abs, terms))
 
 
-def test_omega0_is_the_mean_decay_where_it_exists() -> None:
+def test_omega0_is_the_mean_decay_where_it_exists():
     """−(a4/a0)^(1/4) at 60 digits; nan for a4/a0 < 0. Where a4 or a0 cancels, ω0 inherits its rounding."""
     seen = set()
     for p in designs(100):
@@ -182,7 +180,7 @@ def test_omega0_is_the_mean_decay_where_it_exists() -> None:
     assert seen == {True, False}
 
 
-def test_Fr_c_is_the_speed_where_the_hurwitz_determinant_vanishes() -> None:
+def test_Fr_c_is_the_speed_where_the_hurwitz_determinant_vanishes():
     """Found by bisection of the 60-digit determinant, not by a formula; nan where it keeps its sign."""
     found = 0
     for p in designs(40, seed=1):
@@ -197,7 +195,7 @@ def test_Fr_c_is_the_speed_where_the_hurwitz_determinant_vanishes() -> None:
     assert 5 < found < 35
 
 
-def test_Fr_c_agrees_with_flus_on_arrays() -> None:
+def test_Fr_c_agrees_with_flus_on_arrays():
     rows = designs(500, seed=2)
     columns = {name: np.array([p[name] for p in rows]) for name in rows[0]}
     square = laws.flus(**{name: value for name, value in columns.items() if name != "Fr"})
@@ -209,20 +207,20 @@ def test_Fr_c_agrees_with_flus_on_arrays() -> None:
 
 
 @pytest.mark.parametrize("tilt", [0.5, -0.5])
-def test_Fr_c_does_not_exist_where_the_masses_are_above_one_another(tilt: float) -> None:
+def test_Fr_c_does_not_exist_where_the_masses_are_above_one_another(tilt):
     """a3 = 0 at χ_B = χ_H: the Hurwitz determinant is −a1² a4, with no zero in the speed."""
     p = {**designs(1)[0], "chi_B": 1.2, "chi_H": 1.2, "lambda_s": tilt}
     assert math.isnan(quantities(p)["Fr_c"])
 
 
-def test_omega0_does_not_exist_where_the_degree_drops() -> None:
+def test_omega0_does_not_exist_where_the_degree_drops():
     """ζ_H = 0 and χ_H = 1: the front mass is on the steer axis, and a0 = 0."""
     p = {**designs(1)[0], "chi_H": 1.0, "zeta_H": 0.0, "lambda_s": 0.3}
     assert tms.coefficients(p)[0] == 0
     assert math.isnan(quantities(p)["omega0"])
 
 
-def test_equations_of_quantities_vanish_at_their_values_and_nowhere_near() -> None:
+def test_equations_of_quantities_vanish_at_their_values_and_nowhere_near():
     """An optimiser carries x with equation(x) = 0 in place of the formula."""
     checked = 0
     for p in designs(30):
@@ -238,7 +236,7 @@ def test_equations_of_quantities_vanish_at_their_values_and_nowhere_near() -> No
     assert checked > 20
 
 
-def test_values_is_a_mapping_of_everything_an_expression_may_use() -> None:
+def test_values_is_a_mapping_of_everything_an_expression_may_use():
     values = quantities(BENCHMARK, SI)
     names = set(SI.names) | set(NATIVE.names) | {"a0", "a1", "a2", "a3", "a4"}
     assert set(values) == names | QUANTITIES | set(SI_UNITS) | set(TIMES)
@@ -256,13 +254,13 @@ TIMES = {"decay_rate": "1/s", "decay_time": "s", "frequency": "Hz"}
 """Quantities of time, of the roots and the unit of rates."""
 
 
-def test_a_decay_without_an_end_warns_of_nothing() -> None:
+def test_a_decay_without_an_end_warns_of_nothing():
     (time,) = (q for q in SI.quantities if q.name == "decay_time")
     with np.errstate(over="raise", divide="raise"):
         assert time.value({"w": 1.0, "g": 9.81, "abscissa": np.float64(-1e-310)}) == math.inf
 
 
-def test_the_parameters_of_the_contract() -> None:
+def test_the_parameters_of_the_contract():
     assert NATIVE.names == ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
     assert SI.names == ("w", "v", "g", "lambda_s", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")
     assert tms.coefficient_names() == ("a0", "a1", "a2", "a3", "a4")
@@ -288,7 +286,7 @@ EVERY = [p for s in tms.sets for p in s.parameters] + [*tms.quantities, *SI.quan
 
 
 @pytest.mark.parametrize("item", EVERY, ids=lambda p: p.name)
-def test_every_parameter_and_quantity_is_documented(item: Parameter | Quantity) -> None:
+def test_every_parameter_and_quantity_is_documented(item):
     assert item.name.isidentifier()
     assert len(item.meaning) > 4
     assert item.unit == {**UNITS, **SI_UNITS, **TIMES}.get(item.name, "1")
@@ -317,27 +315,27 @@ PHYSICAL = {
 
 
 @pytest.mark.parametrize("parameter", [p for s in tms.sets for p in s.parameters], ids=lambda p: p.name)
-def test_ranges_hold_what_can_be_built(parameter: Parameter) -> None:
+def test_ranges_hold_what_can_be_built(parameter):
     """z points down, so heights are ≤ 0; masses and lengths are positive; a tilt of 90° has no tangent."""
     inside, outside = PHYSICAL[parameter.name]
     assert all(x in parameter.range for x in inside)
     assert not any(x in parameter.range for x in [*outside, math.nan])
 
 
-def test_a_range_says_what_it_accepts() -> None:
+def test_a_range_says_what_it_accepts():
     assert str(Range()) == "any finite number"
     assert str(Range(lower=0.0)) == ">= 0"
     assert str(Range(upper=0.0)) == "<= 0"
     assert str(Range(0.0, 2.0, closed=False)) == "> 0 and < 2"
 
 
-def test_tms_is_frozen() -> None:
+def test_tms_is_frozen():
     for item in (tms, NATIVE, NATIVE["Fr"], tms.quantities[0], NATIVE["Fr"].range):
         with pytest.raises(AttributeError):
             item.name = "other"  # type: ignore[misc]
 
 
-def test_what_stands_beside_a_dimensionless_number_is_that_number_in_si() -> None:
+def test_what_stands_beside_a_dimensionless_number_is_that_number_in_si():
     """Lengths are multiples of w, masses of m_B, speeds of √(g w), loads of the weight."""
     native, scaled = tms.sets
     design = {"Fr": 1.7, "mu": 0.3, "chi_B": 1.2, "chi_H": 0.9, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.4}
@@ -353,7 +351,7 @@ def test_what_stands_beside_a_dimensionless_number_is_that_number_in_si() -> Non
         assert value == pytest.approx(values[name] * scales[unit], rel=1e-14), name
 
 
-def test_a_model_has_the_words_of_its_users() -> None:
+def test_a_model_has_the_words_of_its_users():
     """Meijaard et al. (2007) for bicycles; flutter and divergence for other systems (Ziegler 1952)."""
     stated = from_coefficients([1, ca.SX.sym("x"), 1])
     for model in (tms, whipple):

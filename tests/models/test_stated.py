@@ -83,7 +83,7 @@ def eigenvalues(M: Any, D: Any, K: Any) -> Any:
 # What they make
 
 
-def test_pendulums_of_a_file_are_solved(tmp_path: Path) -> None:
+def test_pendulums_of_a_file_are_solved(tmp_path):
     """The optimum is not beaten by differential evolution on NumPy's eigenvalues, and is met by it to 1e-7."""
     problem = loaded(tmp_path, PENDULUMS)
     design = tmsopt.solve(problem)
@@ -106,7 +106,7 @@ def test_pendulums_of_a_file_are_solved(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", range(1, 7))
-def test_coefficients_of_matrices_are_those_of_numpy(size: int) -> None:
+def test_coefficients_of_matrices_are_those_of_numpy(size):
     random = np.random.default_rng(size)
     M, D, K = random.normal(size=(3, size, size))
     model = from_matrices(M, ca.DM(D) * c, ca.DM(K) * k)
@@ -120,7 +120,7 @@ def test_coefficients_of_matrices_are_those_of_numpy(size: int) -> None:
 
 
 @pytest.mark.parametrize("size", [1, 2, 5, 8, 12])
-def test_coefficients_of_a_first_order_system_are_those_of_numpy(size: int) -> None:
+def test_coefficients_of_a_first_order_system_are_those_of_numpy(size):
     A = np.random.default_rng(size).normal(size=(size, size))
     model = from_matrices(A=ca.DM(A) * k)
     found, expected = np.array(model.coefficients({"k": 1.3}), dtype=float), np.poly(1.3 * A)
@@ -130,7 +130,7 @@ def test_coefficients_of_a_first_order_system_are_those_of_numpy(size: int) -> N
     assert np.allclose(minus_A, -1.3 * A)
 
 
-def test_a_model_is_pickled_as_what_it_is() -> None:
+def test_a_model_is_pickled_as_what_it_is():
     model = from_matrices([[1]], [[c]], [[k]], quantities={"ratio": c / k})
     assert pickle.loads(pickle.dumps(model)) is model
     assert from_matrices([[1]], [[c]], [[k]], quantities={"ratio": c / k}) is model
@@ -149,7 +149,7 @@ def test_a_model_is_pickled_as_what_it_is() -> None:
         np.array([[1, 0], [0, ca.SX(2)]], dtype=object),
     ],
 )
-def test_matrices_of_any_kind(matrix: Any) -> None:
+def test_matrices_of_any_kind(matrix):
     """det(diag(1, 2) s² + k I) = 2 s⁴ + 3 k s² + k²."""
     model = from_matrices(matrix, None, [[k, 0], [0, k]])
     assert [float(x) for x in model.coefficients({"k": 3.0})] == [2, 0, 9, 0, 9]
@@ -178,11 +178,11 @@ def test_matrices_of_any_kind(matrix: Any) -> None:
         (ca.sqrt(ca.cos(k) ** 2) ** 2 + ca.sin(k) ** 2 - 1, 1),
     ],
 )
-def test_a_leading_coefficient_is_left_out_only_where_it_is_nought_for_all(lead: Any, degree: int) -> None:
+def test_a_leading_coefficient_is_left_out_only_where_it_is_nought_for_all(lead, degree):
     assert from_coefficients([lead, 1, k + c]).degree == degree
 
 
-def test_singular_mass_matrices() -> None:
+def test_singular_mass_matrices():
     """Singular in decimals, though not in binary."""
     assert Fraction(0.1) * Fraction(2.1) != Fraction(0.7) * Fraction(0.3)
     model = from_matrices([[0.1, 0.7], [0.3, 2.1]], [[k, 0], [0, 1]], [[1, 0], [0, k]])
@@ -197,7 +197,7 @@ def test_singular_mass_matrices() -> None:
     assert [float(x) for x in model.coefficients({"k": 2.0, "c": 4.0})] == pytest.approx([2 * 2 + 2 / 16, 0, 2])
 
 
-def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path: Path) -> None:
+def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path):
     problem = loaded(
         tmp_path,
         """
@@ -217,7 +217,7 @@ k = 4
     assert [float(values[n]) for n in ("w", "z", "half", "a1", "a2")] == [2, 0.75, 0.375, 3, 4]
 
 
-def test_numbers_of_a_model_are_told_apart_in_full() -> None:
+def test_numbers_of_a_model_are_told_apart_in_full():
     """CasADi prints six digits."""
     first, second = (from_coefficients([1, (1 + x) * k, 1]) for x in (1e-9, 2e-9))
     assert first.statement != second.statement
@@ -243,7 +243,7 @@ def test_numbers_of_a_model_are_told_apart_in_full() -> None:
         ("I1", "I_{1}"),
     ],
 )
-def test_names_as_symbols(name: str, symbol: str) -> None:
+def test_names_as_symbols(name, symbol):
     assert latex(name) == symbol
     MathTextParser("agg").parse(f"${symbol}$")  # raises on what a figure could not show
 
@@ -251,7 +251,7 @@ def test_names_as_symbols(name: str, symbol: str) -> None:
 # What they refuse
 
 
-def test_no_name_is_taken_twice() -> None:
+def test_no_name_is_taken_twice():
     assert {*ROOT_NAMES, *FUNCTIONS, *CONSTANTS} <= {*TAKEN}
 
 
@@ -299,7 +299,7 @@ def test_no_name_is_taken_twice() -> None:
         ("coefficients = [1, 'k']\nquantities.q = 'k/(1 - 1)'", 3, "'k/(1 - 1)' divides by 0"),
     ],
 )
-def test_a_statement_that_makes_no_model_is_placed(tmp_path: Path, statement: str, line: int, said: str) -> None:
+def test_a_statement_that_makes_no_model_is_placed(tmp_path, statement, line, said):
     file = written(tmp_path, f"[model]\n{statement}\n{PARAMETERS}")
     with pytest.raises(tmsopt.InputError) as caught:
         tmsopt.load(file)
@@ -316,12 +316,12 @@ def test_a_statement_that_makes_no_model_is_placed(tmp_path: Path, statement: st
         ("model = 'tms'\n[model]\nname = 'x'", "not TOML"),
     ],
 )
-def test_what_is_no_model(tmp_path: Path, model: str, said: str) -> None:
+def test_what_is_no_model(tmp_path, model, said):
     with pytest.raises(tmsopt.InputError, match=said):
         loaded(tmp_path, model + PARAMETERS)
 
 
-def test_lines_below_matrices_of_several_lines(tmp_path: Path) -> None:
+def test_lines_below_matrices_of_several_lines(tmp_path):
     """A row of a matrix may look like a header, and a text in it like a key."""
     text = """[model]
 M = [
@@ -371,7 +371,7 @@ k = 1
         (from_matrices, "M: is missing"),
     ],
 )
-def test_expressions_that_make_no_model(make: Any, said: str) -> None:
+def test_expressions_that_make_no_model(make, said):
     with pytest.raises(Unfit) as caught:
         make()
     assert said in str(caught.value)
@@ -379,7 +379,7 @@ def test_expressions_that_make_no_model(make: Any, said: str) -> None:
     assert (again.key, str(again)) == (caught.value.key, str(caught.value))
 
 
-def test_no_parameter_is_a_reserved_word() -> None:
+def test_no_parameter_is_a_reserved_word():
     for word in keyword.kwlist:
         with pytest.raises(Unfit, match="reserved word"):
             from_coefficients([1, ca.SX.sym(word)])
@@ -388,7 +388,7 @@ def test_no_parameter_is_a_reserved_word() -> None:
 # That all verbs take them
 
 
-def test_parameters_named_like_coefficients(tmp_path: Path) -> None:
+def test_parameters_named_like_coefficients(tmp_path):
     """The parameter or quantity keeps the name, and a chart is of the true coefficients."""
     problem = loaded(
         tmp_path,
@@ -409,7 +409,7 @@ a3 = 0.5
     assert [float(values[n]) for n in ("a0", "a1", "coefficient0", "coefficient1")] == [2, 1, 1, 2]
 
 
-def test_one_root(tmp_path: Path) -> None:
+def test_one_root(tmp_path):
     """m s + a: the abscissa −a/m is least at a = 2 with m a = 1, and nothing is asked of pairs that are not there."""
     text = """
 [model]
@@ -431,7 +431,7 @@ product = "m*a >= 1"
     assert command("prove", file).exit_code == 0
 
 
-def test_coefficients_without_a_value_somewhere(tmp_path: Path) -> None:
+def test_coefficients_without_a_value_somewhere(tmp_path):
     """s² + s/x + 1 has its EP2 at x = 1/2; the box holds the pole x = 0 in its middle."""
     text = "[model]\ncoefficients = [1, '1/x', 1]\n[parameters]\nx = {{ min = {}, max = 1 }}\n[objective]\nminimize = 'abscissa'"
     for least in (0, -1):
@@ -439,7 +439,7 @@ def test_coefficients_without_a_value_somewhere(tmp_path: Path) -> None:
         assert (design.structure, design.parameters["x"]) == ("EP2", pytest.approx(0.5, abs=1e-12))
 
 
-def test_coefficients_without_a_value_anywhere(tmp_path: Path) -> None:
+def test_coefficients_without_a_value_anywhere(tmp_path):
     text = "[model]\ncoefficients = [1, 'sqrt(x)', 1]\n[parameters]\nx = { min = -2, max = -1 }\n[objective]\nminimize = 'abscissa'"
     result = command("solve", written(tmp_path, text))
     assert result.exit_code == 3
@@ -448,7 +448,7 @@ def test_coefficients_without_a_value_anywhere(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [1e6, 1e-6])
-def test_roots_of_any_size(tmp_path: Path, size: float) -> None:
+def test_roots_of_any_size(tmp_path, size):
     """s³ + x s² + y s + ω³: EP3 at −ω, x = 3 ω, y = 3 ω²."""
     problem = tmsopt.Problem(
         model=from_coefficients([1, ca.SX.sym("x"), ca.SX.sym("y"), size**3 * ca.SX.sym("z")]),
@@ -462,7 +462,7 @@ def test_roots_of_any_size(tmp_path: Path, size: float) -> None:
     assert design.abscissa / size == pytest.approx(-1, rel=1e-11)
 
 
-def test_small_roots_of_a_stiff_system_are_not_called_double() -> None:
+def test_small_roots_of_a_stiff_system_are_not_called_double():
     """(s² + c s + 2)(1e-8 s² + d s + 1e8): double where c² = 8, and not 8e-5 off that, whatever the fast roots are."""
     d = ca.SX.sym("d")
     model = from_matrices([[1, 0], [0, 1e-8]], [[c, 0], [0, d]], [[2, 0], [0, 1e8]])
@@ -474,7 +474,7 @@ def test_small_roots_of_a_stiff_system_are_not_called_double() -> None:
         assert found.abscissa == pytest.approx(-slow / 2 + np.sqrt(slow**2 / 4 - 2), abs=1e-7)
 
 
-def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path: Path) -> None:
+def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path):
     own = "[model]\ncoefficients = [1, 'x', '{}*y']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = 1\n[objective]\nminimize = 'abscissa'"
     study = written(tmp_path, "problem = 'own.toml'\n[study]\nmethod = 'grid'\n[vary]\ny = [1, 4]\n", "study")
     store = tmp_path / "rows.sqlite"
@@ -490,7 +490,7 @@ def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path: Path) -> 
     assert 'coefficients[0][2]: "y" in the store, "(1.000000001 * y)" in the file' in result.output
 
 
-def test_a_chart_is_not_gone_on_with_after_the_model_changed(tmp_path: Path) -> None:
+def test_a_chart_is_not_gone_on_with_after_the_model_changed(tmp_path):
     own = "[model]\ncoefficients = [1, 'x', 'y', '{}']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = {{ min = 0, max = 9 }}"
     folder = tmp_path / "plane.chart"
     for written_as, status in (("1", 0), ("1", 0), ("1.0000001", 2)):
@@ -499,7 +499,7 @@ def test_a_chart_is_not_gone_on_with_after_the_model_changed(tmp_path: Path) -> 
     assert '"1.0000001"' in result.output
 
 
-def test_axes_beside_layers_of_the_same_name(tmp_path: Path) -> None:
+def test_axes_beside_layers_of_the_same_name(tmp_path):
     problem = tmsopt.Problem(model=from_coefficients([1, ca.SX.sym("kind"), c]), free={"kind": (1, 9), "c": (0, 9)})
     found = tmsopt.chart(problem, points=(2, 2), layers=["kind"], boundaries=False)
     found.save(tmp_path / "plane.npz")
@@ -508,7 +508,7 @@ def test_axes_beside_layers_of_the_same_name(tmp_path: Path) -> None:
         assert data["kind"].shape == (2, 2)
 
 
-def test_matrices_take_the_texts_that_a_file_takes() -> None:
+def test_matrices_take_the_texts_that_a_file_takes():
     """The same model as by symbols, and as of a file; texts and symbols may stand side by side."""
     mu, w, c = (ca.SX.sym(n) for n in ("mu", "w", "c"))
     texts = {"M": [[1, 0], [0, "mu"]], "K": [["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]}

@@ -20,7 +20,7 @@ def refused(tmp_path: Path, text: str) -> str:
 
 
 @pytest.mark.parametrize("k", ['"0.5+0.2j"', "0.5j", '"0.5j"', "0.5+0.2j"])
-def test_parameters_are_real(tmp_path: Path, k: str) -> None:
+def test_parameters_are_real(tmp_path, k):
     said = refused(tmp_path, f"{HEAD}k = {k}\n[objective]\nlocate = 'EP2'\n")
     assert "own.toml:7" in said
     assert "parameters are real" in said
@@ -28,19 +28,19 @@ def test_parameters_are_real(tmp_path: Path, k: str) -> None:
     assert "with a unit" not in said
 
 
-def test_a_threshold_is_weave_in_data(tmp_path: Path) -> None:
+def test_a_threshold_is_weave_in_data(tmp_path):
     assert "'threshold' is weave in data; write weave" in refused(
         tmp_path, f"{HEAD}k = 0.5\n[objective]\nlocate = 'threshold'\n"
     )
 
 
-def test_a_bare_j_is_told_where_it_is_alone(tmp_path: Path) -> None:
+def test_a_bare_j_is_told_where_it_is_alone(tmp_path):
     said = refused(tmp_path, '[model]\nH = [["1j*g", "k"], ["j*k", "-1j"]]\n[parameters]\ng = 1\nk = 1\n')
     assert said.count("would be a parameter") == 1
     assert "row 2, column 1: 'j' would be a parameter" in said
 
 
-def test_numbers_alone_make_no_model() -> None:
+def test_numbers_alone_make_no_model():
     with pytest.raises(Unfit, match="name one entry, such as 'k'"):
         from_hamiltonian(np.array([[1 - 1j, 1], [1, 2]]))
 
@@ -52,7 +52,7 @@ def test_numbers_alone_make_no_model() -> None:
         (-1.0, False, "an eigenfrequency is above the real axis"),
     ],
 )
-def test_a_proof_speaks_of_eigenfrequencies(g: float, holds: bool, words: str) -> None:
+def test_a_proof_speaks_of_eigenfrequencies(g, holds, words):
     """−i g and −3i, uncoupled."""
     design = tmsopt.solve(tmsopt.Problem(from_hamiltonian([["-1j*g", 0], [0, "-3j"]]), fixed={"g": g}))
     stable = tmsopt.prove(design).stable
@@ -61,7 +61,7 @@ def test_a_proof_speaks_of_eigenfrequencies(g: float, holds: bool, words: str) -
     assert "imaginary" not in stable.words
 
 
-def test_coefficients_of_the_real_system_are_no_names_of_h(tmp_path: Path) -> None:
+def test_coefficients_of_the_real_system_are_no_names_of_h(tmp_path):
     """Their carrier is chosen for the ranges of a problem, so that a limit on them would say nothing of H."""
     said = refused(tmp_path, f'{HEAD}k = 0.5\n[objective]\nlocate = "EP2"\n[constraints]\nc = "a1 <= 2"\n')
     assert "a1" in said

@@ -57,7 +57,7 @@ def answered(path: Path, text: str) -> list[str]:
         ("2 m_H <= 500 kg", "2*m_H <= 500"),
     ],
 )
-def test_a_limit_is_written_as_it_should_be(tmp_path: Path, written: str, meant: str) -> None:
+def test_a_limit_is_written_as_it_should_be(tmp_path, written, meant):
     """And so written it is accepted."""
     path = tmp_path / "robot.toml"
     (found,) = answered(path, ROBOT.replace("LIMIT", written))
@@ -81,7 +81,7 @@ def test_a_limit_is_written_as_it_should_be(tmp_path: Path, written: str, meant:
         ("absissa <= 0", "did you mean 'abscissa'"),
     ],
 )
-def test_a_limit_that_cannot_be_mended_is_explained(tmp_path: Path, written: str, said: str) -> None:
+def test_a_limit_that_cannot_be_mended_is_explained(tmp_path, written, said):
     (found,) = answered(tmp_path / "robot.toml", ROBOT.replace("LIMIT", written))
     assert re.match(rf"16: constraints\.arm: .*{said}", found), found
 
@@ -111,14 +111,14 @@ def test_a_limit_that_cannot_be_mended_is_explained(tmp_path: Path, written: str
         ('"tms"', "[1, [2]", 2, "a ] is missing"),
     ],
 )
-def test_a_line_is_answered_with_what_to_write(tmp_path: Path, old: str, new: str, line: int, said: str) -> None:
+def test_a_line_is_answered_with_what_to_write(tmp_path, old, new, line, said):
     """One fault, at its line."""
     (found,) = answered(tmp_path / "robot.toml", ROBOT.replace("LIMIT", "u_H >= 0.02").replace(old, new))
     assert found.startswith(f"{line}: ")
     assert said in found
 
 
-def test_a_list_that_is_not_closed_is_found_where_it_begins(tmp_path: Path) -> None:
+def test_a_list_that_is_not_closed_is_found_where_it_begins(tmp_path):
     text = '[model]\nM = [[1]]\nD = [["c"]\nK = [["k"]]\n[parameters]\nc = 1\nk = 1\n'
     (found,) = answered(tmp_path / "own.toml", text)
     assert found.startswith("3: ")
@@ -128,12 +128,12 @@ def test_a_list_that_is_not_closed_is_found_where_it_begins(tmp_path: Path) -> N
     assert set(tmsopt.load(tmp_path / "own.toml").fixed) == {"c", "k"}
 
 
-def test_a_wheelbase_of_whipple_has_a_trail() -> None:
+def test_a_wheelbase_of_whipple_has_a_trail():
     with pytest.raises(tmsopt.InputError, match=r"write c \(trail,"):
         tmsopt.Problem(model=tmsopt.models.whipple, fixed={"trail": 0.08})
 
 
-def test_degrees_are_offered_for_angles_alone() -> None:
+def test_degrees_are_offered_for_angles_alone():
     with pytest.raises(tmsopt.InputError) as caught:
         tmsopt.Problem(model=tmsopt.models.tms, fixed={"zeta_B": 0.4, "lambda_s": math.tau})
     assert [("deg" in fault.message) for fault in caught.value.faults if "not physical" in fault.message] == [
@@ -142,7 +142,7 @@ def test_degrees_are_offered_for_angles_alone() -> None:
     ]
 
 
-def test_a_file_with_anything_left_out_is_answered_in_words(tmp_path: Path) -> None:
+def test_a_file_with_anything_left_out_is_answered_in_words(tmp_path):
     """Every file with a piece cut away is read, or refused as bad input, with its lines."""
     path = tmp_path / "robot.toml"
     text = ROBOT.replace("LIMIT", "abs(u_H - 2*v) >= 0.02").replace('"robot"', '"""\na\n"""')

@@ -6,8 +6,6 @@ import os
 import re
 import string
 import subprocess
-from collections.abc import Callable
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -15,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings, strategies as st
 from mpmath import mp
 
-from tmsopt.problem import Expression, ExpressionError, parse_comparison, parse_value
+from tmsopt.problem import ExpressionError, parse_comparison, parse_value
 
 NAMES = ("Fr", "mu", "zeta_B", "a0", "lambda_s", "abscissa")
 
@@ -42,7 +40,7 @@ texts = st.recursive(
 
 @settings(max_examples=250, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(texts, st.lists(st.floats(-3, 3), min_size=len(NAMES), max_size=len(NAMES)))
-def test_random_expressions_mean_what_they_mean_in_python(text: str, numbers: list[float]) -> None:
+def test_random_expressions_mean_what_they_mean_in_python(text, numbers):
     """NumPy and CasADi against Python's own reading of the text, at 40 digits; where rounding matters nothing is asked."""
     at = dict(zip(NAMES, numbers, strict=True))
     written = re.sub(r"(?<![\w.])(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", r"mpf('\g<0>')", text)
@@ -82,14 +80,14 @@ def test_random_expressions_mean_what_they_mean_in_python(text: str, numbers: li
         ("  2 + 2 ", 4),
     ],
 )
-def test_the_rules_of_school(text: str, value: float) -> None:
+def test_the_rules_of_school(text, value):
     expression = parse_value(text, ())
     assert float(expression({})) == value
     assert float(ca.evalf(ca.SX(expression.symbolic({})))) == value
 
 
 @pytest.mark.parametrize("text", ["sqrt(Fr)", "log(Fr)", "asin(2 - Fr)", "Fr ** 0.5", "sqrt(Fr) + 1", "0/(Fr + 1)"])
-def test_what_does_not_exist_is_nan_without_a_warning(text: str) -> None:
+def test_what_does_not_exist_is_nan_without_a_warning(text):
     """Warnings are errors in these tests. At Fr = −1; CasADi itself takes 0/x for 0."""
     expression = parse_value(text, NAMES)
     assert math.isnan(expression({"Fr": -1.0}))
@@ -99,11 +97,11 @@ def test_what_does_not_exist_is_nan_without_a_warning(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["1/(Fr + 1)", "exp(-1000*Fr)", "(Fr + 1) ** -1", "10 ** (-400*Fr)", "-log(Fr + 1)"])
-def test_what_overflows_is_infinite_without_a_warning(text: str) -> None:
+def test_what_overflows_is_infinite_without_a_warning(text):
     assert parse_value(text, NAMES)({"Fr": -1.0}) == math.inf
 
 
-def test_names_in_order_of_appearance() -> None:
+def test_names_in_order_of_appearance():
     assert parse_value("mu*Fr + mu/a0 - pi", NAMES).names == ("mu", "Fr", "a0")
     assert parse_comparison("a0 >= mu + Fr*mu", NAMES).names == ("a0", "mu", "Fr")
 
@@ -124,7 +122,7 @@ def test_names_in_order_of_appearance() -> None:
         ("(Fr <= 1)", "<=", 0.5, 0.5 / 1.5),
     ],
 )
-def test_comparisons(text: str, comparison: str, difference: float, violation: float) -> None:
+def test_comparisons(text, comparison, difference, violation):
     """Value: left minus right. Violation: relative to the larger side, or to 1 if both are smaller."""
     expression = parse_comparison(text, NAMES)
     at = {"Fr": 1.5, "mu": 1.0}
@@ -135,12 +133,12 @@ def test_comparisons(text: str, comparison: str, difference: float, violation: f
     assert float(ca.Function("f", [*symbols.values()], [expression.symbolic(symbols)])(1.5, 1.0)) == difference
 
 
-def test_a_comparison_of_what_does_not_exist_is_violated_by_nan() -> None:
+def test_a_comparison_of_what_does_not_exist_is_violated_by_nan():
     assert math.isnan(parse_comparison("sqrt(Fr) >= 0", NAMES).violation({"Fr": -1.0}))
     assert math.isnan(parse_comparison("1/Fr >= 0", NAMES).violation({"Fr": 0.0}))
 
 
-def test_values_and_comparisons_are_told_apart() -> None:
+def test_values_and_comparisons_are_told_apart():
     assert parse_value("abscissa", NAMES).comparison == ""
     with pytest.raises(ExpressionError, match="is a comparison"):
         parse_value("abscissa <= 0", NAMES)
@@ -168,10 +166,11 @@ def test_values_and_comparisons_are_told_apart() -> None:
         "Fr <=",
         "<= 1",
         "min(Fr <= 1, 2) <= 3",
+        "Fr <= True",
         "Fr <= x",
     ],
 )
-def test_other_comparisons_are_refused(text: str) -> None:
+def test_other_comparisons_are_refused(text):
     with pytest.raises(ExpressionError) as caught:
         parse_comparison(text, NAMES)
     assert text in str(caught.value)
@@ -264,14 +263,14 @@ FORBIDDEN = {
 @pytest.mark.parametrize(
     ("kind", "text"), [(kind, text) for kind, texts in FORBIDDEN.items() for text in texts], ids=ascii
 )
-def test_everything_else_is_refused(kind: str, text: str) -> None:
+def test_everything_else_is_refused(kind, text):
     with pytest.raises(ExpressionError):
         parse_value(text, NAMES)
     with pytest.raises(ExpressionError):
         parse_comparison(f"{text} <= 1", NAMES)
 
 
-def test_nothing_is_ever_executed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_nothing_is_ever_executed(monkeypatch, tmp_path):
     """The classic escapes, with every door that they lead to alarmed."""
 
     def alarm(*args: object, **keywords: object) -> None:
@@ -326,7 +325,7 @@ DEEP = {
 
 
 @pytest.mark.parametrize("kind", DEEP)
-def test_deep_nesting_is_refused(kind: str) -> None:
+def test_deep_nesting_is_refused(kind):
     text = DEEP[kind]
     assert len(text) <= 2000, "the length alone would refuse it"
     with pytest.raises(ExpressionError):
@@ -336,13 +335,13 @@ def test_deep_nesting_is_refused(kind: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["Fr+" * 33_000 + "Fr", "(" * 100_000, "9" * 100_000, "F" * 100_000, " " * 100_000])
-def test_100_kB_of_text_are_refused_briefly(text: str) -> None:
+def test_100_kB_of_text_are_refused_briefly(text):
     with pytest.raises(ExpressionError) as caught:
         parse_value(text, NAMES)
     assert len(str(caught.value)) < 1000
 
 
-def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
+def test_a_misspelt_name_is_answered_with_the_nearest():
     with pytest.raises(ExpressionError, match="unknown name 'zeta_b'; did you mean 'zeta_B'") as caught:
         parse_value("2*zeta_b", NAMES)
     assert all(known in str(caught.value) for known in NAMES)
@@ -350,7 +349,7 @@ def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
         parse_comparison("abcissa <= 0", NAMES)
 
 
-def test_a_caret_is_answered_with_the_power() -> None:
+def test_a_caret_is_answered_with_the_power():
     with pytest.raises(ExpressionError, match=r"write 'Fr\*\*2'"):
         parse_value("Fr^2", NAMES)
 
@@ -362,9 +361,7 @@ tokens = st.lists(st.sampled_from([*NAMES, *WORDS.split(), "\n", "\x00"]), max_s
 
 @settings(max_examples=800, deadline=None, derandomize=True)
 @given(tokens, st.sampled_from(["", " "]), st.sampled_from([parse_value, parse_comparison]))
-def test_random_tokens_are_refused_or_can_be_evaluated(
-    parts: list[str], space: str, parse: Callable[..., Expression]
-) -> None:
+def test_random_tokens_are_refused_or_can_be_evaluated(parts, space, parse):
     text = space.join(parts)
     try:
         expression = parse(text, NAMES)
@@ -377,7 +374,7 @@ def test_random_tokens_are_refused_or_can_be_evaluated(
 
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.text(max_size=30))
-def test_random_text_never_raises_anything_else(text: str) -> None:
+def test_random_text_never_raises_anything_else(text):
     for parse in (parse_value, parse_comparison):
         try:
             parse(text, NAMES)

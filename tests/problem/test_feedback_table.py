@@ -94,12 +94,12 @@ def line(text: str, found: str) -> int:
         ("lag = 0.05", 0.05),
     ],
 )
-def test_numbers_with_units(written: str, value: float, tmp_path: Path) -> None:
+def test_numbers_with_units(written, value, tmp_path):
     problem = read(tmp_path, WHEELS.replace(PHI, written))
     assert problem.fixed[written.split(maxsplit=1)[0]] == pytest.approx(value, rel=1e-15)
 
 
-def test_gains_stand_in_either_table_and_in_python(tmp_path: Path) -> None:
+def test_gains_stand_in_either_table_and_in_python(tmp_path):
     """One problem in three ways; what is left out of the steer torque is 0."""
     head, rest = WHEELS.split("[feedback]")
     gains = "".join(f"k_{x} = {{ min = -100, max = 100 }}\n" for x in ("phi", "phidot"))
@@ -113,7 +113,7 @@ def test_gains_stand_in_either_table_and_in_python(tmp_path: Path) -> None:
     assert one.model.name == "whipple"
 
 
-def test_an_empty_table_is_no_controller(tmp_path: Path) -> None:
+def test_an_empty_table_is_no_controller(tmp_path):
     head = WHEELS.split("[feedback]")[0]
     problem = read(tmp_path, f'{head}[feedback]\n[objective]\nminimize = "abscissa"\n')
     assert problem.model is tmsopt.models.whipple
@@ -163,7 +163,7 @@ def test_an_empty_table_is_no_controller(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_one_fault_at_its_line(text: str, old: str, new: str, at: str, said: str, tmp_path: Path) -> None:
+def test_one_fault_at_its_line(text, old, new, at, said, tmp_path):
     assert old in text
     wrong = text.replace(old, new, 1)
     (found,) = fault(tmp_path, wrong)
@@ -173,7 +173,7 @@ def test_one_fault_at_its_line(text: str, old: str, new: str, at: str, said: str
 
 
 @pytest.mark.parametrize("written", ["3", "[1, 2]", '"k_phi"'])
-def test_what_is_no_table(written: str, tmp_path: Path) -> None:
+def test_what_is_no_table(written, tmp_path):
     head, rest = WHEELS.split("[feedback]")
     text = f"{head}[objective]{rest.split(OBJECTIVE)[1]}".replace("[parameters]", f"feedback = {written}\n[parameters]")
     (found,) = fault(tmp_path, text)
@@ -181,7 +181,7 @@ def test_what_is_no_table(written: str, tmp_path: Path) -> None:
     assert found.endswith("accepted: a table of gains, such as k_phidot = -20")
 
 
-def test_faults_of_a_study_are_in_its_own_table(tmp_path: Path) -> None:
+def test_faults_of_a_study_are_in_its_own_table(tmp_path):
     tables = "\n".join(t for t in WHEELS.splitlines() if not t.startswith("#"))
     for name in ("parameters", "feedback", "objective"):
         tables = tables.replace(f"[{name}]", f"[problem.{name}]")
@@ -214,7 +214,7 @@ def abscissa(v: float, k: dict[str, float]) -> float:
     return float(eigenvalues(v, k).real.max())
 
 
-def test_the_schedule_is_stable_at_every_speed_and_its_torque_the_least() -> None:
+def test_the_schedule_is_stable_at_every_speed_and_its_torque_the_least():
     """The rate asked for, −0.5, at 501 speeds; at 1 m/s it binds, up to what the search calls a limit met, 1e-6."""
     design = tmsopt.solve("problems/gain_schedule.toml")
     k = {n: x for n, x in design.parameters.items() if n.startswith("k_")}
@@ -225,7 +225,7 @@ def test_the_schedule_is_stable_at_every_speed_and_its_torque_the_least() -> Non
 
 
 @pytest.mark.slow
-def test_no_search_on_eigenvalues_beats_what_is_found() -> None:
+def test_no_search_on_eigenvalues_beats_what_is_found():
     """Differential evolution with a penalty that is worth no breach, 1000 beside 8 per unit; what binds is at 1 m/s."""
     from scipy.optimize import differential_evolution
 
@@ -243,7 +243,7 @@ def test_no_search_on_eigenvalues_beats_what_is_found() -> None:
 
 
 @pytest.mark.slow
-def test_balance_assist_is_certified_and_proved() -> None:
+def test_balance_assist_is_certified_and_proved():
     """Four gains place four roots anywhere, so the limit at −100 alone holds the decay: the optimum leans on it."""
     design = tmsopt.certify("problems/balance_assist.toml", seconds=60)
     assert design.bound.proven
@@ -264,7 +264,7 @@ def problems(tmp_path: Path) -> dict[str, tmsopt.Problem]:
 
 @pytest.mark.parametrize("kind", ["wheels", "skates", "plain", "lag"])
 @pytest.mark.slow
-def test_results_are_written_for_every_kind(kind: str, tmp_path: Path) -> None:
+def test_results_are_written_for_every_kind(kind, tmp_path):
     """Reports in both units, JSON, a page of the explorer whose file is the same problem."""
     problem = problems(tmp_path)[kind]
     design = tmsopt.solve(problem)
@@ -290,7 +290,7 @@ def test_results_are_written_for_every_kind(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["wheels", "lag"])
-def test_speeds_are_those_of_a_grid_of_eigenvalues(kind: str, tmp_path: Path) -> None:
+def test_speeds_are_those_of_a_grid_of_eigenvalues(kind, tmp_path):
     design = tmsopt.solve(problems(tmp_path)[kind])
     found = tmsopt.speeds(design)
     names = tmsopt.models.whipple.sets[0].names
@@ -305,7 +305,7 @@ def test_speeds_are_those_of_a_grid_of_eigenvalues(kind: str, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_the_most_tolerant_gains() -> None:
+def test_the_most_tolerant_gains():
     """Where a gain is 0 in one design of the climb and not in another; the distance by moving that far in 1000 ways."""
     problem = tmsopt.load("problems/balance_assist.toml")
     free = {n: problem.free[n] for n in ("k_phi", "k_phidot")}

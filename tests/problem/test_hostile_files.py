@@ -46,7 +46,7 @@ TOO_LARGE = {
 
 
 @pytest.mark.parametrize("kind", TOO_LARGE)
-def test_a_file_larger_than_files_need_is_refused_at_its_line(tmp_path: Path, kind: str) -> None:
+def test_a_file_larger_than_files_need_is_refused_at_its_line(tmp_path, kind):
     text, line, words = TOO_LARGE[kind]
     path = tmp_path / "p.toml"
     (first, *_) = refused(path, text)
@@ -57,7 +57,7 @@ def test_a_file_larger_than_files_need_is_refused_at_its_line(tmp_path: Path, ki
 @pytest.mark.parametrize(
     ("entry", "line"), [("b{} = 1", "unknown parameter 'b0'"), ("b{} = []", "found []"), ("b{0} = {{x = 1}}", "b0")]
 )
-def test_the_first_faults_are_listed_and_the_rest_is_counted(tmp_path: Path, entry: str, line: str) -> None:
+def test_the_first_faults_are_listed_and_the_rest_is_counted(tmp_path, entry, line):
     text = GOOD + "".join(entry.format(k) + "\n" for k in range(10_000))
     found = refused(tmp_path / "p.toml", text)
     assert line in found[0]
@@ -65,7 +65,7 @@ def test_the_first_faults_are_listed_and_the_rest_is_counted(tmp_path: Path, ent
     assert int(found[-1].removeprefix("and ").removesuffix(" more")) + errors.LISTED >= 10_000
 
 
-def test_a_text_of_several_lines_and_a_list_do_not_move_the_lines(tmp_path: Path) -> None:
+def test_a_text_of_several_lines_and_a_list_do_not_move_the_lines(tmp_path):
     """Lines counted by hand; what looks like a section or a key in a text, a list or a comment is none."""
     text = f'title = """\n[a]\nb = 1\n"""  # [c]\n{HEAD}mu = [\n  "x", # ]\n  \'d = 1\',\n]\n\n"e" = []\n[f]\n'
     found = [line.split(": ")[0].rsplit(":", 1)[1] for line in refused(tmp_path / "p.toml", text)]
@@ -76,7 +76,7 @@ UNSHOWN = ["\x1b[31m", "\n", "\x07", "\x9b", "\x7f", "\u2028", "\u202e", "\u2066
 
 
 @pytest.mark.parametrize("sign", UNSHOWN, ids=ascii)
-def test_what_a_terminal_obeys_is_neither_accepted_nor_written(tmp_path: Path, sign: str) -> None:
+def test_what_a_terminal_obeys_is_neither_accepted_nor_written(tmp_path, sign):
     """In titles and names, from a file and from Python; the message has it as an escape."""
     path, written = tmp_path / "p.toml", f"a{sign}b".encode("unicode_escape").decode()
     quoted = '"a' + "".join(f"\\u{ord(c):04x}" for c in sign) + 'b"'
@@ -106,7 +106,7 @@ def test_what_a_terminal_obeys_is_neither_accepted_nor_written(tmp_path: Path, s
         from_coefficients([1, ca.SX.sym(f"a{sign}b")])
 
 
-def test_expressions_are_kept_without_the_ends_of_their_lines(tmp_path: Path) -> None:
+def test_expressions_are_kept_without_the_ends_of_their_lines(tmp_path):
     path = tmp_path / "p.toml"
     free = GOOD.replace("Fr = 1", "Fr = { min = 1, max = 2 }")
     path.write_text(
@@ -130,7 +130,7 @@ BICYCLES = {
 
 @pytest.mark.parametrize("ending", [".txt", ".yml"])
 @pytest.mark.parametrize("kind", BICYCLES)
-def test_a_bicycle_file_from_a_stranger(tmp_path: Path, kind: str, ending: str) -> None:
+def test_a_bicycle_file_from_a_stranger(tmp_path, kind, ending):
     text, words = BICYCLES[kind]
     if ending == ".yml":
         text = "values:\n" + "".join(f"  {line}\n" for line in text.replace("=", ":").splitlines())
@@ -141,7 +141,7 @@ def test_a_bicycle_file_from_a_stranger(tmp_path: Path, kind: str, ending: str) 
     assert "\x1b" not in "".join(found)
 
 
-def test_yaml_that_refers_to_itself_is_no_number(tmp_path: Path) -> None:
+def test_yaml_that_refers_to_itself_is_no_number(tmp_path):
     text = "a: &a [1]\nb: &b [*a, *a]\nvalues:\n  rF: *b\n  rR: !!python/object/apply:os.getcwd []\n"
     found = refused(tmp_path / "b.yml", text, tmsopt.read_bicycle)
     assert "rF: found '*b'" in found[0]
@@ -150,7 +150,7 @@ def test_yaml_that_refers_to_itself_is_no_number(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are of POSIX")
 @pytest.mark.parametrize("read", [tmsopt.load, tmsopt.load_study, tmsopt.read_bicycle, tmsopt.studies.read_csv])
-def test_what_is_no_file_is_not_opened(tmp_path: Path, read) -> None:
+def test_what_is_no_file_is_not_opened(tmp_path, read):
     """A pipe would wait for ever, a device has no end, a link to itself none either."""
     pipe, circle, odd = tmp_path / "pipe", tmp_path / "circle", tmp_path / "a\n\x1b[31m"
     os.mkfifo(pipe)
@@ -170,13 +170,13 @@ def test_what_is_no_file_is_not_opened(tmp_path: Path, read) -> None:
         assert str(caught.value).isprintable()
 
 
-def test_a_file_that_names_itself(tmp_path: Path) -> None:
+def test_a_file_that_names_itself(tmp_path):
     study, bicycle = tmp_path / "s.toml", tmp_path / "p.toml"
     assert "is a study" in refused(study, 'problem = "s.toml"\n[vary]\nmu = [1]\n', tmsopt.load_study)[0]
     assert refused(bicycle, f'bicycle = "p.toml"\n{GOOD}')[0].startswith(f"{bicycle}:1: ")
 
 
-def test_the_limit_of_a_file_is_stated(tmp_path: Path) -> None:
+def test_the_limit_of_a_file_is_stated(tmp_path):
     path = tmp_path / "p.toml"
     path.write_text(GOOD + "#" * (files.LARGEST - len(GOOD)), encoding="utf-8")
     assert tmsopt.load(path).fixed
@@ -185,7 +185,7 @@ def test_the_limit_of_a_file_is_stated(tmp_path: Path) -> None:
     ]
 
 
-def test_a_title_from_the_name_of_a_file_is_shown_as_it_is(tmp_path: Path) -> None:
+def test_a_title_from_the_name_of_a_file_is_shown_as_it_is(tmp_path):
     path = tmp_path / "a\n\x1b[31m.toml"
     path.write_text(GOOD, encoding="utf-8")
     assert tmsopt.load(path).title == r"a\n\x1b[31m"
@@ -208,7 +208,7 @@ LARGE = {
 
 
 @pytest.mark.parametrize("kind", LARGE)
-def test_any_value_is_shown_in_a_few_words(kind: str) -> None:
+def test_any_value_is_shown_in_a_few_words(kind):
     """Python writes no integer of more than 4300 digits and no list that is 1000 deep."""
     value = LARGE[kind]
     assert len(errors.short(value)) <= 60
@@ -219,5 +219,5 @@ def test_any_value_is_shown_in_a_few_words(kind: str) -> None:
 @pytest.mark.parametrize(
     "value", [1.5, "it's", "a\nb", (1,), [], {}, {"a": [1, (2, "b")]}, None, True, b"x", Fraction(1, 3)]
 )
-def test_a_short_value_is_shown_as_python_writes_it(value: object) -> None:
+def test_a_short_value_is_shown_as_python_writes_it(value):
     assert errors.short(value) == repr(value)

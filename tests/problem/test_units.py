@@ -83,20 +83,20 @@ def _pint_is_warm() -> None:
         ("981 cm/s^2", "m/s^2", 9.81),
     ],
 )
-def test_units_by_their_definitions(text: str, unit: str, value: float) -> None:
+def test_units_by_their_definitions(text, unit, value):
     """A factor and a product: two roundings, and two more in the factor of a quotient."""
     assert with_unit(text, unit) == pytest.approx(value, rel=4 * sys.float_info.epsilon)
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300))
-def test_the_parameters_own_unit_changes_nothing(number: float) -> None:
+def test_the_parameters_own_unit_changes_nothing(number):
     for unit in ("m", "kg", "m/s", "m/s^2", "rad"):
         assert with_unit(f"{number!r} {unit}", unit) == number
 
 
 @pytest.mark.parametrize(("written", "unit"), [(written, unit) for unit, table in USUAL.items() for written in table])
-def test_usual_units_are_as_pint_has_them(written: str, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_usual_units_are_as_pint_has_them(written, unit, monkeypatch):
     """To the last bit of what is read and shown, for every one of the table that spares loading pint."""
     texts = [f"{number} {written}" for number in ("1", "-0.7", "3.1e5", "12.345678", "1e-9", "0")]
     own = [read(text, unit) for text in texts], factor(written, unit)
@@ -119,7 +119,7 @@ CONSTANTS = {
 
 
 @pytest.mark.parametrize(("text", "unit"), CONSTANTS)
-def test_a_constant_is_kept_as_it_is_written(text: str, unit: str) -> None:
+def test_a_constant_is_kept_as_it_is_written(text, unit):
     """The double is near, and the exact number is the true one, to 50 digits by mpmath."""
     with mp.workdps(60), flint.ctx.workdps(70):
         truth = CONSTANTS[text, unit]()
@@ -129,7 +129,7 @@ def test_a_constant_is_kept_as_it_is_written(text: str, unit: str) -> None:
         assert abs(mp.mpf(exact.ball().str(60, radius=False)) - truth) < 1e-50
 
 
-def test_a_problem_keeps_the_constants_that_it_was_given() -> None:
+def test_a_problem_keeps_the_constants_that_it_was_given():
     system = tmsopt.models.from_coefficients([1, "c", "k"])
     problem = tmsopt.Problem(system, fixed={"k": "8/3"}, free={"c": ("1/10", "sqrt(50)")}, locate="EP2")
     assert problem.fixed["k"] == 8 / 3
@@ -210,7 +210,7 @@ REFUSED = {
     [(kind, *case) for kind, cases in REFUSED.items() for case in cases],
     ids=lambda x: ascii(x)[:40],
 )
-def test_everything_else_is_refused(kind: str, text: str, unit: str) -> None:
+def test_everything_else_is_refused(kind, text, unit):
     with at_once(), pytest.raises(ValueError, match="found"):
         with_unit(text, unit)
 
@@ -237,18 +237,18 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
-def test_hostile_text_is_refused_at_once(kind: str) -> None:
+def test_hostile_text_is_refused_at_once(kind):
     with at_once(), pytest.raises(ValueError, match="found"):
         with_unit(HOSTILE[kind], "m")
 
 
-def test_products_and_powers_are_read() -> None:
+def test_products_and_powers_are_read():
     for text in ("5 m*m/m", "5 m^2/m", "5 m**2 / m", "5 m² m^-1", "5 m s / s"):
         with at_once():
             assert with_unit(text, "m") == 5
 
 
-def test_a_sum_of_unlike_units_has_none_whatever_is_added() -> None:
+def test_a_sum_of_unlike_units_has_none_whatever_is_added():
     """In any order: metres and kilograms added are neither, and no third summand gives its unit to all."""
     metre, kilogram, none = Dimension.of("m"), Dimension.of("kg"), Dimension()
     for parts in permutations((metre, kilogram, kilogram, none)):
@@ -267,7 +267,7 @@ def test_a_sum_of_unlike_units_has_none_whatever_is_added() -> None:
     ).map("".join),
     st.sampled_from(["m", "rad", "kg", "m/s", "m/s^2", "1"]),
 )
-def test_random_text_gives_a_finite_number_or_a_value_error(text: str, unit: str) -> None:
+def test_random_text_gives_a_finite_number_or_a_value_error(text, unit):
     try:
         with at_once():
             value = with_unit(text, unit)
@@ -292,7 +292,7 @@ lambda_s = {tilt}
 @pytest.mark.parametrize(
     ("tilt", "needed"), [("0.0872664625997165", False), ('"5 deg"', False), ('"300 arcmin"', True)]
 )
-def test_pint_is_imported_only_when_an_unusual_unit_is_written(tmp_path: Path, tilt: str, needed: bool) -> None:
+def test_pint_is_imported_only_when_an_unusual_unit_is_written(tmp_path, tilt, needed):
     file = tmp_path / "problem.toml"
     file.write_text(PROBLEM.format(tilt=tilt), encoding="utf-8")
     script = "import sys, tmsopt; p = tmsopt.load(sys.argv[1]); print('pint' in sys.modules, p.fixed['lambda_s'])"
@@ -305,7 +305,7 @@ def test_pint_is_imported_only_when_an_unusual_unit_is_written(tmp_path: Path, t
     assert float(value) == pytest.approx(math.radians(5), rel=1e-15)
 
 
-def test_no_problem_that_comes_along_needs_pint() -> None:
+def test_no_problem_that_comes_along_needs_pint():
     root = Path(__file__).parents[2]
     files = [f for f in sorted((root / "problems").glob("*.toml")) if not f.name.startswith("study_")]
     script = "import sys, tmsopt; [tmsopt.load(f) for f in sys.argv[1:]]; print('pint' in sys.modules)"
@@ -314,7 +314,7 @@ def test_no_problem_that_comes_along_needs_pint() -> None:
 
 
 @pytest.mark.slow
-def test_json_names_seconds_only_where_there_are_seconds() -> None:
+def test_json_names_seconds_only_where_there_are_seconds():
     """A system of one's own, as a dimensionless bicycle, is in no unit of time."""
     own = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])
     assert tmsopt.solve(tmsopt.Problem(own, fixed={"c": 1.0})).to_json()["units"] == {}

@@ -1,7 +1,6 @@
 """One rule for each word: what is stable, marginally stable, growing, an exceptional point."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import flint
 import pytest
@@ -24,17 +23,17 @@ from tmsopt.roots import exact_longest, exact_nullity, has_one_eigenvector
         ((float("nan"), 1.0), (), ""),
     ],
 )
-def test_one_verdict(ends: tuple[float, float], edges: tuple[str, ...], verdict: str) -> None:
+def test_one_verdict(ends, edges, verdict):
     assert stability(ends, edges, largest=1.0).verdict == verdict
 
 
-def test_the_longest_chain_on_the_rightmost_line_grows() -> None:
+def test_the_longest_chain_on_the_rightmost_line_grows():
     met = (MultipleRoot(0.0, 1.0, 2, 2, 1), MultipleRoot(0.0, -1.0, 4, 2, 3), MultipleRoot(-1.0, 0.0, 6, 1, 6))
     found = stability((0.0, 0.0), ("weave",), met, 1.0)
     assert (found.verdict, found.growth, found.on_edge) == ("growing", "t^2", True)
 
 
-def test_what_is_no_exceptional_point_has_a_name() -> None:
+def test_what_is_no_exceptional_point_has_a_name():
     assert crossing_in_words(MultipleRoot(0, 0, 2, 2, 1)) == "diabolic point (semisimple), not an EP"
     assert "not an EP4" in crossing_in_words(MultipleRoot(0, 0, 4, 2, 2))
     assert MultipleRoot(0, 0, 2, None, 2).exceptional  # coefficients cannot tell
@@ -58,9 +57,7 @@ AXIS = [
 
 
 @pytest.mark.parametrize(("model", "fixed", "growth"), AXIS)
-def test_a_defective_root_on_the_axis_grows(
-    model: tmsopt.models.Model, fixed: Mapping[str, float], growth: str
-) -> None:
+def test_a_defective_root_on_the_axis_grows(model, fixed, growth):
     """By the size of the largest Jordan block; every root is exactly on the axis, and nothing doubts it."""
     found = tmsopt.solve(tmsopt.Problem(model, fixed=fixed))
     data, report = found.to_json(), str(found)
@@ -79,7 +76,7 @@ ZIEGLER = from_matrices(M=[[3, 1], [1, 1]], K=[["2 - p", "p - 1"], [-1, 1]])
 """2 s⁴ + (7 − 2 p) s² + 1: a double pair at p = 7/2 − √2."""
 
 
-def test_the_entry_of_a_root_on_the_axis_says_how_it_grows() -> None:
+def test_the_entry_of_a_root_on_the_axis_says_how_it_grows():
     """A Jordan block of two beside a lossy mode: rounding leaves 1e-17 of the real part, which is shown as 0."""
     model = from_hamiltonian([["1", "1", "0"], ["0", "1", "0"], ["0", "0", "-1j*g"]])
     data = tmsopt.solve(tmsopt.Problem(model, fixed={"g": 0.3})).to_json()
@@ -100,9 +97,7 @@ def test_the_entry_of_a_root_on_the_axis_says_how_it_grows() -> None:
         (from_matrices([[1, 0], [0, 1]], None, [["k", 0], [0, "k"]]), {"k": "1/3"}, "", True),
     ],
 )
-def test_growth_is_hedged_unless_fractions_show_it(
-    model: tmsopt.models.Model, at: Mapping[str, float | str], growth: str, exact: bool
-) -> None:
+def test_growth_is_hedged_unless_fractions_show_it(model, at, growth, exact):
     found = tmsopt.solve(tmsopt.Problem(model, fixed=at))
     data, report = found.to_json(), found.report(full=True)
     assert (found.stability.growth, found.edge_is_exact, data["verdict_is_exact"]) == (growth, exact, exact)
@@ -115,7 +110,7 @@ def test_growth_is_hedged_unless_fractions_show_it(
 
 
 @pytest.mark.parametrize(("k", "exact"), [("1/4", True), ("1/4 + 1e-13", False), ("sqrt(2)/4*sqrt(2)/2", False)])
-def test_roots_meet_as_far_as_rounding_tells(k: str, exact: bool) -> None:
+def test_roots_meet_as_far_as_rounding_tells(k, exact):
     """s² + s + k is a square at k = 1/4."""
     found = tmsopt.solve(tmsopt.Problem(from_coefficients([1, 1, "k"]), fixed={"k": k}))
     assert found.structure == "EP2"
@@ -125,7 +120,7 @@ def test_roots_meet_as_far_as_rounding_tells(k: str, exact: bool) -> None:
 
 
 @pytest.mark.parametrize("sizes", [(1,), (3,), (2, 1), (2, 2), (3, 1), (1, 1, 1), (3, 2, 1)])
-def test_the_longest_chain_in_fractions(sizes: tuple[int, ...]) -> None:
+def test_the_longest_chain_in_fractions(sizes):
     """Blocks of Jordan at 1/3, seen through a change of basis."""
     n, q = sum(sizes), flint.fmpq
     ends = {sum(sizes[: k + 1]) - 1 for k in range(len(sizes))}
@@ -146,19 +141,19 @@ def judged(model: tmsopt.models.Model, pattern: str, at: Mapping[str, float]) ->
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, 3e-6])
-def test_a_crossing_is_seen_from_as_far_as_coefficients_accept(off: float) -> None:
+def test_a_crossing_is_seen_from_as_far_as_coefficients_accept(off):
     """Real symmetric; the coefficients are those of an EP2 to off²."""
     assert judged(from_hamiltonian([["d", "k"], ["k", "-d"]]), "EP2", {"d": off, "k": -off}) == (2, 1)
     equal = from_matrices([[1, 0], [0, 1]], None, [["1 + x", "y"], ["y", "1 - x"]])
     assert judged(equal, "CEP2", {"x": off, "y": off}) == (2, 1)
 
 
-def test_a_weak_coupling_still_makes_a_jordan_chain() -> None:
+def test_a_weak_coupling_still_makes_a_jordan_chain():
     assert judged(from_hamiltonian([["d + 1j*k", 1e-6], [0, 0]]), "EP2", {"d": 0.0, "k": 0.0}) == (1, 2)
     assert judged(from_matrices(A=[["a", 1, 0], [0, 0, 0], [0, 0, "b"]]), "EP3", {"a": 0.0, "b": 0.0}) == (2, 2)
 
 
-def test_eigenvectors_are_counted_in_fractions_and_in_balls() -> None:
+def test_eigenvectors_are_counted_in_fractions_and_in_balls():
     """s² + 1 twice: apart, and with a coupling of its two oscillators."""
     q = flint.fmpq
     one, factor = [[q(1), q(0)], [q(0), q(1)]], flint.fmpq_poly([1, 0, 1])
@@ -170,7 +165,7 @@ def test_eigenvectors_are_counted_in_fractions_and_in_balls() -> None:
     assert not has_one_eigenvector([one, zero, one], flint.acb(0, 1))
 
 
-def test_no_design_on_the_edge_is_said_to_be_the_least_unstable() -> None:
+def test_no_design_on_the_edge_is_said_to_be_the_least_unstable():
     """ω = ±sqrt(k² − g²) are real for all g <= 1/2; at g = 1/2 alone the motion grows, and the abscissa is 0 everywhere."""
     system = from_hamiltonian([["1j*g", "k"], ["k", "-1j*g"]])
     problem = tmsopt.Problem(system, fixed={"k": 0.5}, free={"g": (0.1, 1.0)}, minimize="abscissa")
@@ -182,7 +177,7 @@ def test_no_design_on_the_edge_is_said_to_be_the_least_unstable() -> None:
     assert "grows more slowly" not in told + " ".join(design.report(full=True).split())
 
 
-def test_a_share_of_a_value_is_written_as_its_amount(tmp_path: Path) -> None:
+def test_a_share_of_a_value_is_written_as_its_amount(tmp_path):
     """5 % of a mass of 5 kg is 0.25 kg; 0.05 would be 0.05 kg."""
     (tmp_path / "a.toml").write_text('model = "tms"\n[tolerances]\nm_B = "5 %"\n[parameters]\nm_B = "5 kg"\n')
     with pytest.raises(tmsopt.InputError, match="5 % of a value as its amount"):

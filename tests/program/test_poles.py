@@ -1,4 +1,4 @@
-"""Quotients and tangents with a pole in the box: optima in closed form beside poles, and what becomes a variable."""
+"""Quotients and tangents with a pole in the box: optima in closed form beside poles."""
 
 import math
 from typing import Any
@@ -9,12 +9,10 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients
-from tmsopt.program import abscissa as plain_nlp, formulate
 from tmsopt.search import Family, solve
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 SQUARE = {"x": (0.0, 1.0), "y": (0.0, 1.0)}
-KINK = ".kink"
 MET = 1e-8  # what is asked of every value
 
 
@@ -56,7 +54,7 @@ CASES: tuple[tuple[tuple[str, ...], tuple[float, float], tuple[float, float]], .
 
 
 @pytest.mark.parametrize(("limits", "aim", "best"), CASES)
-def test_optimum_beside_a_pole(limits: tuple[str, ...], aim: tuple[float, float], best: tuple[float, float]) -> None:
+def test_optimum_beside_a_pole(limits, aim, best):
     design = tmsopt.solve(problem(limits, aim))
     assert design.status == "optimal"
     assert design.value == pytest.approx(-4 + math.dist(aim, best) ** 2, abs=MET)
@@ -74,20 +72,18 @@ def test_optimum_beside_a_pole(limits: tuple[str, ...], aim: tuple[float, float]
         ),
     ],
 )
-def test_edges_that_are_curved(limits: tuple[str, ...], aim: tuple[float, float], edge: Any) -> None:
+def test_edges_that_are_curved(limits, aim, edge):
     """The nearest point by a scan of the edge, 1e-6 from the next: its distance is right to 1e-12."""
     across = np.linspace(0, 1, 1_000_001)
     squared = (across - aim[0]) ** 2 + (edge(across) - aim[1]) ** 2
     assert tmsopt.solve(problem(limits, aim)).value == pytest.approx(-4 + float(np.nanmin(squared)), abs=MET)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
     ("limit", "aim", "gap"), [("1/(x - y) >= 1000", (0.9, 0.1), 1e-3), ("1/(y - x) >= 300", (0.2, 0.9), -1 / 300)]
 )
-def test_the_side_of_a_pole_does_not_depend_on_the_seed(
-    limit: str, aim: tuple[float, float], gap: float, seed: int
-) -> None:
+def test_the_side_of_a_pole_does_not_depend_on_the_seed(limit, aim, gap, seed):
     design = tmsopt.solve(problem((limit,), aim), seed=seed)
     assert design.value == pytest.approx(-4 + math.dist(aim, line(*aim, gap)) ** 2, abs=MET)
 
@@ -100,65 +96,18 @@ def test_the_side_of_a_pole_does_not_depend_on_the_seed(
         ({"minimize": "max(tan(3*x), -2) + y"}, -2.0),
     ],
 )
-def test_objectives_with_poles(asked: dict[str, str], best: float) -> None:
+def test_objectives_with_poles(asked, best):
     design = tmsopt.solve(problem((), **asked))
     assert design.value == pytest.approx(best, abs=MET)
 
 
-def test_what_no_side_of_a_pole_allows() -> None:
+def test_what_no_side_of_a_pole_allows():
     """x − y ≤ 1/30 and ≥ 1/20."""
     design = tmsopt.solve(problem(("1/(x - y) >= 30", "x - y >= 0.05")), throw=False)
     assert design.status == "infeasible"
 
 
-# What becomes a variable
-
-
-def kinks(*limits: str, free: Any = None, **asked: Any) -> int:
-    return formulate(problem(limits, free=free, **asked)).variables.count(KINK)
-
-
-@pytest.mark.parametrize(
-    ("limits", "count"),
-    [
-        (("1/(x - y) >= 30",), 1),
-        (("x/(y - 0.5) <= -10",), 1),
-        (("tan(9*y) >= 2000",), 1),
-        (("1/(x - y) >= 30", "tan(9*x) + 1/(x + y - 1) >= 3"), 3),
-        (("abs(1/(x - y)) >= 30",), 2),
-        (("1/(x + y) <= 30",), 1),  # 0 at one corner
-        (("1/(x + y + 0.01) <= 30",), 0),
-        (("x/(2 - y) <= 0.7", "1/(1 + x*x) >= 0.6", "y/3 <= 0.2"), 0),
-        (("tan(x) + tan(y - 1) <= 1",), 0),
-        (("x/cos(y) <= 0.5",), 0),
-    ],
-)
-def test_only_what_may_vanish_in_the_box_becomes_a_variable(limits: tuple[str, ...], count: int) -> None:
-    assert kinks(*limits) == count
-
-
-def test_without_a_pole_in_the_box_the_nlp_is_the_same() -> None:
-    stated = problem(("1/(x - y) >= 0.3", "tan(x) <= 1"), free={"x": (0.6, 1.0), "y": (0.0, 0.5)})
-    one, other = formulate(stated), plain_nlp(stated)
-    assert (one.variables, one.rows, one.kinks) == (other.variables, other.rows, ())
-    assert str(one.functions.serialize()) == str(other.functions.serialize())
-
-
-def test_the_variable_is_the_quotient() -> None:
-    """t (x − y) = 1 at a design, held as an equation; the NLP's rows are those of the problem there."""
-    nlp = formulate(problem(("1/(x - y) >= 30",)))
-    (kink,) = nlp.kinks
-    assert kink.quotient
-    assert [(nlp.row_lower[k], nlp.row_upper[k]) for k in kink.rows] == [(0.0, 0.0)]
-    at = np.zeros(len(nlp.variables))
-    at[:2], at[kink.variable] = (0.52, 0.5), 50.0
-    rows = np.array(nlp.at(at)[1]).ravel()
-    assert rows[list(kink.rows)] == pytest.approx([0.0], abs=1e-12)
-    limit = nlp.rows.index("limit0")
-    assert rows[limit] - nlp.row_lower[limit] == pytest.approx(20.0, abs=1e-9)
-
-
-def test_members_of_a_family_with_poles() -> None:
+def test_members_of_a_family_with_poles():
     family = Family(["limit0.limit"])
     for least in (30.0, 100.0, 1000.0):
         stated = problem((f"1/(x - y) >= {least}",), (0.7, 0.3))

@@ -7,7 +7,7 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients
-from tmsopt.program import Scale, objective_size, scale_of
+from tmsopt.program import scale_of
 from tmsopt.roots import product
 from tmsopt.search import same_objective
 
@@ -19,13 +19,8 @@ def powers(rate: float, **asked: str) -> tmsopt.Problem:
     return tmsopt.Problem(model=model, free={"r": (0.5 * rate, 1.5 * rate)}, **asked)
 
 
-def test_scaling_is_exact() -> None:
-    """3 (s + 4)(s + 8) in t = s/4 over 3·2: (t + 1)(t + 2)/2."""
-    assert Scale(unit=4.0, lead=6.0).scaled([3.0, 36.0, 96.0]) == [0.5, 1.5, 1.0]
-
-
 @pytest.mark.parametrize("rate", [1e-6, 0.01, 1.0, 300.0, 1e5])
-def test_the_unit_is_that_of_the_roots(rate: float) -> None:
+def test_the_unit_is_that_of_the_roots(rate):
     """All roots are −r with the median r at the rate: the nearest power of 2 is at most √2 off, and so is 2."""
     found = scale_of(powers(rate, minimize="abscissa"))
     assert abs(math.log2(found.unit / rate)) <= 0.55  # the median over the designs is a little off the middle
@@ -33,14 +28,7 @@ def test_the_unit_is_that_of_the_roots(rate: float) -> None:
     assert math.frexp(found.unit)[0] == 0.5
 
 
-def test_differences_of_small_roots_count() -> None:
-    """An abscissa is of the size of the roots; other objectives have sizes that nobody knows."""
-    assert objective_size(powers(1e-6, minimize="abscissa")) <= 2e-6
-    assert objective_size(powers(1e5, minimize="abscissa")) == 1.0
-    assert objective_size(powers(1e-6, minimize="r")) == 1.0
-
-
 @pytest.mark.parametrize("unit", [1.0, 2.0**-20, 2.0**-60])
-def test_what_is_the_same_optimum_does_not_depend_on_the_unit(unit: float) -> None:
+def test_what_is_the_same_optimum_does_not_depend_on_the_unit(unit):
     for a, b, expected in ((-1.0, -1.0 - 1e-8, True), (-1.0, -1.0 - 1e-6, False), (0.0, 1e-8, True)):
         assert same_objective(a * unit, b * unit, unit) is expected

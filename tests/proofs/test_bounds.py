@@ -66,7 +66,7 @@ def holds(c: Sequence[Fraction], squares: Sequence[Any]) -> bool:
 
 @pytest.mark.parametrize("degree", range(2, 8))
 @pytest.mark.parametrize("rightmost", [0, 1])
-def test_squares_interlace_exactly_if_no_root_is_to_the_right(degree: int, rightmost: int) -> None:
+def test_squares_interlace_exactly_if_no_root_is_to_the_right(degree, rightmost):
     rng = np.random.default_rng([degree, rightmost])
     seen = 0
     for _ in range(40):
@@ -82,7 +82,7 @@ def test_squares_interlace_exactly_if_no_root_is_to_the_right(degree: int, right
 
 @pytest.mark.parametrize("pairs", [(4,), (4, 1), (4, 4), (9, 4, 1), (9, 4, 4), (1, 1, 1)])
 @pytest.mark.parametrize("zeros", [0, 1])
-def test_all_roots_on_the_axis(pairs: tuple[int, ...], zeros: int) -> None:
+def test_all_roots_on_the_axis(pairs, zeros):
     """p(iω) has no second part then; the squares are any that its first part leaves room for: the pairs themselves."""
     c = product(*([Fraction(1), Fraction(0), Fraction(x)] for x in pairs), *[[Fraction(1), Fraction(0)]] * zeros)
     squares = pairs[: unknowns(len(c) - 1)]
@@ -91,7 +91,7 @@ def test_all_roots_on_the_axis(pairs: tuple[int, ...], zeros: int) -> None:
 
 
 @pytest.mark.parametrize("c", [(1, 0, 1, 0, 1), (1, 0, -5, 0, 4), (1, 0, 3, 0, -4), (1, 0, 1, 0, 1, 0)])
-def test_even_polynomials_with_roots_to_the_right(c: tuple[int, ...]) -> None:
+def test_even_polynomials_with_roots_to_the_right(c):
     """Whatever the squares: s⁴ + s² + 1, (s² − 1)(s² − 4) and (s² + 4)(s² − 1) have a root to the right."""
     fractions = [Fraction(x) for x in c]
     count = unknowns(len(c) - 1)
@@ -100,7 +100,7 @@ def test_even_polynomials_with_roots_to_the_right(c: tuple[int, ...]) -> None:
     assert not any(holds(fractions, squares) for squares in tried)
 
 
-def test_a_double_square_admits_more_than_the_theorem() -> None:
+def test_a_double_square_admits_more_than_the_theorem():
     """From degree 5 the conditions leave a gap, on the safe side: nothing stable is ever excluded.
 
     (t² + 4)(t³ + t² + t + 4) has roots to the right, since 1·1 < 1·4, but its second part has the double zero 4, where
@@ -111,7 +111,7 @@ def test_a_double_square_admits_more_than_the_theorem() -> None:
 
 
 @pytest.mark.parametrize("degree", range(2, 8))
-def test_squares_are_found_for_known_coefficients(degree: int) -> None:
+def test_squares_are_found_for_known_coefficients(degree):
     """Within half the digits of a double, which a double zero loses."""
     rng = np.random.default_rng(degree)
     for _ in range(30):
@@ -146,7 +146,7 @@ def function(text: str, names: Sequence[str] = ("x", "y", "z")) -> ca.Function:
 
 
 @pytest.mark.parametrize("text", EXPRESSIONS)
-def test_values_lie_in_ranges(text: str) -> None:
+def test_values_lie_in_ranges(text):
     """CasADi's own values at points of boxes, corners among them; its roundings are below 1e-13 of sizes below 1e3."""
     f, rng = function(text), np.random.default_rng(len(text))
     bounded = 0
@@ -165,23 +165,23 @@ def test_values_lie_in_ranges(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["1/x", "x**-1", "x**-2", "y/x", "log(x)", "sqrt(x)", "tan(2*x)", "asin(2*x)"])
-def test_what_may_not_exist_has_no_bounds(text: str) -> None:
+def test_what_may_not_exist_has_no_bounds(text):
     assert ranges(function(text), [(-1, 1), (1, 2), (0, 0)]) == [[EVERYTHING]]
 
 
 @pytest.mark.parametrize(("text", "most"), [("x**2 + y**4", 85), ("(x - y)**2", 25), ("x**2", 4)])
-def test_squares_are_not_negative(text: str, most: float) -> None:
+def test_squares_are_not_negative(text, most):
     """0 is reached, and so is the other end; within the 30 bits of the radius of a ball."""
     assert ranges(function(text), [(-1, 2), (-3, 1), (0, 0)])[0][0] == pytest.approx((0, most), abs=1e-8 * most)
 
 
 @pytest.mark.parametrize("ends", [(-math.inf, 1.0), (0.0, math.inf), EVERYTHING, (math.nan, 1.0)])
-def test_an_infinite_end_leaves_no_bounds(ends: tuple[float, float]) -> None:
+def test_an_infinite_end_leaves_no_bounds(ends):
     assert interval(ball(ends)) == EVERYTHING
 
 
 @pytest.mark.parametrize("degree", range(1, 7))
-def test_no_root_is_larger_than_the_bound(degree: int) -> None:
+def test_no_root_is_larger_than_the_bound(degree):
     """NumPy's roots, within 1e-3: an n-fold root loses all but an n-th of the digits."""
     rng = np.random.default_rng(degree)
     for _ in range(50):
@@ -193,7 +193,7 @@ def test_no_root_is_larger_than_the_bound(degree: int) -> None:
             assert np.abs(found).max(initial=0) <= most * (1 + 1e-3)
 
 
-def test_roots_have_no_bound_where_one_may_be_at_infinity() -> None:
+def test_roots_have_no_bound_where_one_may_be_at_infinity():
     for leading in ((0.0, 1.0), (-1.0, 1.0), (-1.0, 0.0)):
         assert root_bound([leading, (1.0, 1.0), (1.0, 1.0)]) == math.inf
 
@@ -248,7 +248,7 @@ def least(text: str, ends: tuple[float, float], sign: float = 1.0) -> NLP:
 
 @scip
 @pytest.mark.parametrize("text", ONE_OF_EACH)
-def test_every_operation_is_what_it_is(text: str) -> None:
+def test_every_operation_is_what_it_is(text):
     """With x known, no value is possible but that of NumPy; within the 1e-6 of the size that a bound is moved by."""
     at, _ = ONE_OF_EACH[text]
     value = float(parse_value(text, ("x",))({"x": at}))
@@ -262,7 +262,7 @@ def test_every_operation_is_what_it_is(text: str) -> None:
 @scip
 @pytest.mark.parametrize("text", ONE_OF_EACH)
 @pytest.mark.slow
-def test_no_value_is_below_the_bound(text: str) -> None:
+def test_no_value_is_below_the_bound(text):
     """Values at 30 001 points, 0 and 1 among them, their least within 1e-6 of the true one; a bound is moved by as much."""
     _, ends = ONE_OF_EACH[text]
     values = parse_value(text, ("x",))({"x": np.linspace(*ends, 30001)})
@@ -298,7 +298,7 @@ def constrained(texts: Sequence[str], ends: Sequence[tuple[float, float]], most:
         (("(x - 1)**2 + 1 - 1/y", "1.001 - y"), False),
     ],
 )
-def test_possible_and_impossible(texts: tuple[str, ...], possible: bool) -> None:
+def test_possible_and_impossible(texts, possible):
     decision = SCIP.decide(task(constrained(texts, [(-2, 2), (0.5, 2)]), 5.0))
     assert decision.verdict == (FOUND if possible else INFEASIBLE)
     if possible:
@@ -312,7 +312,7 @@ def test_possible_and_impossible(texts: tuple[str, ...], possible: bool) -> None
 @scip
 @pytest.mark.parametrize("text", ["x**2 - y", "x*y - y**3", "sin(x) - x", "log(x)**2 - y", "1/x - y", "sqrt(x) - y"])
 @pytest.mark.parametrize("width", [0.0, 1e-15, 1e-12, 1e-9])
-def test_hardly_any_room_is_room(text: str, width: float) -> None:
+def test_hardly_any_room_is_room(text, width):
     """Summands cancel in a narrow box, and what is left of them is not known to more digits than they are."""
     centre = {"x": 1.7, "y": 0.9}
     value = float(parse_value(text, ("x", "y"))(centre))
@@ -337,7 +337,7 @@ def drawn_expression(rng: np.random.Generator, depth: int) -> str:
 @scip
 @pytest.mark.parametrize("seed", [*range(8), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(8, 60))])
 @pytest.mark.slow
-def test_what_is_possible_is_never_called_impossible(seed: int) -> None:
+def test_what_is_possible_is_never_called_impossible(seed):
     """Values that an expression has at points of the box, its corners and its middle among them, it can have."""
     rng = np.random.default_rng(seed)
     text = drawn_expression(rng, 4)
@@ -355,7 +355,7 @@ def test_what_is_possible_is_never_called_impossible(seed: int) -> None:
 
 
 @scip
-def test_a_row_without_variables() -> None:
+def test_a_row_without_variables():
     for value, verdict in ((1.0, INFEASIBLE), (-1.0, FOUND)):
         x = ca.SX.sym("x", 2)
         f = ca.Function("f", [x], [ca.SX(0), ca.vertcat(ca.SX(value))])
@@ -364,7 +364,7 @@ def test_a_row_without_variables() -> None:
 
 
 @scip
-def test_an_operation_that_scip_lacks_is_named() -> None:
+def test_an_operation_that_scip_lacks_is_named():
     x = ca.SX.sym("x")
     f = ca.Function("f", [x], [ca.floor(x), ca.SX(0, 1)])
     with pytest.raises(NotAccepted, match="floor"):

@@ -100,7 +100,7 @@ def is_closed(design: Solution) -> bool:
 # Global optima
 
 
-def test_the_least_abscissa_of_a_plane(slow_plane: Solution, bounded_plane: Solution) -> None:
+def test_the_least_abscissa_of_a_plane(slow_plane, bounded_plane):
     """At a grid, of which some design comes close: near an EP3 a distance of 0.02 is felt as its cube root, 0.3."""
     assert slow_plane.bound.method == "omega0"
     assert not slow_plane.bound.proven
@@ -113,7 +113,7 @@ def test_the_least_abscissa_of_a_plane(slow_plane: Solution, bounded_plane: Solu
     assert design.bound.value > OMEGA0
 
 
-def test_the_same_in_si(slow_plane: Solution) -> None:
+def test_the_same_in_si(slow_plane):
     """Froude number v/√(g w), and a scale of 1 m: the same question, the same dimensionless bound."""
     root = math.sqrt(9.81)
     fixed = {"w": 1.0, "lambda_s": 0.2, "m_B": 10.0, "z_B": -0.4, "m_H": 1.0, "x_H": 1.0, "z_H": -0.2}
@@ -123,7 +123,7 @@ def test_the_same_in_si(slow_plane: Solution) -> None:
     assert design.bound.value == pytest.approx(slow_plane.value, rel=CLOSED)
 
 
-def test_a_limit_on_the_tilt() -> None:
+def test_a_limit_on_the_tilt():
     """Of designs in three parameters, thousands drawn at random and near the optimum; none is below the bound."""
     free = {**PLANE, "lambda_s": (0.02, 1.2)}
     design = certify(
@@ -139,7 +139,7 @@ def test_a_limit_on_the_tilt() -> None:
 
 
 @pytest.mark.slow
-def test_the_slowest_stable_speed(slowest: Solution) -> None:
+def test_the_slowest_stable_speed(slowest):
     """Of the designs of a grid whose abscissa is at most −0.2, none is slower than the bound; some nearly as slow."""
     design = certify(slowest, seconds=SECONDS)
     assert is_closed(design)
@@ -149,7 +149,7 @@ def test_the_slowest_stable_speed(slowest: Solution) -> None:
 
 
 @pytest.mark.slow
-def test_the_greatest_stable_tilt() -> None:
+def test_the_greatest_stable_tilt():
     """Likewise, maximised: none is above the bound."""
     fixed = {**HEIGHTS, "Fr": 2.5}
     free = {"chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.2)}
@@ -162,7 +162,7 @@ def test_the_greatest_stable_tilt() -> None:
 
 
 @pytest.mark.slow
-def test_the_greatest_abscissa() -> None:
+def test_the_greatest_abscissa():
     """Bounded from above: the line must have a root on it, or any line to the right would do."""
     free = {"chi_B": (1.01, 3.0), "lambda_s": (0.1, 0.5)}
     design = certify(solve(Problem(models.tms, {**HEIGHTS, "Fr": 2.5}, free, maximize="abscissa")), seconds=SECONDS)
@@ -174,7 +174,7 @@ def test_the_greatest_abscissa() -> None:
 
 
 @pytest.mark.slow
-def test_the_greatest_damping_ratio() -> None:
+def test_the_greatest_damping_ratio():
     """Below 1, since the speed is; of a grid, none above the bound."""
     design = certify(
         solve(problem(constraints={"v": "Fr <= 1.6"}, maximize="damping_ratio"), starts=8), seconds=SECONDS
@@ -185,13 +185,13 @@ def test_the_greatest_damping_ratio() -> None:
     assert design.value - 0.1 <= greatest <= design.bound.value < 1
 
 
-def test_a_damping_ratio_is_never_above_1() -> None:
+def test_a_damping_ratio_is_never_above_1():
     design = certify(solve(problem(maximize="damping_ratio"), starts=8), seconds=SECONDS)
     assert design.bound == Bound(1.0, 0.0, True, "definition")
 
 
 @pytest.mark.slow
-def test_the_slowest_ep4() -> None:
+def test_the_slowest_ep4():
     """By the law of χ_H = 1: with r = √(ζ_B/ζ_H), h = √(ζ_B ζ_H), T = (r−1)(r²+6r+1)/(16h(r+1)), Fr = … 4√h (r+1).
 
     Along it Fr falls with the tilt, so the slowest has the least tilt.
@@ -211,7 +211,7 @@ def test_the_slowest_ep4() -> None:
 
 
 @pytest.mark.slow
-def test_over_a_band_of_speeds() -> None:
+def test_over_a_band_of_speeds():
     """No design is better at its worst speed, which is one of a grid or worse."""
     asked = problem({"chi_B": (1.01, 3.0)}, minimize="abscissa", scenarios={"Fr": Band(1.5, 2.5)})
     design = certify(solve(asked, starts=4), seconds=SECONDS)
@@ -220,7 +220,7 @@ def test_over_a_band_of_speeds() -> None:
     assert design.bound.value <= growth(Fr=Fr, chi_B=chi_B).max(axis=1).min() <= design.value + 0.01
 
 
-def test_the_instant_bound_is_kept_where_it_proves_more() -> None:
+def test_the_instant_bound_is_kept_where_it_proves_more():
     """The EP4 of χ_H = 1 is at ω0, whatever SCIP would say."""
     free = {"Fr": (0.5, 6.0), "chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.2)}
     design = certify(problem(free, minimize="abscissa"), seconds=SECONDS)
@@ -229,7 +229,7 @@ def test_the_instant_bound_is_kept_where_it_proves_more() -> None:
     assert design.bound.value == pytest.approx(OMEGA0, rel=1e-14)
 
 
-def test_json(slow_plane: Solution, bounded_plane: Solution) -> None:
+def test_json(slow_plane, bounded_plane):
     assert set(slow_plane.to_json()["bound"]) == {"value", "gap", "proven", "method"}
     bound = json.loads(json.dumps(bounded_plane.to_json()))["bound"]
     assert set(bound) == {"value", "gap", "proven", "method", "seconds", "nodes", "feasibility_tolerance"}
@@ -249,7 +249,7 @@ def unclaimed(design: Solution, names: str) -> bool:
     return not design.bound.proven and not design.bound.tolerance
 
 
-def test_a_bound_on_the_roots_that_is_too_small(slowest: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bound_on_the_roots_that_is_too_small(slowest, monkeypatch):
     """A tenth, for frequencies of some 1: x1 is the square of one."""
     monkeypatch.setattr(lines, "root_bound", lambda coefficients: 0.1)
     assert unclaimed(certify(slowest, seconds=SECONDS), "x1.0")
@@ -268,7 +268,7 @@ def test_a_wrong_equation(slowest: Solution, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize("which", [0, 1, 2, 3])
-def test_a_wrong_sign(slowest: Solution, monkeypatch: pytest.MonkeyPatch, which: int) -> None:
+def test_a_wrong_sign(slowest, monkeypatch, which):
     """Of one coefficient of p(t − 0.2)."""
     right = interlaces.interlacing
 
@@ -280,18 +280,18 @@ def test_a_wrong_sign(slowest: Solution, monkeypatch: pytest.MonkeyPatch, which:
     assert unclaimed(certify(slowest, seconds=SECONDS), "abscissa")
 
 
-def test_a_forged_bound_is_not_believed(slow_plane: Solution) -> None:
+def test_a_forged_bound_is_not_believed(slow_plane):
     forged = replace(slow_plane, bound=Bound(slow_plane.value + 0.1, 0.0, True, "omega0"))
     design = certify(forged, seconds=SECONDS)
     assert is_closed(design)
 
 
-def test_a_forged_value_is_not_believed(slow_plane: Solution) -> None:
+def test_a_forged_value_is_not_believed(slow_plane):
     """A design that is not as good as it says: whatever is better than that excludes the design itself."""
     assert unclaimed(certify(replace(slow_plane, value=slow_plane.value - 0.1), seconds=SECONDS), "")
 
 
-def test_a_forged_infeasibility_is_not_believed(slow_plane: Solution) -> None:
+def test_a_forged_infeasibility_is_not_believed(slow_plane):
     design = certify(replace(slow_plane, status="infeasible", value=math.nan), seconds=SECONDS)
     assert design.status == "optimal"
     assert design.value <= slow_plane.value + 1e-9
@@ -299,7 +299,7 @@ def test_a_forged_infeasibility_is_not_believed(slow_plane: Solution) -> None:
 
 
 @pytest.mark.slow
-def test_a_singular_mass_matrix_within_the_box() -> None:
+def test_a_singular_mass_matrix_within_the_box():
     """ν_H = (χ_H − 1) cos λ_s − ζ_H sin λ_s vanishes where χ_H = 1 + ζ_H tan λ_s = 0.9595, and a root is at infinity."""
     free = {"Fr": (0.5, 3.0), "chi_H": (0.9, 1.1)}
     design = certify(
@@ -312,7 +312,7 @@ def test_a_singular_mass_matrix_within_the_box() -> None:
 
 
 @pytest.mark.slow
-def test_a_nearly_singular_problem() -> None:
+def test_a_nearly_singular_problem():
     """A design of the suite without a limit on ν_H; its value is kept beside it, found in many ways."""
     kept = KEPT[48]
     start = {n: kept.parameters[n] for n in random_problem(48).free}
@@ -325,7 +325,7 @@ def test_a_nearly_singular_problem() -> None:
 
 
 @pytest.mark.parametrize("index", [4, 5, 11])
-def test_infeasible_problems_are_proved_to_be(slow_plane: Solution, index: int) -> None:
+def test_infeasible_problems_are_proved_to_be(slow_plane, index):
     """That they are is kept beside the suite. 11 asks for ω0 ≥ −1.17 and ω0 ≤ −1.3; 4 for exp(−Fr) ≤ −1.12 − μ/10."""
     design = certify(unsolved(random_problem(index), slow_plane), seconds=SECONDS)
     assert design.status == "infeasible"
@@ -342,7 +342,7 @@ def test_infeasible_problems_are_proved_to_be(slow_plane: Solution, index: int) 
         ("damping_ratio >= 1.001", {"minimize": "Fr"}),
     ],
 )
-def test_what_a_law_excludes(slow_plane: Solution, limit: str, asked: dict[str, str]) -> None:
+def test_what_a_law_excludes(slow_plane, limit, asked):
     free = {**PLANE, "lambda_s": (0.1, 0.5)}
     design = certify(unsolved(problem(free, constraints={"limit": limit}, **asked), slow_plane), seconds=SECONDS)
     assert design.status == "infeasible"
@@ -351,7 +351,7 @@ def test_what_a_law_excludes(slow_plane: Solution, limit: str, asked: dict[str, 
 
 
 @pytest.mark.slow
-def test_a_corner_is_enough() -> None:
+def test_a_corner_is_enough():
     """Of the plane only a 1e-12th, at the corner Fr = χ_B = 3, has a product of 8.99999; found there or not."""
     asked = problem(constraints={"corner": "Fr*chi_B >= 8.99999"}, minimize="abscissa")
     found = solve(asked, starts=2, throw=False)
@@ -363,14 +363,14 @@ def test_a_corner_is_enough() -> None:
 
 
 @pytest.mark.parametrize("limit", ["sqrt((Fr - 2)**2 + 0.01) <= 0.2", "1/((Fr - 1.5)**2 + 0.1) >= 9"])
-def test_a_square_is_least_at_nought(slow_plane: Solution, limit: str) -> None:
+def test_a_square_is_least_at_nought(slow_plane, limit):
     """At Fr = 2, and at Fr = 1.5, in the midst of the range of a difference."""
     asked = problem(constraints={"limit": limit}, minimize="abscissa")
     assert certify(unsolved(asked, slow_plane), seconds=SECONDS).status == "optimal"
 
 
 @pytest.mark.parametrize("width", [1e-6, 1e-10])
-def test_hardly_any_room(slow_plane: Solution, width: float) -> None:
+def test_hardly_any_room(slow_plane, width):
     """A box so narrow that differences in it are roundings; it is feasible, and a bound is no better than any of it.
 
     In the narrowest SCIP cannot find even the known design again, and its word does not count.
@@ -389,7 +389,7 @@ def test_hardly_any_room(slow_plane: Solution, width: float) -> None:
 
 
 @pytest.mark.slow
-def test_a_better_design_takes_the_place_of_a_worse_one() -> None:
+def test_a_better_design_takes_the_place_of_a_worse_one():
     """The optimum of a part of the plane, sold as that of all of it."""
     all_of_it = problem(minimize="abscissa")
     part = solve(problem({**PLANE, "Fr": (0.5, 1.2)}, minimize="abscissa"), starts=4)
@@ -401,7 +401,7 @@ def test_a_better_design_takes_the_place_of_a_worse_one() -> None:
 
 
 @pytest.mark.slow
-def test_a_basin_that_many_starts_miss() -> None:
+def test_a_basin_that_many_starts_miss():
     """Where a dozen starts agree on +0.0138; the value that is kept was found by differential evolution."""
     design = certify(random_problem(32), seconds=5.0)
     assert design.value == pytest.approx(KEPT[32].value, rel=1e-6)
@@ -427,11 +427,11 @@ def children(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     assert all(child.poll() is not None for child in seen)
 
 
-def test_no_process_is_left(slow_plane: Solution, children: list[Any]) -> None:
+def test_no_process_is_left(slow_plane, children):
     assert certify(slow_plane, seconds=SECONDS).bound.proven
 
 
-def test_an_interrupt_keeps_the_design(slow_plane: Solution, children: list[Any]) -> None:
+def test_an_interrupt_keeps_the_design(slow_plane, children):
     def stop(told: Progress) -> None:
         if told.done > 0:
             raise KeyboardInterrupt
@@ -444,7 +444,7 @@ def test_an_interrupt_keeps_the_design(slow_plane: Solution, children: list[Any]
 
 
 @pytest.mark.slow
-def test_a_process_that_crashes_costs_no_result(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_crashes_costs_no_result(slow_plane, monkeypatch):
     """At once, every time: nothing is decided, in the time that was given and that of one process more."""
     crashed: list[Any] = []
 
@@ -467,7 +467,7 @@ def test_a_process_that_crashes_costs_no_result(slow_plane: Solution, monkeypatc
         assert len(os.listdir("/proc/self/fd")) <= before + 2
 
 
-def test_one_crash_of_two(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch, children: list[Any]) -> None:
+def test_one_crash_of_two(slow_plane, monkeypatch, children):
     """The other one answers."""
     start = started.start
 
@@ -481,14 +481,14 @@ def test_one_crash_of_two(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch,
     assert is_closed(certify(slow_plane, seconds=SECONDS))
 
 
-def test_hardly_any_time(slow_plane: Solution) -> None:
+def test_hardly_any_time(slow_plane):
     design = certify(slow_plane, seconds=1e-3)
     assert design.value == slow_plane.value
     assert design.bound.value == slow_plane.bound.value
     assert not design.bound.proven
 
 
-def test_progress_is_told(slow_plane: Solution) -> None:
+def test_progress_is_told(slow_plane):
     """Seconds, and the gap as it closes."""
     told: list[Progress] = []
     certify(slow_plane, seconds=SECONDS, progress=told.append)
@@ -500,7 +500,7 @@ def test_progress_is_told(slow_plane: Solution) -> None:
     assert gaps[-1] < gaps[0]
 
 
-def test_a_crew_is_closed_whatever_happens(children: list[Any]) -> None:
+def test_a_crew_is_closed_whatever_happens(children):
     def fail() -> None:
         with SolverPool(SCIP) as crew:
             crew.ahead(2)
@@ -515,13 +515,13 @@ def test_a_crew_is_closed_whatever_happens(children: list[Any]) -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, math.nan])
-def test_time_must_be_positive(slow_plane: Solution, seconds: float) -> None:
+def test_time_must_be_positive(slow_plane, seconds):
     with pytest.raises(InputError, match=r"seconds.*found.*accepted: a positive number"):
         certify(slow_plane, seconds=seconds)
 
 
 @pytest.mark.slow
-def test_that_branch_and_bound_cannot_take_a_radius_is_said() -> None:
+def test_that_branch_and_bound_cannot_take_a_radius_is_said():
     """Branch and bound would know nothing of the radius, and any bound without it is none."""
     asked = replace(
         load("problems/tolerant.toml"), maximize=None, minimize="Fr", constraints={"near": "radius >= 0.05"}
@@ -540,7 +540,7 @@ def without_scip(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("without_scip")
-def test_without_scip_the_error_says_what_to_install(slow_plane: Solution) -> None:
+def test_without_scip_the_error_says_what_to_install(slow_plane):
     with pytest.raises(InputError, match=r"PySCIPOpt is not installed; pip install 'tmsopt\[certify\]'"):
         certify(slow_plane)
 
@@ -549,7 +549,7 @@ TIMID = GlobalSolver("Timid", "math", "", 0.0, timid.prepare, timid.decide)
 
 
 @pytest.mark.slow
-def test_another_global_solver_is_asked_and_named(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_global_solver_is_asked_and_named(slow_plane, monkeypatch):
     """Whoever searched, the bound that holds without a search stays, under its own name."""
     monkeypatch.setattr(certifying, "SOLVER", TIMID)
     monkeypatch.setattr(answering, "count", lambda: count(2000))  # one that gives up at once comes to so many turns
@@ -561,12 +561,12 @@ def test_another_global_solver_is_asked_and_named(slow_plane: Solution, monkeypa
     assert "optimal, proved" not in report
 
 
-def test_a_front_has_no_bound() -> None:
+def test_a_front_has_no_bound():
     with pytest.raises(InputError, match="pareto"):
         certify(problem(pareto=["abscissa", "Fr"]))
 
 
-def test_nothing_to_bound() -> None:
+def test_nothing_to_bound():
     located = certify(problem({**PLANE, "lambda_s": (0.02, 1.2)}, locate="EP4"), seconds=SECONDS)
     assert any("nothing is minimised or maximised" in note for note in located.notes)
     fixed = certify(Problem(models.tms, {**TILTED, "Fr": 1.0, "chi_B": 1.3}, minimize="abscissa"), seconds=SECONDS)
@@ -599,7 +599,7 @@ def run(*arguments: str | Path) -> tuple[int, str, str]:
     return result.exit_code, result.stdout, result.stderr
 
 
-def test_command(file: Path, slow_plane: Solution) -> None:
+def test_command(file, slow_plane):
     code, out, _ = run("solve", file, "--starts", "8", "--json", "--certify", "8")
     assert code == 0
     bound = json.loads(out)["bound"]
@@ -609,20 +609,20 @@ def test_command(file: Path, slow_plane: Solution) -> None:
 
 
 @pytest.mark.usefixtures("without_scip")
-def test_command_without_scip(file: Path) -> None:
+def test_command_without_scip(file):
     code, out, err = run("solve", file, "--certify")
     assert (code, out) == (2, "")
     assert "pip install 'tmsopt[certify]'" in err
 
 
 @pytest.mark.parametrize("seconds", ["0", "-3.5", "soon"])
-def test_command_with_a_bad_time(file: Path, seconds: str) -> None:
+def test_command_with_a_bad_time(file, seconds):
     code, _, err = run("solve", file, f"--certify={seconds}")
     assert code == 2
     assert ("--certify" if seconds != "-3.5" else "-3") in err  # which click takes for an option
 
 
-def test_command_for_a_front(tmp_path: Path) -> None:
+def test_command_for_a_front(tmp_path):
     path = tmp_path / "front.toml"
     path.write_text(FILE + 'pareto = ["abscissa", "Fr"]\n')
     code, out, err = run("solve", path, "--certify", "5")

@@ -1,7 +1,6 @@
 """Bounds, certificates and proofs for systems of any degree, beside closed forms and independent computations."""
 
 import math
-from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 from importlib import import_module
@@ -69,7 +68,7 @@ def rebuilt(proof: Proof) -> list[Any]:
 # Relations of the coefficients
 
 
-def test_the_two_mass_spring_controller_is_optimal_and_its_6_fold_root_exists() -> None:
+def test_the_two_mass_spring_controller_is_optimal_and_its_6_fold_root_exists():
     """The published optimum −√15/5; (s + √15/5)⁶ gives x1 = 6r, x0 = 15r² − 2, y2 = 15r⁴ − 2x0, y1 = 6r⁵, y0 = r⁶."""
     design = two_mass_spring()
     assert (design.structure, design.bound.method, design.bound.proven) == ("EP6", "relation", True)
@@ -85,7 +84,7 @@ def test_the_two_mass_spring_controller_is_optimal_and_its_6_fold_root_exists() 
 
 
 @pytest.mark.parametrize("degree", range(2, 13))
-def test_constant_product_and_constant_mean(degree: int) -> None:
+def test_constant_product_and_constant_mean(degree):
     """With aₙ = c the bound is ω0 = −c^(1/n), with a1 = c the mean of the roots, −c/n."""
     last = boxed(free_polynomial(degree, **{f"a{degree}": lambda a: 3 + 0 * a[1]}), minimize="abscissa")
     mean = boxed(free_polynomial(degree, a1=lambda a: 3 + 0 * a[2]), minimize="abscissa")
@@ -94,7 +93,7 @@ def test_constant_product_and_constant_mean(degree: int) -> None:
     assert relation_bound(mean) == pytest.approx(-3 / degree, rel=1e-15)
 
 
-def test_of_two_relations_the_one_without_the_leading_coefficient_counts_too() -> None:
+def test_of_two_relations_the_one_without_the_leading_coefficient_counts_too():
     """a₃ = 100 and a₄ = 1: 100 = −Σ Re 1/sₖ ≤ 4/d where all Re sₖ ≤ −d < 0; either relation alone says far less."""
     a, b = symbols("a b")
     both = boxed(from_coefficients([1, a, b, 100, 1]), 0.0, 200.0, minimize="abscissa")
@@ -102,7 +101,7 @@ def test_of_two_relations_the_one_without_the_leading_coefficient_counts_too() -
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 6, 9])
-def test_no_polynomial_of_a_family_with_one_relation_is_below_its_bound(degree: int) -> None:
+def test_no_polynomial_of_a_family_with_one_relation_is_below_its_bound(degree):
     """Drawn from the family at random, and near (s + z)ⁿ with z a zero of h, where that is the optimum."""
     rng = np.random.default_rng(degree)
     reached = 0
@@ -125,7 +124,7 @@ def test_no_polynomial_of_a_family_with_one_relation_is_below_its_bound(degree: 
     assert reached
 
 
-def test_what_is_no_relation() -> None:
+def test_what_is_no_relation():
     """Without one, with one that holds for one sign only, and with numbers that are no fractions: no bound."""
     a, b = symbols("a b")
     for coefficients in ([1, a, b], [1, ca.fabs(a), b, a * b], [1, ca.sin(b) * 0 + ca.sqrt(2 + b), a]):
@@ -148,7 +147,7 @@ def test_what_is_no_relation() -> None:
         lambda x, y: (1 + x) / (2 + y),
     ],
 )
-def test_the_bound_by_the_product_of_the_roots_holds_for_any_formula(last: Any) -> None:
+def test_the_bound_by_the_product_of_the_roots_holds_for_any_formula(last):
     x, y = symbols("x y")
     model = from_coefficients([1, x, y, last(x, y)])
     problem = boxed(model, 0.0, 1.5, minimize="abscissa")
@@ -158,7 +157,7 @@ def test_the_bound_by_the_product_of_the_roots_holds_for_any_formula(last: Any) 
     assert -math.inf < bound <= -(largest ** (1 / 3)) * (1 - 1e-15)
 
 
-def test_more_parameters_than_have_corners() -> None:
+def test_more_parameters_than_have_corners():
     """Twelve of thirteen coefficients free: the product is the last one, at most 1."""
     problem = boxed(free_polynomial(12, a1=lambda a: a[2] * a[3]), 0.0, 1.0, minimize="abscissa")
     more = {f"b{k}": (0.0, 1.0) for k in range(3)}
@@ -186,7 +185,7 @@ def verdict(problem: tmsopt.Problem, limit: float | None) -> set[str]:
         ("x1 x0 y2 y1 y0", lambda x1, x0, y2, y1, y0: [1, x1, x0 + 2, 2 * x1, 2 * x0 + y2, y1, y0], -R6),
     ],
 )
-def test_branch_and_bound_draws_the_line_at_the_optimum(names: str, coefficients: Any, optimum: float) -> None:
+def test_branch_and_bound_draws_the_line_at_the_optimum(names, coefficients, optimum):
     """Degrees 2, 3, 5 and 6: nothing is 1 % beyond the closed form, something is 1 % short of it."""
     model = from_coefficients(coefficients(*symbols(names)))
     problem = boxed(model, -10.0 if names.startswith("x") else 0.0, 90.0, minimize="abscissa")
@@ -197,7 +196,7 @@ def test_branch_and_bound_draws_the_line_at_the_optimum(names: str, coefficients
 
 @scip
 @pytest.mark.parametrize(("limit", "told"), [(0.51, INFEASIBLE), (0.49, FOUND)])
-def test_damping_ratios_of_an_odd_degree(limit: float, told: str) -> None:
+def test_damping_ratios_of_an_odd_degree(limit, told):
     """(s + d)(s² + 2ζws + w²), the last two coefficients 1 and 2ζ ≤ 1 by the box of the pair: ζ ≤ 1/2."""
     d, z = symbols("d z")
     problem = tmsopt.Problem(
@@ -208,7 +207,7 @@ def test_damping_ratios_of_an_odd_degree(limit: float, told: str) -> None:
     assert told in verdict(problem, limit)
 
 
-def test_the_greatest_damping_ratio_of_an_odd_degree() -> None:
+def test_the_greatest_damping_ratio_of_an_odd_degree():
     """(s + r)(s² + p s + 1): ζ = p/2 is greatest at x = 1/5 among r = (x − 2/5)(x − 4/5) ≥ 0; beyond, p is larger."""
     (x,) = symbols("x")
     p = 0.6 - 10 * (x - 0.2) ** 2 + 40 * (x - 0.2) ** 3
@@ -219,7 +218,7 @@ def test_the_greatest_damping_ratio_of_an_odd_degree() -> None:
 
 
 @scip
-def test_a_positive_root_of_an_odd_degree_has_the_damping_ratio_minus_1() -> None:
+def test_a_positive_root_of_an_odd_degree_has_the_damping_ratio_minus_1():
     d, z = symbols("d z")
     model = from_coefficients(product([1, -d], [1, z, 1]))
     for text, told in (("damping_ratio <= -0.9", FOUND), ("damping_ratio >= -0.9", INFEASIBLE)):
@@ -231,7 +230,7 @@ def test_a_positive_root_of_an_odd_degree_has_the_damping_ratio_minus_1() -> Non
 
 @scip
 @pytest.mark.parametrize(("most", "told"), [(4.9, INFEASIBLE), (5.1, FOUND)])
-def test_patterns_are_excluded_or_found_in_any_unit(most: float, told: str) -> None:
+def test_patterns_are_excluded_or_found_in_any_unit(most, told):
     """(s + 100)⁵ = s⁵ + 500 s⁴ + … + 10¹⁰ is in the box only if 500 is in the range of the first coefficient."""
     a, b, c, d = symbols("a b c d")
     model = from_coefficients([1, 1e2 * a, 1e4 * b, 1e6 * c, 1e8 * d, 1e10])
@@ -243,7 +242,7 @@ def test_patterns_are_excluded_or_found_in_any_unit(most: float, told: str) -> N
 
 @pytest.mark.slow
 @scip
-def test_a_gap_is_closed_or_left_open_but_never_wrong() -> None:
+def test_a_gap_is_closed_or_left_open_but_never_wrong():
     """Three equal masses in a chain with three dampers: in one second a bound, if any, that a grid does not beat."""
     c = symbols("c0 c1 c2")
     D = [[c[i] if i == j else 0 for j in range(3)] for i in range(3)]
@@ -260,7 +259,7 @@ def test_a_gap_is_closed_or_left_open_but_never_wrong() -> None:
 # Proofs
 
 
-def test_the_whole_structure_of_an_optimum_is_proved() -> None:
+def test_the_whole_structure_of_an_optimum_is_proved():
     """Degree 5 with a₅ = 2a₁ − 1: a double pair and a real root on one line; the roots rebuild the coefficients."""
     a, b, d, e = symbols("a b d e")
     design = tmsopt.solve(boxed(from_coefficients([1, a, b, d, e, 2 * a - 1]), 0.0, 20.0, minimize="abscissa"))
@@ -276,7 +275,7 @@ def test_the_whole_structure_of_an_optimum_is_proved() -> None:
 
 
 @pytest.mark.parametrize("names", ["a1 a2 a3 a4 a5 a6", "r b c W d1 c1"])
-def test_parameters_may_have_the_names_of_unknowns(names: str) -> None:
+def test_parameters_may_have_the_names_of_unknowns(names):
     """(s + 1/3)² (s² + s/7 + 1/3)² beside, in doubles: whatever the parameters are called."""
     exact = product(*[[Fraction(1), Fraction(1, 3)]] * 2, *[[Fraction(1), Fraction(1, 7), Fraction(1, 3)]] * 2)
     model = from_coefficients([1, *symbols(names)])
@@ -290,7 +289,7 @@ def test_parameters_may_have_the_names_of_unknowns(names: str) -> None:
         assert all(abs(mp.mpf(found[n].value) - x) < 1e-12 for n, x in near.items())
 
 
-def test_twelve_equal_roots() -> None:
+def test_twelve_equal_roots():
     """s¹² + 4s¹¹ + …: (s + 1/3)¹² by its eleven other coefficients, of which doubles are as far off as they round."""
     model = free_polynomial(12, a1=lambda a: 4 + 0 * a[2])
     stored = {f"a{k}_": math.comb(12, k) / 3.0**k for k in range(2, 13)}
@@ -302,7 +301,7 @@ def test_twelve_equal_roots() -> None:
         assert holds(proof.parameters["a12_"], mp.mpf(3) ** -12)
 
 
-def test_what_is_no_multiple_root_is_refused() -> None:
+def test_what_is_no_multiple_root_is_refused():
     """(s + 1)(s + 1.001)(s² + s + 1)(s² + s + 2) is no EP2; one beside it is farther than rounding explains."""
     c = product([1, 1], [1, 1.001], [1, 1, 1], [1, 1, 2])
     names = [f"a{k}_" for k in range(1, 7)]
@@ -328,7 +327,7 @@ def test_what_is_no_multiple_root_is_refused() -> None:
         ([[1, 0, 3]] * 2 + [[1, 1, 1]], "CEP2", {"CEP2", "weave", "resonance"}),  # its pair does not count twice
     ],
 )
-def test_patterns_of_fractions_of_any_degree(factors: list[list[int]], name: str, patterns: set[str]) -> None:
+def test_patterns_of_fractions_of_any_degree(factors, name, patterns):
     a = [flint.fmpq(-3, 7) * c for c in product(*factors)]
     asked = {"EP6", "EP3+CEP2", "EP3", "CEP2", "EP2", "2EP2", "3EP2", "weave", "resonance", "capsize"}
     asked |= {"weave+capsize", "EP2+weave", "CEP2+weave"}
@@ -338,7 +337,7 @@ def test_patterns_of_fractions_of_any_degree(factors: list[list[int]], name: str
     assert factored.multiple_roots(moved) == ""
 
 
-def test_exact_fractions_are_decided_without_rounding() -> None:
+def test_exact_fractions_are_decided_without_rounding():
     """(s + 1/2)³ (s² + s + 1)²: nothing is free, and nothing needs to be."""
     c = product(*[[Fraction(1), Fraction(1, 2)]] * 3, *[[Fraction(1)] * 3] * 2)
     names = [f"a{k}_" for k in range(1, 8)]
@@ -363,7 +362,7 @@ def roots_of(*places: tuple[complex, int]) -> list[Root]:
         ([(-1 + 1j, 1), (-2 + 0j, 2)], ["EP2"]),
     ],
 )
-def test_patterns_that_roots_show(places: Sequence[tuple[complex, int]], names: list[str]) -> None:
+def test_patterns_that_roots_show(places, names):
     """Each starts from unknowns that rebuild the polynomial."""
     found = shown_patterns(roots_of(*places))
     assert [p.name for p in found] == names
@@ -387,5 +386,5 @@ def test_patterns_that_roots_show(places: Sequence[tuple[complex, int]], names: 
         ([(1j, 1)], "weave", False),  # nothing is said of where the line is
     ],
 )
-def test_patterns_that_others_imply(places: Sequence[tuple[complex, int]], name: str, told: bool) -> None:
+def test_patterns_that_others_imply(places, name, told):
     assert implies(roots_of(*places), name) is told

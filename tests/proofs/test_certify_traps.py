@@ -102,7 +102,7 @@ def test_squared_frequencies_of_equal_roots_are_within_their_range(degree):
     assert all(most >= max(squares_of(coefficients)) * (1 - 1e-12) for most in upper)
 
 
-def test_a_search_that_finds_nothing_anywhere_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_that_finds_nothing_anywhere_is_not_believed(monkeypatch):
     """SCIP that says no to every question says no to the one that the known design answers: then no bound, no proof."""
     monkeypatch.setattr(
         SolverPool, "race", lambda self, tasks, tick=None: [Decision(INFEASIBLE, bound=1.0) for _ in tasks]

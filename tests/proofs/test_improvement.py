@@ -44,7 +44,7 @@ def worse(asked: tmsopt.Problem, **changed: Any) -> tmsopt.Solution:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("lost")
-def test_a_better_design_is_the_answer_though_nothing_converges_from_it() -> None:
+def test_a_better_design_is_the_answer_though_nothing_converges_from_it():
     """The least abscissa is −0.95. Found again and again, until none is better by a 1e-4 of it, and that is proved."""
     design = tmsopt.certify(worse(problem(minimize="abscissa")), seconds=SECONDS)
     assert design.status == "not_converged"
@@ -56,7 +56,7 @@ def test_a_better_design_is_the_answer_though_nothing_converges_from_it() -> Non
     assert any("does not converge" in note for note in design.notes)
 
 
-def test_where_the_solver_converges_the_optimum_is_the_answer() -> None:
+def test_where_the_solver_converges_the_optimum_is_the_answer():
     design = tmsopt.certify(worse(problem(minimize="abscissa")), seconds=SECONDS)
     assert (design.status, design.bound.proven) == ("optimal", True)
     assert design.value == pytest.approx(-0.95, abs=1e-12)
@@ -65,7 +65,7 @@ def test_where_the_solver_converges_the_optimum_is_the_answer() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("lost")
 @pytest.mark.parametrize("status", ["infeasible", "not_converged"])
-def test_a_feasible_design_is_never_called_infeasible(status: str) -> None:
+def test_a_feasible_design_is_never_called_infeasible(status):
     """x² ≥ 3.6 leaves 1.897 ≤ x ≤ 1.9: a corner that the search is said to have missed."""
     asked = problem(minimize="x", constraints={"corner": "x**2 >= 3.6"})
     missed = replace(tmsopt.solve(asked), status=status, value=float("nan"))
@@ -81,7 +81,7 @@ def test_a_feasible_design_is_never_called_infeasible(status: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("off", [4e-10, 1e-8, 1e-6])
-def test_what_is_better_only_beyond_a_limit_is_no_alarm(off: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_better_only_beyond_a_limit_is_no_alarm(off, monkeypatch):
     """x ≥ 1 is met to a tolerance, and 1 + 1000 (x − 1) is less by a thousand times that."""
 
     def race(self: SolverPool, tasks: Any, tick: Any = None) -> list[Decision]:
@@ -97,13 +97,13 @@ def test_what_is_better_only_beyond_a_limit_is_no_alarm(off: float, monkeypatch:
 
 
 @pytest.mark.usefixtures("lost")
-def test_a_design_that_is_off_by_a_rounding_is_none_where_nothing_mends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_design_that_is_off_by_a_rounding_is_none_where_nothing_mends_it(monkeypatch):
     """The same where no feasible design beside it can be found."""
     test_what_is_better_only_beyond_a_limit_is_no_alarm(4e-10, monkeypatch)
 
 
 @pytest.mark.slow
-def test_what_is_better_in_the_cases_asked_alone_is_no_alarm() -> None:
+def test_what_is_better_in_the_cases_asked_alone_is_no_alarm():
     """Between the speeds at which the best design was checked, another that is better at those does worse than it."""
     found = tmsopt.solve("problems/speed_band.toml")
     design = tmsopt.certify(found, seconds=5.0)

@@ -75,7 +75,7 @@ def on_ep_set(lambda_s: float, kind: str) -> tuple[tmsopt.Problem, dict[str, flo
 
 
 @pytest.mark.parametrize("digits", [5, 30, 50])
-def test_the_printed_EP4_lies_in_the_balls(digits: int) -> None:
+def test_the_printed_EP4_lies_in_the_balls(digits):
     """Table 1: χ_B = √2, tan λ_s = 15/4 − 75√2/32, Fr = 3√(110√2 − 120)/8, s = −√5/2^(1/4); at 60 digits."""
     proof = tmsopt.prove(solved("ep4"), digits)
     with mp.workdps(70):
@@ -99,7 +99,7 @@ def test_the_printed_EP4_lies_in_the_balls(digits: int) -> None:
     assert proof.uniqueness > 1e-3 > proof.explained > proof.distance
 
 
-def test_the_optimised_benchmark_on_all_its_branches() -> None:
+def test_the_optimised_benchmark_on_all_its_branches():
     """The line is −1, and +1 where Fr < 0; each branch is another design."""
     design = solved("optimised_benchmark")
     points = [design.parameters, *(b.parameters for b in design.branches)]
@@ -116,7 +116,7 @@ def test_the_optimised_benchmark_on_all_its_branches() -> None:
             assert holds(proof.parameters["chi_B"], mp.mpf("1.19"))
 
 
-def test_a_triple_root_and_its_derivatives() -> None:
+def test_a_triple_root_and_its_derivatives():
     """The EP3 of heavy damping at the least speed: p, p′, p″ vanish, by mpmath's root finder at 60 digits."""
     proof = tmsopt.prove(solved("heavily_damped"))
     with mp.workdps(60):
@@ -137,7 +137,7 @@ def test_a_triple_root_and_its_derivatives() -> None:
 
 
 @pytest.mark.parametrize(("tangent", "pattern"), [("2/5", "2EP2"), ("6/5", "CEP2")])
-def test_the_EP_set_at_an_exact_tangent(tangent: str, pattern: str) -> None:
+def test_the_EP_set_at_an_exact_tangent(tangent, pattern):
     """Equation epset; real pairs below the EP4 (tan λ_s = 0.435), complex ones above. The tangent is a fraction."""
     T = Fraction(tangent)
     proof = prove_design(*on_ep_set(math.atan(T), pattern), pattern, 40, {"tan(lambda_s)": tangent})
@@ -153,7 +153,7 @@ def test_the_EP_set_at_an_exact_tangent(tangent: str, pattern: str) -> None:
     assert (sign > 0) is (pattern == "2EP2")
 
 
-def test_uniqueness_ends_before_the_other_solution() -> None:
+def test_uniqueness_ends_before_the_other_solution():
     """At Fr = 2.25 the EP set is met at two tilts, the roots of a quadratic; each is proved, unique up to the other."""
     fixed = {**HEIGHTS, "Fr": 2.25}
     problem = tmsopt.Problem(
@@ -180,7 +180,7 @@ def polished(design: dict[str, float]) -> dict[str, float]:
         return {**design, "lambda_s": float(mp.atan(T))}
 
 
-def test_the_critical_speed() -> None:
+def test_the_critical_speed():
     """Table 1: Fr_c = √(30√2 + 120)/8 at the EP4's tilt and χ_B = √2; held here at doubles, so to 1e-14."""
     held = {"chi_B": SQRT2, "lambda_s": math.atan(15 / 4 - 75 * SQRT2 / 32)}
     proof = tmsopt.prove(located("weave", held, {"Fr": (0.5, 3)}))
@@ -190,7 +190,7 @@ def test_the_critical_speed() -> None:
     assert proof.abscissa == Number("0", "0")
 
 
-def test_a_root_at_0() -> None:
+def test_a_root_at_0():
     """a4 = −ζ_B T − μ (χ_H − 1) vanishes at tan λ_s = μ (χ_H − 1)/|ζ_B| = 1/20."""
     held = {"chi_H": 1.2, "chi_B": 1.3, "Fr": 1.3}
     proof = tmsopt.prove(located("capsize", held, {"lambda_s": (0.01, 0.4)}))
@@ -198,7 +198,7 @@ def test_a_root_at_0() -> None:
     assert proof.tangents["lambda_s"].contains("0.05")
 
 
-def test_the_same_EP4_in_SI() -> None:
+def test_the_same_EP4_in_SI():
     """v = Fr √(g w), x_B = χ_B w: with w = 2 m, g = 9.81 m/s²."""
     problem = tmsopt.Problem(
         tmsopt.models.tms,
@@ -216,7 +216,7 @@ def test_the_same_EP4_in_SI() -> None:
 
 
 @pytest.mark.parametrize(("name", "pattern"), [("physical_machine", "EP2"), ("least_speed", "pair+real")])
-def test_patterns_of_optima(name: str, pattern: str) -> None:
+def test_patterns_of_optima(name, pattern):
     """Whatever the rightmost roots show; the proved polynomial has the abscissa of the design."""
     design = solved(name)
     assert (design.structure, tmsopt.prove(design).pattern, tmsopt.prove(design).proved) == (pattern, pattern, True)
@@ -224,7 +224,7 @@ def test_patterns_of_optima(name: str, pattern: str) -> None:
     assert tmsopt.prove(design).stable.holds is True
 
 
-def test_a_design_without_multiple_roots_is_taken_as_it_is() -> None:
+def test_a_design_without_multiple_roots_is_taken_as_it_is():
     """Nothing is solved for: its roots are isolated; beside them those of mpmath at 50 digits."""
     design = solved("benchmark")
     proof = tmsopt.prove(design)
@@ -245,14 +245,14 @@ def test_a_design_without_multiple_roots_is_taken_as_it_is() -> None:
 # Exact input
 
 
-def test_a_double_stands_for_the_decimal_that_prints_it() -> None:
+def test_a_double_stands_for_the_decimal_that_prints_it():
     assert decimal(0.1) == Fraction(1, 10)
     assert decimal(1e-17) == Fraction(1, 10**17)
     assert tmsopt.prove(solved("ep4")).held == {"mu": "1/10", "chi_H": "1", "zeta_B": "-2/5", "zeta_H": "-1/5"}
     assert tmsopt.prove(solved("ep4")).parameters["zeta_B"] == Number("-0.4", "0")
 
 
-def test_thirds_are_thirds_where_they_are_given_exactly() -> None:
+def test_thirds_are_thirds_where_they_are_given_exactly():
     """ζ_B = −1/3: the closed form lies in the balls of the fraction, and 1e-17 beside those of the decimal."""
     held = {"zeta_B": -1 / 3, "zeta_H": -0.2}
     design = located("EP4", held, {"Fr": (0.1, 6), "chi_B": (1.01, 3), "lambda_s": (0.01, 1)})
@@ -268,7 +268,7 @@ def test_thirds_are_thirds_where_they_are_given_exactly() -> None:
         assert float(beside.parameters["Fr"]) == pytest.approx(float(truth["Fr"]), abs=1e-14)
 
 
-def test_an_angle_in_degrees_is_exact_where_it_is_given_so() -> None:
+def test_an_angle_in_degrees_is_exact_where_it_is_given_so():
     problem, design = on_ep_set(math.radians(20), "2EP2")
     exact = prove_design(problem, design, "2EP2", exact={"lambda_s": "20 deg"})
     plain = prove_design(problem, design, "2EP2")
@@ -289,7 +289,7 @@ def fractions(**changed: float) -> tmsopt.Solution:
     )
 
 
-def test_a_pattern_in_fractions_needs_no_free_parameter() -> None:
+def test_a_pattern_in_fractions_needs_no_free_parameter():
     exact: dict[str, Any] = {"Fr": Fraction(17, 12), "tan(lambda_s)": "17/48"}
     proof = tmsopt.prove(fractions(), exact=exact)
     assert (proof.proved, proof.pattern, proof.method) == (True, "EP4", "exact factorisation")
@@ -298,7 +298,7 @@ def test_a_pattern_in_fractions_needs_no_free_parameter() -> None:
     assert proof.radius == 0
 
 
-def test_nothing_free_and_not_exact_is_refused() -> None:
+def test_nothing_free_and_not_exact_is_refused():
     """The same bicycle in doubles is no EP4, and one in a fraction a little off is none either."""
     for proof in (
         tmsopt.prove(fractions()),
@@ -325,14 +325,14 @@ def test_nothing_free_and_not_exact_is_refused() -> None:
         ({"zeta_B": "-1/3", "zeta": 1}, ["exact.zeta_B", "exact.zeta:"]),
     ],
 )
-def test_exact_numbers_that_are_not_accepted(exact: dict[str, Any], words: list[str]) -> None:
+def test_exact_numbers_that_are_not_accepted(exact, words):
     with pytest.raises(tmsopt.InputError) as raised:
         tmsopt.prove(solved("ep4"), exact=exact)
     assert all(word in str(raised.value) for word in words)
 
 
 @pytest.mark.parametrize("digits", [0, 1001, 2.5, True])
-def test_digits_that_are_not_accepted(digits: Any) -> None:
+def test_digits_that_are_not_accepted(digits):
     with pytest.raises(tmsopt.InputError, match="1 to 1000"):
         tmsopt.prove(solved("ep4"), digits)
 
@@ -345,7 +345,7 @@ def test_digits_that_are_not_accepted(digits: Any) -> None:
     [(n, d) for n in ("ep4", "optimised_benchmark", "heavily_damped") for d in (3, 6, 9)]
     + [("ep4", 12), ("heavily_damped", 12)],
 )
-def test_a_rounded_design_is_refused(name: str, digits: int) -> None:
+def test_a_rounded_design_is_refused(name, digits):
     """A true EP is near it, but not where the stored numbers say, and 16 digits would be nearer than these.
 
     Of the optimised benchmark 12 digits are left out: 64 roundings of each number move its μ = 20.8 by 2e-10.
@@ -359,7 +359,7 @@ def test_a_rounded_design_is_refused(name: str, digits: int) -> None:
     assert prove_design(design.problem, dict(design.parameters), design.structure).proved
 
 
-def test_a_fold_is_refused() -> None:
+def test_a_fold_is_refused():
     """At Fr = √5 the EP set turns back, so with Fr held its equations are singular (tan λ_s = r (r − 1)/(2 h (r + 1))).
 
     The doubles beside √5 have no solution, or two 4e-8 apart.
@@ -378,7 +378,7 @@ def test_a_fold_is_refused() -> None:
     assert prove_design(*on_ep_set(tilt, "2EP2"), "2EP2").proved
 
 
-def test_a_parameter_without_effect_is_no_unknown() -> None:
+def test_a_parameter_without_effect_is_no_unknown():
     """At χ_H = 1 the polynomial does not depend on μ."""
     fixed = {n: v for n, v in HEIGHTS.items() if n != "mu"} | {"chi_B": SQRT2}
     free = {"mu": (0.05, 0.2), "Fr": (1.0, 4.0), "lambda_s": (0.1, 1.0)}
@@ -390,7 +390,7 @@ def test_a_parameter_without_effect_is_no_unknown() -> None:
 
 @pytest.mark.parametrize("rate", [1e-9, 1e6, 1e12])
 @pytest.mark.parametrize("carrier", [0.0, 1e6])
-def test_an_EP2_of_H_in_any_unit_and_frame(rate: float, carrier: float) -> None:
+def test_an_EP2_of_H_in_any_unit_and_frame(rate, carrier):
     """|g1 − g2|/2 = k and d = 0, whatever the unit of rates; a carrier costs its own digits of double precision."""
     dimer = tmsopt.models.from_hamiltonian([["w + d - 1j*g1", "k"], ["k", "w - 1j*g2"]])
     fixed = {"w": carrier * rate, "g1": 3 * rate, "g2": rate}
@@ -404,7 +404,7 @@ def test_an_EP2_of_H_in_any_unit_and_frame(rate: float, carrier: float) -> None:
 
 
 @pytest.mark.parametrize("rate", [1e-6, 1e6])
-def test_a_CEP2_of_oscillators_in_any_unit_of_time(rate: float) -> None:
+def test_a_CEP2_of_oscillators_in_any_unit_of_time(rate):
     """c1 − c2 = ±2 δ with δ² = A + B − 2 √(AB − k²), A = 1 + k, B = w + k, in units of the rate."""
     k, w = 0.3, 1.2
     square = rate * rate
@@ -418,7 +418,7 @@ def test_a_CEP2_of_oscillators_in_any_unit_of_time(rate: float) -> None:
     assert apart == pytest.approx(2 * math.sqrt(A + B - 2 * math.sqrt(A * B - k * k)), rel=1e-12)
 
 
-def test_too_few_free_parameters() -> None:
+def test_too_few_free_parameters():
     problem = tmsopt.Problem(
         tmsopt.models.tms,
         fixed={**HEIGHTS, "chi_B": SQRT2, "Fr": 2.236317518367822},
@@ -431,7 +431,7 @@ def test_too_few_free_parameters() -> None:
     assert "free 2 more" in proof.reason
 
 
-def test_an_irrational_design_is_not_called_rounded() -> None:
+def test_an_irrational_design_is_not_called_rounded():
     """The double pair of 2 s⁴ + (7 − 2 p) s² + 1 at p = 7/2 − √2, which fractions cannot show."""
     ziegler = tmsopt.models.from_matrices(M=[[3, 1], [1, 1]], K=[["2 - p", "p - 1"], [-1, 1]])
     proof = tmsopt.prove(tmsopt.Problem(ziegler, fixed={"p": "7/2-sqrt(2)"}))
@@ -439,7 +439,7 @@ def test_an_irrational_design_is_not_called_rounded() -> None:
     assert all(words in proof.reason for words in ("could not be proved", "may be rounded, or irrational", "fractions"))
 
 
-def test_numbers_in_the_unit_of_the_roots_have_it() -> None:
+def test_numbers_in_the_unit_of_the_roots_have_it():
     """In SI the roots are per √(g/w); a dimensionless design has no such unit."""
     design = solved("point_mass_robot")
     proof = tmsopt.prove(design)
@@ -452,7 +452,7 @@ def test_numbers_in_the_unit_of_the_roots_have_it() -> None:
     assert {row[3] for row in free if row[0] in ("abscissa", "r")} == {""}
 
 
-def test_a_singular_mass_matrix_is_refused() -> None:
+def test_a_singular_mass_matrix_is_refused():
     """χ_H = 1 and λ_s = 0 make a0 = 0."""
     design = {**solved("ep4").parameters, "lambda_s": 0.0}
     proof = prove_design(solved("ep4").problem, design, "EP4")
@@ -464,14 +464,14 @@ def test_a_singular_mass_matrix_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("asked", "T"), [("2EP2", 1.2), ("CEP2", 0.4)])
-def test_the_other_kind_of_pair_is_refused(asked: str, T: float) -> None:
+def test_the_other_kind_of_pair_is_refused(asked, T):
     kind = "CEP2" if asked == "2EP2" else "2EP2"
     proof = prove_design(*on_ep_set(math.atan(T), asked), kind)
     assert not proof.proved
     assert f"a {kind}, not a {asked}" in proof.reason
 
 
-def test_the_wrong_structure_is_refused() -> None:
+def test_the_wrong_structure_is_refused():
     """An EP3 and a pair of double roots are no EP4, an EP4 is no EP3 with a root apart, and a weave is elsewhere."""
     triple = solved("heavily_damped")
     problem = solved("ep4").problem
@@ -487,7 +487,7 @@ def test_the_wrong_structure_is_refused() -> None:
     assert all(p.reason for p in wrong)
 
 
-def test_an_EP3_that_a_last_bit_chooses_is_not_the_designs() -> None:
+def test_an_EP3_that_a_last_bit_chooses_is_not_the_designs():
     """Along the EP3s the tilt leaves that of the EP4 as (r − t)²: rounded to their side, it has one with roots 1e-8 apart.
 
     At 1e-4 of a radian from there rounding has no say any more.
@@ -505,7 +505,7 @@ def test_an_EP3_that_a_last_bit_chooses_is_not_the_designs() -> None:
     assert (proof.proved, proof.pattern) == (True, "EP3")
 
 
-def test_what_is_not_solved_is_not_proved() -> None:
+def test_what_is_not_solved_is_not_proved():
     proof = tmsopt.prove(replace(solved("ep4"), status="infeasible"))
     assert not proof.proved
     assert "not solved (infeasible)" in proof.reason
@@ -516,7 +516,7 @@ def test_what_is_not_solved_is_not_proved() -> None:
 # Stability and heavy damping
 
 
-def test_stability_and_heavy_damping_of_random_polynomials() -> None:
+def test_stability_and_heavy_damping_of_random_polynomials():
     """Beside isolated roots of the same fractions; strictly inside, on the edge and outside."""
     rng = np.random.default_rng(5)
     seen = set()
@@ -541,7 +541,7 @@ def test_stability_and_heavy_damping_of_random_polynomials() -> None:
     assert len(seen) == 6
 
 
-def test_signs_that_cannot_be_told_are_not() -> None:
+def test_signs_that_cannot_be_told_are_not():
     wide = flint.arb(0, 1e-10)
     assert Factored((([flint.arb(1), flint.arb(2), wide], 1),)).stable is None
     assert Factored((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).heavily_damped is None
@@ -558,7 +558,7 @@ def quadratic(constant: str) -> Any:
     return lambda at: [at["x"] * at["x"] + flint.arb(constant)]
 
 
-def test_krawczyk_on_a_square() -> None:
+def test_krawczyk_on_a_square():
     """x² = 2 has ±√2; its test fails at 0, and where there is no root, and for a double one."""
     with flint.ctx.workdps(50):
         system = quadratic("-2")
@@ -578,7 +578,7 @@ def refined_and_enclosed(system: Any) -> Any:
     return enclosed(system, refined(system, {"x": flint.arb("0.3")}, ["x"], 45), ["x"], 45)
 
 
-def test_decimals_hold_their_balls() -> None:
+def test_decimals_hold_their_balls():
     """Whatever the size and radius: the ends of the ball are within the radius of the decimal."""
     rng = np.random.default_rng(1)
     with flint.ctx.workdps(60):
@@ -596,7 +596,7 @@ def test_decimals_hold_their_balls() -> None:
 # As data, as text, on the command line
 
 
-def test_a_proof_is_plain_data() -> None:
+def test_a_proof_is_plain_data():
     proof = tmsopt.prove(solved("ep4"))
     assert pickle.loads(pickle.dumps(proof)) == proof
     assert tmsopt.prove(pickle.loads(pickle.dumps(solved("ep4")))).parameters == proof.parameters
@@ -607,7 +607,7 @@ def test_a_proof_is_plain_data() -> None:
     assert isinstance(tmsopt.Proof("nothing", False), Proof)
 
 
-def test_a_band_is_proved_in_its_worst_case() -> None:
+def test_a_band_is_proved_in_its_worst_case():
     problem = tmsopt.load(PROBLEMS / "speed_band.toml")
     design = {**HEIGHTS, "Fr": 1.8, "chi_B": 1.28, "lambda_s": 0.12}
     proof = prove_design(problem, design, "pair", case=Case(at={"Fr": 1.2}))
@@ -621,7 +621,7 @@ def run(*arguments: str) -> Any:
     return CliRunner().invoke(main, ["prove", *arguments])
 
 
-def test_the_command() -> None:
+def test_the_command():
     done = run(str(PROBLEMS / "ep4.toml"), "--digits", "40")
     assert done.exit_code == 0
     assert "proved: a design with EP4 exists" in done.stdout
@@ -636,7 +636,7 @@ def test_the_command() -> None:
 
 
 @pytest.mark.slow
-def test_the_exit_status_of_the_command(tmp_path: Path) -> None:
+def test_the_exit_status_of_the_command(tmp_path):
     text = (PROBLEMS / "ep4.toml").read_text(encoding="utf-8")
     infeasible, none = tmp_path / "infeasible.toml", tmp_path / "none.toml"
     infeasible.write_text(text + '\n[constraints]\nfast = "abscissa <= -3"\n', encoding="utf-8")

@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -75,7 +74,7 @@ def balance(solution: Solution) -> str:
     return line(design_report(solution), "front wheel ").split("; ", 1)[1]
 
 
-def test_lengths_speeds_and_angles_read_as_they_were_written() -> None:
+def test_lengths_speeds_and_angles_read_as_they_were_written():
     report = full(solved())
     expected = {
         "x_B": (120, "cm"),
@@ -91,7 +90,7 @@ def test_lengths_speeds_and_angles_read_as_they_were_written() -> None:
     assert {symbol: read(report, symbol) for symbol in expected} == expected
 
 
-def test_loads_u_H_and_critical_speed_of_the_benchmark() -> None:
+def test_loads_u_H_and_critical_speed_of_the_benchmark():
     """By hand: moments 10·0.2 + 1·0.02 kg m about the front contact, 13.02 about the rear one, of 11 kg."""
     report = full(solved())
     assert next(r[:3] for r in rows(report) if r[0] == "load_front") == ["load_front", "118.364", "%"]  # 13.02/11
@@ -107,30 +106,30 @@ def test_loads_u_H_and_critical_speed_of_the_benchmark() -> None:
     )
 
 
-def test_a_bicycle_that_pitches_over_the_front_is_told_its_ballast() -> None:
+def test_a_bicycle_that_pitches_over_the_front_is_told_its_ballast():
     assert balance(solved()).startswith(
         "pitches over the front wheel, unless ballast of 2.02 kg is at the rear contact"
     )
 
 
-def test_a_bicycle_that_pitches_over_the_rear_is_told_its_ballast() -> None:
+def test_a_bicycle_that_pitches_over_the_rear_is_told_its_ballast():
     """x_B = -0.3 m: -10·0.3 + 1.02 = -1.98 kg m about the rear contact."""
     text = balance(solved(x_B=-0.3))
     assert text.startswith("pitches over the rear wheel, unless ballast of 1.98 kg is at the front contact")
 
 
-def test_a_bicycle_on_both_wheels() -> None:
+def test_a_bicycle_on_both_wheels():
     assert balance(solved(x_B=0.5)) == "stands on both wheels"
 
 
 @pytest.mark.parametrize(("x_B", "lifted"), [(0.998, "rear"), (-0.102, "front")])
-def test_a_wheel_that_carries_nothing_is_named(x_B: float, lifted: str) -> None:
+def test_a_wheel_that_carries_nothing_is_named(x_B, lifted):
     """Moments 10·0.002 = 1·0.02 about the front contact; 10·0.102 = 1·1.02 about the rear one: 0 up to rounding."""
     assert f"the {lifted} wheel carries no load" in balance(solved(x_B=x_B))
     assert f"{lifted} wheel 0 N (0 %)" in line(design_report(solved(x_B=x_B)), "front wheel ")
 
 
-def test_a_stable_oscillation_has_decay_time_and_frequency() -> None:
+def test_a_stable_oscillation_has_decay_time_and_frequency():
     design = solved()
     text = line(design_report(design), "decay time ")
     rate = math.sqrt(9.81)
@@ -139,7 +138,7 @@ def test_a_stable_oscillation_has_decay_time_and_frequency() -> None:
     assert "growth time" not in design_report(design)
 
 
-def test_two_pairs_have_two_frequencies() -> None:
+def test_two_pairs_have_two_frequencies():
     """√3/2 and √15/2 √(g/w), in either order: their real parts are the same."""
     text = line(design_report(tmsopt.solve(tmsopt.Problem(tms, fixed=TWO_PAIRS))), "decay time ")
     found = re.search(r"angular frequencies (\S+) and (\S+) √\(g/w\)", text)
@@ -147,7 +146,7 @@ def test_two_pairs_have_two_frequencies() -> None:
     assert sorted(found.groups()) == sorted(f"{math.sqrt(k) / 2:.4g}" for k in (3, 15))
 
 
-def test_an_unstable_bicycle_has_a_growth_time() -> None:
+def test_an_unstable_bicycle_has_a_growth_time():
     design = solved(v=2.0)
     report = design_report(design)
     assert f"growth time {1 / (design.abscissa * math.sqrt(9.81)):.4g} s" in report
@@ -155,7 +154,7 @@ def test_an_unstable_bicycle_has_a_growth_time() -> None:
     assert "as given: not stable" in report
 
 
-def test_a_double_pair_has_one_frequency_and_EP4_none() -> None:
+def test_a_double_pair_has_one_frequency_and_EP4_none():
     """s = −1/2 ± i√3/2, twice: one frequency, √3/2. At EP4 nothing swings."""
     cep2 = tmsopt.solve(tmsopt.Problem(tms, fixed=CEP2))
     assert cep2.structure == "CEP2"
@@ -163,7 +162,7 @@ def test_a_double_pair_has_one_frequency_and_EP4_none() -> None:
     assert line(design_report(tmsopt.solve("problems/ep4.toml")), "decay time ").endswith("nothing swings")
 
 
-def test_wheelbase_and_rear_mass_scale_a_dimensionless_design() -> None:
+def test_wheelbase_and_rear_mass_scale_a_dimensionless_design():
     """Twice the length: lengths ×2, speeds ×√2; three times the mass: loads ×3."""
     design = tmsopt.solve(tmsopt.load("problems/ep4.toml"))
     small, large = full(design, 1.0, 1.0), full(design, 2.0, 3.0)
@@ -174,7 +173,7 @@ def test_wheelbase_and_rear_mass_scale_a_dimensionless_design() -> None:
     assert "unless ballast of 0.4142 m_B" in design_report(design)  # √2 − 1: chi_H = 1 has no part in it
 
 
-def test_a_singular_mass_matrix_is_reported_all_the_same() -> None:
+def test_a_singular_mass_matrix_is_reported_all_the_same():
     """No front mass: a root at infinity, no time and no frequency, but loads."""
     fixed = {**BENCHMARK, "z_H": 0.0, "x_H": 1.0}
     design = tmsopt.solve(tmsopt.Problem(tms, fixed=fixed), throw=False)
@@ -194,7 +193,7 @@ inertia = "mass_margin >= 1e-4\""""
 
 
 @pytest.mark.slow
-def test_from_a_file_in_units_to_a_report_in_units(tmp_path: Path) -> None:
+def test_from_a_file_in_units_to_a_report_in_units(tmp_path):
     """One file through the command line, as text and as JSON; v.max binds (a robot is steadier when faster)."""
     file = tmp_path / "robot.toml"
     file.write_text(FILE, encoding="utf-8")
@@ -251,7 +250,7 @@ def test_laws_charts_and_traces_are_of_the_nominal_design():
     assert tmsopt.compare(asked).design.abscissa == pytest.approx(tmsopt.solve(plain).abscissa, abs=1e-12)
 
 
-def test_a_limit_without_a_value_is_named_without_an_amount() -> None:
+def test_a_limit_without_a_value_is_named_without_an_amount():
     """As omega0 >= 0.3 has none at the edge of where omega0, negative wherever it is, exists."""
     design = tmsopt.solve("problems/ep4.toml")
     conflict = Relaxation(design.parameters, Table({"trail": math.inf}), ("trail",), Table({}))
@@ -260,7 +259,7 @@ def test_a_limit_without_a_value_is_named_without_an_amount() -> None:
 
 
 @pytest.mark.slow
-def test_a_radius_out_of_reach_says_how_near_a_design_comes() -> None:
+def test_a_radius_out_of_reach_says_how_near_a_design_comes():
     """What it says is the radius of the design that it shows, of another computation; 0.5 is far beyond it."""
     asked = tmsopt.load("problems/tolerant.toml")
     fixed = {**asked.fixed, "chi_B": 1.4, "lambda_s": 0.35}

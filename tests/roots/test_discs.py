@@ -22,7 +22,7 @@ def polynomials(degree: int) -> np.ndarray:
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 8])
 @pytest.mark.parametrize("share", [0.0, 1e-13])
-def test_the_true_values_are_within_the_errors(degree: int, share: float) -> None:
+def test_the_true_values_are_within_the_errors(degree, share):
     a = polynomials(degree)
     moved = a * (1 + share * np.random.default_rng(0).uniform(-1, 1, a.shape))
     found = enclose_motions([Bounded(c, share * np.abs(c)) for c in a.T], 1e-12)
@@ -36,14 +36,14 @@ def test_the_true_values_are_within_the_errors(degree: int, share: float) -> Non
     assert found.simple[:60].mean() > 0.9
 
 
-def test_a_multiple_root_is_never_certain() -> None:
+def test_a_multiple_root_is_never_certain():
     for roots in ([-1, -1, -2, -3], [-1, -1, -1, -1], [1j, -1j, 1j, -1j], [0, 0, -1, -2]):
         a = np.poly(roots).real
         assert not enclose_motions([Bounded(np.full(1, c), np.zeros(1)) for c in a], 1e-12).simple.any()
 
 
 @pytest.mark.parametrize("apart", [1e-13, -1e-13])
-def test_a_second_root_on_the_rightmost_line_is_never_certain(apart: float) -> None:
+def test_a_second_root_on_the_rightmost_line_is_never_certain(apart):
     """Which of a pair and a real root is rightmost, rounding decides."""
     a = np.poly([-1 + apart, -1 + 2j, -1 - 2j, -3]).real
     assert not enclose_motions([Bounded(np.full(1, c), np.zeros(1)) for c in a], 1e-12).simple.any()

@@ -50,7 +50,7 @@ def fractions(p: sympy.Poly, length: int) -> list[Fraction]:
 
 @repeatable
 @given(st.lists(polynomial, max_size=4))
-def test_product_is_the_product(factors: list[list[Fraction]]) -> None:
+def test_product_is_the_product(factors):
     expected = sympy.Poly(1, s, domain="QQ")
     for factor in factors:
         expected *= poly(factor)
@@ -59,7 +59,7 @@ def test_product_is_the_product(factors: list[list[Fraction]]) -> None:
 
 @repeatable
 @given(polynomial, rational)
-def test_shift_is_composition_with_t_plus_gamma(p: list[Fraction], gamma: Fraction) -> None:
+def test_shift_is_composition_with_t_plus_gamma(p, gamma):
     argument = sympy.Poly(s + sympy.Rational(gamma.numerator, gamma.denominator), s, domain="QQ")
     assert shift(p, gamma) == fractions(poly(p).compose(argument), len(p))
 
@@ -69,14 +69,14 @@ def _random_matrix(rng: np.random.Generator, n: int, length: int) -> list[list[l
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
-def test_determinant_of_a_polynomial_matrix(n: int) -> None:
+def test_determinant_of_a_polynomial_matrix(n):
     entries = _random_matrix(np.random.default_rng(n), n, 3)
     expected = sympy.Matrix(n, n, lambda i, j: poly(entries[i][j]).as_expr()).det(method="berkowitz")
     assert determinant(entries) == fractions(sympy.Poly(expected, s, domain="QQ"), 2 * n + 1)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_quadratic_pencil_is_det_of_M_s2_D_s_K(n: int) -> None:
+def test_quadratic_pencil_is_det_of_M_s2_D_s_K(n):
     rng = np.random.default_rng(10 + n)
     M, D, K = ([[e[0] for e in row] for row in _random_matrix(rng, n, 1)] for _ in range(3))
     pencil = sympy.Matrix(n, n, lambda i, j: poly([M[i][j], D[i][j], K[i][j]]).as_expr())
@@ -149,7 +149,7 @@ def random_roots(rng: np.random.Generator, degree: int) -> list[complex]:
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
-def test_roots_of_random_polynomials_rebuild_the_coefficients(degree: int) -> None:
+def test_roots_of_random_polynomials_rebuild_the_coefficients(degree):
     rng = np.random.default_rng(degree)
     for _ in range(30):
         assert_jointly_right(coefficients_of(random_roots(rng, degree), leading=rng.uniform(-5, 5)))
@@ -158,14 +158,14 @@ def test_roots_of_random_polynomials_rebuild_the_coefficients(degree: int) -> No
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
 @pytest.mark.parametrize("scale", [1e-8, 1e8])
-def test_roots_do_not_care_about_the_unit_of_time(degree: int, scale: float) -> None:
+def test_roots_do_not_care_about_the_unit_of_time(degree, scale):
     rng = np.random.default_rng(degree)
     for _ in range(20):
         assert_jointly_right(coefficients_of([scale * z for z in random_roots(rng, degree)], leading=-3.0))
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
-def test_roots_sixteen_decades_apart(degree: int) -> None:
+def test_roots_sixteen_decades_apart(degree):
     rng = np.random.default_rng(degree)
     for _ in range(15):
         assert_jointly_right(coefficients_of([complex(-(10 ** rng.uniform(-8, 8))) for _ in range(degree)]))
@@ -193,15 +193,13 @@ def near_ep4(draw: st.DrawFn) -> list[complex]:
 
 @settings(max_examples=250, deadline=None, derandomize=True)
 @given(near_ep4(), st.sampled_from([1.0, -0.3, 1e-8, 1e8]), st.sampled_from([1.0, 1e-8, 1e8]))
-def test_roots_next_to_a_four_fold_one_rebuild_the_coefficients(
-    values: list[complex], leading: float, scale: float
-) -> None:
+def test_roots_next_to_a_four_fold_one_rebuild_the_coefficients(values, leading, scale):
     assert_jointly_right(coefficients_of([scale * z for z in values], leading))
 
 
 @pytest.mark.parametrize("r", [-1.0, -1.8803015465431967, -0.1, 3.7, -1e8, -1e-8])
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
-def test_multiple_roots_of_full_multiplicity(degree: int, r: float) -> None:
+def test_multiple_roots_of_full_multiplicity(degree, r):
     assert_jointly_right(coefficients_of([complex(r)] * degree))
 
 
@@ -218,12 +216,12 @@ def test_multiple_roots_of_full_multiplicity(degree: int, r: float) -> None:
         [1, -1, 1j, -1j],
     ],
 )
-def test_roots_of_every_pattern_rebuild_the_coefficients(values: list[complex]) -> None:
+def test_roots_of_every_pattern_rebuild_the_coefficients(values):
     assert_jointly_right(coefficients_of([complex(z) for z in values]))
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
-def test_roots_at_zero_are_zero(degree: int) -> None:
+def test_roots_at_zero_are_zero(degree):
     rng = np.random.default_rng(degree)
     for zeros in range(1, degree + 1):
         for _ in range(5):
@@ -233,7 +231,7 @@ def test_roots_at_zero_are_zero(degree: int) -> None:
             assert np.count_nonzero(roots(c) == 0) == zeros
 
 
-def test_conjugate_pairs_are_exact_and_adjacent() -> None:
+def test_conjugate_pairs_are_exact_and_adjacent():
     rng = np.random.default_rng(0)
     for degree in (2, 3, 4, 5, 6):
         found = roots(rng.normal(size=(200, degree + 1)))
@@ -247,24 +245,24 @@ def test_conjugate_pairs_are_exact_and_adjacent() -> None:
                 k += 1
 
 
-def test_abscissa_is_the_largest_real_part() -> None:
+def test_abscissa_is_the_largest_real_part():
     """(s + 1)(s + 2)(s² + s + 1) and s (s + 3): −1/2 and 0."""
     assert abscissa(product([1, 1], [1, 2], [1, 1, 1])) == pytest.approx(-0.5, rel=1e-14)
     assert abscissa([1, 3, 0]) == 0
     assert abscissa(np.ones((2, 3, 4))).shape == (2, 3)
 
 
-def test_rebuilt_coefficients_are_monic_and_real() -> None:
+def test_rebuilt_coefficients_are_monic_and_real():
     assert rebuilt(np.array([1j, -1j, 2.0])).tolist() == [1, -2, 1, -2]
 
 
-def test_backward_error_is_relative_to_the_terms_of_each_coefficient() -> None:
+def test_backward_error_is_relative_to_the_terms_of_each_coefficient():
     """(s − 1)(s + 1) for s² + 0.002 s − 1: a1 is off by 0.002 and summed from terms of total size 2."""
     assert backward_error([1, 0.002, -1], np.array([1.0 + 0j, -1.0])) == pytest.approx(0.001, rel=1e-15)
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (7,), (2, 3), (2, 0)])
-def test_roots_are_vectorised(shape: tuple[int, ...]) -> None:
+def test_roots_are_vectorised(shape):
     c = np.random.default_rng(3).normal(size=(*shape, 5))
     found = roots(c)
     assert found.shape == (*shape, 4)
@@ -277,7 +275,7 @@ def test_roots_are_vectorised(shape: tuple[int, ...]) -> None:
     "bad",
     [[0, 1, 2], [1, np.nan, 2], [1, np.inf], [-np.inf, 1], [1], [], 5.0, [[1, 2, 3], [0, 2, 3]], [[1, 2], [1, np.nan]]],
 )
-def test_roots_refuse_what_has_none(bad: object) -> None:
+def test_roots_refuse_what_has_none(bad):
     with pytest.raises(ValueError, match="coefficients"):
         roots(bad)
 
@@ -301,7 +299,7 @@ def random_exact(degree: int) -> list[list[Fraction]]:
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
-def test_is_stable_agrees_with_the_exact_routh_table(degree: int) -> None:
+def test_is_stable_agrees_with_the_exact_routh_table(degree):
     for p in random_exact(degree):
         decisive = [q / sum(abs(c) for c in p) for q in lienard_chipart(p)]
         if min(map(abs, decisive)) < 1e-9:
@@ -310,7 +308,7 @@ def test_is_stable_agrees_with_the_exact_routh_table(degree: int) -> None:
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
-def test_lienard_chipart_is_positive_exactly_for_stable_ones(degree: int) -> None:
+def test_lienard_chipart_is_positive_exactly_for_stable_ones(degree):
     for p in random_exact(degree):
         quantities = lienard_chipart([c * (1 if p[0] > 0 else -1) for c in p])
         assert len(quantities) == degree
@@ -329,17 +327,17 @@ def test_lienard_chipart_is_positive_exactly_for_stable_ones(degree: int) -> Non
         [1, np.nan, 1],
     ],
 )
-def test_the_boundary_is_not_stable(unstable: list[float]) -> None:
+def test_the_boundary_is_not_stable(unstable):
     assert not is_stable(unstable)
     assert not is_stable([-c for c in unstable])
 
 
-def test_is_stable_is_vectorised() -> None:
+def test_is_stable_is_vectorised():
     c = np.array([[[1, 2, 3], [-1, -2, -3]], [[1, -2, 3], [1, 2, -3]]])
     assert is_stable(c).tolist() == [[True, True], [False, False]]
 
 
-def test_discriminant_keeps_its_sign_across_two_double_roots() -> None:
+def test_discriminant_keeps_its_sign_across_two_double_roots():
     """(s² + 3s + 2)² ± ε both have four distinct real or complex roots, and a positive discriminant."""
     for epsilon in (Fraction(1, 1000), Fraction(-1, 1000)):
         p = product([1, 3, 2], [1, 3, 2])

@@ -28,7 +28,7 @@ PUBLISHED: dict[str, tuple[dict[str, float], complex, int]] = {
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_published_exceptional_points_are_located_and_proved(name: str) -> None:
+def test_published_exceptional_points_are_located_and_proved(name):
     where, omega, order = PUBLISHED[name]
     found = tmsopt.solve(f"problems/{name}.toml")
     assert max(abs(found.parameters[n] - x) for n, x in where.items()) < EXACT
@@ -47,7 +47,7 @@ def test_published_exceptional_points_are_located_and_proved(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "exponent", "size"), [("loss_only_dimer", "1/2", math.sqrt(0.4)), ("ep3_sensor", "1/3", 1.0)]
 )
-def test_a_sensor_responds_by_the_root_of_its_order(name: str, exponent: str, size: float) -> None:
+def test_a_sensor_responds_by_the_root_of_its_order(name, exponent, size):
     """(k eps)^(1/2) of a dimer and (k² eps)^(1/3) of a trimer, by the characteristic equation to leading order."""
     (diagnosis,) = tmsopt.diagnose(f"problems/{name}.toml")
     (law,) = next(r for r in diagnosis.responses if r.parameter == "eps").laws
@@ -55,7 +55,7 @@ def test_a_sensor_responds_by_the_root_of_its_order(name: str, exponent: str, si
     assert law.branches.size == pytest.approx(size, rel=1e-9)
 
 
-def test_the_curve_of_a_dimer_is_half_the_difference_of_losses() -> None:
+def test_the_curve_of_a_dimer_is_half_the_difference_of_losses():
     model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
     free = {"g2": (0.1, 3.0), "d": (-1.0, 1.0), "k": (0.01, 2.0)}
     traced = tmsopt.trace(tmsopt.Problem(model, fixed={"g1": 1.0}, free=free, locate="EP2"))
@@ -72,7 +72,7 @@ def test_the_curve_of_a_dimer_is_half_the_difference_of_losses() -> None:
         assert "c" not in row
 
 
-def test_all_exceptional_points_of_a_dimer_are_counted() -> None:
+def test_all_exceptional_points_of_a_dimer_are_counted():
     """d = 0 and k = ±(g1 − g2)/2, no others: those of the double alone are none."""
     model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
     fixed = {"g1": 1.0, "g2": 0.2}
@@ -82,7 +82,7 @@ def test_all_exceptional_points_of_a_dimer_are_counted() -> None:
     assert {s.structure for s in every.solutions} == {"EP2"}
 
 
-def test_meetings_along_a_parameter_are_those_of_the_matrix() -> None:
+def test_meetings_along_a_parameter_are_those_of_the_matrix():
     """±a pass each other at no k: only k = 0.4 is a meeting, and none is a root 0."""
     model = from_hamiltonian([["-1j*g1", "k"], ["k", "-1j*g2"]])
     found = tmsopt.speeds(
@@ -93,7 +93,7 @@ def test_meetings_along_a_parameter_are_those_of_the_matrix() -> None:
     assert (found[0].root.re, found[0].root.im) == pytest.approx((-0.6, 0.0), abs=1e-14)
 
 
-def test_the_threshold_of_a_pt_dimer() -> None:
+def test_the_threshold_of_a_pt_dimer():
     """Gain g and loss g, coupled by k: balanced up to g = k; with more loss l the threshold is g = l or g l = k²."""
     model = from_hamiltonian([["1j*g", "k"], ["k", "-1j*l"]])
     asked = tmsopt.Problem(model, fixed={"k": 1.0, "l": 2.0}, free={"g": (0.1, 1.5)}, locate="weave")
@@ -105,7 +105,7 @@ def test_the_threshold_of_a_pt_dimer() -> None:
     assert margins.radius == pytest.approx(0.25, abs=1e-9)
 
 
-def test_a_carrier_of_a_million_couplings() -> None:
+def test_a_carrier_of_a_million_couplings():
     """No false exceptional point is found: it is where it is without the carrier, to the roundings of that."""
     model = from_hamiltonian([["w1 - 1j*g1", "k"], ["k", "w - 1j*g2"]])
     free = {"w1": (1e6 - 1, 1e6 + 1), "k": (0.01, 1)}
@@ -115,7 +115,7 @@ def test_a_carrier_of_a_million_couplings() -> None:
     assert tmsopt.prove(found).proved
 
 
-def test_the_optimum_of_a_lossy_dimer_is_its_trace() -> None:
+def test_the_optimum_of_a_lossy_dimer_is_its_trace():
     """No eigenfrequency decays faster than the mean loss, which all reach beyond the exceptional point."""
     model = from_hamiltonian([["-1j*g1", "k"], ["k", "-1j*g2"]])
     asked = tmsopt.Problem(model, fixed={"g1": 1.0, "g2": 0.2}, free={"k": (0.1, 2)}, minimize="abscissa")
@@ -125,7 +125,7 @@ def test_the_optimum_of_a_lossy_dimer_is_its_trace() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])
-def test_the_optimum_where_nothing_is_stable_is_the_mean_gain(size: int) -> None:
+def test_the_optimum_where_nothing_is_stable_is_the_mean_gain(size):
     """No greatest gain is below the mean one, which symmetric chains reach; a search for EPs of full order leads on."""
     rows: list[list[str]] = [
         [
@@ -140,7 +140,7 @@ def test_the_optimum_where_nothing_is_stable_is_the_mean_gain(size: int) -> None
 
 
 @pytest.mark.parametrize("command", ["solve", "prove", "describe"])
-def test_no_words_of_the_double_are_shown(command: str) -> None:
+def test_no_words_of_the_double_are_shown(command):
     text = (
         CliRunner()
         .invoke(main, [command, "problems/pt_trimer.toml", *(["--full"] if command == "solve" else [])])
@@ -150,7 +150,7 @@ def test_no_words_of_the_double_are_shown(command: str) -> None:
     assert "eigenfrequenc" in text
 
 
-def test_json_has_eigenfrequencies_beside_roots() -> None:
+def test_json_has_eigenfrequencies_beside_roots():
     found: dict[str, Any] = tmsopt.solve("problems/loss_only_dimer.toml").to_json()
     (root,) = found["roots"]
     of_block = {"multiplicity": 2, "defective": True, "geometric_multiplicity": 1}  # an EP2: one eigenvector
@@ -158,7 +158,7 @@ def test_json_has_eigenfrequencies_beside_roots() -> None:
     assert "eigenfrequencies" not in tmsopt.solve("problems/coupled_pair.toml").to_json()
 
 
-def test_studies_keep_to_the_matrix() -> None:
+def test_studies_keep_to_the_matrix():
     """A row for each g2; the exceptional point follows it."""
     problem = tmsopt.load("problems/loss_only_dimer.toml")
     rows = tmsopt.run_study(tmsopt.Study(problem, {"g2": [0.2, 0.4, 0.6]})).rows
@@ -166,7 +166,7 @@ def test_studies_keep_to_the_matrix() -> None:
     assert [row.parameters["k"] for row in rows] == pytest.approx([0.4, 0.3, 0.2], abs=EXACT)
 
 
-def test_charts_and_pages_take_a_complex_system() -> None:
+def test_charts_and_pages_take_a_complex_system():
     """Stable beside unstable where the gain passes the loss; roots of the page are told as eigenfrequencies."""
     model = from_hamiltonian([["1j*g", "k"], ["k", "-1j*l"]])
     plane = tmsopt.Problem(model, fixed={"k": 1.0}, free={"g": (0.1, 1.5), "l": (0.1, 1.5)})
@@ -184,7 +184,7 @@ LASER = [["d + 1j*g", "k"], ["k", "-1j*l"]]
 """Characteristic equation (ω − d − i g)(ω + i l) = k²; a real ω asks for (ω − d) ω + g l = k² and ω (l − g) = d l."""
 
 
-def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real() -> None:
+def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real():
     """ω = d l / (l − g) by the imaginary part of the characteristic equation; the other is the trace less this."""
     fixed = {"l": 0.5, "d": 0.2, "k": 0.3}
     found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(LASER), fixed=fixed, free={"g": (-1, 1.5)}, locate="weave"))
@@ -198,7 +198,7 @@ def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real() -> No
     assert f"neither loss nor gain; {real:.5g} is real" in report
 
 
-def test_a_threshold_of_a_lossier_mode_is_not_the_edge() -> None:
+def test_a_threshold_of_a_lossier_mode_is_not_the_edge():
     """The other eigenfrequency has the imaginary part of the trace, g − l."""
     fixed = {"l": 0.1, "d": 0.3, "k": 0.5}
     found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(LASER), fixed=fixed, free={"g": (-2, 2)}, locate="weave"))
@@ -212,7 +212,7 @@ def test_a_threshold_of_a_lossier_mode_is_not_the_edge() -> None:
 
 
 @pytest.mark.parametrize(("rest", "beyond"), [("s + 1", 0.0), ("s - 1", 1.0)])
-def test_a_weave_of_a_real_system_says_whether_it_is_the_edge(rest: str, beyond: float) -> None:
+def test_a_weave_of_a_real_system_says_whether_it_is_the_edge(rest, beyond):
     """(s² + c s + 1.3) times s ± 1, whose weave is c = 0."""
     r = 1 if rest == "s + 1" else -1
     model = tmsopt.models.from_coefficients([1, f"c + {r}", f"1.3 + {r}*c", f"1.3*{r}"])
@@ -224,7 +224,7 @@ def test_a_weave_of_a_real_system_says_whether_it_is_the_edge(rest: str, beyond:
     assert ("marginally stable\n" in tmsopt.report.design_report(found)) is not bool(beyond)
 
 
-def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold() -> None:
+def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold():
     """A detuning ε of an EP2 moves it by (k ε)^(1/2) beside ε/2, which is within 10 % up to some 1e-2; a common one by ε.
 
     Of −i (g1 + g2)/2 ± (k² − (g1 − g2)²/4 + …)^(1/2) the EP2 is at k = (g1 − g2)/2 = 0.6.
@@ -247,7 +247,7 @@ def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold() -> None:
     assert "nowhere sampled" not in text
 
 
-def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met() -> None:
+def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met():
     """The EP3 of the trimer at g = l = √2, d = 0: what is printed near it is right to half a unit of its last digit."""
     model = from_hamiltonian([["d + 1j*g", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j*l"]])
     free = {"g": (0.1, 2.5), "l": (0.1, 2.5), "d": (-1.0, 1.0)}
@@ -266,7 +266,7 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met() -> None:
 
 
 @pytest.mark.slow
-def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix() -> None:
+def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix():
     model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
     asked = tmsopt.Problem(
         model,
@@ -281,7 +281,7 @@ def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix() -> None:
     assert "damping ratio" not in report
 
 
-def test_words_of_a_matrix_with_gain() -> None:
+def test_words_of_a_matrix_with_gain():
     model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
     told, chart = import_module("tmsopt.models.user_spectrum"), import_module("tmsopt.plots.chart")
     lossy, gaining = (told.structure_in_words(model, "EP2", gain) for gain in (False, True))

@@ -36,7 +36,7 @@ DAMPED = tmsopt.Problem(
 """A heavily damped design is at chi_B = 1.33, zeta_B = -0.403, zeta_H = -0.463, and few are near it."""
 
 
-def test_by_the_sum_of_the_roots_one_excludes_the_other() -> None:
+def test_by_the_sum_of_the_roots_one_excludes_the_other():
     """Roots left of -0.99 with a sum of -8.5 or less: the sum of their products by two is least where all but one are
     there, and more than the box allows."""
     rest = 8.5 - (FOLD - 1) * 0.99
@@ -48,13 +48,13 @@ def test_by_the_sum_of_the_roots_one_excludes_the_other() -> None:
 
 
 @pytest.mark.slow
-def test_a_limit_that_a_needle_meets_is_not_out_of_reach() -> None:
+def test_a_limit_that_a_needle_meets_is_not_out_of_reach():
     relaxation = tmsopt.solve(FAST, throw=False, alone=False, stability=0.0).relaxation
     limits = {n for n in relaxation.conflict if n in FAST.constraints}
     assert (limits, relaxation.irreducible) == (set(FAST.constraints), True)
 
 
-def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish() -> None:
+def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish():
     """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
     search = import_module("tmsopt.search.search")
     found, told = search._reached(workspace(FAST), ["far"])
@@ -67,7 +67,7 @@ def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may
     assert search._reached(workspace(DAMPED), ["damped"]) == (None, False)
 
 
-def test_where_a0_may_vanish_a_search_is_not_said_to_tell() -> None:
+def test_where_a0_may_vanish_a_search_is_not_said_to_tell():
     design = tmsopt.solve(DAMPED, throw=False, alone=False, stability=0.0)
     first = " ".join(infeasible_lines(design)[:1])
     assert set(design.relaxation.conflict) >= {*DAMPED.constraints} or not design.relaxation.irreducible
@@ -76,7 +76,7 @@ def test_where_a0_may_vanish_a_search_is_not_said_to_tell() -> None:
 
 
 @pytest.mark.slow
-def test_a_heavily_damped_design_meets_that_limit_alone() -> None:
+def test_a_heavily_damped_design_meets_that_limit_alone():
     kept = {"damped": DAMPED.constraints["damped"]}
     design = tmsopt.solve(replace(DAMPED, constraints=kept), stability=0.0)
     p = DAMPED.values(design.parameters)
@@ -108,7 +108,7 @@ def blind(monkeypatch):
 
 
 @pytest.mark.usefixtures("blind")
-def test_what_a_whole_search_meets_is_decided_anew() -> None:
+def test_what_a_whole_search_meets_is_decided_anew():
     """Without a design of its own each set seems to be out of reach; the searches show what excludes what."""
     points = [{"x": x, "y": y} for x, y in ((0.1, 0.1), (0.1, 0.6), (0.9, 0.1))]
     asked = []
@@ -127,20 +127,20 @@ def test_what_a_whole_search_meets_is_decided_anew() -> None:
 
 
 @pytest.mark.usefixtures("blind")
-def test_of_what_searches_go_on_to_meet_no_fewer_limits_are_claimed() -> None:
+def test_of_what_searches_go_on_to_meet_no_fewer_limits_are_claimed():
     endless = iter({"x": 0.5, "y": k / 1000} for k in range(1000))  # that meet none of the limits, whatever is said
     found = named(BOUNDS, lambda names: (next(endless), True))
     assert (found.conflict, found.irreducible) == (("a", "b", "c"), False)
 
 
 @pytest.mark.usefixtures("blind")
-def test_where_no_search_can_tell_that_is_said() -> None:
+def test_where_no_search_can_tell_that_is_said():
     assert not named(BOUNDS, lambda names: (None, False)).irreducible
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fold", [7, 9, 10])
-def test_a_root_of_any_multiplicity_is_within_reach_alone(fold: int) -> None:
+def test_a_root_of_any_multiplicity_is_within_reach_alone(fold):
     """(s + 1)ⁿ is at 0; x1 >= 0.5 excludes it, as at eight."""
     coefficients = ["1", *(f"{comb(fold, k)} + x{k}" for k in range(1, fold + 1))]
     free = {f"x{k}": (-1.0, 1.3) for k in range(1, fold + 1)}
@@ -151,7 +151,7 @@ def test_a_root_of_any_multiplicity_is_within_reach_alone(fold: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["2EP2", "EP2+EP2"])
-def test_the_least_speed_of_a_pattern_is_told_by_whichever_name(name: str) -> None:
+def test_the_least_speed_of_a_pattern_is_told_by_whichever_name(name):
     """By the law epset: its Froude number falls as the tilt grows to 0.405, so at 0.38 at most it is that at 0.38."""
     fixed = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1, "chi_B": math.sqrt(2), "Fr": 1.0}
     problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free={"lambda_s": (0.01, 0.38)}, locate=name)
@@ -161,7 +161,7 @@ def test_the_least_speed_of_a_pattern_is_told_by_whichever_name(name: str) -> No
     assert need.value == pytest.approx(float(tmsopt.laws.epset(zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.38)), rel=1e-6)
 
 
-def test_a_limit_that_is_moved_by_its_seventh_digit_is_shown_as_it_is() -> None:
+def test_a_limit_that_is_moved_by_its_seventh_digit_is_shown_as_it_is():
     """s² + 2xs + 1 comes to −1 and no further."""
     oscillator = tmsopt.models.from_coefficients([1, "2*x", 1])
     asked = tmsopt.Problem(oscillator, free={"x": (0, 5)}, minimize="x", constraints={"c": "abscissa <= -1.000001"})

@@ -11,7 +11,7 @@ DIABOLIC = from_hamiltonian([["d", "k"], ["k", "-d"]])
 BOX = {"d": (-1.0, 1.0), "k": (-1.0, 1.0)}
 
 
-def test_a_diabolic_point_is_not_found() -> None:
+def test_a_diabolic_point_is_not_found():
     found = tmsopt.solve(tmsopt.Problem(DIABOLIC, free=BOX, locate="EP2"), throw=False)
     data, report = found.to_json(), str(found)
     assert (found.status, data["defective"], data["geometric_multiplicity"]) == ("not_converged", False, 2)
@@ -23,7 +23,7 @@ def test_a_diabolic_point_is_not_found() -> None:
     assert "not an EP" in proof.reason
 
 
-def test_the_search_goes_on_for_a_defective_one() -> None:
+def test_the_search_goes_on_for_a_defective_one():
     """A = [[d, k], [−k, −d]] is nilpotent where d² = k², and 0 at the middle of the box, to which it is nearest."""
     model = from_matrices(A=[["d", "k"], ["-k", "-d"]])
     found = tmsopt.solve(tmsopt.Problem(model, free=BOX, locate="EP2"))
@@ -34,7 +34,7 @@ def test_the_search_goes_on_for_a_defective_one() -> None:
     assert found.to_json()["geometric_multiplicity"] == 1
 
 
-def test_all_designs_count_crossings_apart() -> None:
+def test_all_designs_count_crossings_apart():
     every = tmsopt.solve_all(tmsopt.Problem(DIABOLIC, free=BOX, locate="EP2"), seconds=0)
     assert not every.solutions
     assert every.coverage is not None
@@ -43,7 +43,7 @@ def test_all_designs_count_crossings_apart() -> None:
 
 
 @pytest.mark.parametrize(("coupling", "proved"), [("0", False), ("1", True)])
-def test_prove_counts_eigenvectors(coupling: str, proved: bool) -> None:
+def test_prove_counts_eigenvectors(coupling, proved):
     """Twice −0.7, with and without a Jordan chain, in fractions."""
     model = from_matrices(A=[["a", coupling], [0, "a"]])
     proof = tmsopt.prove(tmsopt.Problem(model, fixed={"a": -0.7}))
@@ -51,7 +51,7 @@ def test_prove_counts_eigenvectors(coupling: str, proved: bool) -> None:
     assert proof.defective.holds is proved
 
 
-def test_prove_shows_a_minor_in_balls() -> None:
+def test_prove_shows_a_minor_in_balls():
     """s⁴ + 3 s² + 2 + p²: flutter begins at p = 1/2, with one eigenvector."""
     model = from_matrices([[1, 0], [0, 1]], None, [[1, "p"], ["-p", 2]])
     proof = tmsopt.prove(tmsopt.Problem(model, free={"p": (0.1, 1.0)}, locate="CEP2"))
@@ -59,7 +59,7 @@ def test_prove_shows_a_minor_in_balls() -> None:
     assert (proof.geometric_multiplicity, proof.defective.holds) == (1, True)
 
 
-def test_blocks_of_two_are_no_ep4() -> None:
+def test_blocks_of_two_are_no_ep4():
     """Two equal oscillators, critically damped: −1 four times, with two eigenvectors."""
     model = from_matrices([[1, 0], [0, 1]], [["c", 0], [0, "c"]], [[1, 0], [0, 1]])
     problem = tmsopt.Problem(model, free={"c": (0.1, 4.0)}, minimize="abscissa")
@@ -68,14 +68,14 @@ def test_blocks_of_two_are_no_ep4() -> None:
     assert "not an EP" in str(found)
 
 
-def test_coefficients_cannot_tell() -> None:
+def test_coefficients_cannot_tell():
     swing = from_coefficients([1, "c", 1])
     found = tmsopt.solve(tmsopt.Problem(swing, free={"c": (0.0, 3.0)}, locate="EP2"))
     assert found.to_json()["defective"] is None
     assert "coefficients cannot tell" in str(found)
 
 
-def test_an_optimum_at_a_singular_mass_matrix_is_none() -> None:
+def test_an_optimum_at_a_singular_mass_matrix_is_none():
     """(m s + 1)(s + 2 − m): the abscissa m − 2 is least at m = 0, where a root is at infinity."""
     model = from_coefficients(["m", "1 + m*(2 - m)", "2 - m"])
     found = tmsopt.solve(tmsopt.Problem(model, free={"m": (0.0, 0.4)}, minimize="abscissa"), throw=False)

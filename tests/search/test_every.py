@@ -45,7 +45,7 @@ def meeting(k: float, w: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("k", "w"), [(0.3, 1.2), (0.1, 1.5)])
-def test_both_cep2_of_two_oscillators(k: float, w: float) -> None:
+def test_both_cep2_of_two_oscillators(k, w):
     one = np.array(meeting(k, w))
     polynomial = np.convolve([1, one[0], 1 + k], [1, one[1], w + k]) - [0, 0, 0, 0, k * k]
     b, c = one.sum() / 2, math.sqrt((1 + k) * (w + k) - k * k)
@@ -57,7 +57,7 @@ def test_both_cep2_of_two_oscillators(k: float, w: float) -> None:
     assert sorted(s.abscissa for s in found) == pytest.approx(sorted([-b / 2, b / 2]), abs=1e-11)
 
 
-def test_a_box_with_one_of_them_or_none() -> None:
+def test_a_box_with_one_of_them_or_none():
     stable = all_of(oscillators(0.3, 1.2, (0, 2)), starts=12)
     (design,) = stable.solutions
     assert [design.parameters[n] for n in ("c1", "c2")] == pytest.approx(meeting(0.3, 1.2), abs=1e-11)
@@ -68,12 +68,12 @@ def test_a_box_with_one_of_them_or_none() -> None:
     assert none.coverage.chance == pytest.approx(3 / none.coverage.starts)  # the rule of three
 
 
-def test_constraints_choose_among_them() -> None:
+def test_constraints_choose_among_them():
     chosen = all_of(oscillators(0.3, 1.2, constraints={"unstable": "c1 + c2 <= 0"}), starts=12).solutions
     assert [s.parameters["c1"] for s in chosen] == [pytest.approx(-meeting(0.3, 1.2)[0], abs=1e-11)]
 
 
-def test_both_exchanged_ep3_of_three_masses() -> None:
+def test_both_exchanged_ep3_of_three_masses():
     """K = [[μ + 1, −1, 0], [−1, 2, −1], [0, −1, ν + 1]] has a 3-fold λ where 3λ = tr K, 3λ² = minors, λ³ = det K."""
     problem = tmsopt.load(Path(__file__).parents[2] / "problems" / "three_masses.toml")
     free = tmsopt.Problem(model=problem.model, free=problem.free, locate="CEP3")
@@ -90,7 +90,7 @@ def test_both_exchanged_ep3_of_three_masses() -> None:
     assert {s.structure for s in found} == {"CEP3"}
 
 
-def test_two_solutions_close_to_each_other_are_not_told_to_more_digits_than_hold() -> None:
+def test_two_solutions_close_to_each_other_are_not_told_to_more_digits_than_hold():
     """(s + 1)² + (y − 1/2) (y − 0.5000001): rounding of the 1 moves y by 1e-9, for the slope is 1e-7."""
     y = ca.SX.sym("y")
     model = from_coefficients([1, 2, 1 + (y - 0.5) * (y - 0.5000001)])
@@ -99,7 +99,7 @@ def test_two_solutions_close_to_each_other_are_not_told_to_more_digits_than_hold
         assert abs(solution.parameters["y"] - true) <= errors["y"] < 1e-7
 
 
-def test_coverage_says_how_much_was_looked_at() -> None:
+def test_coverage_says_how_much_was_looked_at():
     """w (n − 1)/(n − w − 2) solutions expected for w found in n hits (Boender and Rinnooy Kan 1987)."""
     coverage = tmsopt.solve_all(oscillators(0.3, 1.2), seconds=0).coverage
     w, n = len(coverage.hits), sum(coverage.hits)
@@ -113,7 +113,7 @@ def test_coverage_says_how_much_was_looked_at() -> None:
     assert few.chance > coverage.chance
 
 
-def test_the_same_is_found_from_other_starts_and_again() -> None:
+def test_the_same_is_found_from_other_starts_and_again():
     first, again, other = (all_of(oscillators(0.3, 1.2), seed=s, starts=12) for s in (0, 0, 5))
     assert first.to_json()["coverage"] == again.to_json()["coverage"]
     assert [dict(s.parameters) for s in first.solutions] == [dict(s.parameters) for s in again.solutions]
@@ -122,7 +122,7 @@ def test_the_same_is_found_from_other_starts_and_again() -> None:
     assert np.allclose(*found, atol=1e-11)
 
 
-def test_of_seven_roots() -> None:
+def test_of_seven_roots():
     """With the product 2⁷ all meet at −2 alone."""
     row = [math.comb(7, j) * 2.0**j for j in range(8)]
     names = [ca.SX.sym(f"y{j}") for j in range(1, 7)]
@@ -150,12 +150,12 @@ def test_of_seven_roots() -> None:
         (oscillators(0.3, 1.2, tolerances={"c1": 0.1}), "do not make single solutions"),
     ],
 )
-def test_problems_without_single_solutions_are_refused(problem: tmsopt.Problem, said: str) -> None:
+def test_problems_without_single_solutions_are_refused(problem, said):
     with pytest.raises(tmsopt.InputError, match=said):
         tmsopt.solve_all(problem)
 
 
-def test_a_constraint_on_a_quantity_with_an_equation_of_its_own() -> None:
+def test_a_constraint_on_a_quantity_with_an_equation_of_its_own():
     """ω0 is an unknown beside those of the pattern; written by its formula, the bicycle is the same."""
     file = Path(__file__).parents[2] / "problems" / "optimised_benchmark.toml"
     problem = tmsopt.load(file)
@@ -164,13 +164,13 @@ def test_a_constraint_on_a_quantity_with_an_equation_of_its_own() -> None:
         assert design.parameters["mu"] == pytest.approx(20.84626701, rel=1e-9)
 
 
-def test_a_constraint_on_what_only_the_roots_define_is_refused() -> None:
+def test_a_constraint_on_what_only_the_roots_define_is_refused():
     said = "the constraints use damping_ratio, .*accepted: parameters, coefficients, and quantities with a formula"
     with pytest.raises(tmsopt.InputError, match=said):
         tmsopt.solve_all(oscillators(0.3, 1.2, constraints={"damped": "damping_ratio >= 0.1"}))
 
 
-def test_of_the_command_line(tmp_path: Path) -> None:
+def test_of_the_command_line(tmp_path):
     file = tmp_path / "own.toml"
     file.write_text(
         """
@@ -210,7 +210,7 @@ locate = "CEP2"
     assert data["undecided"] >= 1
 
 
-def test_a_continuum_of_solutions_is_told_from_none() -> None:
+def test_a_continuum_of_solutions_is_told_from_none():
     """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, a whole curve, for there is no damping."""
     Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
     model = from_matrices([[1, 0], [0, 1]], [[0, -Om], [Om, 0]], [[-1, 0], [0, -k]])
@@ -231,7 +231,7 @@ def test_the_pattern_that_is_suggested_has_as_many_conditions_as_there_are_free_
         tmsopt.solve_all(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
 
 
-def test_designs_at_a_parameter_that_is_zero() -> None:
+def test_designs_at_a_parameter_that_is_zero():
     """H = [[10 + d − i, k], [k, 10 − d − 3i]]: 4 (d + i)² + 4 k² = 0 at d = 0 and k = ±1 alone, where ω = 10 − 2i."""
     dimer = tmsopt.models.from_matrices(
         A=[[-1, 0, "10 + d", "k"], [0, -3, "k", "10 - d"], ["-10 - d", "-k", -1, 0], ["-k", "-10 + d", 0, -3]]
@@ -248,7 +248,7 @@ def test_designs_at_a_parameter_that_is_zero() -> None:
         assert float(proof.parameters["d"].value) == pytest.approx(0, abs=1e-50)
 
 
-def test_double_exceptional_points_of_a_chain_with_gain_and_loss() -> None:
+def test_double_exceptional_points_of_a_chain_with_gain_and_loss():
     """det(ω − H) = (ω² + bω + c)² of the matrix itself; H → −H* mirrors d1, d2, and one design is its own image."""
     d1, d2, g1, g2 = (ca.SX.sym(n) for n in ("d1", "d2", "g1", "g2"))
     rows = [[(d1, g1), 1, 0, 0], [1, (d2, -g2), 0.4, 0], [0, 0.4, 0.9j, 1], [0, 0, 1, -0.8j]]

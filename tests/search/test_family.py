@@ -29,7 +29,7 @@ def limited(problem: Problem, name: str, value: float) -> Problem:
     return replace(problem, constraints={**problem.constraints, name: with_limit(problem.constraints[name], value)})
 
 
-def test_every_member_obeys_the_laws_of_ep4() -> None:
+def test_every_member_obeys_the_laws_of_ep4():
     family = Family(["zeta_H", "zeta_B", "mu"])
     for zeta_B, zeta_H in ((-0.4, -0.2), (-1.0, -0.3), (-0.5, -0.45)):
         found = solve(with_fixed(EP4, zeta_B=zeta_B, zeta_H=zeta_H, mu=0.3), family=family)
@@ -72,7 +72,7 @@ MEMBERS = {
 
 @pytest.mark.parametrize("name", MEMBERS)
 @pytest.mark.slow
-def test_a_member_is_solved_as_alone_and_whatever_came_before(name: str) -> None:
+def test_a_member_is_solved_as_alone_and_whatever_came_before(name):
     """The same optimum as without a family; the very same bits in a family of its own."""
     varied, member, values = MEMBERS[name]
     family = Family(varied)
@@ -89,7 +89,7 @@ def test_a_member_is_solved_as_alone_and_whatever_came_before(name: str) -> None
         assert found.abscissa == pytest.approx(alone.abscissa, rel=1e-6)
 
 
-def test_the_box_of_a_member_is_its_own() -> None:
+def test_the_box_of_a_member_is_its_own():
     family = Family(["mu"])
     for most in (0.3, 0.35):
         problem = replace(EP4, free={**EP4.free, "lambda_s": (0.02, most)})
@@ -98,7 +98,7 @@ def test_the_box_of_a_member_is_its_own() -> None:
         assert family.formulate(problem).upper == formulate(problem).upper
 
 
-def test_a_design_nearby_leads_to_the_same_optimum() -> None:
+def test_a_design_nearby_leads_to_the_same_optimum():
     start = solve(EP4)
     problem = with_fixed(EP4, zeta_H=-0.21)
     warm = solve(problem, near=start.parameters, starts=1)
@@ -107,7 +107,7 @@ def test_a_design_nearby_leads_to_the_same_optimum() -> None:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_design_nearby_decides_on_the_side(sign: int) -> None:
+def test_a_design_nearby_decides_on_the_side(sign):
     """Where both signs of the tilt would be searched, only that of the given design is."""
     problem = load("problems/realistic.toml")
     there = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()} | {"lambda_s": 0.2 * sign}
@@ -116,7 +116,7 @@ def test_a_design_nearby_decides_on_the_side(sign: int) -> None:
     assert len(found.sides) == 1
 
 
-def test_nothing_grows_without_end() -> None:
+def test_nothing_grows_without_end():
     """Boxes of a pattern without an objective are part of its NLP: each is another one."""
     family = Family(["mu"])
     problem = replace(EP4, minimize=None, locate="EP3")
@@ -154,7 +154,7 @@ ALIKE = {
 
 
 @pytest.mark.parametrize("name", ALIKE)
-def test_a_member_has_the_rows_that_it_has_alone(name: str) -> None:
+def test_a_member_has_the_rows_that_it_has_alone(name):
     """Whichever member was formulated first: the same rows, limits and values at a point."""
     problem, varied, values, ratio = ALIKE[name]
     for order in (values, values[::-1]):

@@ -89,7 +89,7 @@ def test_other_limits_keep_their_price():
     assert "limit0" not in tmsopt.solve(bicycle("(Fr - 1.7)**4 <= 0", maximize="Fr")).active
 
 
-def test_a_flat_stretch_at_the_bound_is_optimal() -> None:
+def test_a_flat_stretch_at_the_bound_is_optimal():
     """Two modes beyond their EP at k = 0.4 share the loss (g1 + g2)/2 whatever k is, and no design does better."""
     pair = tmsopt.models.from_hamiltonian([["-1j", "k"], ["k", "-0.2j"]])
     design = tmsopt.solve(tmsopt.Problem(pair, free={"k": (0.1, 0.5)}, minimize="abscissa"))

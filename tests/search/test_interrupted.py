@@ -58,7 +58,7 @@ def pressed() -> None:
 
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("how", [pressed, stop])
-def test_the_best_so_far(how: Callable[[], Any]) -> None:
+def test_the_best_so_far(how):
     asked = problem("x >= -1.5", start={"x": 0.2})
     found = tmsopt.solve(asked, throw=False, exhaustive=True, progress=when(third, how))
     assert (found.status, found.interrupted, dict(found.violations)) == ("not_converged", True, {})
@@ -71,13 +71,13 @@ def test_the_best_so_far(how: Callable[[], Any]) -> None:
     assert "interrupted" not in tmsopt.solve(asked).to_json()
 
 
-def test_it_is_raised_like_any_design_that_is_no_optimum() -> None:
+def test_it_is_raised_like_any_design_that_is_no_optimum():
     with pytest.raises(tmsopt.NotSolved, match="the user stopped the search") as raised:
         tmsopt.solve(problem(), exhaustive=True, progress=when(third))
     assert raised.value.solution.interrupted
 
 
-def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left(monkeypatch):
     """Its sample was refined to 4e-4 of the box, where the well has the curvature 3 x² − 1 = 2.3."""
     monkeypatch.setattr(import_module("tmsopt.search.multistart").Runner, "solve_from", stop)
     found = tmsopt.solve(problem(), throw=False)
@@ -85,7 +85,7 @@ def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left(monkeypatc
     assert depth(LEAST) <= found.value <= depth(LEAST) + 2.3 / 2 * (4 * 4e-4) ** 2
 
 
-def test_a_part_of_the_box_that_was_done_counts() -> None:
+def test_a_part_of_the_box_that_was_done_counts():
     """EP4 of the paper (Table 1) has normal rake; the search is stopped at the first start with reversed."""
     ep4 = tmsopt.load("problems/ep4.toml")
     free = {**ep4.free, "lambda_s": (-1.4, 1.4)}
@@ -101,7 +101,7 @@ def test_a_part_of_the_box_that_was_done_counts() -> None:
 
 
 @pytest.mark.parametrize("chosen", [third, lambda done, most: most < 64])
-def test_of_an_infeasible_problem_the_least_violating_design_is_left(chosen: Callable[[float, float], bool]) -> None:
+def test_of_an_infeasible_problem_the_least_violating_design_is_left(chosen):
     """While it is searched, or relaxed."""
     asked = problem("x >= 10")
     found = tmsopt.solve(asked, throw=False, progress=when(chosen))
@@ -111,7 +111,7 @@ def test_of_an_infeasible_problem_the_least_violating_design_is_left(chosen: Cal
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatch):
     """s² + (x − 2) s + 1, stable where x > 2: at x = 1 the roots are 1/2 ± i √3/2."""
     monkeypatch.setattr(asking, "none_stable", lambda problem: False)
     asked = tmsopt.Problem(from_coefficients([1, x - 2, 1]), free={"x": (0, 1)}, minimize="abscissa")
@@ -134,13 +134,13 @@ def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatc
         tmsopt.solve(asked, progress=meanwhile, interruptible=False)
 
 
-def test_with_nothing_in_hand_there_is_nothing_to_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_nothing_in_hand_there_is_nothing_to_leave(monkeypatch):
     monkeypatch.setattr(sampling.Sampler, "sample", stop)
     with pytest.raises(KeyboardInterrupt):
         tmsopt.solve(problem())
 
 
-def test_a_second_one_ends_that_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_one_ends_that_too(monkeypatch):
     monkeypatch.setattr(solving, "_as_it_is", stop)
     with pytest.raises(KeyboardInterrupt):
         tmsopt.solve(problem(), exhaustive=True, progress=when(third))
@@ -155,6 +155,6 @@ def test_a_second_one_ends_that_too(monkeypatch: pytest.MonkeyPatch) -> None:
         lambda asked: planned(Sampling(asked, 10, tolerances={"mu": 0.01}), progress=stop),
     ],
 )
-def test_verbs_that_solve_on_the_way_are_ended_whole(verb: Callable[[tmsopt.Problem], Any]) -> None:
+def test_verbs_that_solve_on_the_way_are_ended_whole(verb):
     with pytest.raises(KeyboardInterrupt):
         verb(tmsopt.load("problems/ep4.toml"))

@@ -1,7 +1,5 @@
 """Basins that few starts see: a triple root beside zero in a wide box, and a well a thousandth of it wide."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -34,7 +32,7 @@ def triple_abscissa(k_phi: float, k_deltadot: float) -> float:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_triple_root_beside_zero_is_not_overlooked(seed: int, tmp_path: Path) -> None:
+def test_a_triple_root_beside_zero_is_not_overlooked(seed, tmp_path):
     """Three starts agree at −0.2279, far from it."""
     path = tmp_path / "triple.toml"
     path.write_text(TRIPLE, encoding="utf-8")
@@ -48,7 +46,7 @@ def test_a_triple_root_beside_zero_is_not_overlooked(seed: int, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_well_of_exponentials_beside_zero_is_found(seed: int, tmp_path: Path) -> None:
+def test_a_well_of_exponentials_beside_zero_is_found(seed, tmp_path):
     """s² + b s + 9 has the abscissa −b/2 for b < 6: −5/2 at x = 0, where b is 5; elsewhere b is 2.9 at most."""
     path = tmp_path / "well.toml"
     path.write_text(WELL, encoding="utf-8")

@@ -40,12 +40,12 @@ ROBOT = tmsopt.Problem(
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 3))])
-def test_a_double_pair_in_a_needle_is_found(seed: int) -> None:
+def test_a_double_pair_in_a_needle_is_found(seed):
     assert tmsopt.solve(NEEDLE, seed=seed, stability=0.0).value <= DEEPEST
 
 
 @pytest.mark.slow
-def test_both_root_quantities_at_their_best_at_one_design() -> None:
+def test_both_root_quantities_at_their_best_at_one_design():
     """No damping ratio is above 1 and no abscissa below the least, so a design with both is the best of any sum."""
     least = tmsopt.solve(ROBOT)
     assert least.structure == "EP4"
@@ -57,7 +57,7 @@ def test_both_root_quantities_at_their_best_at_one_design() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("goal", ["v", "m_H", "x_B", "-lambda_s"])
-def test_a_needle_about_the_least_abscissa_is_not_called_empty(goal: str) -> None:
+def test_a_needle_about_the_least_abscissa_is_not_called_empty(goal):
     """The least abscissa is -3.1251038, proved, so -3.125 leaves a needle, at whose end every goal is nearly what it is.
 
     No design that was looked at is in it.
@@ -74,7 +74,7 @@ def test_a_needle_about_the_least_abscissa_is_not_called_empty(goal: str) -> Non
 @pytest.mark.parametrize(
     ("violation", "slope", "ended"), [(1e-12, 1e-5, True), (1e-7, 1e-12, True), (1e-7, 1e-7, False)]
 )
-def test_an_end_off_the_rows_is_no_optimum(violation: float, slope: float, ended: bool) -> None:
+def test_an_end_off_the_rows_is_no_optimum(violation, slope, ended):
     """IPOPT says that it succeeded of rows as it scales them; beside a pole they are large, and polished all the same."""
     run = SimpleNamespace(status="Solve_Succeeded")
     point = SimpleNamespace(violation=violation, stationarity=slope)

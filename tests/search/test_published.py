@@ -219,7 +219,7 @@ ANSWERS = {
 
 
 @pytest.mark.parametrize("name", ANSWERS)
-def test_answer_is_exact(name: str) -> None:
+def test_answer_is_exact(name):
     answer = ANSWERS[name]()
     assert vanishes(at(name, answer.parameters) - answer.polynomial)
 
@@ -249,12 +249,12 @@ def ends_at(design: tmsopt.Solution, answer: Answer) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in ANSWERS if name != "three_masses"])  # all of its EP3 are below
-def test_program_ends_at_the_answer(name: str) -> None:
+def test_program_ends_at_the_answer(name):
     ends_at(solved(name), ANSWERS[name]())
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
-def test_six_poles_meet_from_one_random_start(seed: int) -> None:
+def test_six_poles_meet_from_one_random_start(seed):
     ends_at(tmsopt.solve(problem("two_mass_spring"), starts=1, seed=seed), two_mass_spring())
 
 
@@ -269,13 +269,13 @@ def test_six_poles_meet_from_one_random_start(seed: int) -> None:
         ("brake_squeal_coupling", {"c1": 0.05, "c2": 0.25}),
     ],
 )
-def test_program_follows_the_closed_form(name: str, numbers: dict[str, float]) -> None:
+def test_program_follows_the_closed_form(name, numbers):
     varied = replace(problem(name), fixed={**problem(name).fixed, **numbers})
     arguments = list(dict.fromkeys(sp.Rational(str(v)) for v in numbers.values()))
     ends_at(tmsopt.solve(varied), ANSWERS[name](*arguments))
 
 
-def test_best_damping_need_not_be_positive() -> None:
+def test_best_damping_need_not_be_positive():
     """det D = 6 sqrt(k) − 1 − k: beyond k = 17 + 12 sqrt(2) one direction of motion is fed with energy."""
     r = sp.Symbol("r", positive=True)
     found = freitas_lancaster(r**4).parameters
@@ -284,7 +284,7 @@ def test_best_damping_need_not_be_positive() -> None:
     assert solved("freitas_lancaster").quantities["det_D"] == pytest.approx(7, abs=MET)
 
 
-def test_poles_far_smaller_than_the_rates_of_the_system_meet_too() -> None:
+def test_poles_far_smaller_than_the_rates_of_the_system_meet_too():
     """Poles at −0.05 of a system of rate 1: the last coefficient, 3e-7, is a difference of numbers near 1."""
     problem = tmsopt.load(PROBLEMS / "chocolate_limit.toml")
     slow = replace(problem, constraints={**problem.constraints, "decay": "abscissa <= -0.05"})
@@ -295,13 +295,13 @@ def test_poles_far_smaller_than_the_rates_of_the_system_meet_too() -> None:
     assert float(sp.sin(t - f) / sp.sin(f)) == pytest.approx(0.05, abs=MET)
 
 
-def test_chocolate_controllers_are_stable() -> None:
+def test_chocolate_controllers_are_stable():
     for name in ("chocolate", "chocolate_limit"):
         x = [1.0, *(solved(name).parameters[n] for n in ("x2", "x1", "x0"))]
         assert np.roots(x).real.max() < -0.5
 
 
-def test_all_ep3_of_three_masses_are_found() -> None:
+def test_all_ep3_of_three_masses_are_found():
     """With mu_r ≥ nu_r two of the four that are complex, conjugates; the file asks for one."""
     asked = problem("three_masses")
     both = replace(asked, free={**asked.free, "mu_i": (-5.0, 5.0), "nu_i": (-5.0, 5.0)})
@@ -312,7 +312,7 @@ def test_all_ep3_of_three_masses_are_found() -> None:
     assert ends == [pytest.approx([1.5, sign * height, 0.5, sign * height], abs=MET) for sign in (-1, 1)]
 
 
-def test_little_damping_need_not_weaken_the_pendulum() -> None:
+def test_little_damping_need_not_weaken_the_pendulum():
     """Hurwitz for any b1, b2: as they vanish at b1/b2 = 4 + 5 sqrt(2) the load is that without dampers."""
     b1, b2, p = sp.symbols("b1 b2 p")
     a = polynomial("ziegler").all_coeffs()
@@ -332,7 +332,7 @@ def test_little_damping_need_not_weaken_the_pendulum() -> None:
 # No better design
 
 
-def test_no_controller_of_two_masses_is_faster() -> None:
+def test_no_controller_of_two_masses_is_faster():
     """Poles left of −v: p(t − v) has coefficients q ≥ 0, and a condition on them that none meets for v² > 3/5."""
     v, t, *q = sp.symbols("v t q1:7", nonnegative=True)
     shifted = sp.Poly(t**6 + sum(c * t ** (5 - k) for k, c in enumerate(q)), t).as_expr()
@@ -344,7 +344,7 @@ def test_no_controller_of_two_masses_is_faster() -> None:
 
 
 @pytest.mark.parametrize("rate", [1.0, 1e-3, 1e3])
-def test_twelve_roots_meet_whatever_the_unit_of_time(rate: float) -> None:
+def test_twelve_roots_meet_whatever_the_unit_of_time(rate):
     """(s + rate)¹²: with the product of the roots held, their abscissa is least where all of them are equal."""
     c = [ca.SX.sym(f"c{k}") for k in range(1, 13)]
     model = tmsopt.models.from_coefficients([1, *(x * rate**k for k, x in enumerate(c, start=1))])

@@ -37,7 +37,7 @@ def middle(system: System) -> dict[str, float]:
 # The suite
 
 
-def test_the_suite_is_what_was_promised() -> None:
+def test_the_suite_is_what_was_promised():
     """100 systems of 2 to 6 degrees of freedom with 3 to 8 free parameters, even and odd degrees, the same every time."""
     assert len(SUITE) == 100
     assert {s.degree for s in SUITE} == set(range(3, 13))
@@ -48,7 +48,7 @@ def test_the_suite_is_what_was_promised() -> None:
 
 
 @pytest.mark.parametrize("index", SOME)
-def test_judges_and_model_agree_on_the_polynomial(index: int) -> None:
+def test_judges_and_model_agree_on_the_polynomial(index):
     """Eigenvalues of the state matrix, the exact polynomial of the text, and the model's own coefficients."""
     system = SUITE[index]
     design = middle(system)
@@ -66,7 +66,7 @@ def test_judges_and_model_agree_on_the_polynomial(index: int) -> None:
 
 
 @pytest.mark.parametrize("index", range(70, 75))
-def test_an_unfolding_has_its_exceptional_point_where_it_was_put(index: int) -> None:
+def test_an_unfolding_has_its_exceptional_point_where_it_was_put(index):
     system = SUITE[index]
     cost = eval(system.goal["minimize"], {}, dict(system.known))
     assert confirmed_system(system, system.known, cost)
@@ -75,7 +75,7 @@ def test_an_unfolding_has_its_exceptional_point_where_it_was_put(index: int) -> 
     assert not confirmed_system(system, moved, eval(system.goal["minimize"], {}, moved))
 
 
-def test_only_the_value_of_the_multiple_root_is_confirmed_system() -> None:
+def test_only_the_value_of_the_multiple_root_is_confirmed_system():
     d = 2 * math.sqrt(2)
     assert confirmed_system(DAMPED, {"d": d}, -math.sqrt(2))
     assert not confirmed_system(DAMPED, {"d": d}, -math.sqrt(2) - 1e-6)
@@ -83,7 +83,7 @@ def test_only_the_value_of_the_multiple_root_is_confirmed_system() -> None:
     assert confirmed_system(DAMPED, {"d": 2.0}, -1.0)
 
 
-def test_evolution_finds_the_critical_damping() -> None:
+def test_evolution_finds_the_critical_damping():
     """To the square root of the rounding unit, as eigenvalues of a double root do."""
     found = evolve_system(DAMPED)
     assert found.parameters["d"] == pytest.approx(2 * math.sqrt(2), rel=1e-6)
@@ -92,18 +92,18 @@ def test_evolution_finds_the_critical_damping() -> None:
 
 
 @pytest.mark.parametrize("index", SOME)
-def test_a_kept_value_is_that_of_its_design(index: int) -> None:
+def test_a_kept_value_is_that_of_its_design(index):
     system, one = SUITE[index], KNOWN[index]
     assert confirmed_system(system, one.parameters, one.value)
     assert all(lo <= one.parameters[n] <= hi for n, (lo, hi) in system.free.items())
 
 
-def test_every_system_has_a_kept_value() -> None:
+def test_every_system_has_a_kept_value():
     assert sorted(KNOWN) == list(range(100))
     assert all(math.isfinite(one.value) for one in KNOWN.values())
 
 
-def test_the_section_runs() -> None:
+def test_the_section_runs():
     report = next(s for s in SECTIONS if s.name == "random").report()(Asked("random", quick=True))
     assert "| systems | 3 |" in report
     assert "### By degree" in report
@@ -120,7 +120,7 @@ def steep(slope: float) -> Problem:
     return Problem(model, fixed={"k": 1e-4}, free={"x": (0.3, 0.4)}, minimize="abscissa")
 
 
-def test_a_structure_holds_within_the_last_places_of_the_parameters() -> None:
+def test_a_structure_holds_within_the_last_places_of_the_parameters():
     """One unit in the last place of x moves d by 5e-17 · 1e6, 5e-9 of it: no double of x gives the double root."""
     found = solve(steep(1e6))
     assert found.structure == "EP2"
@@ -129,7 +129,7 @@ def test_a_structure_holds_within_the_last_places_of_the_parameters() -> None:
     assert off[1] == pytest.approx(2e6 * 2**-53 / 3, rel=0.2)  # of 2 d, x being near 1/3: 5e-9 of it
 
 
-def test_without_cancellation_rounding_explains_nothing() -> None:
+def test_without_cancellation_rounding_explains_nothing():
     """s² + 2 s + 1 + 1e-9: as far from a double root as it says, whatever the parameters round."""
     d = ca.SX.sym("d")
     problem = Problem(models.from_coefficients([1, d, 1 + 1e-9], name="plain"), fixed={"d": 2.0}, free={})
@@ -141,7 +141,7 @@ def test_without_cancellation_rounding_explains_nothing() -> None:
 # Starts
 
 
-def test_a_start_better_than_its_basin_is_not_lost() -> None:
+def test_a_start_better_than_its_basin_is_not_lost():
     """A lightly damped chain whose best design is in a corner that IPOPT leaves from afar.
 
     Differential evolution on the eigenvalues finds it too.
@@ -152,7 +152,7 @@ def test_a_start_better_than_its_basin_is_not_lost() -> None:
     assert start_worth(system.problem, one.parameters) == pytest.approx(one.value, rel=1e-9)
 
 
-def test_a_limit_on_the_damping_ratio_below_minus_one_forbids_nothing() -> None:
+def test_a_limit_on_the_damping_ratio_below_minus_one_forbids_nothing():
     """s² − 2 a s + a² − 0.04 + c, a = 1 + 10 c: the roots a ± √(0.04 − c) are least at c = 0, where they are real.
 
     No factor s² + p s + w² with p ≥ −2 w has two different positive roots.

@@ -61,14 +61,14 @@ def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> 
 
 
 @pytest.mark.parametrize("objective", ["abscissa", "x**4/4 - x**2/2 + x/10 - 1"])
-def test_a_search_in_the_wrong_basin_is_taken_up_again(objective: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_in_the_wrong_basin_is_taken_up_again(objective, monkeypatch):
     monkeypatch.setattr(multistart, "starting", lambda work, ended=(), left=None: iter([({"x": 0.9}, True)] * 64))
     design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"
 
 
-def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch):
     """Where neither the sample nor the starts know of the other basin."""
     real = sampling.Sampler.sample
 
@@ -84,7 +84,7 @@ def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch: pytest.Monkey
     assert design.status == "optimal"
 
 
-def test_an_end_that_a_design_contradicts_is_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_end_that_a_design_contradicts_is_no_optimum(monkeypatch):
     """If no start leaves the basin on the right, what was looked at on the left is said, and that it is no optimum."""
     stuck(monkeypatch, 0.9)
     design = tmsopt.solve(problem(WELLS, WIDE), throw=False)
@@ -95,7 +95,7 @@ def test_an_end_that_a_design_contradicts_is_no_optimum(monkeypatch: pytest.Monk
     assert design.value == pytest.approx(depth(LEFT), abs=1e-6)
 
 
-def test_the_right_basin_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_right_basin_is_left_alone(monkeypatch):
     stuck(monkeypatch, -1.2)
     design = tmsopt.solve(problem(WELLS, WIDE), throw=False)
     assert (design.status, design.notes) == ("optimal", ())
@@ -110,9 +110,7 @@ def test_the_right_basin_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
         (RIGHT, 2.0, "optimal", depth(RIGHT)),
     ],
 )
-def test_no_optimum_stands_that_a_start_ended_better_than(
-    found: float, between: float, status: str, value: float
-) -> None:
+def test_no_optimum_stands_that_a_start_ended_better_than(found, between, status, value):
     """On the left designs change between the three values of a band that are looked at first, for better or worse."""
     worse = between * ca.sin(2 * np.pi * y) ** 2 * (x - RIGHT) ** 2
     asked = problem([1, WELLS[1] - worse], WIDE, scenarios={"y": tmsopt.Band(0.0, 1.0, 3)}, minimize="abscissa")
@@ -128,9 +126,7 @@ def test_no_optimum_stands_that_a_start_ended_better_than(
 
 
 @pytest.mark.parametrize("limits", [(), ("x <= -0.5", "abscissa <= -1.3")])
-def test_a_design_that_meets_all_limits_forbids_infeasible(
-    limits: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_design_that_meets_all_limits_forbids_infeasible(limits, monkeypatch):
     stuck(monkeypatch, 0.9, feasible=False)
     design = tmsopt.solve(problem(WELLS, WIDE, limits), throw=False)
     assert design.status == "not_converged"
@@ -166,9 +162,7 @@ OPEN = [
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("coefficients", "asked", "best"), OPEN)
 @pytest.mark.slow
-def test_there_is_no_best_design_where_a_root_goes_to_infinity(
-    coefficients: Any, asked: Any, best: float, sign: int
-) -> None:
+def test_there_is_no_best_design_where_a_root_goes_to_infinity(coefficients, asked, best, sign):
     design = tmsopt.solve(problem([sign * c for c in coefficients], **asked), throw=False)
     assert design.status == "not_converged"
     assert any(note.startswith("no best design: it improves towards a singular mass matrix") for note in design.notes)
@@ -183,7 +177,7 @@ def test_there_is_no_best_design_where_a_root_goes_to_infinity(
 
 
 @pytest.mark.parametrize(("coefficients", "asked", "best"), OPEN)
-def test_a_limit_makes_it_an_optimum(coefficients: Any, asked: Any, best: float) -> None:
+def test_a_limit_makes_it_an_optimum(coefficients, asked, best):
     design = tmsopt.solve(problem(coefficients, {"x": (0.1, 1.0)}, **asked))
     assert (design.status, design.notes) == ("optimal", ())
     assert design.parameters["x"] == pytest.approx(0.1, abs=MET)
@@ -201,7 +195,7 @@ def test_a_limit_makes_it_an_optimum(coefficients: Any, asked: Any, best: float)
     ],
     ids=["both signs", "one sign", "two roots", "two parameters"],
 )
-def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients: Any, free: Any) -> None:
+def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients, free):
     """It is −1/x, or −(1 + y)/x: below anything as x goes to 0 from above."""
     design = tmsopt.solve(problem(coefficients, free), throw=False)
     assert design.status == "not_converged"
@@ -212,7 +206,7 @@ def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients: An
     assert design.value == pytest.approx(-numerator / design.parameters["x"], rel=1e-9)
 
 
-def test_a_bound_far_away_is_still_one() -> None:
+def test_a_bound_far_away_is_still_one():
     """The same from x = 1e-4 on: −1e4 is the optimum."""
     design = tmsopt.solve(problem([x, 1], {"x": (1e-4, 1.0)}))
     assert design.status == "optimal"
@@ -224,7 +218,7 @@ def test_a_bound_far_away_is_still_one() -> None:
 
 @pytest.mark.parametrize("lower", [0.0, -1.0])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower: float, sign: int) -> None:
+def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower, sign):
     """(s + x)(s² + 0.6 s + 1) has the damping ratio 0.3 for x > 0, 0 at x = 0 and −1 below: no least x, but a limit."""
     a = [sign * c for c in product([1, x], [1, 0.6, 1])]
     design = tmsopt.solve(problem(a, {"x": (lower, 1.0)}, ("damping_ratio >= 0.1",), minimize="x"))
@@ -241,7 +235,7 @@ def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower: float, sign: int) -> No
         (product([1, 2 * x, 1], [1, y]), {"x": (0.1, 3.0), "y": (-1.0, 1.0)}),
     ],
 )
-def test_a_damping_ratio_of_1_is_not_beaten(coefficients: Any, free: Any) -> None:
+def test_a_damping_ratio_of_1_is_not_beaten(coefficients, free):
     """Where all roots are real and negative; exactly 1, and without a solver."""
     design = tmsopt.solve(problem(coefficients, free, maximize="damping_ratio"))
     assert (design.status, design.value) == ("optimal", 1.0)
@@ -252,7 +246,7 @@ def test_a_damping_ratio_of_1_is_not_beaten(coefficients: Any, free: Any) -> Non
     assert np.all(z.real < 0)
 
 
-def test_a_damping_ratio_of_1_in_all_cases_and_one_that_is_not_reached() -> None:
+def test_a_damping_ratio_of_1_in_all_cases_and_one_that_is_not_reached():
     """s² + 2 x s + k: 1 from x = √k on, √k being 2 at most; and x/2 = 0.75 where x ends at 1.5."""
     for most, best in ((3.0, 1.0), (1.5, 0.75)):
         stated = problem([1, 2 * x, y], {"x": (0.1, most)}, scenarios={"y": [1.0, 4.0]}, maximize="damping_ratio")
@@ -264,7 +258,7 @@ def test_a_damping_ratio_of_1_in_all_cases_and_one_that_is_not_reached() -> None
 # Progress
 
 
-def test_long_work_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_work_tells_how_far_it_is(monkeypatch):
     """Starts that an unstable best spends, though others of the box are stable, and those of a relaxation."""
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
     told: list[tmsopt.Progress] = []
@@ -279,7 +273,7 @@ def test_long_work_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("coefficients", [[1, "c", 0], ["m", "c", 0]])
-def test_a_root_that_is_0_in_every_design_is_no_reason_to_see_another_run_away(coefficients) -> None:
+def test_a_root_that_is_0_in_every_design_is_no_reason_to_see_another_run_away(coefficients):
     """m s² + c s: roots 0 and −c/m, so that every design of positive c is as good as any."""
     free = {"c": (0.1, 3)} | ({"m": (0.5, 2)} if "m" in coefficients else {})
     design = tmsopt.solve(problem(coefficients, free))

@@ -36,20 +36,18 @@ def unclear(roots: list[tuple[float, int]], stored: float, asked: str = "absciss
         ([(-1e-17, 1), (-1.0, 1)], 1e-17, False),  # a simple one at 0 but for rounding
     ],
 )
-def test_roots_as_stored_lie_where_the_multiple_ones_allow(
-    roots: list[tuple[float, int]], stored: float, said: bool
-) -> None:
+def test_roots_as_stored_lie_where_the_multiple_ones_allow(roots, stored, said):
     """An m-fold root is off by the m-th root of what its coefficients are: 1e-8 at most."""
     assert unclear(roots, stored) is said
 
 
-def test_roots_at_0_but_for_rounding_have_no_damping_ratio() -> None:
+def test_roots_at_0_but_for_rounding_have_no_damping_ratio():
     assert unclear([(-1e-16, 2), (-1.0, 1)], -1e-16, "damping_ratio")
     assert not unclear([(-1e-16, 2), (-1.0, 1)], -1e-16)
 
 
 @pytest.mark.parametrize(("off", "status"), [(1e-9, "optimal"), (1e-4, "not_converged")])
-def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch: pytest.MonkeyPatch, off: float, status: str) -> None:
+def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch, off, status):
     module = import_module("tmsopt.search.solve")
     plain = module.certified_numbers
 
@@ -68,7 +66,7 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch: pytest.Monkey
         ("search", "demote_if_beaten", lambda work, finding: replace(finding, status="not_converged")),
     ],
 )
-def test_every_optimum_is_asked(monkeypatch: pytest.MonkeyPatch, room: str, name: str, said: Any) -> None:
+def test_every_optimum_is_asked(monkeypatch, room, name, said):
     assert tmsopt.solve(PLAIN, throw=False).status == "optimal"
     monkeypatch.setattr(import_module(f"tmsopt.search.{room}"), name, said)
     assert tmsopt.solve(PLAIN, throw=False).status == "not_converged"

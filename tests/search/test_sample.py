@@ -40,7 +40,7 @@ def cube() -> Any:
     return Cube(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
 
 
-def test_a_design_has_one_point_of_the_cube_and_a_point_one_design() -> None:
+def test_a_design_has_one_point_of_the_cube_and_a_point_one_design():
     space = cube()
     for u in np.random.default_rng(0).random((200, space.size)):
         design = {n: float(v) for n, v in space.designs(u).items()}
@@ -49,7 +49,7 @@ def test_a_design_has_one_point_of_the_cube_and_a_point_one_design() -> None:
         assert {n: float(v) for n, v in again.items()} == pytest.approx(design, rel=1e-12, abs=1e-12)
 
 
-def test_ranges_end_exactly_and_are_run_through_in_order() -> None:
+def test_ranges_end_exactly_and_are_run_through_in_order():
     space = cube()
     columns = space.designs(np.linspace(0, 1, 1001)[:, None] * np.ones(space.size))
     for name, (lower, upper) in space.problem.free.items():
@@ -60,7 +60,7 @@ def test_ranges_end_exactly_and_are_run_through_in_order() -> None:
 # What is looked at
 
 
-def test_every_design_that_is_judged_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_design_that_is_judged_is_counted(monkeypatch):
     seen: list[int] = []
     real = sampling.evaluate
 
@@ -75,7 +75,7 @@ def test_every_design_that_is_judged_is_counted(monkeypatch: pytest.MonkeyPatch)
     assert design.to_json()["looked"] == design.starts.looked == sum(seen) > 2000
 
 
-def test_the_sample_fills_the_box_to_its_faces_and_corners() -> None:
+def test_the_sample_fills_the_box_to_its_faces_and_corners():
     """No hole of a tenth of the box, inside or on a face; and all corners."""
     drawn = Sampler(problem(), 0).draw()
     assert drawn.u.min() == 0
@@ -90,7 +90,7 @@ def test_the_sample_fills_the_box_to_its_faces_and_corners() -> None:
             assert np.diff(face).max() < 0.1
 
 
-def test_the_sample_stands_for_its_seed() -> None:
+def test_the_sample_stands_for_its_seed():
     first, again, other = (Sampler(problem(("x*y >= 0.1",)), seed).sample() for seed in (5, 5, 6))
     assert np.array_equal(first.refined.u, again.refined.u)
     assert not np.array_equal(first.refined.u, other.refined.u)
@@ -118,7 +118,7 @@ def sought(stated: tmsopt.Problem, seed: int = 0, count: int = 64) -> tuple[Any,
     ],
 )
 @pytest.mark.parametrize("seed", [0, 1])
-def test_limits_are_met_by_the_way_of_newton(limits: tuple[str, ...], share: float, seed: int) -> None:
+def test_limits_are_met_by_the_way_of_newton(limits, share, seed):
     """Not from everywhere: shares are counted; whoever arrives is judged by formulas of NumPy's own."""
     sampler, start, ends = sought(problem(limits), seed)
     arrived = ends.violation == 0
@@ -135,7 +135,7 @@ def test_limits_are_met_by_the_way_of_newton(limits: tuple[str, ...], share: flo
                 assert np.max(off) <= 1e-9  # excess of 1e-10 of what is usual, which is 1 or so
 
 
-def test_a_pole_is_approached_from_its_own_side() -> None:
+def test_a_pole_is_approached_from_its_own_side():
     """1/(x − y) ≥ 1000 is met for 0 < x − y ≤ 0.001, and from x < y by no small step."""
     sampler = Sampler(problem(("1/(x - y) >= 1000",)), 0)
     sampler.draw()
@@ -147,7 +147,7 @@ def test_a_pole_is_approached_from_its_own_side() -> None:
     assert np.all(found["x"] - found["y"] <= 0.001 * (1 + 1e-9))
 
 
-def test_what_is_refined_is_no_worse_limits_first() -> None:
+def test_what_is_refined_is_no_worse_limits_first():
     stated = problem(("x**2 + 2*y**2 <= 0.3", "x - y >= 0.5"), minimize="(x - 0.3)**2 - y + 0.1*abscissa")
     sampler = Sampler(stated, 2)
     start = sampler.draw().take(np.arange(0, 4000, 40))
@@ -163,7 +163,7 @@ def test_what_is_refined_is_no_worse_limits_first() -> None:
     assert np.array_equal(again.violation, ends.violation)
 
 
-def test_the_neighbourhood_of_a_design_reaches_from_a_hair_to_the_other_end_of_the_box() -> None:
+def test_the_neighbourhood_of_a_design_reaches_from_a_hair_to_the_other_end_of_the_box():
     """Best of all is (−1, −1), a corner; or, of a well 2e-4 wide, its bottom."""
     far = problem(minimize="x + 0.1*abs(y - 0.3)")
     seen = Sampler(far, 0).around({"x": 1.0, "y": 0.3})
@@ -181,13 +181,13 @@ WELLS = from_coefficients([1, 1 - NARROW[0] / (NARROW[0] + 0.004) * NARROW[1]])
 
 
 @pytest.mark.parametrize("asked", [{"seed": seed} for seed in range(6)] + [{"starts": n} for n in (1, 2, 3, 4)])
-def test_the_deep_basin_is_found_though_it_is_narrow(asked: dict[str, int]) -> None:
+def test_the_deep_basin_is_found_though_it_is_narrow(asked):
     design = tmsopt.solve(problem(model=WELLS), **asked)
     assert design.value == pytest.approx(-1, abs=1e-12)
     assert dict(design.parameters) == pytest.approx({"x": 0.71, "y": -0.37}, abs=1e-7)
 
 
-def test_limits_between_wells() -> None:
+def test_limits_between_wells():
     """(x² − 1)² + x/5 has its deeper well at the left, from which the limit keeps all but a sliver of width 2e-5."""
     model = from_coefficients([1, 2 - (x**2 - 1) ** 2 - 0.2 * x])
     limit = "(x - 0.95)*(x + 0.9) * (x + 0.90002) >= 0"
@@ -230,7 +230,7 @@ def robot_holds(d: dict[str, Any]) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
-def test_the_stable_robot_is_found(seed: int) -> None:
+def test_the_stable_robot_is_found(seed):
     stated = tmsopt.Problem(tmsopt.models.tms, fixed=ROBOT, free=PARTS, constraints=HOLDS, minimize="abscissa")
     design = tmsopt.solve(stated, seed=seed, stability=0.0)
     assert design.stable

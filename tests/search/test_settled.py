@@ -39,25 +39,25 @@ def settled(ends: list[float | None], share: float, far_off: bool = False, left:
         (0.5, [1.0, 2.0, *[None] * 20], 18),  # sixteen failed, beside two others
     ],
 )
-def test_a_search_ends_with_so_many_starts_and_not_before(share: float, ends: list[float | None], enough: int) -> None:
+def test_a_search_ends_with_so_many_starts_and_not_before(share, ends, enough):
     tried = (ends * enough)[:enough]
     assert settled(tried, share)
     assert not settled(tried[:-1], share)
 
 
-def test_designs_left_count_as_optima_of_their_own() -> None:
+def test_designs_left_count_as_optima_of_their_own():
     """Ten starts in one optimum and three designs left: w = 4, n = 13, and 4/7 are expected."""
     assert settled([1.0] * 10, 0.5)
     assert not settled([1.0] * 10, 0.5, left=3)
     assert settled([1.0] * 23, 0.5, left=3)
 
 
-def test_three_starts_are_enough_where_no_design_of_the_sample_comes_near_the_limits() -> None:
+def test_three_starts_are_enough_where_no_design_of_the_sample_comes_near_the_limits():
     assert settled([None] * 3, 0.0, far_off=True)
     assert not settled([None] * 2, 0.0, far_off=True)
 
 
-def test_the_estimate_is_that_of_boender_and_rinnooy_kan() -> None:
+def test_the_estimate_is_that_of_boender_and_rinnooy_kan():
     """Optima in equal basins: the mean number not met is what is estimated from those that were, within its noise.
 
     The estimate is w (w + 1)/(n − w − 2), the posterior mean for a uniform prior over numbers and shares of basins.
@@ -74,7 +74,7 @@ def test_the_estimate_is_that_of_boender_and_rinnooy_kan() -> None:
     assert np.mean(np.array(truth)[small]) == pytest.approx(np.mean(np.array(estimate)[small]), rel=0.25)
 
 
-def test_the_words_follow_from_the_numbers() -> None:
+def test_the_words_follow_from_the_numbers():
     def words(tried: int, at_best: int, optima: int) -> str:
         return ", ".join(tmsopt.Starts(tried, tried, at_best, optima=optima).sureness)
 

@@ -116,7 +116,7 @@ def test_matching_on_both_sides():
     assert any("reversed rake wins" in n for n in design.notes)
 
 
-def test_sides_that_are_equally_good_are_said_to_be() -> None:
+def test_sides_that_are_equally_good_are_said_to_be():
     """No design with Fr >= 0.6 is better than 0.6, whatever its tilt."""
     free = {"Fr": (0.6, 1.0), "lambda_s": (-0.5, 0.5)}
     fixed = {"mu": 0.1, "chi_B": 1.0, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}
@@ -128,7 +128,7 @@ def test_sides_that_are_equally_good_are_said_to_be() -> None:
     assert "wins" not in note
 
 
-def test_the_side_with_a_stable_design_is_searched_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_side_with_a_stable_design_is_searched_first(monkeypatch):
     """On the other side stability need not be insisted on; sides are told in their order all the same."""
     rooms, searched = import_module("tmsopt.search.solve"), []
     explore = rooms.explore

@@ -38,14 +38,14 @@ def headline(design: tmsopt.Solution) -> list[str]:
 
 
 @pytest.mark.parametrize("x", [1.0, 2.0, 3.0])
-def test_a_given_design(x: float) -> None:
+def test_a_given_design(x):
     design = tmsopt.solve(tmsopt.Problem(from_coefficients([1, X - 2, 1]), fixed={"x": x}))
     assert design.stable is (x > 2)
     assert design.to_json()["stable"] is (x > 2)
 
 
 @scip
-def test_that_none_is_stable_is_proved() -> None:
+def test_that_none_is_stable_is_proved():
     design = found(1.0)
     assert (design.stable, design.any_stable) == (False, False)
     assert headline(design)[1] == NONE
@@ -54,7 +54,7 @@ def test_that_none_is_stable_is_proved() -> None:
 
 @pytest.mark.slow
 @scip
-def test_limits_that_a_proof_rests_on_are_named() -> None:
+def test_limits_that_a_proof_rests_on_are_named():
     """Without the limit x = 3 would do; one on the roots themselves is none that it rests on."""
     assert headline(found(3.0, constraints={"most": "x**2 <= 3"}))[1] == f"{NONE} under its constraints"
     design = found(1.5, constraints={"decay": "abscissa <= -0.1"}, minimize="x")
@@ -63,40 +63,40 @@ def test_limits_that_a_proof_rests_on_are_named() -> None:
 
 
 @scip
-def test_at_the_edge_nothing_is_proved() -> None:
+def test_at_the_edge_nothing_is_proved():
     design = found(2.0)
     assert design.abscissa == pytest.approx(0, abs=1e-9)
     assert (design.stable, design.any_stable) == (False, None)
     assert headline(design)[1] == f"marginally stable; {UNKNOWN}"
 
 
-def test_what_is_not_asked_is_not_known() -> None:
+def test_what_is_not_asked_is_not_known():
     design = found(1.0, stability=0.0)
     assert design.any_stable is None
     assert headline(design)[1] == UNKNOWN
 
 
-def test_a_root_at_0_needs_no_search() -> None:
+def test_a_root_at_0_needs_no_search():
     """The product of the roots is 0, so one of them is: the instant bound says so."""
     design = found(3.0, (1, X, 1, 0), stability=0.0)
     assert (design.stable, design.any_stable) == (False, False)
     assert headline(design)[1] == f"marginally stable; {NONE}"
 
 
-def test_a_stable_design_is_one() -> None:
+def test_a_stable_design_is_one():
     design = found(3.0)
     assert (design.stable, design.any_stable) == (True, True)
     assert headline(design)[1] == "stable"
 
 
-def test_who_does_not_ask_for_stability_is_told_of_none() -> None:
+def test_who_does_not_ask_for_stability_is_told_of_none():
     design = found(3.0, minimize="x")
     assert (design.stable, design.any_stable) == (False, None)
     assert headline(design)[1] == "not stable"
 
 
 @scip
-def test_a_stable_design_that_the_search_missed_is_found() -> None:
+def test_a_stable_design_that_the_search_missed_is_found():
     """The best design of the box 0 ≤ x ≤ 1, sold as that of 0 ≤ x ≤ 3, where −1/2 is least, at x = 3."""
     part = found(1.0, stability=0.0)
     missed = replace(part, problem=replace(part.problem, free={"x": (0.0, 3.0)}))
@@ -107,7 +107,7 @@ def test_a_stable_design_that_the_search_missed_is_found() -> None:
 
 
 @scip
-def test_a_limit_that_cannot_be_met_though_designs_are_stable() -> None:
+def test_a_limit_that_cannot_be_met_though_designs_are_stable():
     """The least abscissa is −1/2, at x = 3."""
     design = found(3.0, constraints={"decay": "abscissa <= -0.6"}, minimize="x")
     assert design.status == "infeasible"
@@ -115,6 +115,6 @@ def test_a_limit_that_cannot_be_met_though_designs_are_stable() -> None:
 
 
 @pytest.mark.parametrize("stability", [-1.0, float("nan"), "soon"])
-def test_seconds_must_be_a_number(stability: Any) -> None:
+def test_seconds_must_be_a_number(stability):
     with pytest.raises(tmsopt.InputError, match=r"stability: found .*; accepted: seconds, 0 or more"):
         found(1.0, stability=stability)

@@ -12,10 +12,10 @@ TMS = tmsopt.models.tms
 HEIGHTS = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
 WIDE = {"chi_B": (1.01, 3.0), "lambda_s": (0.05, 1.2)}
 BAND_OPTIMUM = -0.3778543571
-"""Of the band Fr = 1.2 … 2.4, by differential evolution over 2 401 speeds (tests/test_problems.py, speed_band)."""
+"""Of the band Fr = 1.2 … 2.4, by differential evolution over 2 401 speeds (tests/search/test_problems.py, speed_band)."""
 
 
-@pytest.mark.parametrize("points", [2, 6])  # 7 in tests/test_problems.py
+@pytest.mark.parametrize("points", [2, 6])  # 7 in tests/search/test_problems.py
 def test_points_of_a_band_do_not_matter(points):
     """With 6 points a search once ended where two factors share a double root, which then cannot become a pair."""
     band = {"Fr": {"min": 1.2, "max": 2.4, "points": points}}

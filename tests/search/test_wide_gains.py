@@ -37,7 +37,7 @@ def placed(parameters: dict[str, float], root: float) -> Array:
     ],
 )
 @pytest.mark.slow
-def test_gains_that_place_all_roots_are_not_overlooked(speed, ends, limits, root, seed) -> None:
+def test_gains_that_place_all_roots_are_not_overlooked(speed, ends, limits, root, seed):
     bicycle = {"g": 9.81, **tmsopt.read_bicycle("problems/bicycles/browser-rider.txt").parameters, "v": speed}
     known = placed(bicycle, root)
     assert all(low <= k <= high for (low, high), k in zip(ends, known, strict=True))

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from helpers import oracles
-from helpers.rows import assert_same
+from helpers.rows import assert_same, row as row_of
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import Progress, laws
@@ -32,12 +32,14 @@ from tmsopt.report import study_table
 from tmsopt.search import solve
 from tmsopt.studies import (
     Row,
+    RowTable,
     Solver,
     Study,
     load_study,
     monte_carlo,
     open_store,
     over_grid,
+    part_of,
     read_store,
     run_study,
     solve_row,
@@ -159,7 +161,7 @@ def test_failures_are_rows_with_a_cause() -> None:
     assert "1.5" in rows[1].cause
     assert "trail" in rows[2].cause
     assert rows[2].violations["trail"] > 0
-    told = summary(study, rows)
+    told = summary(rows)
     assert dict(told.counts) == {"optimal": 1, "infeasible": 1, "failed": 1}
     assert told.best == rows[0]
     assert sum(told.causes.values()) == 2
@@ -187,22 +189,24 @@ def test_rows_are_drawn_around_a_design() -> None:
         lone = solve(Problem(model=tms, fixed=dict(row.parameters)))
         assert row.abscissa == pytest.approx(lone.abscissa, rel=1e-9)
         assert row.abscissa > design.abscissa  # EP4 is the best of all
-    told = summary(study, rows).product
+    told = summary(rows).product
     assert told is not None
     assert told.stable.count == 5
 
 
 def test_a_summary_of_rows_is_what_its_numbers_are_by_definition() -> None:
-    """Objectives 1, 2, 3 and 7, one row unstable, three not solved for causes that differ in their numbers alone or not."""
-    made = [Row(k, 0, Table(), "optimal", objective=v, abscissa=v - 6) for k, v in enumerate((2.0, 1.0, 3.0, 7.0))]
-    made += [Row(4 + k, 0, Table(), "infeasible", cause=c) for k, c in enumerate(("a by 0.1", "a by 2e-05", "b by 3"))]
-    told = summary(over_grid(EP4, {"mu": [0.1] * 7}), made)
-    assert told.spread["objective"] == (1.0, 2.5, 7.0)
-    assert told.best is made[1]
-    assert told.stable == 3
+    """Rows that are made up: one of them unstable, three not solved for causes that differ in their numbers or not."""
+    given = [(2.0, 1e-9), (1.0, -1e-3), (3.0, 1e-6), (7.0, 0.0)]
+    made = [row_of(k, GRID, objective=v, abscissa=v - 6, laws=Table({"w01": law})) for k, (v, law) in enumerate(given)]
+    study = over_grid(EP4, {"mu": [0.1] * 7})
+    causes = ("a by 0.1", "a by 2e-05", "b by 3")
+    made += [row_of(4 + k, study, status="infeasible", abscissa=math.nan, cause=c) for k, c in enumerate(causes)]
+    told = summary(RowTable(study, [part_of(made)]))
+    assert (told.spread["objective"], told.spread["abscissa"]) == ((1.0, 2.5, 7.0), (-5.0, -3.5, 1.0))
+    assert (told.best.number, told.stable, dict(told.laws)) == (1, 3, {"w01": 1e-3})
     assert dict(told.causes) == {"a": 2, "b by 3": 1}
-    greatest = summary(over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1]}), made)
-    assert greatest.best is made[3]
+    greatest = over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1] * 7})
+    assert summary(RowTable(greatest, [part_of(made)])).best.number == 3
 
 
 @pytest.mark.slow
@@ -239,25 +243,29 @@ TWO = Problem(
 """Two valleys, at Fr = 1 and 3; over mu the second overtakes the first at one half: least value 0.1 min(mu, 1 − mu)."""
 
 
-def test_a_valley_that_is_overtaken_on_the_way_is_left() -> None:
-    values = np.linspace(0.0, 1.0, 16)
-    warm = run_study(over_grid(TWO, {"mu": values.tolist()}, warm=True), workers=1).rows
-    assert sum(row.warm for row in warm) >= 10
-    for row, mu in zip(warm, values.tolist(), strict=True):
-        assert row.objective == pytest.approx(0.1 * min(mu, 1 - mu), abs=1e-12)
-    middle = [row.parameters["Fr"] for row in warm]
-    assert middle[0] == pytest.approx(1, abs=1e-6)
-    assert middle[-1] == pytest.approx(3, abs=1e-6)
+THREE = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1*(1 - mu)))"
+"""A third valley at Fr = 2, of least value 0.03, is the best from mu = 0.3 to 0.7 and nowhere else."""
 
 
-def test_a_valley_that_neither_end_knows_is_found_on_the_way_and_carried_both_ways() -> None:
-    """A third valley at Fr = 2, of least value 0.03, is the best from mu = 0.3 to 0.7 and nowhere else."""
-    third = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1*(1 - mu)))"
+@pytest.mark.parametrize(
+    ("asked", "sign", "most"),
+    [
+        ({}, 1, 1.0),
+        ({"minimize": THREE}, 1, 0.03),
+        ({"minimize": None, "maximize": f"-({TWO.minimize})"}, -1, 1.0),
+    ],
+    ids=["overtaken by the far end", "found on the way and carried both ways", "hills"],
+)
+def test_the_best_valley_is_kept(asked: dict[str, Any], sign: int, most: float) -> None:
+    """What is better follows the sense of the objective."""
     values = np.linspace(0.0, 1.0, 16).tolist()
-    warm = run_study(over_grid(replace(TWO, minimize=third), {"mu": values}, warm=True), workers=1).rows
-    assert sum(row.warm for row in warm) >= 10
-    for row, mu in zip(warm, values, strict=True):
-        assert row.objective == pytest.approx(min(0.1 * mu, 0.03, 0.1 * (1 - mu)), abs=1e-12)
+    rows = run_study(over_grid(replace(TWO, **asked), {"mu": values}, warm=True), workers=1).rows
+    assert sum(row.warm for row in rows) >= 10
+    for row, mu in zip(rows, values, strict=True):
+        assert sign * row.objective == pytest.approx(min(0.1 * mu, 0.1 * (1 - mu), most), abs=1e-12)
+    best = summary(rows).best
+    assert best is not None
+    assert best.objective == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.slow
@@ -277,19 +285,6 @@ def test_warm_starts_find_the_optima_of_cold_ones() -> None:
     assert any(row.warm for row in warm)
     for a, b in zip(warm, cold, strict=True):
         assert a.objective == pytest.approx(b.objective, rel=1e-10)
-
-
-def test_the_greatest_of_several_valleys_upside_down_is_kept() -> None:
-    """The same two valleys as hills: what is better follows the sense of the objective."""
-    hills = replace(TWO, minimize=None, maximize=f"-({TWO.minimize})")
-    values = np.linspace(0.0, 1.0, 16).tolist()
-    study = over_grid(hills, {"mu": values}, warm=True)
-    rows = run_study(study, workers=1).rows
-    for row, mu in zip(rows, values, strict=True):
-        assert row.objective == pytest.approx(-0.1 * min(mu, 1 - mu), abs=1e-12)
-    best = summary(study, rows).best
-    assert best is not None
-    assert best.objective == pytest.approx(0.0, abs=1e-12)
 
 
 def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -314,7 +309,7 @@ def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_pat
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 10).tolist()}, warm=True)
     whole = run_study(study, workers=1).rows
     with open_store(tmp_path / "s.sqlite", study) as store:
-        store.add(whole[:4])
+        store.add(part_of(whole[:4]))
     resumed = run_study(study, tmp_path / "s.sqlite", workers=1)
     assert resumed.solved == 6
     assert_same(resumed.rows, whole)
@@ -369,22 +364,6 @@ def test_a_row_is_solved_from_its_own_seed_with_the_starts_of_the_study_on_one_t
     with threadpool_limits(2):  # more than one, wherever this runs
         run_study(study, workers=1)
     assert seen == [(study.seed_of(row), 3) for row in range(6)]
-
-
-def test_a_summary_by_hand() -> None:
-    """Rows that are made up: what they say together is known without solving anything."""
-    study = over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1, 0.2, 0.3, 0.4]})
-    objectives, residuals = (1.0, 5.0, 2.0, 9.0), (1e-9, -1e-3, 1e-6, 0.0)
-    rows = [
-        Row(k, 0, study.varied(k), "optimal", objective=value, abscissa=-value, laws=Table({"w01": residual}))
-        for k, (value, residual) in enumerate(zip(objectives, residuals, strict=True))
-    ]
-    rows[3] = replace(rows[3], status="infeasible", laws=Table())
-    told = summary(study, rows)
-    assert told.best is rows[1]
-    assert told.spread["objective"] == (1.0, 2.0, 5.0)
-    assert told.spread["abscissa"] == (-5.0, -2.0, -1.0)
-    assert dict(told.laws) == {"w01": 1e-3}
 
 
 def test_a_row_tells_how_far_its_design_is_from_the_laws() -> None:
@@ -496,7 +475,7 @@ def test_rows_that_a_study_cannot_have_are_refused(number: int, tmp_path: Path) 
     """In a store from somebody else: before anything is solved, and where its rows are shown."""
     study, path = over_grid("problems/ep4.toml", {"mu": [0.1, 0.2]}), tmp_path / "s.sqlite"
     with open_store(path, study) as store:
-        store.add([Row(1, 1, Table({"mu": 0.2}), "failed"), Row(number, 1, Table({"mu": 0.1}), "failed")])
+        store.add(part_of([Row(n, 1, Table({"mu": 0.2}), "failed") for n in (1, number)]))
     told: list[Progress] = []
     for call in (lambda: stored(study, path), lambda: run_study(study, path, progress=told.append)):
         with pytest.raises(InputError, match=f"row {number} is not of this study"):
@@ -506,8 +485,8 @@ def test_rows_that_a_study_cannot_have_are_refused(number: int, tmp_path: Path) 
 
 def test_what_a_row_says_is_printable(tmp_path: Path) -> None:
     study = over_grid("problems/ep4.toml", {"mu": [0.1]})
-    rows = [Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")]
-    assert "\ufffd[31mred\ufffd" in study_table(study, summary(study, rows), rows)
+    rows = RowTable(study, [part_of([Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")])])
+    assert "\ufffd[31mred\ufffd" in study_table(study, summary(rows), rows)
 
 
 # By the clock

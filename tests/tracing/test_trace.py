@@ -201,7 +201,7 @@ UNIT = {"unit": "omega0 == -1"}
         (MIRRORED, REVERSED | {"mu": (0.01, 20.0)}, UNIT, 0.19),
     ],
 )
-def test_ep4_curve_is_the_law_and_the_certified_solution(fixed, free, constraints, least):
+def test_ep4_curve_is_the_law(fixed, free, constraints, least):
     found = traced("EP4", fixed, free, constraints)
     (branch,) = found.branches
     p = branch.parameters
@@ -219,16 +219,6 @@ def test_ep4_curve_is_the_law_and_the_certified_solution(fixed, free, constraint
     assert np.tan(p["lambda_s"][away]) == pytest.approx(law.tan_lambda_s, rel=EXACT)
     # mu is divided by chi_H − 1 in the law: the rounding of T, up to 1e-15, over 1e-3
     assert p["mu"][away] == pytest.approx(law.mu, abs=1e-10)
-    unknown = [n for n in free if n not in ("chi_H", "mu")]
-    for k in range(0, len(branch), max(1, len(branch) // 12)):
-        values = design(branch, k)
-        known = {n: v for n, v in values.items() if n not in unknown}
-        start = {n: values[n] for n in unknown} | {"s": float(branch.unknowns["r"][k])}
-        true = certified(equations("EP4"), start, known)
-        assert values["Fr"] == pytest.approx(float(true["Fr"]), abs=EXACT)
-        assert values["chi_B"] == pytest.approx(float(true["chi_B"]), abs=EXACT)
-        assert values["lambda_s"] == pytest.approx(float(true.lambda_s), abs=EXACT)
-        assert branch.unknowns["r"][k] == pytest.approx(float(true["s"]), abs=2e-12)
     check_every_point(found, stride=9, limit=1e-13)
 
 
@@ -349,21 +339,6 @@ def test_every_point_of_a_discriminant_curve_has_a_double_root(planes, name):
     check_every_point(planes[name], stride=23, limit=1e-13 if name == "fig00 at EP4" else ROUNDING)
     for branch in planes[name].branches:
         check_tangents(branch, PLANES[name][1])
-        for k in range(0, len(branch), 41):
-            assert relative_discriminant(design(branch, k)) <= 1e-13
-
-
-def relative_discriminant(values):
-    """|4I³ − J²| over the same with all terms of the coefficients taken positive, exactly."""
-
-    def invariants(a, b, c, d, e, sign):
-        i = 12 * a * e + sign * 3 * b * d + c * c
-        j = 72 * a * c * e + 9 * b * c * d + sign * (27 * a * d * d + 27 * e * b * b + 2 * c * c * c)
-        return i, j
-
-    i, j = invariants(*exact_polynomial(values), -1)
-    size_i, size_j = invariants(*map(Fraction, sizes_of(values)), 1)
-    return float(abs(4 * i**3 - j**2) / (4 * size_i**3 + size_j**2))
 
 
 def test_folds_of_the_discriminant_curves_in_speed_are_at_the_closed_form(planes):

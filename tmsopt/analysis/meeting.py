@@ -190,12 +190,10 @@ def _steps(at: Meeting, left: Sequence[Any], lead: Any, moving: Sequence[str]) -
     matrix = np.array([[middle(x) for x in column] for column in columns]).T
     right = np.array([middle(x / size) for x in left])
     J, r = (np.concatenate([x.real, x.imag]) for x in (matrix, right))
-    slopes = np.linalg.norm(J, axis=1)
-    for weights in (np.ones_like(r), 1 / np.where(slopes > 0, slopes, np.inf)) if np.isfinite(J).all() else ():
-        for rank in _RANKS:  # where conditions are singular their slopes vanish with what is left of them
-            found = np.linalg.lstsq(weights[:, None] * J, -weights * r, rcond=rank)[0]
-            steps: list[Any] = [size * float(x) for x in found[: len(moving)]]
-            yield [*steps, size * flint.acb(*found[len(moving) :].tolist())]
+    for rank in _RANKS if np.isfinite(J).all() else ():  # where conditions are singular their slopes vanish too
+        found = np.linalg.lstsq(J, -r, rcond=rank)[0]
+        steps: list[Any] = [size * float(x) for x in found[: len(moving)]]
+        yield [*steps, size * flint.acb(*found[len(moving) :].tolist())]
 
 
 def _moved(at: Meeting, step: Sequence[Any], moving: Sequence[str]) -> Meeting:

@@ -9,19 +9,14 @@ from typing import Any
 
 import flint
 import numpy as np
-from numpy.typing import NDArray
 
-from tmsopt.evaluation.recheck import FEASIBLE, is_violated, realised_roots
+from tmsopt.evaluation.recheck import FEASIBLE, judged_exactly
 from tmsopt.evaluation.worst_case import peaks
-from tmsopt.models import Values
 from tmsopt.problem.cases import Case
-from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.problem import Problem
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, unit_of
-from tmsopt.program.judgement import values_of
-from tmsopt.records import Array, Table, plain
+from tmsopt.records import Table, plain
 
 ALONE = 3
 """Significant digits to which each parameter is rounded alone."""
@@ -29,7 +24,6 @@ ALONE = 3
 DIGITS = (2, 3, 4, 6)
 """Significant digits to which all parameters are rounded together."""
 
-_MOTION = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)
 _SAME = 1e-15  # relative change that is no rounding: a degree or two written as radians
 _DEGREE = math.pi / 180
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
@@ -77,40 +71,28 @@ def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) ->
     """A design with some of its parameters rounded, for each choice of these and of significant digits, all at once."""
     if not choices:
         return ()
-    problem, m = solution.problem, len(choices)
+    problem = solution.problem
     units = {n: unit_of(problem, n) for n in problem.free}
     written = [{n: _rounded(solution, n, units[n], digits) for n in names} for names, digits in choices]
-    with flint.ctx.workdps(_WORKING):
-        nominal = [{**solution.parameters, **{n: _exact(x, units[n]) for n, x in row.items()}} for row in written]
-        each = [(k, case.applied(nominal[k])) for k, cases in enumerate(_cases(solution, nominal)) for case in cases]
-        designs, owner = [design for _, design in each], np.array([k for k, _ in each])
-        motion = np.array([_motion(problem, design) for design in designs]).T
-    whose = np.concatenate([np.arange(m), owner])
-    with np.errstate(all="ignore"):  # what has no value is nan or inf
-        values = values_of(problem, _doubles([*nominal, *designs]), whose.shape)
-    known = {}
-    for name, of, worst_of in zip(_MOTION, motion, (np.max, np.min, np.max), strict=True):
-        known[name] = np.array([worst_of(of[owner == k]) for k in range(m)])
-        values.define(name, known[name][whose])
-    objective = np.broadcast_to(problem.objective(values) if problem.objective else math.nan, whose.shape)
-    violated = _violations(problem, values, whose, m)
     found = []
-    for k, (texts, (_, digits)) in enumerate(zip(written, choices, strict=True)):
-        shown = Table({n: f"{text} {units[n].text}".rstrip() for n, text in texts.items()})
-        abscissa, ratio = (float(known[name][k]) for name in _MOTION[:2])
-        ratio = ratio if problem.model.carrier is None else math.nan
-        loss = abscissa - solution.abscissa
-        found.append(Rounded(digits, shown, abscissa, loss, ratio, float(objective[k]), Table(violated[k])))
+    with flint.ctx.workdps(_WORKING):
+        designs = [{**solution.parameters, **{n: _exact(x, units[n]) for n, x in row.items()}} for row in written]
+        cases = _cases(solution, designs)
+        for texts, (_, digits), design, own in zip(written, choices, designs, cases, strict=True):
+            with np.errstate(all="ignore"):  # what has no value is nan or inf
+                values, violated = judged_exactly(problem, design, own)
+                objective = float(problem.objective(values)) if problem.objective else math.nan
+            shown = Table({n: f"{text} {units[n].text}".rstrip() for n, text in texts.items()})
+            abscissa = float(values["abscissa"])
+            all_there = (
+                sum(r.multiplicity for r in values["structure"].roots) == problem.model.degree
+            )  # none at infinity
+            told = all_there and problem.model.carrier is None
+            ratio = float(values["damping_ratio"]) if told else math.nan
+            beyond = Table(violated | _beyond_box(problem, design))
+            loss = abscissa - solution.abscissa
+            found.append(Rounded(digits, shown, abscissa, loss, ratio, objective, beyond))
     return tuple(found)
-
-
-def _motion(problem: Problem, design: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Abscissa, damping ratio and greatest angular frequency of a design exactly as it is; nan where there is none."""
-    roots = realised_roots(problem, design)
-    if sum(root.multiplicity for root in roots) < problem.model.degree:  # one is at infinity
-        return max((root.re for root in roots), default=math.nan), math.nan, math.nan
-    ratios = (-root.re / (math.hypot(root.re, root.im) or 1.0) for root in roots)
-    return roots[0].re, min(ratios) + 0.0, max(abs(root.im) for root in roots)
 
 
 def worst(alone: Mapping[str, Rounded]) -> str:
@@ -124,42 +106,19 @@ def _cases(solution: Solution, designs: Sequence[Mapping[str, Any]]) -> list[lis
     problem = solution.problem
     listed = [case for case in problem.cases if not case.direction]
     shared = [*listed, *([solution.worst] if solution.worst else [])]
-    own = peaks(problem, _doubles(designs), len(designs)) if listed else [[] for _ in designs]
+    columns = {n: np.array([float(design[n]) for design in designs]) for n in designs[0]}
+    own = peaks(problem, columns, len(designs)) if listed else [[] for _ in designs]
     return [list(dict.fromkeys([*shared, *cases])) or [Case()] for cases in own]
 
 
-def _doubles(designs: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
-    """Parameters of several designs as columns."""
-    return {n: np.array([float(design[n]) for design in designs]) for n in designs[0]}
-
-
-def _violations(problem: Problem, values: Values, whose: NDArray[np.int64], count: int) -> list[dict[str, float]]:
-    """What each design violates in any case beyond tolerance, by how much.
-
-    Args:
-        values: of all designs, nominal, and then of their cases.
-        whose: number of the design that each is one of.
-    """
-    found: list[dict[str, float]] = [{} for _ in range(count)]
-    for name, condition in problem.conditions.items():
-        if RADIUS in condition.names:  # it takes a search of its own
-            continue
-        left, right = (np.broadcast_to(np.asarray(side, dtype=float), whose.shape) for side in condition.each(values))
-        excess = condition.excess(left - right)
-        relative = excess / np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
-        relative = np.where(np.isfinite(left - right), relative, np.inf)
-        names = (*problem.parameter_set.names, *(n for n in ROOT_NAMES if n in condition.names))
-        at = whose if depends_on_case(problem, condition, problem.cases) else whose[:count]
-        for k in range(count):
-            own = np.flatnonzero(at == k)
-            worst = own[relative[own].argmax()]
-            one = {n: float(np.broadcast_to(values[n], whose.shape)[worst]) for n in names}
-            if is_violated(problem, condition, float(relative[worst]), one):
-                found[k][name] = float(excess[worst])
+def _beyond_box(problem: Problem, design: Mapping[str, Any]) -> dict[str, float]:
+    """Ends of ranges that a design is beyond, by how much."""
+    found = {}
     for name, (lower, upper) in problem.free.items():
-        for end, amounts, limit in (("min", lower - values[name], lower), ("max", values[name] - upper, upper)):
-            for k in np.flatnonzero(amounts[:count] > FEASIBLE * max(1.0, abs(limit))).tolist():
-                found[k][f"{name}.{end}"] = float(amounts[k])
+        value = float(design[name])
+        for end, amount, limit in (("min", lower - value, lower), ("max", value - upper, upper)):
+            if amount > FEASIBLE * max(1.0, abs(limit)):
+                found[f"{name}.{end}"] = amount
     return found
 
 

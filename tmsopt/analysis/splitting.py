@@ -114,8 +114,7 @@ def _ends(at: Meeting, name: str, branch: Branches, sign: int) -> tuple[float, f
             row = np.array([middle(c / shifted[at.multiplicity].abs_upper()) for c in shifted])
             row[np.cumsum(np.abs(row)) <= _SLOWER * np.abs(row).sum()] = 0  # of roots that stay far behind
             rows.append(row)
-        every = zip(predicted, scales, _largest(np.array(rows), at.multiplicity), strict=True)
-        return [_deviation(t, scale, inverse) <= DEVIATION for t, scale, inverse in every]
+        return [_deviation(*each) <= DEVIATION for each in zip(predicted, scales, rows, strict=True)]
 
     seen = _CLEAR * _scatter(at)
     decades = [m for m in _DECADES if max(abs(t) for t in branch.shifts(sign * 10.0**m)) > seen]
@@ -169,24 +168,14 @@ def _scatter(at: Meeting) -> float:
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
-def _largest(rows: NDArray[np.complex128], k: int) -> list[NDArray[np.complex128]]:
-    """Roots other than 0 of polynomials, coefficients descending; none of one without first coefficients."""
-    plain = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0) & (rows[:, -1] != 0)
-    companion = np.zeros((int(plain.sum()), rows.shape[1] - 1, rows.shape[1] - 1), dtype=complex)
-    companion[:, 1:, :-1] = np.eye(rows.shape[1] - 2)
-    companion[:, 0] = -rows[plain, 1:] / rows[plain, :1]
-    every = iter(np.linalg.eigvals(companion))
-    found = []
-    for row, whole in zip(rows, plain, strict=True):
-        some = np.all(np.isfinite(row)) and np.any(row[: k + 1])
-        roots = next(every) if whole else np.roots(row) if some else np.empty(0, dtype=complex)
-        found.append(roots[roots != 0])
-    return found
+def _deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.complex128]) -> float:
+    """The largest distance of a predicted shift from the nearest true one left, relative; inf where there is none.
 
-
-def _deviation(predicted: Sequence[complex], scale: float, inverse: NDArray[np.complex128]) -> float:
-    """The largest distance of a predicted shift from the nearest true one left, relative; inf where there is none."""
-    left, worst = list(scale / inverse), 0.0
+    Args:
+        row: coefficients of the polynomial in scale/t, descending.
+    """
+    inverse = np.roots(row) if np.all(np.isfinite(row)) else np.zeros(0)
+    left, worst = list(scale / inverse[inverse != 0]), 0.0
     for t in predicted:
         nearest = min(range(len(left)), key=lambda i: abs(left[i] - t), default=None)
         if nearest is None:

@@ -21,7 +21,6 @@ MATCHED = 1e-10
 _BY_SIGNS = 3
 """Up to this degree Hurwitz's inequalities give all limits of stable polynomials; above, they admit others too."""
 
-_STEPS = 20
 _LEAD = 1e-9  # of the largest coefficient: a smaller leading one is replaced before roots are guessed from
 _SMALL = 1e-3
 
@@ -40,7 +39,6 @@ class Edge:
         powers: which coefficient each equation is about.
         nonnegative: expressions that are ≥ 0: the other roots are not right of the axis, or are real.
         guess: unknowns to start from, for numeric coefficients.
-        divisor: the factor of the edge itself for e, where it has one.
     """
 
     name: str
@@ -50,7 +48,6 @@ class Edge:
     powers: tuple[int, ...]
     nonnegative: Callable[[Sequence[Any], Sequence[Any]], list[Any]]
     guess: Callable[[Array], list[float]]
-    divisor: Callable[[Any], list[Any]] | None = None
 
 
 @lru_cache(maxsize=16)
@@ -94,7 +91,6 @@ def _divided(name: str, degree: int, divisor: Callable[[Any], list[Any]], real: 
         tuple(range(degree + 1)),
         lambda c, u: others.nonnegative(u[1:]),
         guess,
-        divisor,
     )
 
 
@@ -203,38 +199,6 @@ def _counted(c: Array, stable: Truth) -> Truth:
     damped = np.asarray(stable & np.all(newton, axis=-1))
     damped[damped] = real_roots(c[damped], exact=False)[0] == n
     return damped
-
-
-def lies_on(c: Array, edge: Edge, sizes: Array) -> bool:
-    """Whether a polynomial, signed as on the inner side, is on an edge within 1e-10 of the sizes of its coefficients.
-
-    Args:
-        sizes: of the terms of each coefficient of a design that is not on the edge; larger coefficients count more.
-    """
-    size = np.maximum(np.abs(c), sizes)
-    if edge.divisor is not None:
-        # Inverted roots keep both factors, and keep clear of infinity.
-        return _distance(*((c, size) if abs(c[0]) >= abs(c[-1]) else (c[::-1], size[::-1])), edge) <= MATCHED
-    if edge.name == "real":  # what was matched to factors is there
-        return bool(np.all(c >= -MATCHED * size))
-    inner, end = (slice(0, -1), -1) if edge.name.startswith("capsize") else (slice(1, None), 0)
-    return bool(abs(c[end]) <= MATCHED * size[end] and np.all(c[inner] >= -MATCHED * size[inner]))
-
-
-def _distance(c: Array, size: Array, edge: Edge) -> float:
-    """Relative change of the coefficients that makes the factor of an edge divide them, by Gauss and Newton."""
-    assert edge.divisor is not None
-    e, left = _nearest(c, edge.divisor, _candidates(c, edge.name), size)
-    for _ in range(_STEPS):
-        factor, slope = np.array(edge.divisor(e)), np.array(edge.divisor(e + 1e-100j)).imag / 1e-100
-        columns = [np.convolve(factor, unit) for unit in np.eye(len(left))]
-        jacobian = np.stack([np.convolve(slope, left), *columns], axis=1) / size[:, None]
-        step = np.linalg.lstsq(jacobian, (c - np.convolve(factor, left)) / size, rcond=None)[0]
-        e, left = e + float(step[0]), left + step[1:]
-        if abs(step[0]) <= 1e-15:
-            break
-    inside = -MATCHED <= e <= 1 + MATCHED
-    return float(np.linalg.norm((c - np.convolve(edge.divisor(e), left)) / size)) if inside else np.inf
 
 
 def losses(c: Array, heavy: bool) -> tuple[str, ...]:

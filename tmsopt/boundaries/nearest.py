@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.boundaries.approach import ALIKE, Approach, approach
-from tmsopt.boundaries.boundaries import KINDS, Edge, edges, lies_on
+from tmsopt.boundaries.boundaries import KINDS, Edge, edges
 from tmsopt.boundaries.rays import RayCrossing, between, elsewhere, most_damped, ray_crossings
 from tmsopt.boundaries.surroundings import WeightedDesign, placed
 from tmsopt.boundaries.witness import exactly_stable, is_boundary
@@ -291,8 +291,7 @@ def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array]) -
         before = best.distance
         for u in starts:
             found = run(u, best.distance)
-            if found is not None and lies_on(sign * place.space.coefficients(found.u), edge, place.sizes):
-                best = found
+            best = found or best
         if not best.u.size:
             break
         met = between(place.space, best.u, edge.name not in STABILITY)

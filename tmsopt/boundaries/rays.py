@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tmsopt.boundaries.boundaries import heavily_damped, losses
 from tmsopt.records import Array, Truth
-from tmsopt.roots import discriminant, hurwitz_minors, is_stable, roots
+from tmsopt.roots import is_stable, roots
 
 _DIRECTIONS = 1000
 _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
@@ -129,26 +129,16 @@ def _stable(c: Array) -> Truth:
 
 
 def _tests(c: Array) -> Array:
-    """What vanishes on the edges: a0, aₙ, the Hurwitz determinant and the discriminant, shape (…, 4)."""
-    n = c.shape[-1] - 1
-    if n > 4:
-        pair, double = _of_pairs(c)
-    elif n == 1:
-        pair = double = np.ones(c.shape[:-1])  # one root has no other to meet
-    else:
-        by_power = [c[..., k] for k in range(n + 1)]
-        pair, double = hurwitz_minors(by_power)[n - 2], discriminant(by_power)
-    return np.stack([c[..., 0], c[..., -1], pair, double], axis=-1)
+    """What vanishes on the edges: a0, aₙ, ∏ −(zᵢ + zⱼ) and ∏ (zᵢ − zⱼ)² over pairs of roots, shape (…, 4).
 
-
-def _of_pairs(c: Array) -> tuple[Array, Array]:
-    """∏ −(zᵢ + zⱼ) and ∏ (zᵢ − zⱼ)² over pairs of roots: Δₙ₋₁ (Orlando) and the discriminant without powers of a0."""
+    The last two are Δₙ₋₁ (Orlando) and the discriminant without powers of a0.
+    """
     proper = np.all(np.isfinite(c), axis=-1) & (c[..., 0] != 0)
     z = roots(np.where(proper[..., None], c, np.eye(c.shape[-1])[0]))
     first, second = np.triu_indices(z.shape[-1], 1)
     sums, differences = z[..., first] + z[..., second], z[..., first] - z[..., second]
     pair, double = np.prod(-sums, axis=-1).real, np.prod(differences * differences, axis=-1).real
-    return np.where(proper, pair, np.nan), np.where(proper, double, np.nan)
+    return np.stack([c[..., 0], c[..., -1], *(np.where(proper, x, np.nan) for x in (pair, double))], axis=-1)
 
 
 def _different(unit: Array, rows: list[int]) -> NDArray[np.int_]:

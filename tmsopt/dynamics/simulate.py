@@ -13,17 +13,16 @@ from tmsopt.dynamics.asked import Disturbance, asked_for
 from tmsopt.dynamics.flow import sampled, shaken, stationary
 from tmsopt.dynamics.measures import FINEST, MOST, Measure, Watched, grid, measured
 from tmsopt.dynamics.mode_shapes import ModeShape, mode_shapes
+from tmsopt.dynamics.speeds import parameters_of
 from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
 from tmsopt.errors import Fault, InputError
 from tmsopt.files import write_csv
 from tmsopt.models.user_spectrum import user_structure
 from tmsopt.problem.files import Given, as_problem
 from tmsopt.problem.problem import Problem
-from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Column, Table, Tabular, plain
 from tmsopt.roots import Structure
-from tmsopt.search.solve import solve
 
 _DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # times of a motion that is watched, in times 1/|abscissa| and 1/|s|
 _DOUBLINGS, _STILL = 8, 0.002  # of a stable one, until the second half is so much smaller than its peak
@@ -168,11 +167,7 @@ def simulate(
     whole = as_problem(design)
     asked = whole.nominal
     matrices_of(asked.model)
-    if isinstance(design, Solution):
-        own = dict(design.parameters)
-    else:
-        own = dict(solve(whole, progress=progress, interruptible=False).parameters if whole.free else whole.fixed)
-    own = asked.ordered(own) | dict(at or {})
+    own = asked.ordered(parameters_of(design, whole, "", progress)) | dict(at or {})
     if faults := list(parameter_faults(asked, own)):
         raise InputError([replace(f, key=("at", *f.key[-1:])) for f in faults])
     start_steps(progress, "following the motion")

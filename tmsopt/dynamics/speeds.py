@@ -137,7 +137,7 @@ def speeds(
         raise InputError([Fault(message, ("parameter",))])
     if name not in of.names:
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
-    own = _parameters(design, whole, name, progress)
+    own = parameters_of(design, whole, name, progress)
     start_steps(progress, "isolating speeds")
     allowed = of[name].range
     try:
@@ -212,7 +212,7 @@ def _powers(x: Any) -> Polynomial:
     return [found.get(k, flint.fmpq(0)) for k in range(max(found, default=0) + 1)]
 
 
-def _parameters(design: Any, whole: Problem, name: str, progress: Listener | None) -> dict[str, float]:
+def parameters_of(design: Any, whole: Problem, name: str, progress: Listener | None) -> dict[str, float]:
     """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
     if isinstance(design, Solution):
         return dict(design.parameters)

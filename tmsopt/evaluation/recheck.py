@@ -125,7 +125,20 @@ def missed(
         return {}
     looked = _look(problem, parameters, cases, around)
     near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(problem, c))}
-    return _violated(problem, _look(problem, parameters, cases, looked.around, stored=True), near)[1] if near else {}
+    exactly = _look(problem, parameters, cases, looked.around, parameters) if near else looked
+    return _violated(problem, exactly, near)[1]
+
+
+def judged_exactly(
+    problem: Problem, parameters: Mapping[str, Any], cases: Sequence[Case]
+) -> tuple[Values, dict[str, float]]:
+    """Quantities of a design of exact numbers, and what it violates beyond tolerance, in the units of the sides.
+
+    Those of the roots are the worst over the cases, by exact roots; the robustness radius plays no part.
+    """
+    looked = _look(problem, {n: float(x) for n, x in parameters.items()}, cases, stored=parameters)
+    conditions = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
+    return looked.nominal, _violated(problem, looked, conditions)[1]
 
 
 def _is_near(condition: Expression, values: Values) -> bool:
@@ -143,24 +156,13 @@ def _violated(
     for name, condition in conditions.items():
         at = looked.at(problem, condition)
         violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
-        if is_violated(problem, condition, violation, worst):
+        if not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, worst)):
             violations[name] = violation
             amounts[name] = float(condition.excess(float(condition(worst))))
     return violations, amounts
 
 
-def is_violated(
-    problem: Problem, condition: Expression, violation: float, values: Values | Mapping[str, float]
-) -> bool:
-    """Whether a condition is violated by so much of the size of its sides that it is not for rounding alone.
-
-    Args:
-        values: of the parameters, and of the root quantities that it names.
-    """
-    return not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, values))
-
-
-def _beyond(problem: Problem, condition: Expression, values: Values | Mapping[str, float]) -> bool:
+def _beyond(problem: Problem, condition: Expression, values: Values) -> bool:
     """Whether no design within `FEASIBLE` of another meets a condition, so that a small excess is none of rounding.
 
     Parameters move by so much of their size or of their range, root quantities of theirs; (Fr - 1.7)**4 <= 0 is missed
@@ -235,7 +237,7 @@ def _look(
     parameters: Mapping[str, float],
     cases: Sequence[Case],
     around: Robustness | None = None,
-    stored: bool = False,
+    stored: Mapping[str, Any] | None = None,
 ) -> _Look:
     """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
     listed = [case for case in cases if not case.direction]
@@ -243,8 +245,9 @@ def _look(
     nominal = problem.values(parameters)
     each = [problem.values(design) for design in designs] if listed else [nominal]
     near_top, near_least, near_fastest = _candidates(each)
-    if stored:
-        for design, values in zip((*designs, parameters), (*each, nominal), strict=True):
+    if stored is not None:
+        exact = [case.applied(stored) for case in listed] or [dict(stored)]
+        for design, values in zip((*exact, stored), (*each, nominal), strict=True):
             values.define("structure", Structure("undecided", realised_roots(problem, design), 0.0))
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
@@ -253,7 +256,7 @@ def _look(
     if problem.asks(ANGULAR_FREQUENCY):
         fastest = max(near_fastest, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
         worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]
-    if around is None and problem.asks_radius:
+    if around is None and problem.asks_radius and stored is None:
         around = robustness_at(problem, parameters)
     if around is not None:
         worst[RADIUS] = around.radius

@@ -15,7 +15,7 @@ from tmsopt.algebra.intervals import interval
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.algebra.walk import NotAccepted
 from tmsopt.global_search.conditions import Ends, Sheet, sheets
-from tmsopt.global_search.pruning import Box, Pruned, Puzzle, ends, partial, prune, tree
+from tmsopt.global_search.pruning import Box, Pruned, Puzzle, ends, halves, partial, prune, tree
 from tmsopt.killable import Killable
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Problem
@@ -160,8 +160,8 @@ class _Run:
                     if zero and not any(_within(zero.enclosure.balls, sheet.names, other.near) for other in known):
                         known.append(zero)
                         waiting.append(box)
-                    elif halves := _halves(box, puzzle.widths, least):
-                        waiting += halves
+                    elif parts := halves(box, puzzle.widths, least, [hi - lo for lo, hi in box]):
+                        waiting += parts
                     else:
                         small.append(box)
                 if len(small) >= most:
@@ -322,17 +322,6 @@ def _met(problem: Problem, condition: Expression, at: Mapping[str, Any]) -> bool
     """Whether a constraint that may not exist somewhere near exists at the middle, and is met."""
     values = problem.values(problem.ordered({name: float(at[name].mid()) for name in problem.free}))
     return bool(condition.violation(values) <= 0)
-
-
-def _halves(box: Box, widths: Sequence[float], least: float) -> list[Box]:
-    """A box cut across its longest side; none for one that is small."""
-    share = [(hi - lo) / w if w > 0 else 0.0 for (lo, hi), w in zip(box, widths, strict=True)]
-    k = max(range(len(box)), key=share.__getitem__)
-    lo, hi = box[k]
-    middle = lo + (hi - lo) / 2
-    if not (share[k] > least and lo < middle < hi):
-        return []
-    return [(*box[:k], ends, *box[k + 1 :]) for ends in ((lo, middle), (middle, hi))]
 
 
 def _places(problem: Problem, left: Iterable[tuple[Sheet, Box, str]]) -> list[tuple[Box, str]]:

@@ -108,6 +108,21 @@ def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
             yield [(kind, part.order, k >= inner) for k in range(part.count)]
 
 
+def values_at(problem: Problem, lifted: Sequence[Quantity], at: Mapping[str, Any], held: Mapping[str, Any]) -> Values:
+    """Everything that follows from numbers by name, angles by their tangents; `held` are parameters themselves."""
+    of, known = problem.parameter_set, {q.name for q in lifted}
+    own = {n: held[n] if n in held else at[n].atan() if of[n].tangent else at[n] for n in of.names}
+    return Values(problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
+
+
+def others(
+    values: Values, lifted: Sequence[Quantity], equalities: Sequence[Expression], at: Mapping[str, Any]
+) -> list[Any]:
+    """Left sides of the equations beside those of a pattern: of quantities that are unknowns, and == constraints."""
+    left = [q.equation(values, at[q.name]) for q in lifted if q.equation]
+    return left + [e.enclosure(values) for e in equalities]
+
+
 @dataclass(frozen=True)
 class Sheet:
     """The equations of a pattern where some of its roots are small and the others large; names go to any numbers.
@@ -141,11 +156,7 @@ class Sheet:
 
     def values(self, at: Mapping[str, Any]) -> Values:
         """Everything that follows from numbers by name."""
-        problem = self.problem
-        of, known = problem.parameter_set, {q.name for q in self.lifted}
-        free = {n: at[n].atan() if of[n].tangent else at[n] for n in problem.free}
-        own = {n: free.get(n, self.held.get(n)) for n in of.names}
-        values = Values(problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
+        values = values_at(self.problem, self.lifted, at, self.held)
         if (abscissa := self._abscissa([at[n] for n in self.unknowns])) is not None:
             values.define("abscissa", abscissa)
         return values
@@ -154,8 +165,7 @@ class Sheet:
         """Left sides of the equations: as many as unknowns."""
         values = self.values(at)
         left = conditions(self._scaled(values), self.pieces, [at[n] for n in self.unknowns])
-        left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
-        return left + [e.enclosure(values) for e in self.equalities]
+        return left + others(values, self.lifted, self.equalities, at)
 
     def shared(self, at: Mapping[str, Any]) -> list[Any]:
         """What must be 0 beside the equations where roots of size 1 count as small and as large."""

@@ -99,8 +99,8 @@ def prune(
             continue
         if zero:
             met.append(_box(x))
-        elif halves := contractors.halves(x, least):
-            left += [_box(half) for half in halves]
+        elif parts := halves(_box(x), puzzle.widths, least, contractors.weights(x)):
+            left += parts
         else:
             small.append(_box(x))
     if not _upwards(codac):
@@ -112,6 +112,17 @@ def _upwards(codac: Any) -> bool:
     """Whether the rounding mode of this thread is what codac's intervals rely on."""
     third, sum = codac.Interval(1.0) / codac.Interval(3.0), codac.Interval(0.1) + codac.Interval(0.2)
     return bool(third.lb() < third.ub() and sum.lb() < sum.ub())
+
+
+def halves(box: Box, widths: Sequence[float], least: float, weights: Sequence[float]) -> list[Box]:
+    """A box cut across the side of the greatest weight; none for one that is small."""
+    middles = [lo + (hi - lo) / 2 for lo, hi in box]
+    each = enumerate(zip(box, middles, widths, strict=True))
+    wide = [k for k, ((lo, hi), m, w) in each if least * w < hi - lo < math.inf and lo < m < hi]
+    if not wide:
+        return []
+    k = max(wide, key=weights.__getitem__)
+    return [(*box[:k], part, *box[k + 1 :]) for part in ((box[k][0], middles[k]), (middles[k], box[k][1]))]
 
 
 class _Contractors:
@@ -199,15 +210,6 @@ class _Contractors:
             elif not over.lb() > 0.0:
                 return False
         return True
-
-    def halves(self, x: Any, least: float) -> list[Any]:
-        """A box cut where the equations change most across it; none for one that is small."""
-        n = x.size()
-        wide = [k for k in range(n) if x[k].diam() < math.inf and x[k].diam() > least * self.widths[k]]
-        wide = [k for k in wide if x[k].lb() < x[k].mid() < x[k].ub()]
-        if not wide:
-            return []
-        return list(x.bisect(max(wide, key=self.weights(x).__getitem__)))
 
     def weights(self, x: Any) -> list[float]:
         """How much each variable's width adds to those of the equations, at most 1 each; or its share of the first."""

@@ -9,6 +9,7 @@ import numpy as np
 from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.walk import NotAccepted
 from tmsopt.problem.problem import Problem
+from tmsopt.roots import hurwitz_minors
 
 _BOXES = 300  # looked at, beyond which it is left to others
 
@@ -48,8 +49,8 @@ def none_stable(problem: Problem) -> bool:
 
 def _determinants(a: list[Any]) -> list[Any]:
     """A Hurwitz determinant of degree 3 or 4 that has the coefficients' sign where all roots are left of the axis."""
-    if len(a) == 4:
-        return [a[0] * (a[1] * a[2] - a[0] * a[3])]
-    if len(a) == 5:
-        return [a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2]
-    return []
+    n = len(a) - 1
+    if n not in (3, 4):
+        return []
+    minor = hurwitz_minors(a)[n - 2]
+    return [a[0] * minor if n == 3 else minor]

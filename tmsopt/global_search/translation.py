@@ -5,6 +5,7 @@ what the formula shares, the relaxation shares. Quotients, radicals and arctange
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -101,8 +102,7 @@ class _Translation:
         self.scip.hideOutput()
         self.count = 0
         self.impossible = False
-        self.known: dict[int, Term] = {}
-        self.kept: list[Term] = []
+        self.known: dict[tuple[str, int], tuple[Term, Any]] = {}
 
     def free(self, lower: float, upper: float, over: Any = None) -> Term:
         """A variable, scaled by a power of two to about 1."""
@@ -120,14 +120,24 @@ class _Translation:
 
     def variable(self, term: Term) -> Term:
         """The same, at most affine: what is of degree 2 gets a variable, once."""
-        if term.degree < 2:
-            return term
-        if id(term) not in self.known:
-            new = self.defined(term.ball)
-            self.between(Term(new.expression - term.expression, 2, term.ball, term.size), 0.0, 0.0)
-            self.known[id(term)] = new
-            self.kept.append(term)
-        return self.known[id(term)]
+        found: Term = term if term.degree < 2 else self.once("variable", term, self.replaced)
+        return found
+
+    def replaced(self, term: Term) -> Term:
+        """A variable that is equal to a term."""
+        new = self.defined(term.ball)
+        self.between(Term(new.expression - term.expression, 2, term.ball, term.size), 0.0, 0.0)
+        return new
+
+    def once(self, name: str, term: Term, make: Callable[[Term], Any]) -> Any:
+        """What is made of a term, the same for each of its uses; the term is kept, lest another get its id."""
+        if (name, id(term)) not in self.known:
+            self.known[name, id(term)] = term, make(term)
+        return self.known[name, id(term)][1]
+
+    def equal(self, left: Any, right: Any, size: float = 1.0) -> None:
+        """An equation between expressions about as large as `size`."""
+        self.scip.addCons(left / size == right / size)
 
     def between(self, term: Term, lower: float, upper: float) -> None:
         """A row, scaled to about 1."""
@@ -136,8 +146,7 @@ class _Translation:
             return
         size = term.unit
         if lower == upper:
-            self.scip.addCons(term.expression / size == lower / size)
-            return
+            return self.equal(term.expression, lower, size)
         if math.isfinite(lower):
             self.scip.addCons(term.expression / size >= lower / size)
         if math.isfinite(upper):
@@ -160,7 +169,7 @@ class _Translation:
             ca.OP_POW: self.power,
             ca.OP_CONSTPOW: self.power,
             ca.OP_TAN: self.tangent,
-            ca.OP_ATAN: self.arctangent,
+            ca.OP_ATAN: lambda a: self.once("angle", self.variable(a), self.arctangent),
             ca.OP_ASIN: lambda a: self.inverse(a, "sin", ca.OP_ASIN),
             ca.OP_ACOS: lambda a: self.inverse(a, "cos", ca.OP_ACOS),
             ca.OP_FABS: self.size,
@@ -235,7 +244,7 @@ class _Translation:
         power = flint.arb(exponent)
         low, high = (flint.arb(e) ** power if math.isfinite(e) else flint.arb("inf") for e in (least, most))
         v = self.free(max(interval(low)[0], 0.0), interval(high)[1])
-        self.scip.addCons(v.expression / v.scale == a.expression**exponent / v.scale)
+        self.equal(v.expression, a.expression**exponent, v.scale)
         return v
 
     def applied(self, a: Term, name: str, operation: int) -> Term:
@@ -245,43 +254,32 @@ class _Translation:
         if name == "exp":
             _refuse_huge(INTERVALS[operation](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
-            cosine, sine = self.on_circle(a.tangent)
-            return sine if name == "sin" else cosine
+            part: Term = self.once("circle", a.tangent, self.on_circle)[name == "sin"]
+            return part
         a = self.variable(a)
         v = self.defined(INTERVALS[operation](a.ball))
         if name == "log":  # SCIP keeps the argument of its own away from 0
-            self.scip.addCons(a.expression / a.scale == self.functions.exp(v.expression) / a.scale)
+            self.equal(a.expression, self.functions.exp(v.expression), a.scale)
         else:
             # Others than exp are as small as their argument is known.
             size = v.scale if name == "exp" else max(v.scale, _CANCELLED)
-            self.scip.addCons(v.expression / size == getattr(self.functions, name)(a.expression) / size)
+            self.equal(v.expression, getattr(self.functions, name)(a.expression), size)
         return v
 
     def on_circle(self, t: Term) -> tuple[Term, Term]:
         """Cosine and sine of the arctangent of t: C > 0, S = t C, C² + S² = 1."""
-        key = -id(t)
-        if key not in self.known:
-            angle = t.ball.atan()
-            cosine, sine = self.defined(angle.cos(), lower=0.0), self.defined(angle.sin())
-            self.between(self.sum(sine, self.product(t, cosine), -1.0), 0.0, 0.0)
-            self.between(self.sum(self.square(sine), self.square(cosine), 1.0), 1.0, 1.0)
-            self.known[key] = Term((cosine, sine), 1, None, 1.0)
-            self.kept.append(t)
-        pair: tuple[Term, Term] = self.known[key].expression
-        return pair
+        angle = t.ball.atan()
+        cosine, sine = self.defined(angle.cos(), lower=0.0), self.defined(angle.sin())
+        self.between(self.sum(sine, self.product(t, cosine), -1.0), 0.0, 0.0)
+        self.between(self.sum(self.square(sine), self.square(cosine), 1.0), 1.0, 1.0)
+        return cosine, sine
 
     def arctangent(self, t: Term) -> Term:
         """An angle, its sine and cosine through its tangent."""
-        t = self.variable(t)
-        key = id(t)
-        if key not in self.known:
-            angle = self.defined(t.ball.atan())
-            self.known[key] = Term(angle.expression, 1, angle.ball, angle.size, tangent=t)
-            self.kept.append(t)
-            cosine, sine = self.on_circle(t)
-            for part, name in ((cosine, "cos"), (sine, "sin")):
-                self.scip.addCons(part.expression == getattr(self.functions, name)(angle.expression))
-        return self.known[key]
+        angle = self.defined(t.ball.atan())
+        for part, name in zip(self.once("circle", t, self.on_circle), ("cos", "sin"), strict=True):
+            self.equal(part.expression, getattr(self.functions, name)(angle.expression))
+        return Term(angle.expression, 1, angle.ball, angle.size, tangent=t)
 
     def tangent(self, a: Term) -> Term:
         if a.tangent is not None:
@@ -293,7 +291,7 @@ class _Translation:
         ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
         over = INTERVALS[operation](a.ball)
         angle = self.defined(over) if over.is_finite() else self.free(*ends)
-        self.scip.addCons(self.variable(a).expression == getattr(self.functions, name)(angle.expression))
+        self.equal(self.variable(a).expression, getattr(self.functions, name)(angle.expression))
         return angle
 
     def size(self, a: Term) -> Term:
@@ -303,7 +301,7 @@ class _Translation:
         if lower >= 0 or upper <= 0:
             return self.times(a, 1.0 if lower >= 0 else -1.0)
         v = self.defined(abs(a.ball), lower=0.0)
-        self.scip.addCons(v.expression / v.scale == abs(a.expression) / v.scale)
+        self.equal(v.expression, abs(a.expression), v.scale)
         return v
 
     def extreme(self, a: Term, b: Term, half: float) -> Term:

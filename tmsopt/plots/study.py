@@ -13,7 +13,7 @@ from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of,
 from tmsopt.problem import Unit, status_text
 from tmsopt.records import Array, Truth
 from tmsopt.search.solve import solve
-from tmsopt.studies import Results, columns, header
+from tmsopt.studies import Results, header
 
 _BINS = 25
 _FAR = 6  # widths of the middle half of the values: farther ones are counted, not shown
@@ -43,15 +43,14 @@ def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
 
 
 def _drawn_around(ax: Axes, data: Results) -> str:
-    problem, rows = data.study.problem, columns(data.rows)
+    problem, rows = data.study.problem, data.rows
     rate, names = problem.parameter_set.rate, problem.parameter_set.names
-    values = rows["abscissa"].values
-    if rate is not None and np.isfinite(values).any():  # then rows have parameters
-        values = _shown(values, {n: rows[header("parameters", n)].values for n in names}, rate)
+    values = rows.values("abscissa")
+    values = _shown(values, {n: rows.values(header("parameters", n)) for n in names}, rate)
     known = np.isfinite(values)
     beyond = known & ~_near(values)
     known &= ~beyond
-    stable = rows["stable"].present & rows["stable"].values.astype(bool)
+    stable = rows.column("stable").filled(False)
     nominal = solve(problem, throw=False, interruptible=False)
     edges = _edges(values[known])
     for chosen, colour, hatch, label in (
@@ -96,18 +95,18 @@ def _edges(values: Array) -> Array:
 
 
 def _over_what_varies(ax: Axes, data: Results) -> str:
-    study, rows = data.study, columns(data.rows)
+    study, rows = data.study, data.rows
     first, second = [*study.columns, None, None][:2]
     sense = study.problem.minimize or study.problem.maximize
-    found = rows["status"].values == "optimal"
+    found = rows.values("status") == "optimal"
     scale = scale_of(study.problem, sense) if sense else AxisScale("abscissa", abscissa_label(study.problem), _PLAIN)
-    y = scale.of(rows["objective" if sense else "abscissa"].values[found])
+    y = scale.of(rows.values("objective" if sense else "abscissa")[found])
 
     def varied(name: str) -> Array:
-        return np.asarray(rows[header("varied", name)].values[found]) if found.any() else np.empty(0)
+        return np.asarray(rows.values(header("varied", name))[found])
 
     across = scale_of(study.problem, first) if first else None
-    x = across.of(varied(across.name)) if across else rows["number"].values[found]
+    x = across.of(varied(across.name)) if across else rows.numbers[found]
     if second is None or not found.any():
         ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
     else:

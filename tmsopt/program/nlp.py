@@ -161,11 +161,6 @@ class NLP:
         second = function.factory("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
         return function, {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
 
-    @property
-    def equations(self) -> int:
-        """Number of equality rows."""
-        return sum(lo == hi for lo, hi in zip(self.row_lower, self.row_upper, strict=True))
-
     def touchings(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
         """The same with everything in `touches` met exactly: in the ways that a point is closest to, then in others.
 

@@ -52,15 +52,28 @@ class Existing:
 
 def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | None:
     """The design itself, if its numbers are fractions and have the pattern exactly."""
-    a = design.coefficients(problem.model, problem.parameter_set)
-    if a is None or not has_pattern(pattern.form, a):
-        return None
-    if any(c.equality for c in problem.conditions.values()):
-        return None
-    balls = design.balls()
-    tangents = {n: balls[n].tan() for n in balls if problem.parameter_set[n].tangent}
+    found = as_stored(problem, design)
+    equal = any(c.equality for c in problem.conditions.values())
+    return (
+        found
+        if found and found.method == EXACT and not equal and has_pattern(pattern.form, found.coefficients)
+        else None
+    )
+
+
+def as_stored(problem: Problem, design: Written) -> Existing | None:
+    """The design as its numbers are, whatever its roots; None where a0 cannot be told from 0."""
+    balls, of = design.balls(), problem.parameter_set
+    tangents = {n: b.tan() for n, b in balls.items() if of[n].tangent}
     tangents |= {n: e.ball() for n, e in design.tangents.items()}
-    return Existing(EXACT, a, balls, tangents, {}, factored(a))
+    exact = design.coefficients(problem.model, of)
+    a = problem.model.coefficients(balls, of) if exact is None else exact
+    if a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
+        return None
+    if exact is not None:
+        return Existing(EXACT, a, balls, tangents, {}, factored(a))
+    whole = Factored((([c / a[0] for c in a], 1),))
+    return Existing("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
 
 
 def beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:

@@ -5,14 +5,13 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.balls import largest_radius
 from tmsopt.algebra.elementary import rational
 from tmsopt.models import Values
 from tmsopt.models.exact import Written
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.proofs.existence import EXACT, Existing
-from tmsopt.proofs.factored import Factored, factored, roots_of
+from tmsopt.proofs.factored import Factored, roots_of
 from tmsopt.roots import exact_nullity, has_one_eigenvector
 
 
@@ -35,21 +34,6 @@ NOTHING = Verdict()
 
 BINDS = 1e-9
 """Room between the sides of an inequality up to which it binds: what a solver leaves."""
-
-
-def as_stored(problem: Problem, design: Written) -> Existing | None:
-    """The design as its numbers are, whatever its roots; None where a0 cannot be told from 0."""
-    balls = design.balls()
-    of = problem.parameter_set
-    tangents = {n: b.tan() for n, b in balls.items() if of[n].tangent}
-    exact = design.coefficients(problem.model, of)
-    a = problem.model.coefficients(balls, of) if exact is None else exact
-    if exact is not None and a[0] != 0:
-        return Existing(EXACT, a, balls, tangents, {}, factored(a))
-    if a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
-        return None
-    whole = Factored((([c / a[0] for c in a], 1),))
-    return Existing("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
 
 
 def eigenvectors(problem: Problem, design: Written, found: Existing) -> tuple[int | None, Verdict]:

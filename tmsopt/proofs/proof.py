@@ -21,9 +21,9 @@ from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.verdict.stability import CROSSING, crossing_in_words
 from tmsopt.program.options import AskedOfSolve, documents_options, options_of
 from tmsopt.progress import begin
-from tmsopt.proofs.existence import Existing, beside, exactly
+from tmsopt.proofs.existence import Existing, as_stored, beside, exactly
 from tmsopt.proofs.factored import multiple_roots
-from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, eigenvectors, heavy_damping, inside, limits, stability
+from tmsopt.proofs.facts import NOTHING, Verdict, eigenvectors, heavy_damping, inside, limits, stability
 from tmsopt.records import Printable, Table, plain
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots.patterns.doubled import complex_shown

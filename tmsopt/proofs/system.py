@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from tmsopt.algebra.krawczyk import Refused, slopes
-from tmsopt.models import Quantity, Values
+from tmsopt.global_search.conditions import others, values_at
+from tmsopt.models import Quantity
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
@@ -65,17 +66,13 @@ class Equations:
 
     def __call__(self, at: Mapping[str, Any]) -> list[Any]:
         """The left sides."""
-        of = self.problem.parameter_set
-        own = {n: at[n].atan() if of[n].tangent else at[n] for n in of.names}
-        known = {q.name for q in self.lifted}
-        values = Values(self.problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
+        values = values_at(self.problem, self.lifted, at, {})
         u = [at[n] for n in self.of_pattern]
         a = values.coefficients
         left = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
-        left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
         if self.equalities:
             values.define("abscissa", abscissa_formula(self.pattern, u))
-        return left + [expression.enclosure(values) for expression in self.equalities]
+        return left + others(values, self.lifted, self.equalities, at)
 
 
 def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:

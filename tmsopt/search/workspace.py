@@ -46,7 +46,6 @@ class Family:
         known: what other such problems met, which families of other objectives may share; given where all but limits
             is the same.
         name: under which this family has designs there.
-        box: ranges of the free parameters that hold those of all problems, for NLPs to serve all of them.
     """
 
     def __init__(
@@ -54,9 +53,8 @@ class Family:
         varied: Collection[str] = (),
         known: SampleCache | None = None,
         name: Hashable = None,
-        box: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
-        self.varied, self._known, self._name, self._box = tuple(varied), known, name, box
+        self.varied, self._known, self._name = tuple(varied), known, name
         self._memories: OrderedDict[Hashable, Remembered] = OrderedDict()
         self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
         self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
@@ -66,14 +64,13 @@ class Family:
         self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None, lead: int = 0
     ) -> NLP:
         """What `formulate` gives, with the problem's numbers in place of another's of the family."""
-        if not self.varied and not self._box:
+        if not self.varied:
             return formulate(problem, cases, damping_ratio=damping_ratio, lead=lead)
-        wide = replace(problem, free=self._box) if self._box else problem
         symbols = {name: ca.SX.sym(name) for name in self.varied}
         nlp = _kept(
             self._nlps,
-            (tuple(cases), damping_ratio, lead, *_decisions(wide, self.varied)),
-            lambda: formulate(wide, cases, damping_ratio=damping_ratio, settings=symbols, lead=lead),
+            (tuple(cases), damping_ratio, lead, *_decisions(problem, self.varied)),
+            lambda: formulate(problem, cases, damping_ratio=damping_ratio, settings=symbols, lead=lead),
         )
         return narrowed(replace(nlp, settings=tuple(_value(problem, name) for name in self.varied)), problem)
 

@@ -4,12 +4,12 @@ from .monte_carlo import (
     Sampling as Sampling, check_unchanged as check_unchanged, monte_carlo as monte_carlo, planned as planned,
 )
 from .neighbours import blocks as blocks
-from .rows import Row as Row, RowTable as RowTable, columns as columns, header as header
-from .run import Results as Results, fill as fill, run_study as run_study, stored as stored
+from .rows import Row as Row, RowTable as RowTable, header as header, part_of as part_of
+from .run import Results as Results, run_study as run_study, stored as stored
 from .sampling import (
     Span as Span, grid as grid, latin_hypercube as latin_hypercube, sobol as sobol, sobol_note as sobol_note,
 )
 from .solving import Solver as Solver, solve_row as solve_row
-from .store import Store as Store, open_store as open_store, read_store as read_store
+from .store import Store as Store, check_same as check_same, open_store as open_store, read_store as read_store
 from .study import Study as Study, definition as definition, over_grid as over_grid
-from .summary import Share as Share, summary as summary, wilson as wilson, yield_of as yield_of
+from .summary import Share as Share, summary as summary, yield_of as yield_of

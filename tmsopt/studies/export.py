@@ -2,55 +2,34 @@
 
 import csv
 import json
+import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, import_optional
 from tmsopt.files import cell, headed, netcdf_errors, write_atomic
 from tmsopt.progress import Listener, Steps, start_steps
-from tmsopt.records import Array
-from tmsopt.studies.rows import PREFIXES, Names, PartialColumn, Row, columns
-
-
-@dataclass(frozen=True)
-class Format:
-    """How rows are written to a file of one ending.
-
-    Attributes:
-        write: takes header → column, the path, metadata as JSON, and what counts.
-        needs: modules that the extra ``data`` brings.
-    """
-
-    write: Callable[[Mapping[str, PartialColumn], Path, str, Steps | None], None]
-    needs: tuple[str, ...] = ()
-
-
-_CHUNK = 10_000  # rows turned into text at once
-_GROUP = 2**16  # rows of Parquet written at once
+from tmsopt.records import frame
+from tmsopt.studies.rows import BLOCK, PREFIXES, RowTable
 
 
 def export(
-    rows: Iterable[Row],
+    rows: RowTable,
     path: Path | str,
     metadata: Mapping[str, Any] | None = None,
-    names: Names = MappingProxyType({}),
     progress: Listener | None = None,
 ) -> None:
     """Write rows to a file whose ending says how, one of `FORMATS`; doubles come back bit by bit.
 
-    Headers are those of `columns`. A blank in CSV is nan or absent; Parquet has null for what is absent; netCDF nan, on
-    the dimension ``row``, and where the rows fill a grid also in the group ``grid``, over the values that vary.
+    A blank in CSV is nan or absent; Parquet has null for what is absent; netCDF nan, on the dimension ``row``, and
+    where the rows fill a grid also in the group ``grid``, over the values that vary.
 
     Args:
         progress: called with a `tmsopt.Progress` now and then.
-        names: that have a column anyway; see `columns`.
         metadata: plain data to go with the rows in Parquet (schema metadata, key ``tmsopt``) and netCDF (attribute
             ``tmsopt``), as JSON; `Store.about` makes it.
 
@@ -59,10 +38,10 @@ def export(
     """
     path = Path(path)
     check_export(path)
+    write, _ = FORMATS[_ending(path)]
     try:
         with write_atomic(path) as temporary:
-            steps = start_steps(progress, f"writing {path.name}", "row")
-            FORMATS[_ending(path)].write(columns(rows, names), temporary, json.dumps(metadata or {}), steps)
+            write(rows, temporary, metadata or {}, start_steps(progress, f"writing {path.name}", "row"))
     except OSError as error:
         raise InputError([Fault(f"cannot be written: {error.strerror or error}", file=str(path))]) from error
 
@@ -79,7 +58,7 @@ def check_export(path: Path) -> None:
     if (path.exists() and not path.is_file()) or not path.parent.is_dir():
         problem = "is no regular file" if path.exists() else "is in a folder that does not exist"
         raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", ("export",))])
-    for module in FORMATS[_ending(path)].needs:
+    for module in FORMATS[_ending(path)][1]:
         import_optional(module, "export to a .csv file")
 
 
@@ -87,127 +66,98 @@ def _ending(path: Path) -> str:
     return path.suffix.lstrip(".").lower()
 
 
-def _parts(count: int, each: int, steps: Steps | None) -> Iterator[int]:
-    """Where parts of so many rows begin, counted as they are done."""
-    for first in range(0, count, each):
-        yield first
+def _blocks(rows: RowTable, steps: Steps | None) -> Iterator[dict[str, Any]]:
+    """Columns of some rows after others, at least of none, counted as they are done."""
+    for first in range(0, max(len(rows), 1), BLOCK):
+        yield {head: rows.column(head, slice(first, first + BLOCK)) for head in rows.headers}
         if steps:
-            steps(min(first + each, count), count)
+            steps(min(first + BLOCK, len(rows)), len(rows))
 
 
-def _csv(table: Mapping[str, PartialColumn], path: Path, metadata: str, steps: Steps | None) -> None:
-    units = json.loads(metadata).get("units", {})
-    columns = list(table.values())
+def _csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
+    units = metadata.get("units", {})
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(cell(headed(name, units.get(_bare(name), ""))) for name in table)
-        for first in _parts(len(columns[0].values), _CHUNK, steps):
-            known: dict[bytes, list[str]] = {}  # columns may be equal, as the abscissa and the objective are
-            some = [(c.values[first : first + _CHUNK], c.present[first : first + _CHUNK]) for c in columns]
-            writer.writerows(zip(*(_texts(*part, known) for part in some), strict=True))
+        writer.writerow(cell(headed(head, units.get(_bare(head), ""))) for head in rows.headers)
+        for columns in _blocks(rows, steps):
+            writer.writerows(zip(*map(_cells, columns.values()), strict=True))
 
 
 def _bare(header: str) -> str:
     """The name whose unit a column has: of what varies, is reported or violated, that without its prefix and end."""
-    for prefix in (PREFIXES["varied"], PREFIXES["reports"], PREFIXES["violations"]):
-        header = header.removeprefix(prefix)
+    for table in ("varied", "reports", "violations"):
+        header = header.removeprefix(PREFIXES[table])
     return re.sub(r"\.(min|max|limit)$", "", header)
 
 
-def _texts(values: NDArray[Any], present: NDArray[np.bool_], known: dict[bytes, list[str]]) -> list[str]:
-    if values.dtype == np.bool_:
-        return [("true" if v else "false") if p else "" for v, p in zip(values.tolist(), present.tolist(), strict=True)]
-    if values.dtype != np.float64:
-        cells = {v: cell(v) if isinstance(v, str) else str(v) for v in set(values.tolist())}
-        return [cells[v] for v in values.tolist()]
-    if (key := values.tobytes()) not in known:
-        same = len(values) > 0 and key == key[:8] * len(values)
-        some = values[:1] if same else values
-        texts = ["" if v != v else repr(v) for v in some.tolist()]  # noqa: PLR0124
-        known[key] = texts * len(values) if same else texts
-    return known[key]
+def _cells(column: Any) -> list[Any]:
+    if column.dtype.kind == "f":
+        values = column.filled(np.nan)
+        return list(np.where(np.isnan(values), "", values.astype(object)))
+    return [str(value).lower() if isinstance(value, bool) else cell(value) for value in column.tolist()]
 
 
-def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str, steps: Steps | None) -> None:
+def _parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
     pa, parquet = import_optional("pyarrow"), import_optional("pyarrow.parquet")
-    arrays = {name: pa.array(c.values, _kind(pa, c), mask=~c.present, from_pandas=False) for name, c in table.items()}
-    whole = pa.table(arrays).replace_schema_metadata({"tmsopt": metadata})
-    with parquet.ParquetWriter(path, whole.schema) as writer:
-        for first in _parts(len(whole), _GROUP, steps):
-            writer.write_table(whole.slice(first, _GROUP))
+    kinds = {head: rows.column(head, slice(0)).dtype for head in rows.headers}
+    types = {head: pa.string() if kind.hasobject else pa.from_numpy_dtype(kind) for head, kind in kinds.items()}
+    schema = pa.schema(types, {"tmsopt": json.dumps(metadata)})
+    with parquet.ParquetWriter(path, schema) as writer:
+        for columns in _blocks(rows, steps):
+            arrays = [pa.array(c.data, types[head], mask=c.mask, from_pandas=False) for head, c in columns.items()]
+            writer.write_table(pa.table(arrays, schema=schema))
 
 
-def _kind(pa: Any, column: PartialColumn) -> Any:
-    return pa.string() if column.values.dtype == object else pa.from_numpy_dtype(column.values.dtype)
-
-
-def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str, _: Steps | None) -> None:
-    xarray = import_optional("xarray")
-    names = _names(table)
-    over_rows = {names[n]: ("row", c.numbers, {"long_name": n}) for n, c in table.items()}
-    made = xarray.Dataset(over_rows, {"row": table["number"].values}, {"tmsopt": metadata})
+def _netcdf(rows: RowTable, path: Path, metadata: Mapping[str, Any], _: Steps | None) -> None:
+    over_rows = _dataset(rows, _table(rows).set_index(rows.numbers).rename_axis("row"))
     with netcdf_errors():
-        made.to_netcdf(path, engine="netcdf4", encoding={name: {"_FillValue": None} for name in made.variables})
-        if (made := gridded(table)) is not None:
-            encoding = {name: {"_FillValue": None} for name in made.variables}
-            made.to_netcdf(path, mode="a", group="grid", engine="netcdf4", encoding=encoding)
+        over_rows.assign_attrs(tmsopt=json.dumps(metadata)).to_netcdf(path, engine="netcdf4")
+        if (over_grid := gridded(rows)) is not None:
+            over_grid.to_netcdf(path, mode="a", group="grid", engine="netcdf4")
 
 
-def gridded(table: Mapping[str, PartialColumn]) -> Any:
+def gridded(rows: RowTable) -> Any:
     """Rows that fill a grid as a dataset over the values that vary; None for others.
+
+    What has one value in all rows is no axis.
 
     Raises:
         InputError: where xarray is not installed.
     """
-    xarray, names, axes = import_optional("xarray"), _names(table), levels(table)
-    if not axes:
+    import_optional("xarray")
+    table = _table(rows)
+    sizes = {name: table[name].nunique() for name in table if name.startswith(PREFIXES["varied"])}
+    axes = [name for name, size in sizes.items() if size > 1]
+    if not axes or math.prod(sizes.values()) != len(table) or table.duplicated(axes).any():
         return None
-    order = np.argsort(places(table, axes))
-    shape, axis_names = tuple(len(v) for v in axes.values()), [names[n] for n in axes]
-    over_grid = {
-        names[n]: (axis_names, c.numbers[order].reshape(shape), {"long_name": n})
-        for n, c in table.items()
-        if n not in axes
-    }
-    return xarray.Dataset(over_grid, {names[n]: v for n, v in axes.items()})
+    return _dataset(rows, table.set_index(axes))
 
 
-def _names(headers: Iterable[str]) -> dict[str, str]:
-    """Header → name of a variable: netCDF knows no slash; ``row`` is the dimension. All differ."""
-    made: dict[str, str] = {}
-    for header in headers:
-        name = header.replace("/", " over ").strip()
-        while name in made.values() or name == "row":
+def _names(rows: RowTable) -> dict[str, str]:
+    """Name of a variable → header: netCDF knows no slash; ``row`` is the dimension. All differ."""
+    names: dict[str, str] = {}
+    for head in rows.headers:
+        name = head.replace("/", " over ").strip()
+        while name in names or name == "row":
             name += "_"
-        made[header] = name
+        names[name] = head
+    return names
+
+
+def _table(rows: RowTable) -> Any:
+    return frame({name: rows.values(head) for name, head in _names(rows).items()})
+
+
+def _dataset(rows: RowTable, table: Any) -> Any:
+    made = table.to_xarray()
+    for name, head in _names(rows).items():
+        made[name].attrs["long_name"] = head
     return made
 
 
-FORMATS: Mapping[str, Format] = {
-    "csv": Format(_csv),
-    "parquet": Format(_parquet, ("pyarrow", "pyarrow.parquet")),
-    "nc": Format(_netcdf, ("xarray", "netCDF4")),
+FORMATS: Mapping[str, tuple[Callable[[RowTable, Path, Mapping[str, Any], Steps | None], None], tuple[str, ...]]] = {
+    "csv": (_csv, ()),
+    "parquet": (_parquet, ("pyarrow", "pyarrow.parquet")),
+    "nc": (_netcdf, ("xarray", "netCDF4")),
 }
-"""Ending → format; another one is added here."""
-
-
-def levels(columns: Mapping[str, PartialColumn]) -> dict[str, Array]:
-    """Header → ascending values along that axis, where every combination of them is one row; else empty.
-
-    What has one value in all rows is no axis.
-    """
-    varied = {name: c for name, c in columns.items() if name.startswith(PREFIXES["varied"])}
-    if not varied or not all(c.present.all() and np.isfinite(c.values).all() for c in varied.values()):
-        return {}
-    found = {name: np.unique(c.values) for name, c in varied.items()}
-    axes = {name: values for name, values in found.items() if len(values) > 1}
-    count = len(next(iter(varied.values())).values)
-    if not axes or np.prod([float(len(v)) for v in axes.values()]) != count:
-        return {}
-    return axes if len(np.unique(places(columns, axes))) == count else {}
-
-
-def places(columns: Mapping[str, PartialColumn], axes: Mapping[str, Array]) -> NDArray[np.int64]:
-    """Where each row stands in the grid, flattened with the last axis fastest."""
-    indices = tuple(np.searchsorted(values, columns[name].values) for name, values in axes.items())
-    return np.asarray(np.ravel_multi_index(indices, tuple(len(v) for v in axes.values())), dtype=np.int64)
+"""Ending → how rows are written, and modules that the extra ``data`` brings; another one is added here."""

@@ -1,6 +1,5 @@
 """Monte Carlo over tolerances: a design built many times, each time a little off."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -9,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
+from tmsopt.errors import Fault, InputError, at_first, count_faults, is_number, short, suggest, text_faults
 from tmsopt.files import path_of
 from tmsopt.problem.files import Given, as_problem
 from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
 from tmsopt.program.options import STARTS
 from tmsopt.progress import Listener, start_steps
@@ -63,12 +63,14 @@ class Sampling:
     def __post_init__(self) -> None:
         problem = as_problem(self.problem)
         object.__setattr__(self, "problem", problem)
-        found = [*question_faults(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
-        found += [
-            *common_faults(problem, self.seed, self.starts, self.report),
-            *_draw_faults(self.rows, self.distribution),
-        ]
-        found += text_faults(self.title, "title")
+        if not self.tolerances:
+            object.__setattr__(self, "tolerances", problem.tolerances)
+        found = [*question_faults(problem), *_tolerance_faults(problem, self.tolerances)]
+        found += [*common_faults(problem, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
+        found += count_faults("rows", self.rows, 1, MOST_ROWS)
+        if self.distribution not in DISTRIBUTIONS:
+            message = f"found {short(self.distribution)}; {suggest(self.distribution, DISTRIBUTIONS)}"
+            found.append(Fault(message, ("distribution",)))
         if found:
             raise InputError(found)
         object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
@@ -84,16 +86,7 @@ def planned(asked: Study | Sampling, progress: Listener | None = None) -> Study:
     """
     if isinstance(asked, Study):
         return asked
-    design = solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False)
-    return monte_carlo(
-        design,
-        asked.rows,
-        asked.seed,
-        asked.distribution,
-        asked.tolerances or None,
-        title=asked.title,
-        report=asked.report,
-    )
+    return _around(asked, solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False), progress)
 
 
 def monte_carlo(
@@ -131,45 +124,46 @@ def monte_carlo(
     More: docs/tutorials/study.md
     """
     solution = solved_first(design, progress)
+    asked = Sampling(solution.problem, rows, seed, distribution, tolerances or {}, title, report=report)
+    return _around(asked, solution, progress)
+
+
+def _around(asked: Sampling, solution: Solution, progress: Listener | None) -> Study:
     start_steps(progress, "drawing designs")
     if solution.status != "optimal":
         raise NotSolved(solution)
-    stated = solution.problem.tolerances if tolerances is None else tolerances
-    return around(solution.problem, solution.parameters, rows, seed, distribution, stated, title, report)
+    return _drawn(asked, solution.parameters)
 
 
-def around(
-    problem: Problem,
-    design: Mapping[str, float],
-    rows: int,
-    seed: int,
-    distribution: str,
-    stated: Mapping[str, float],
-    title: str,
-    report: Sequence[str],
-) -> Study:
-    """The same around any design of a problem.
+def _drawn(asked: Sampling, design: Mapping[str, float]) -> Study:
+    """The study around any design, in which nothing is asked that no product can meet.
 
     Raises:
-        InputError: listing everything that is wrong.
+        InputError: for tolerances that take the design out of its physical range.
     """
-    drawn, notes = _as_built(problem, design)
-    found = [*_tolerance_faults(drawn, stated), *_draw_faults(rows, distribution), *count_faults("seed", seed, 0)]
-    if found := found or _room_faults(drawn, stated):
-        raise InputError(found)
-    errors = _errors(len(stated), rows, seed, distribution)
-    columns = {
-        name: Column(drawn.fixed[name] + float(tolerance) * error)
-        for (name, tolerance), error in zip(stated.items(), errors, strict=True)
-    }
+    problem = asked.problem
+    equal = [name for name, condition in problem.conditions.items() if condition.equality]
+    left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
+    kept = {n: text for n, text in problem.constraints.items() if n not in equal}
+    stated: dict[str, Any] = {"free": {}, "start": {}, "tolerances": {}, "locate": None, "constraints": kept}
+    built, faults = replace(problem, fixed=dict(design), **stated), list[Fault]()
+    for name, value in asked.tolerances.items():
+        try:
+            replace(built, tolerances={name: value})
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    errors = _errors(len(asked.tolerances), asked.rows, asked.seed, asked.distribution)
+    each = zip(asked.tolerances.items(), errors, strict=True)
     return Study(
-        problem=drawn,
-        columns=columns,
-        title=title or problem.title,
-        seed=seed,
-        report=report,
+        problem=built,
+        columns={name: Column(built.fixed[name] + tolerance * error) for (name, tolerance), error in each},
+        title=asked.title or problem.title,
+        seed=asked.seed,
+        report=asked.report,
         method="monte_carlo",
-        notes=notes,
+        notes=[f"left out, for no drawn design meets it exactly: {', '.join(left_out)}"] if left_out else [],
     )
 
 
@@ -188,31 +182,10 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
         known = opened.about()["definition"]
     try:
         design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.parameter_set.names}
-        design |= study.problem.fixed
-        stated = study.tolerances or study.problem.tolerances
-        drawn = around(
-            study.problem, design, study.rows, study.seed, study.distribution, stated, study.title, study.report
-        )
+        drawn = _drawn(study, {**design, **study.problem.fixed})
     except (InputError, KeyError, TypeError, ValueError):  # of another model, or a design that cannot be drawn around
         return
     check_same(path, drawn)
-
-
-def _as_built(problem: Problem, design: Mapping[str, float]) -> tuple[Problem, tuple[str, ...]]:
-    """A problem with everything fixed and nothing asked that no product can meet; what was left out."""
-    equal = [name for name, condition in problem.conditions.items() if condition.equality]
-    left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
-    notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
-    fixed = replace(
-        problem,
-        fixed=dict(design),
-        free={},
-        start={},
-        tolerances={},
-        locate=None,
-        constraints={n: text for n, text in problem.constraints.items() if n not in equal},
-    )
-    return fixed, notes
 
 
 def _tolerance_faults(problem: Problem, tolerances: Any) -> list[Fault]:
@@ -230,29 +203,9 @@ def _tolerance_faults(problem: Problem, tolerances: Any) -> list[Fault]:
         elif name in problem.scenarios:
             message = f"{name} has a scenario, which a drawn value would not change; leave out one of the two"
             faults.append(Fault(message, key))
-        elif isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        elif not is_number(value) or value <= 0:
             faults.append(Fault(f"found {short(value)}; accepted: a finite number greater than 0", key))
     return faults
-
-
-def _room_faults(drawn: Problem, tolerances: Mapping[str, float]) -> list[Fault]:
-    """Tolerances that take the design out of its physical range."""
-    faults: list[Fault] = []
-    for name, value in tolerances.items():
-        try:
-            replace(drawn, tolerances={name: value})
-        except InputError as error:
-            faults += error.faults
-    return faults
-
-
-def _draw_faults(rows: Any, distribution: Any) -> list[Fault]:
-    found = [*count_faults("rows", rows, 1, MOST_ROWS)]
-    if distribution not in DISTRIBUTIONS:
-        found.append(
-            Fault(f"found {short(distribution)}; {suggest(str(distribution), DISTRIBUTIONS)}", ("distribution",))
-        )
-    return found
 
 
 def _errors(parameters: int, rows: int, seed: int, distribution: str) -> NDArray[np.float64]:

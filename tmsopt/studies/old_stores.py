@@ -7,17 +7,15 @@ import sqlite3
 import zlib
 from collections.abc import Generator
 from contextlib import closing
-from typing import Any
 
 import numpy as np
 
 from tmsopt.files import from_json
-from tmsopt.studies.rows import Part, PartialColumn, Row, columns, full
+from tmsopt.studies.rows import Part, Row, part_of
+from tmsopt.studies.solving import judged_part
 
 _LONGEST = 1_000_000  # characters of a row, or of the head of a block
 _CHUNK = 1000  # rows copied at once
-_STRUCTURES = np.array(["real", "pair"], dtype=object)
-_METHODS = np.array(["none", "omega0", "relation"], dtype=object)
 
 
 def about_of(old: sqlite3.Connection) -> dict[str, str]:
@@ -43,7 +41,7 @@ def parts_of(old: sqlite3.Connection) -> Generator[Part]:
     """
     with closing(old.execute("SELECT data FROM rows ORDER BY number")) as lines:
         while some := lines.fetchmany(_CHUNK):
-            yield columns([Row.from_json(from_json(data, _LONGEST)) for (data,) in some])
+            yield part_of([Row.from_json(from_json(data, _LONGEST)) for (data,) in some])
     if old.execute("SELECT 1 FROM sqlite_schema WHERE name = 'blocks'").fetchall():
         with closing(old.execute("SELECT data FROM blocks ORDER BY first")) as blocks:
             for (data,) in blocks:
@@ -63,24 +61,7 @@ def _part(data: bytes) -> Part:
     """A block: a line of JSON, then the numbers of the rows, then its columns."""
     line, _, rest = data.partition(b"\n")
     head = from_json(line.decode(), _LONGEST)
-    names, count = head["columns"], int(head["rows"])
-    if count < 1 or len(rest) != 8 * count * (1 + len(names)):
-        raise ValueError(f"no {count} rows")
-    whole = np.frombuffer(rest, "<f8", offset=8 * count).reshape(len(names), count)
-    at: dict[str, Any] = dict(zip(names, whole, strict=True))
-    wrong = np.zeros(count, dtype=bool)
-    for name in names:
-        wrong |= name.startswith("violation.") & ~np.isnan(at[name])
-    method = np.where(np.isfinite(at["bound"]), 1 + (at.pop("by_relation") > 0), 0)
-    plain = {
-        "number": np.frombuffer(rest, "<i8", count),
-        "status": np.where(wrong, "infeasible", "optimal").astype(object),
-        "abscissa_realised": at["abscissa"],
-        "structure": _STRUCTURES[at.pop("oscillates").astype(int)],
-        "method": _METHODS[method],
-        "seconds": np.full(count, float(head["seconds"])),
-        "host": np.full(count, head["host"], dtype=object),
-    }
-    some = {name: values for name, values in at.items() if not name.startswith("varied.")}
-    part = {name: full(values) for name, values in (some | plain).items()}
-    return part | {n: PartialColumn(v, ~np.isnan(v)) for n, v in some.items() if n.startswith(("law.", "violation."))}
+    count = int(head["rows"])
+    numbers, *columns = np.frombuffer(rest, "<f8").reshape(-1, count)
+    given = {name: values for name, values in zip(head["columns"], columns, strict=True) if name[:7] != "varied."}
+    return judged_part(numbers.view("<i8"), given, float(head["seconds"]), str(head["host"]))

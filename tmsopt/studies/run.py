@@ -1,7 +1,7 @@
 """A study carried out: rows by an engine, into a store."""
 
 import time
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
@@ -20,10 +20,10 @@ from tmsopt.studies.export import export, gridded
 from tmsopt.studies.files import load_study
 from tmsopt.studies.monte_carlo import Sampling, check_unchanged, planned
 from tmsopt.studies.neighbours import blocks
-from tmsopt.studies.rows import Part, Row, RowTable, columns
+from tmsopt.studies.rows import Part, Row, RowTable, part_of
 from tmsopt.studies.solving import Solver, applies, judged
 from tmsopt.studies.store import Store, open_store, read_store
-from tmsopt.studies.study import Study, definition, names_of
+from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 from tmsopt.versions import SCHEMA
 
@@ -33,10 +33,6 @@ if TYPE_CHECKING:
 
 _COMMIT = 1.0
 """s of rows in one transaction: what a kill may cost, and some 30 times what a transaction takes."""
-
-_WHAT = "solving rows"
-Unit = tuple[int, ...]
-"""Numbers of rows that are solved together: usually one, a block where neighbours start each other."""
 
 _FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
 
@@ -63,12 +59,16 @@ class Results(Printable):
     """
 
     study: Study
-    rows: Sequence[Row] = field(repr=False)
+    rows: RowTable = field(repr=False)
     solved: int
     seconds: float
     engine: str
     found: int = 0
     about: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.rows, RowTable):
+            object.__setattr__(self, "rows", RowTable(self.study, [part_of(self.rows)]))
 
     def column(self, name: str) -> NDArray[Any]:
         """The values of one column, one per row, nan where a row has none: by a header of an exported file.
@@ -79,15 +79,14 @@ class Results(Printable):
         Raises:
             InputError: for a name that no row has.
         """
-        found = columns(self.rows, names_of(self.study))
-        if name not in tuple(found):
-            raise InputError([Fault(f"no column '{name}'; {suggest(name, found)}", ("column",))])
-        return found[name].numbers
+        if name not in self.rows.headers:
+            raise InputError([Fault(f"no column '{name}'; {suggest(name, self.rows.headers)}", ("column",))])
+        return self.rows.values(name)
 
     @property
     def summary(self) -> Summary:
         """What the rows say together: counts, best, spread, causes, and of a Monte Carlo study its shares."""
-        return summary(self.study, self.rows)
+        return summary(self.rows)
 
     def to_frame(self) -> "DataFrame":
         """The rows as a table of pandas, with the headers of an exported file.
@@ -95,7 +94,7 @@ class Results(Printable):
         Raises:
             InputError: where pandas is not installed.
         """
-        return frame({name: column.numbers for name, column in columns(self.rows, names_of(self.study)).items()})
+        return frame({head: self.rows.values(head) for head in self.rows.headers})
 
     def to_xarray(self) -> "Dataset":
         """The rows over the values that vary, of a study whose rows fill a grid.
@@ -103,7 +102,7 @@ class Results(Printable):
         Raises:
             InputError: where they do not, or xarray is not installed.
         """
-        made: Dataset | None = gridded(columns(self.rows, names_of(self.study)))
+        made: Dataset | None = gridded(self.rows)
         if made is None:
             message = f"the {len(self.rows)} rows fill no grid; use to_frame"
             raise InputError([Fault(message, ("study",))])
@@ -118,8 +117,8 @@ class Results(Printable):
     def export(self, path: str | PathLike[str], progress: Listener | None = None) -> None:
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
         about = dict(self.about or {"definition": definition(self.study)})
-        units = units_of(self.study.problem, self.study.report)
-        export(self.rows, path_of(path, "the file to write"), about | {"units": units}, names_of(self.study), progress)
+        about["units"] = units_of(self.study.problem, self.study.report)
+        export(self.rows, path_of(path, "the file to write"), about, progress)
 
 
 def run_study(
@@ -166,20 +165,12 @@ def run_study(
         check_unchanged(stated, store)
     asked = planned(stated, progress)
     if store is None:
-        made, seconds, engine = _carried_out(asked, [], workers, scheduler, note, progress)
-        rows = RowTable(asked, made)
-        return Results(asked, rows, len(rows), seconds, engine)
+        return _completed(asked, None, workers, scheduler, note, progress)
     start_steps(progress, "waiting for the store")
     with open_store(path_of(store, "an SQLite file"), asked, fresh=fresh) as opened:
-        for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
+        for line in opened.warnings:
             note(line)
-        start_steps(progress, "reading the store")
-        there = _held(asked, opened)  # damage is said before any work
-        found = _count(there)
-        if found:
-            note(f"{found} of {len(asked)} rows are in {opened.path}")
-        made, seconds, engine = _carried_out(asked, there, workers, scheduler, note, progress, opened)
-        return Results(asked, RowTable(asked, [*there, *made]), _count(made), seconds, engine, found, opened.about())
+        return _completed(asked, opened, workers, scheduler, note, progress)
 
 
 def stored(study: Study, store: str | PathLike[str]) -> Results:
@@ -193,10 +184,6 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
         return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
 
 
-def _count(parts: Iterable[Part]) -> int:
-    return sum(len(part["number"].values) for part in parts)
-
-
 def _held(study: Study, store: Store) -> list[Part]:
     """All rows of a store.
 
@@ -204,11 +191,10 @@ def _held(study: Study, store: Store) -> list[Part]:
         InputError: for one that the study cannot have, or that is damaged.
     """
     parts = store.parts()
-    for part in parts:
-        for number in part["number"].values[[0, -1]].tolist():
-            if not 0 <= number < len(study):
-                advice = f"--fresh moves the store aside, Store.forget([{number}]) removes the row"
-                raise InputError([Fault(f"row {number} is not of this study; {advice}", file=str(store.path))])
+    for number in (number for part in parts for number in part["number"][[0, -1]].tolist()):
+        if not 0 <= number < len(study):
+            advice = f"--fresh moves the store aside, Store.forget([{number}]) removes the row"
+            raise InputError([Fault(f"row {number} is not of this study; {advice}", file=str(store.path))])
     return parts
 
 
@@ -222,91 +208,80 @@ def _faults(study: object, workers: object, progress: object) -> Iterator[Fault]
     yield from call_faults("progress", progress)
 
 
-def fill(
+def _completed(
     study: Study,
-    store: Store,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Listener | None = None,
-    note: Note = silent,
-) -> tuple[int, float, str]:
-    """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
-    made, seconds, engine = _carried_out(study, _held(study, store), workers, scheduler, note, progress, store)
-    return _count(made), seconds, engine
-
-
-def _carried_out(
-    study: Study,
-    there: Sequence[Part],
+    store: Store | None,
     workers: int | None,
     scheduler: str | None,
     note: Note,
     progress: Listener | None,
-    store: Store | None = None,
-) -> tuple[list[Part], float, str]:
-    """The rows that are not there, in how many seconds, and by which engine; kept in a store as they come."""
-    began, made, engine, steps = time.perf_counter(), list[Part](), "", start_steps(progress, _WHAT, "row")
-    lacks = np.ones(len(study), dtype=bool)
-    for part in there:
-        lacks[part["number"].values] = False
-    count = len(study) - int(lacks.sum())
+) -> Results:
+    """The rows of a store, if there is one, and those that it lacks, which it is given as they come."""
+    parts, lacks, engine = list[Part](), np.ones(len(study), dtype=bool), ""
+    if store is not None:
+        start_steps(progress, "reading the store")
+        parts = _held(study, store)  # damage is said before any work
+        for part in parts:
+            lacks[part["number"]] = False
+    found = count = len(study) - int(lacks.sum())
+    if found and store is not None:
+        note(f"{found} of {len(study)} rows are in {store.path}")
+    began, steps = time.perf_counter(), start_steps(progress, "solving rows", "row")
 
     def keep(part: Part) -> None:
         if store is not None:
-            store.add_part(part)
-        made.append(part)
-        lacks[part["number"].values] = False
+            store.add(part)
+        parts.append(part)
+        lacks[part["number"]] = False
 
-    def tell(more: int) -> None:
+    def show(more: int) -> None:
         nonlocal count
         count += more
         if steps:
             steps(count, len(study))
 
+    if found < len(study):
+        show(0)
+        if applies(study):
+            engine = "in process"
+            for part in judged(study, np.flatnonzero(lacks)):
+                keep(part)
+                show(len(part["number"]))
     if lacks.any():
-        tell(0)
-    if lacks.any() and applies(study):
-        engine = "in process"
-        for part in judged(study, np.flatnonzero(lacks)):
-            keep(part)
-            tell(_count([part]))
-    if lacks.any():
-        rows, engine = _solved(study, set(np.flatnonzero(lacks).tolist()), workers, scheduler, note)
-        fresh, last = list[Row](), time.perf_counter()
+        left, fresh, last = set(np.flatnonzero(lacks).tolist()), list[Row](), time.perf_counter()
+        executor, engine = _engine(len(left), workers, scheduler, note)
         try:
-            with closing(rows):
+            with closing(_rows(study, left, executor, note)) as rows:
                 for row in rows:
                     if lacks[row.number]:  # a block may be stored in part
                         fresh.append(row)
-                        tell(1)
-                    if time.perf_counter() - last >= _COMMIT:
-                        keep(columns(fresh))
+                        show(1)
+                    if fresh and time.perf_counter() - last >= _COMMIT:
+                        keep(part_of(fresh))
                         fresh, last = [], time.perf_counter()
         finally:
             if fresh:
-                keep(columns(fresh))  # interrupted or not, what was solved is kept
-    return made, time.perf_counter() - began if engine else 0.0, engine
+                keep(part_of(fresh))  # interrupted or not, what was solved is kept
+    seconds = time.perf_counter() - began if engine else 0.0
+    about = {} if store is None else store.about()
+    return Results(study, RowTable(study, parts), count - found, seconds, engine, found, about)
 
 
-def _solved(
-    study: Study, left: set[int], workers: int | None, scheduler: str | None, note: Note
-) -> tuple[Generator[Row], str]:
-    """Rows as they come, and the name of the engine."""
-    count = workers or (1 if len(left) <= _FEW else cores())
+def _engine(count: int, workers: int | None, scheduler: str | None, note: Note) -> tuple[Executor, str]:
+    """Who solves so many rows, and its name."""
+    workers = workers or (1 if count <= _FEW else cores())
     if scheduler is not None:
-        return _rows(study, left, cluster(scheduler, note), note), scheduler
-    if count == 1:
-        return _rows(study, left, here(), note), "in process"
-    return _rows(study, left, processes(count, note), note), f"{count} processes"
+        return cluster(scheduler, note), scheduler
+    return (here(), "in process") if workers == 1 else (processes(workers, note), f"{workers} processes")
 
 
 def _rows(study: Study, left: set[int], executor: Executor, note: Note) -> Generator[Row]:
     """Rows as they come. A block that ends its worker is taken apart, a row that does is quarantined."""
-    solver, units = Solver(study), list(_units(study, left))
+    every = blocks(study) if study.warm else [(number,) for number in sorted(left)]
+    solver, units = Solver(study), [unit for unit in every if not left.isdisjoint(unit)]
     with executor:
         while units:
-            taken_apart: list[Unit] = []
+            taken_apart: list[tuple[int, ...]] = []
             with closing(executor.map(solver, units)) as answers:
                 for place, answer in answers:
                     unit = units[place]
@@ -319,10 +294,3 @@ def _rows(study: Study, left: set[int], executor: Executor, note: Note) -> Gener
                         cause = f" ({answer.cause})" if answer.cause else ""
                         yield solver.lost(unit[0], f"ended its worker twice{cause}")
             units = taken_apart
-
-
-def _units(study: Study, left: set[int]) -> Iterable[Unit]:
-    """What is left to be solved; a block of neighbours as a whole."""
-    if study.warm:
-        return (block for block in blocks(study) if not left.isdisjoint(block))
-    return ((number,) for number in sorted(left))

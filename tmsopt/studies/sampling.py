@@ -60,10 +60,16 @@ def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
     Raises:
         InputError: for more rows than a study may have, or an axis that is no list of numbers.
     """
-    lists = {name: _axis(name, values) for name, values in axes.items()}
-    check_size([len(values) for values in lists.values()])
-    crossed = np.meshgrid(*lists.values(), indexing="ij")
-    return {name: Column(values.ravel()) for name, values in zip(lists, crossed, strict=True)}
+    lists = list[Array]()
+    for name, values in axes.items():
+        numbers = column_of_numbers(values)
+        if numbers is None or not numbers.size:
+            message = f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]"
+            raise InputError([Fault(message, (name,))])
+        lists.append(numbers)
+    check_size([len(numbers) for numbers in lists])
+    crossed = np.meshgrid(*lists, indexing="ij")
+    return {name: Column(column.ravel()) for name, column in zip(axes, crossed, strict=True)}
 
 
 def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
@@ -119,14 +125,18 @@ def sobol_note(rows: int) -> str:
     return f"a Sobol sample is evenly balanced for a power of 2; {rows} rows are not, {near} would be"
 
 
+def most_rows(columns: int) -> int:
+    """Of a study with so many columns."""
+    return min(MOST_ROWS, MOST_NUMBERS // max(1, columns))
+
+
 def check_size(sizes: Sequence[int]) -> None:
     """Refuse a grid with more rows than a study may have, before they are made.
 
     Raises:
         InputError: saying how many there would be.
     """
-    most = min(MOST_ROWS, MOST_NUMBERS // max(1, len(sizes)))
-    if math.prod(sizes) > most:
+    if math.prod(sizes) > (most := most_rows(len(sizes))):
         found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
         raise InputError([Fault(f"found {found}; accepted: up to {most}; take fewer points", ("columns",))])
 
@@ -148,14 +158,14 @@ def span_faults(name: str, span: Span) -> Iterator[Fault]:
         yield Fault(f"from {low:.6g} to {high:.6g} is wider than a double can hold; narrow it", key)
 
 
-def _axis(name: str, values: Any) -> Array:
+def column_of_numbers(values: Any) -> Array | None:
+    """What a user gave as an array of doubles; None where it is no list of numbers."""
     try:
-        array = np.asarray(values, dtype=np.float64)
+        array = np.asarray(None if isinstance(values, str | bytes | Mapping) else values)
+        numbers = array.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
-        array = np.zeros((0, 0))
-    if array.ndim != 1 or not array.size:
-        raise InputError([Fault(f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", (name,))])
-    return array
+        return None
+    return numbers if array.ndim == 1 and (array.dtype.kind in "fiu" or not array.size) else None
 
 
 def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
@@ -171,8 +181,7 @@ def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
             found.append(Fault(f"found {short(stated)}; accepted: {accepted}", ("ranges", name)))
     if not ranges:
         found.append(Fault("nothing varies; give a range", ("ranges",)))
-    most = min(MOST_ROWS, MOST_NUMBERS // max(1, len(ranges)))
-    found += [*count_faults("rows", rows, 1, most), *count_faults("seed", seed, 0)]
+    found += [*count_faults("rows", rows, 1, most_rows(len(ranges))), *count_faults("seed", seed, 0)]
     if found:
         raise InputError(found)
     return spans

@@ -2,10 +2,11 @@
 is free.
 """
 
+import math
 import platform
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
@@ -14,17 +15,17 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from tmsopt.errors import InputError
-from tmsopt.evaluation.columns import BLOCK, Verdicts, judgeable, verdicts
+from tmsopt.evaluation.columns import BLOCK, judgeable, verdicts
 from tmsopt.evaluation.law_rows import law_rows
 from tmsopt.models import tms
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text
-from tmsopt.records import Table
+from tmsopt.records import Array, Table
 from tmsopt.search.multistart import same_objective
 from tmsopt.search.solve import solve
 from tmsopt.search.workspace import Family
 from tmsopt.studies.neighbours import blocks
-from tmsopt.studies.rows import Part, PartialColumn, Row, RowTable, full, header
+from tmsopt.studies.rows import PREFIXES, Part, Row, blank, column_of, header
 from tmsopt.studies.study import Study
 
 _AFAR = 1
@@ -46,10 +47,8 @@ def solve_row(study: Study, number: int) -> SolvedRow:
         InputError: for a row that the study has not.
     """
     study.varied(number)
-    solver = Solver(study)
     unit = next((block for block in blocks(study) if number in block), ()) if study.warm else (number,)
-    answer = next(answer for answer in solver.answers(unit) if answer.row.number == number)
-    return replace(answer, row=judged_alone(study, number) or answer.row)
+    return next(answer for answer in Solver(study).answers(unit) if answer.row.number == number)
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ class Solver:
 
     def lost(self, number: int, cause: str) -> Row:
         """A row that ended its worker."""
-        return self._unsolved(number, "quarantined", cause)
+        return self._row(number, status="quarantined", cause=cause)
 
     def __getstate__(self) -> dict[str, Any]:
         return {"study": self.study}
@@ -114,65 +113,52 @@ class Solver:
 
     def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> SolvedRow:
         """One row, near a neighbour's optimum and from so many starts afar if that leads to an optimum."""
-        began = time.perf_counter()
+        began, solution = time.perf_counter(), None
         try:
             problem = self.study.row_problem(number)
             options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False, "family": self._family}
             # What takes longer than the rest of a row without a design is left out, and Ctrl-C is for the whole study.
             options |= {"alone": False, "stability": 0.0, "interruptible": False}
-            solution = None
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
                 solution = solve(problem, starts=1 + afar, near=near, **options)
             warm = solution is not None and solution.status == "optimal"
             if solution is None or not warm:
                 solution = solve(problem, starts=self.study.starts, **options)
-            row = self._solved(number, solution, warm)
+            found = _fields(solution, self.study.report) | {"warm": warm}
         except InputError as error:
-            cause = "; ".join(str(fault) for fault in error.faults)
-            return SolvedRow(self._unsolved(number, "failed", cause, began))
+            found = {"status": "failed", "cause": "; ".join(str(fault) for fault in error.faults)}
         except Exception as error:  # a row that breaks the program must not end a study
-            return SolvedRow(self._unsolved(number, "failed", f"{type(error).__name__}: {error}", began))
-        return SolvedRow(replace(row, seconds=time.perf_counter() - began), solution)
+            found = {"status": "failed", "cause": f"{type(error).__name__}: {error}"}
+        return SolvedRow(self._row(number, seconds=time.perf_counter() - began, **found), solution)
 
-    def _unsolved(self, number: int, status: str, cause: str, began: float | None = None) -> Row:
-        return Row(
-            number=number,
-            seed=self.study.seed_of(number),
-            varied=self.study.varied(number),
-            status=status,
-            cause=cause,
-            seconds=0.0 if began is None else time.perf_counter() - began,
-            host=platform.node(),
-        )
+    def _row(self, number: int, **found: Any) -> Row:
+        given, seed = self.study.varied(number), self.study.seed_of(number)
+        return Row(number, seed, given, host=platform.node(), **found)
 
-    def _solved(self, number: int, solution: Solution, warm: bool) -> Row:
-        problem, bound = solution.problem, solution.bound
-        values = problem.values(solution.parameters)
-        reports = {text: float(problem.read(text)(values)) for text in self.study.report}
-        return Row(
-            number=number,
-            seed=self.study.seed_of(number),
-            varied=self.study.varied(number),
-            status=solution.status,
-            cause=_cause(solution),
-            objective=solution.value,
-            abscissa=solution.abscissa,
-            abscissa_realised=solution.abscissa_realised,
-            damping_ratio=solution.quantities["damping_ratio"],
-            structure=solution.structure,
-            parameters=solution.parameters,
-            reports=Table(reports),
-            bound=bound.value,
-            gap=bound.gap,
-            proven=bound.proven,
-            method=bound.method,
-            laws=Table(_laws(solution)),
-            violations=solution.violations,
-            starts=solution.starts.tried,
-            warm=warm,
-            host=platform.node(),
-        )
+
+def _fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
+    """What a row says of its solution."""
+    problem, bound = solution.problem, solution.bound
+    values = problem.values(solution.parameters)
+    return {
+        "status": solution.status,
+        "cause": _cause(solution),
+        "objective": solution.value,
+        "abscissa": solution.abscissa,
+        "abscissa_realised": solution.abscissa_realised,
+        "damping_ratio": solution.quantities["damping_ratio"],
+        "structure": solution.structure,
+        "parameters": solution.parameters,
+        "reports": Table({text: float(problem.read(text)(values)) for text in report}),
+        "bound": bound.value,
+        "gap": bound.gap,
+        "proven": bound.proven,
+        "method": bound.method,
+        "laws": Table(_laws(solution)),
+        "violations": Table({n: math.inf if math.isnan(x) else x for n, x in solution.violations.items()}),
+        "starts": solution.starts.tried,
+    }
 
 
 @cache
@@ -211,9 +197,7 @@ def _laws(solution: Solution) -> Mapping[str, float]:
     return {row.name: row.relative for row in law_rows(solution) if row.applies}
 
 
-_STATUS = np.array(["optimal", "infeasible"], dtype=object)
-_STRUCTURES = np.array(["real", "pair"], dtype=object)
-_METHODS = np.array(["none", "omega0", "relation"], dtype=object)
+_JUDGED = ("objective", "abscissa", "damping_ratio", "bound", "gap", "oscillates", "by_relation")
 
 
 def applies(study: Study) -> bool:
@@ -235,39 +219,29 @@ def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
         if found is None:
             return
         if found.certain.any():
-            yield _part(some[found.certain], found, (time.perf_counter() - began) / len(some))
+            tables = {"reports": found.reports, "laws": found.laws, "violations": found.violations}
+            each = {name: getattr(found, name) for name in _JUDGED}
+            each |= {header(name, key): values for name, table in tables.items() for key, values in table.items()}
+            columns = {name: values[found.certain] for name, values in each.items()}
+            yield judged_part(some[found.certain], columns, (time.perf_counter() - began) / len(some), platform.node())
 
 
-def judged_alone(study: Study, number: int) -> Row | None:
-    """One row as among others; None where it is to be solved."""
-    parts = list(judged(study, np.array([number]))) if applies(study) else []
-    return RowTable(study, parts)[0] if parts else None
+def judged_part(numbers: NDArray[np.int64], given: dict[str, Array], seconds: float, host: str) -> Part:
+    """Columns of rows that were judged at once.
 
-
-def _part(numbers: NDArray[np.int64], found: Verdicts, seconds: float) -> Part:
-    """Columns; a violation or a law that does not apply is nan."""
-    certain, count = found.certain, len(numbers)
-    violations = {name: values[certain] for name, values in found.violations.items()}
-    wrong = np.logical_or.reduce([~np.isnan(values) for values in violations.values()] or [np.zeros(count, dtype=bool)])
-    bound, abscissa = found.bound[certain], full(found.abscissa[certain])
-    method = np.where(np.isfinite(bound), 1 + found.by_relation[certain], 0)
-    plain = {
-        "number": numbers,
-        "status": _STATUS[wrong.astype(int)],
-        "objective": found.objective[certain],
-        "damping_ratio": found.damping_ratio[certain],
-        "structure": _STRUCTURES[found.oscillates[certain].astype(int)],
-        "bound": bound,
-        "gap": found.gap[certain],
-        "method": _METHODS[method],
-        "seconds": np.full(count, seconds),
-        "host": np.full(count, platform.node(), dtype=object),
+    Args:
+        given: header → numbers; and ``oscillates`` and ``by_relation``, from which structure and method follow.
+    """
+    wrong = np.zeros(len(numbers), dtype=bool)
+    for name, values in given.items():
+        wrong |= name.startswith(PREFIXES["violations"]) & ~np.isnan(values)
+    method = np.where(np.isfinite(given["bound"]), 1 + given.pop("by_relation"), 0)
+    texts = {
+        "status": (("optimal", "infeasible"), wrong),
+        "structure": (("real", "pair"), given.pop("oscillates")),
+        "method": (("none", "omega0", "relation"), method),
+        "host": ((host,), 0 * method),
     }
-    part = {name: full(values) for name, values in plain.items()} | {
-        "abscissa": abscissa,
-        "abscissa_realised": abscissa,
-    }
-    part |= {header("reports", text): full(values[certain]) for text, values in found.reports.items()}
-    laws = {header("laws", label): values[certain] for label, values in found.laws.items()}
-    some = laws | {header("violations", name): values for name, values in violations.items()}
-    return part | {head: PartialColumn(values, ~np.isnan(values)) for head, values in some.items()}
+    made = blank(len(numbers)) | given | {"number": numbers, "abscissa_realised": given["abscissa"]}
+    made["seconds"] = np.full(len(numbers), seconds)
+    return made | {name: column_of(words, str)[which.astype(int)] for name, (words, which) in texts.items()}

@@ -19,8 +19,6 @@ from tmsopt.errors import (
     table_faults,
     text_faults,
 )
-from tmsopt.evaluation.law_rows import LAWS
-from tmsopt.models import tms
 from tmsopt.problem.cases import Band
 from tmsopt.problem.expression import ExpressionError
 from tmsopt.problem.files import Given, as_problem
@@ -28,7 +26,7 @@ from tmsopt.problem.limit import limit_of, with_limit
 from tmsopt.problem.problem import Problem, question_faults
 from tmsopt.program.options import STARTS
 from tmsopt.records import Array, Column, Table
-from tmsopt.studies.sampling import MOST_ROWS, grid
+from tmsopt.studies.sampling import MOST_ROWS, column_of_numbers, grid
 
 _SEEDS = 2**31
 
@@ -113,8 +111,8 @@ class Study:
         Raises:
             InputError: for a row that cannot be posed, such as one with lambda_s.min above lambda_s.max.
         """
-        fixed, constraints = dict(self.problem.fixed), dict(self.problem.constraints)
-        ends = {name: list(pair) for name, pair in self.problem.free.items()}
+        problem = self.problem
+        fixed, free, constraints = dict(problem.fixed), dict(problem.free), dict(problem.constraints)
         for name, value in self.varied(row).items():
             stem, _, end = name.rpartition(".")
             if not stem:
@@ -122,10 +120,10 @@ class Study:
             elif end == "limit":
                 constraints[stem] = with_limit(constraints[stem], value)
             else:
-                ends[stem][("min", "max").index(end)] = value
-        free = {name: (low, high) for name, (low, high) in ends.items()}
-        start = {name: min(max(value, free[name][0]), free[name][1]) for name, value in self.problem.start.items()}
-        return replace(self.problem, fixed=fixed, free=free, constraints=constraints, start=start)
+                low, high = free[stem]
+                free[stem] = (value, high) if end == "min" else (low, value)
+        start = {name: min(max(value, free[name][0]), free[name][1]) for name, value in problem.start.items()}
+        return replace(problem, fixed=fixed, free=free, constraints=constraints, start=start)
 
     def seed_of(self, row: int) -> int:
         """The seed of a row's starts, by which the row can be solved alone."""
@@ -170,19 +168,6 @@ def over_grid(
     )
 
 
-def names_of(study: Study) -> dict[str, tuple[str, ...]]:
-    """Table of a row, such as ``laws`` → the names that rows of a study may have in it."""
-    problem = study.problem
-    pattern = (problem.pattern.name,) if problem.pattern else ()
-    return {
-        "varied": tuple(study.columns),
-        "parameters": problem.parameter_set.names,
-        "reports": tuple(study.report),
-        "laws": LAWS if problem.model is tms else (),
-        "violations": (*problem.constraints, *pattern, "a0", "coefficients"),
-    }
-
-
 def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
     """Everything that the rows of a study follow from, for ``json.dumps``; titles and notes are left out.
 
@@ -192,9 +177,13 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
     Args:
         column: what is made of a column that is no axis of a grid; lists take four times the memory.
     """
+    if study.grid_shape is None:
+        columns: dict[str, Any] = {"columns": {name: column(values) for name, values in study.columns.items()}}
+    else:
+        columns = {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
     return {
         "problem": _problem(study.problem),
-        **_columns(study, column),
+        **columns,
         "seed": int(study.seed),
         "starts": int(study.starts),
         "warm": study.warm,
@@ -202,23 +191,20 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
     }
 
 
-def _columns(study: Study, column: Callable[[Sequence[float]], Any]) -> dict[str, Any]:
-    if study.grid_shape is None:
-        return {"columns": {name: column(values) for name, values in study.columns.items()}}
-    return {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
-
-
 def _problem(problem: Problem) -> dict[str, Any]:
-    asked = {"minimize": problem.minimize, "maximize": problem.maximize, "locate": problem.locate}
     tables: dict[str, dict[str, Any]] = {
-        "fixed": _floats(problem.fixed),
-        "free": {name: [float(low), float(high)] for name, (low, high) in problem.free.items()},
+        "fixed": dict(problem.fixed),
+        "free": {name: list(ends) for name, ends in problem.free.items()},
         "constraints": dict(problem.constraints),
-        "scenarios": {name: _scenario(s) for name, s in problem.variations.items()},
-        "tolerances": _floats(problem.tolerances),
-        "weights": _floats(problem.weights),
-        "start": _floats(problem.start),
+        "scenarios": {
+            name: {"min": float(s.min), "max": float(s.max), "points": s.points} if isinstance(s, Band) else list(s)
+            for name, s in problem.variations.items()
+        },
+        "tolerances": dict(problem.tolerances),
+        "weights": dict(problem.weights),
+        "start": dict(problem.start),
     }
+    asked = {sense: getattr(problem, sense) for sense in ("minimize", "maximize", "locate")}
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
         "parameters": problem.parameter_set.name,
@@ -226,16 +212,6 @@ def _problem(problem: Problem) -> dict[str, Any]:
         **tables,
         "order": {name: list(table) for name, table in tables.items() if len(table) > 1 and name != "fixed"},
     }
-
-
-def _floats(table: Any) -> dict[str, float]:
-    return {name: float(value) for name, value in table.items()}
-
-
-def _scenario(scenario: Band | tuple[float, ...]) -> Any:
-    if isinstance(scenario, Band):
-        return {"min": float(scenario.min), "max": float(scenario.max), "points": scenario.points}
-    return [float(value) for value in scenario]
 
 
 # What is wrong with a study
@@ -299,66 +275,43 @@ def name_faults(problem: Problem) -> Callable[[Any], str]:
 
 
 def _column_faults(study: Stated) -> Iterator[Fault]:
-    columns = study.columns
-    if not columns:
+    if not study.columns:
         accepted = " ".join(variable_names(study.problem))
         yield Fault(f"nothing varies; give at least one column, of: {accepted}", ("columns",))
+        return
     lengths: dict[str, int] = {}
     wrong_with = name_faults(study.problem)
-    for name, values in columns.items():
-        key = ("columns", str(name))
+    for name, values in study.columns.items():
+        key, column = ("columns", str(name)), column_of_numbers(values)
         if wrong := wrong_with(name):
             yield Fault(wrong, key)
-        array = _numbers(values)
-        if array is None:
+        if column is None:
             yield Fault(f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", key)
             continue
-        lengths[name] = len(array)
-        if bad := np.flatnonzero(~np.isfinite(array)).tolist():
+        lengths[name] = len(column)
+        if bad := np.flatnonzero(~np.isfinite(column)).tolist():
             more = f" and {len(bad) - 1} more rows" if len(bad) > 1 else ""
-            yield Fault(f"found {array[bad[0]]} in row {bad[0]}{more}; accepted: finite numbers", key)
-    if len(set(lengths.values())) > 1:
+            yield Fault(f"found {column[bad[0]]} in row {bad[0]}{more}; accepted: finite numbers", key)
+    rows = next(iter(lengths.values()), 1)
+    if set(lengths.values()) - {rows}:
         found = ", ".join(f"{name} has {length}" for name, length in lengths.items())
         yield Fault(f"columns of different lengths: {found}; give every column one value per row", ("columns",))
-    elif lengths:
-        rows = next(iter(lengths.values()))
-        if not 1 <= rows <= MOST_ROWS:
-            yield Fault(f"found {rows} rows; accepted: 1 to {MOST_ROWS}", ("columns",))
-        elif study.grid_shape is not None and len(lengths) == len(columns):
-            yield from _shape_faults(study, rows)
+    elif not 1 <= rows <= MOST_ROWS:
+        yield Fault(f"found {rows} rows; accepted: 1 to {MOST_ROWS}", ("columns",))
+    elif study.grid_shape is not None and len(lengths) == len(study.columns) and not _fills_grid(study):
+        accepted = f"an entry for each column in turn: {', '.join(study.columns)}"
+        message = f"found {short(study.grid_shape)} for {rows} rows; accepted: {accepted}, of a grid with the last axis"
+        yield Fault(f"{message} fastest; see over_grid", ("grid_shape",))
 
 
-def _numbers(values: Any) -> Any:
-    """A column as an array of doubles; None where it is something else."""
-    if isinstance(values, str | bytes | Mapping):
-        return None
-    try:
-        array = np.asarray(values)
-        if array.dtype.kind not in "fiu" and array.size:
-            return None
-        array = array.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return array if array.ndim == 1 else None
-
-
-def _shape_faults(study: Stated, rows: int) -> Iterator[Fault]:
+def _fills_grid(study: Stated) -> bool:
     """Whether the columns are what the grid's shape says."""
-    shape, key = study.grid_shape, ("grid_shape",)
-    if not isinstance(shape, Mapping) or tuple(shape) != tuple(study.columns):
-        found = tuple(shape) if isinstance(shape, Mapping) else shape
-        yield Fault(
-            f"found {short(found)}; accepted: an entry for each column in turn: {', '.join(study.columns)}", key
-        )
-        return
-    sizes = tuple(shape.values())
-    if any(count_faults("points", n, 1) for n in sizes) or math.prod(sizes) != rows:
-        yield Fault(f"found {' x '.join(map(str, sizes))} for {rows} rows; accepted: sizes with that product", key)
-        return
-    for axis, (name, values) in enumerate(study.columns.items()):
-        block = np.moveaxis(np.asarray(values, dtype=np.float64).reshape(sizes), axis, 0).reshape(sizes[axis], -1)
-        if np.any(block != block[:, :1]):
-            yield Fault(f"{name} is not that of a grid of this shape, the last axis fastest; see over_grid", key)
+    shape = study.grid_shape
+    if not isinstance(shape, Mapping) or list(shape) != list(study.columns):
+        return False
+    if any(count_faults("points", n, 1) for n in shape.values()) or math.prod(shape.values()) != len(study):
+        return False
+    return all(np.array_equal(column, study.columns[name]) for name, column in grid(study.axes).items())
 
 
 def _option_faults(study: Stated) -> Iterator[Fault]:
@@ -377,8 +330,8 @@ def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iter
     """What is wrong with the seed, the starts and the report of a study."""
     yield from count_faults("seed", seed, 0)
     yield from count_faults("starts", starts, 1, MOST_STARTS)
-    if isinstance(report, str) or not isinstance(report, Sequence):
-        yield Fault(f"found {short(report)}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
+    if wrong := list_faults("report", report, "['nu_H', '2*Fr_c']"):
+        yield from wrong
         return
     if len(report) > MOST_REPORTED:
         yield Fault(f"found {len(report)} expressions; accepted: up to {MOST_REPORTED}", ("report",))

@@ -3,20 +3,17 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from tmsopt.problem import rate_of
-from tmsopt.records import Array, Table, Truth, plain
-from tmsopt.studies.rows import PREFIXES, STATUSES, PartialColumn, Row, RowTable, columns
-from tmsopt.studies.study import Study
+from tmsopt.records import Array, Table, plain
+from tmsopt.studies.rows import STATUSES, Row, RowTable, header
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-LAW = PREFIXES["laws"]
-_Z = 1.959963984540054  # of the normal distribution, 97.5 % below
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,12 @@ class Share:
     @property
     def interval(self) -> tuple[float, float]:
         """Least and greatest share that the count speaks for."""
-        return wilson(self.count, self.of)
+        from scipy.stats import binomtest
+
+        if not self.of:
+            return 0.0, 1.0
+        found = binomtest(self.count, self.of).proportion_ci(method="wilson")
+        return float(found.low), float(found.high)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -113,99 +115,74 @@ class Summary:
         }
 
 
-def summary(study: Study, rows: Iterable[Row]) -> Summary:
+def summary(rows: RowTable) -> Summary:
     """The rows of a study, read once."""
-    known = rows if isinstance(rows, Sequence) else list(rows)
-    table = columns(known)
-    values = {name: table[name].values for name in ("status", "objective", "abscissa", "structure", "proven", "warm")}
-    status, objective = values["status"], values["objective"]
+    study, problem = rows.study, rows.study.problem
+    status, structure = rows.values("status"), rows.values("structure")
+    values = {name: rows.values(name) for name in ("objective", "abscissa")}
     counts, optimal = Counter(status.tolist()), status == "optimal"
-    clocked = _clocked(study, table, values)
-    judged = clocked.get("objective", objective)
-    ranked = np.flatnonzero(optimal & np.isfinite(judged))
-    best = ranked[np.argmin(study.problem.sign * judged[ranked])] if ranked.size else None
-    answered = optimal | (status == "infeasible")
-    quantiles = study.method == "monte_carlo" and "abscissa" in clocked
-    in_seconds: dict[str, tuple[float, ...]] = {n: ends for n, x in clocked.items() if (ends := _ends(x[optimal]))}
-    in_seconds |= {"quantiles": tuple(_quantiles(clocked["abscissa"][answered]))} if quantiles else {}
-    laws = {
-        name.removeprefix(LAW): float(np.fmax.reduce(np.abs(column.values[column.present]), initial=0.0))
-        for name, column in table.items()
-        if name.startswith(LAW)
-    }
+    clocked = _clocked(rows, values)
+    ranked = np.flatnonzero(optimal & np.isfinite(judged := clocked.get("objective", values["objective"])))
+    best = rows[int(ranked[np.argmin(problem.sign * judged[ranked])])] if ranked.size else None
+    spreads = [{n: ends for n, x in some.items() if (ends := _ends(x[optimal]))} for some in (values, clocked)]
+    in_seconds: dict[str, tuple[float, ...]] = dict(spreads[1])
+    product = None
+    if study.method == "monte_carlo":
+        product = yield_of(rows)
+        if "abscissa" in clocked:
+            in_seconds["quantiles"] = _quantiles(clocked["abscissa"][optimal | (status == "infeasible")])
+    laws = {key: rows.column(head).compressed() for head, (name, key) in rows.headers.items() if name == "laws"}
     return Summary(
         rows=len(study),
         counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
-        best=None if best is None else known[int(best)],
-        causes=_causes(known),
-        spread=Table({n: ends for n in ("objective", "abscissa") if (ends := _ends(values[n][optimal]))}),
-        stable=int(_stable(table).sum()),
-        structures=_ranked(values["structure"][optimal].tolist()),
-        proven=int(values["proven"].sum()),
-        warm=int(values["warm"].sum()),
-        laws=Table(laws),
-        seconds=float(table["seconds"].values.sum()),
-        product=yield_of(known) if study.method == "monte_carlo" else None,
+        best=best,
+        causes=_causes(rows),
+        spread=Table(spreads[0]),
+        stable=int(rows.column("stable").sum() or 0),
+        structures=Table(dict(Counter(structure[optimal].tolist()).most_common())),
+        proven=int(rows.values("proven").sum()),
+        warm=int(rows.values("warm").sum()),
+        laws=Table({name: float(np.abs(residuals).max()) for name, residuals in laws.items() if residuals.size}),
+        seconds=float(rows.values("seconds").sum()),
+        product=product,
         clocked=Table(in_seconds),
     )
 
 
-def _clocked(study: Study, table: Mapping[str, PartialColumn], values: Mapping[str, Array]) -> dict[str, Array]:
+def _clocked(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
     """Objective and abscissa of every row in 1/s, where they are per √(g/w) and a second is known: w may differ."""
-    problem, found = study.problem, {}
-    parameters = {n: table[n].values for n in problem.parameter_set.names if n in table}
+    problem, found = rows.study.problem, {}
+    parameters = {name: rows.values(header("parameters", name)) for name in problem.parameter_set.names}
     for name, text in (("objective", problem.minimize or problem.maximize), ("abscissa", "abscissa")):
-        if text and parameters and (rates := rate_of(problem, text, parameters)) is not None:
+        if text and (rates := rate_of(problem, text, parameters)) is not None:
             found[name] = values[name] * rates
     return found
 
 
-def _stable(table: Mapping[str, PartialColumn]) -> Truth:
-    column = table["stable"]
-    return np.asarray(column.values.astype(bool) & column.present)
-
-
-def _causes(rows: Sequence[Row]) -> Table[int]:
-    each = ((row.cause, 1) for row in rows if row.status != "optimal")
-    alike: dict[str, list[tuple[str, int]]] = {}
-    for text, count in rows.causes() if isinstance(rows, RowTable) else each:
-        alike.setdefault(_NUMBER.sub("#", text), []).append((text, count))
-    counted = [(same[0][0], sum(count for _, count in same)) for same in alike.values()]
-    ranked = sorted(counted, key=lambda pair: pair[1], reverse=True)
-    return Table({text if count == 1 else _AMOUNT.sub("", text): count for text, count in ranked})
-
-
-def _ranked(names: Iterable[str]) -> Table[int]:
-    return Table(dict(Counter(names).most_common()))
+def _causes(rows: RowTable) -> Table[int]:
+    alike: dict[str, list[str]] = {}
+    for text in rows.values("cause")[rows.values("status") != "optimal"].tolist():
+        alike.setdefault(_NUMBER.sub("#", text), []).append(text)
+    ranked = sorted(alike.values(), key=len, reverse=True)
+    return Table({texts[0] if len(texts) == 1 else _AMOUNT.sub("", texts[0]): len(texts) for texts in ranked})
 
 
 def _ends(values: Array) -> tuple[float, float, float] | None:
-    known = np.sort(values[np.isfinite(values)])
-    return (float(known[0]), float(np.median(known)), float(known[-1])) if known.size else None
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(np.median(known)), float(known.max())) if known.size else None
 
 
-def yield_of(rows: Iterable[Row]) -> Yield:
+def yield_of(rows: RowTable) -> Yield:
     """Shares of stable and feasible rows, and quantiles of their abscissa."""
-    table = columns(rows)
-    status, abscissa, stable = table["status"].values, table["abscissa"].values, _stable(table)
+    status, stable = rows.values("status"), rows.column("stable").filled(False)
     feasible = status == "optimal"
     answered = feasible | (status == "infeasible")
     most = int(answered.sum())
-    at = dict(zip((f"{q:g}" for q in QUANTILES), _quantiles(abscissa[answered]), strict=False))
+    at = zip((f"{q:g}" for q in QUANTILES), _quantiles(rows.values("abscissa")[answered]), strict=False)
     shares = [Share(int((of & answered).sum()), most) for of in (stable, feasible, stable & feasible)]
-    return Yield(shares[0], shares[1], shares[2], len(status) - most, Table(at))
+    return Yield(shares[0], shares[1], shares[2], len(status) - most, Table(dict(at)))
 
 
-def _quantiles(abscissa: Array) -> list[float]:
+def _quantiles(abscissa: Array) -> tuple[float, ...]:
     known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa))
-    return [float(known[max(math.ceil(q * len(known)) - 1, 0)]) for q in QUANTILES if len(known)]
-
-
-def wilson(count: int, of: int, z: float = _Z) -> tuple[float, float]:
-    """The score interval of a share (E. B. Wilson, J. Am. Stat. Assoc. 22, 209, 1927); 0 to 1 of none."""
-    if of == 0:
-        return 0.0, 1.0
-    share, square = count / of, z * z
-    middle = (share + square / (2 * of)) / (1 + square / of)
-    half = z / (1 + square / of) * math.sqrt(share * (1 - share) / of + square / (4 * of * of))
-    return (0.0 if count == 0 else middle - half), (1.0 if count == of else middle + half)
+    return tuple(float(known[max(math.ceil(q * len(known)) - 1, 0)]) for q in QUANTILES if len(known))

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.records import Array, Truth
-from tmsopt.tracing.solving import crossing, evaluated, rows_of
+from tmsopt.tracing.solving import Rows, crossing, evaluated, rows_of
 
 _CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
 _CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
@@ -137,9 +137,13 @@ def _even(matrix: Array, axis: int) -> Array:
 
 def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
     """Follow the curve from y in the direction t until a limit, a closed loop, infinity, or `most` points."""
-    advance = _Advance(on, y)
-    ys, ts = [y], [t]
-    s, reach = step / 4, _reach(on, y, t)
+
+    def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
+        new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), origin[None])
+        return new[0], tangent[0], *checks[0].tolist()
+
+    origin, ys, ts, step_from = y, [y], [t], Rows(on.advance, 1)
+    s, reach = step / 4, advance(y, t, 0.0)[6]
     while len(ys) < most:
         s = min(s, step * reach)
         while True:
@@ -149,10 +153,10 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
             s /= 2
             if s < _SMALLEST:
                 return _ended(ys, ts, End(INFINITE if np.abs(y).max() > _FADING else SINGULAR))
-        if len(ys) > 2 and 0 < ahead <= s and far <= 2 * s and advance.returns(y, t, ahead):
+        if len(ys) > 2 and 0 < ahead <= s and far <= 2 * s and _alike(advance(y, t, ahead)[0], origin):
             return _ended([*ys, ys[0]], [*ts, ts[0]], End(CLOSED))
         if slack < 0 and not _along(on, new, tangent):
-            last, direction, end = _at_limit(on, advance, y, t, s)
+            last, direction, end = _at_limit(on, y, t, s)
             return _ended([*ys, last], [*ts, direction], end)
         ys.append(new)
         ts.append(tangent)
@@ -194,7 +198,7 @@ def contains(on: Curve, walked: Walk, y: Array) -> Truth:
     if np.any(there):
         k, y = k[there], y[there]
         new, _ = between(on, walked.y[k], walked.t[k], np.sum(walked.t[k] * (y - walked.y[k]), axis=1))
-        there[there] = np.abs(new - y).max(axis=1) <= _SAME * (1 + np.abs(y).max(axis=1))
+        there[there] = _alike(new, y)
     return np.asarray(there)
 
 
@@ -204,44 +208,15 @@ def same(one: Walk, other: Walk) -> bool:
         return False
 
     def shared(row: int) -> bool:
-        near = (k for k in (0, -1) if np.abs(one.y[row] - other.y[k]).max() <= _SAME * (1 + np.abs(one.y[row]).max()))
+        near = (k for k in (0, -1) if _alike(other.y[k], one.y[row]))
         return any(abs(one.t[row] @ other.t[k]) >= _COSINE for k in near)
 
     return shared(0) and shared(-1)
 
 
-class _Advance:
-    """The compiled step without the cost of converting arguments: a few microseconds a call."""
-
-    def __init__(self, on: Curve, origin: Array) -> None:
-        self._arguments = [np.zeros(origin.size), np.zeros(origin.size), np.zeros(1), origin.copy()]
-        self._results = [np.zeros(origin.size), np.zeros(origin.size), np.zeros(9)]
-        buffer: Any
-        buffer, self._trigger = on.advance.buffer()
-        self._buffer = buffer  # kept alive with the memory that it points to
-        for k, a in enumerate(self._arguments):
-            buffer.set_arg(k, memoryview(a.data))
-        for k, r in enumerate(self._results):
-            buffer.set_res(k, memoryview(r.data))
-
-    def __call__(self, y: Array, t: Array, s: float) -> tuple[Any, ...]:
-        self._arguments[0][:] = y
-        self._arguments[1][:] = t
-        self._arguments[2][0] = s
-        self._trigger()
-        return (self._results[0].copy(), self._results[1].copy(), *self._results[2].tolist())
-
-    def returns(self, y: Array, t: Array, s: float) -> bool:
-        """Whether the curve, followed from y by s, meets the origin."""
-        new = self(y, t, s)[0]
-        return bool(np.abs(new - self._arguments[3]).max() <= _SAME * (1 + np.abs(new).max()))
-
-
-def _reach(on: Curve, y: Array, t: Array) -> float:
-    """Longest step, per unit of `step`: boxed variables by their box, the others by their own size."""
-    boxed = np.logical_and(np.isfinite(on.lower), np.isfinite(on.upper))
-    room = np.where(boxed, 1.0, _ROOM * (1 + np.abs(y)) * np.sqrt(np.maximum(1, np.abs(y) / _REMOTE)))
-    return float(np.min(room / (np.abs(t) + 1e-300)))
+def _alike(y: Array, other: Array) -> Truth:
+    """Whether points are one."""
+    return np.asarray(np.abs(y - other).max(axis=-1) <= _SAME * (1 + np.abs(other).max(axis=-1)))
 
 
 def _along(on: Curve, y: Array, t: Array) -> bool:
@@ -251,21 +226,24 @@ def _along(on: Curve, y: Array, t: Array) -> bool:
     return bool(np.all(beyond[over] <= _EDGE) and np.all(np.abs(t[over]) <= _EDGE))
 
 
-def _at_limit(on: Curve, advance: _Advance, y: Array, t: Array, s: float) -> tuple[Array, Array, End]:
+def _at_limit(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array, End]:
     """The first point within a step that lies on a limit, on it exactly."""
-    beyond = advance(y, t, s)[0]
-    found = []
+
+    def point(r: float) -> Array:
+        return np.asarray(between(on, y[None], t[None], np.array([r]))[0][0])
+
+    beyond, found = point(s), []
     for k in range(y.size):
         for side, limit in (("min", on.lower[k]), ("max", on.upper[k])):
             if beyond[k] < limit if side == "min" else beyond[k] > limit:
 
                 def excess(r: float, k: int = k, limit: float = float(limit)) -> float:
-                    return float(advance(y, t, r)[0][k]) - limit
+                    return float(point(r)[k]) - limit
 
                 share = crossing(excess, s) if excess(0.0) * excess(s) < 0 else 0.0
                 found.append((share, k, side, limit))
     share, k, side, limit = min(found)
-    last, direction = advance(y, t, share)[:2]
+    (last,), (direction,) = between(on, y[None], t[None], np.array([share]))
     last[k] = limit
     return last, direction, End(side, k)
 

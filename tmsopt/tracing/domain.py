@@ -4,7 +4,7 @@ A boundary is not read off a grid: each arc is a traced root pattern, cut where 
 the imaginary axis, or real.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from tmsopt.tracing.branch import Branch, Event
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
 from tmsopt.tracing.equations import coefficients
 from tmsopt.tracing.infinity import Infinity, through_infinity
-from tmsopt.tracing.monitors import on_axis
+from tmsopt.tracing.monitors import on_axis, roots_along
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
@@ -108,20 +108,22 @@ def domain(
     bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
     found: dict[str, list[Branch]] = {"capsize": [], "EP2": []}
     found |= {name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)] for name in bounding}
-    unstable_beyond = [b for name in ("weave", "capsize") for b in found[name]]
     start_steps(progress, "looking for corners")
     infinite = list(through_infinity(plane, step, starts, seed))
     at_infinity = [c for curve in infinite for c in _changes(curve)]
-    stability = [arc for b in unstable_beyond for arc in _pieces(b, _bounds(b, plane), plane, at_infinity)]
-    stability += [arc for curve in infinite for arc in _runs(curve, curve.stable)]
-    damping = [arc for b in found["EP2"] for arc in _pieces(b, b.heavily_damped & _once(b), plane, at_infinity)]
-    damping += [arc for b in found["capsize"] for arc in _pieces(b, b.heavily_damped, plane, at_infinity)]
-    damping += [arc for curve in infinite for arc in _runs(curve, curve.heavily_damped)]
-    parting = [arc for b in (*found["EP2"], *found["capsize"]) for arc in _pieces(b, _parts(b), plane, at_infinity)]
-    parting += [arc for curve in infinite for arc in _runs(curve, curve.parting)]
-    corners = [c for b in (*unstable_beyond, *found["EP2"]) for c in _corners(b, plane)]
-    corners = _distinct([*corners, *(c for curve in infinite for c in _changes(curve, corners=True))])
-    return Domain(tuple(stability), tuple(damping), tuple(parting), tuple(corners))
+
+    def arcs(names: Sequence[str], bounds: Callable[[Branch], Truth], beyond: str) -> tuple[Arc, ...]:
+        traced = (arc for n in names for b in found[n] for arc in _pieces(b, bounds(b), plane, at_infinity))
+        return (*traced, *(arc for curve in infinite for arc in _runs(curve, getattr(curve, beyond))))
+
+    corners = [c for name in ("weave", "capsize", "EP2") for b in found[name] for c in _corners(b, plane)]
+    corners += [c for curve in infinite for c in _changes(curve, corners=True)]
+    return Domain(
+        stability=arcs(("weave", "capsize"), lambda b: _bounds(b, plane), "stable"),
+        heavy_damping=arcs(("EP2", "capsize"), lambda b: b.heavily_damped & _once(b), "heavily_damped"),
+        parting=arcs(("EP2", "capsize"), _parts, "parting"),
+        corners=tuple(_distinct(corners)),
+    )
 
 
 def _in_edge(branch: Branch, problem: Problem) -> bool:
@@ -187,7 +189,8 @@ def _bounds(branch: Branch, problem: Problem) -> Truth:
     Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
     """
     rest = pattern_of(problem.model, branch.pattern).remaining(list(branch.unknowns.values()))
-    tied = on_axis(rest, len(branch))
+    z = roots_along(rest, len(branch))
+    tied = np.where(on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)  # of the fastest, squared
     if np.all(tied < 0):
         return branch.stable
     widths = {n: high - low for n, (low, high) in problem.free.items()}

@@ -22,24 +22,11 @@ _SAMPLE = 32  # designs by which sizes are judged
 _VANISHED = 1e-9
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Median sizes of the coefficients over the box; 0 of one that is mostly 0 there."""
-
-    of: Array
-
-    def leads(self, a: Array) -> Truth:
-        """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit; a of shape (…, n + 1)."""
-        known = self.of > 0
-        share = np.abs(a[..., known]) / self.of[known]
-        return np.asarray(np.abs(a[..., 0]) > _VANISHED * self.of[0] * share.max(axis=-1, initial=0.0))
-
-
-def sizes(problem: Problem) -> Sizes:
-    """Sizes of the coefficients over the box of the free parameters."""
+def sizes(problem: Problem) -> Array:
+    """Median sizes of the coefficients over the box of the free parameters; 0 of one that is mostly 0 there."""
     a = _coefficients(problem, list(islice(spread(problem, 0), _SAMPLE)))
     a = np.abs(a[np.all(np.isfinite(a), axis=1)])
-    return Sizes(np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1))
+    return np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1)
 
 
 def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
@@ -70,7 +57,13 @@ class Traced:
     nlp: NLP
     on: Curve
     unknowns: slice
-    size: Sizes
+    size: Array
+
+    def leads(self, a: Array) -> Truth:
+        """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit; a of shape (…, n + 1)."""
+        known = self.size > 0
+        share = np.abs(a[..., known]) / self.size[known]
+        return np.asarray(np.abs(a[..., 0]) > _VANISHED * self.size[0] * share.max(axis=-1, initial=0.0))
 
 
 def prepare(problem: Problem) -> Traced:
@@ -101,6 +94,12 @@ def prepare(problem: Problem) -> Traced:
         scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1 * unit[free:], 1e3 * unit[free:])
     on = curve(x, ca.vertcat(*[g[k] for k in rows]), scale, lower, upper)
     return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
+
+
+def symbols_of(problem: Problem, x: Sequence[Any]) -> dict[str, Any]:
+    """Free parameters for traced variables that are CasADi expressions."""
+    of = problem.parameter_set
+    return {n: ca.atan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)}
 
 
 def design_at(problem: Problem, x: Array) -> dict[str, Any]:

@@ -3,21 +3,20 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from tmsopt.models import Values
-from tmsopt.problem.problem import Problem
 from tmsopt.records import Array, Table
 from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.tracing.branch import Branch, Event
-from tmsopt.tracing.continuation import CLOSED, Curve, End, Walk
-from tmsopt.tracing.monitors import all_real, parameters_of, satisfied, stability, values_of, vanishes
+from tmsopt.tracing.continuation import CLOSED, End, Walk
+from tmsopt.tracing.equations import Traced, symbols_of
+from tmsopt.tracing.monitors import Points
 from tmsopt.tracing.solving import project
-from tmsopt.tracing.zeros import TOGETHER, Found, located, refined
+from tmsopt.tracing.zeros import TOGETHER, Found, inserted, located, points_of, refined
 
 _NEAR = 1e-3  # distance within which an EP4 is looked for beside an EP3 and a 2EP2
 _TOUCHING = {"EP3", "2EP2"}  # what a double root meets at an EP4, a triple root and a second double one
@@ -31,62 +30,62 @@ _KINDS = ("EP", "several", "zero", "weave", "capsize", "EP2", "constraint", "fol
 """Kinds of events of one codimension, the most telling first."""
 
 
-def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Branch:
+def describe(ready: Traced, walked: Walk) -> Branch:
     """A walked curve in the parameters of the problem, with its events among its points."""
-    walked = refined(problem, pattern, on, unknowns, _trimmed(problem, pattern, on, unknowns, walked))
-    found = [*located(problem, pattern, on, unknowns, walked), *touched(problem, pattern, on, unknowns, walked)]
-    merged = _merged(with_EP4(problem, pattern, on, found), len(problem.free))
-    rows, y, t = _inserted(walked, merged)
-    x = y * on.scale
+    problem, pattern, free = ready.problem, ready.pattern, len(ready.problem.free)
+    walked = refined(ready, _trimmed(ready, walked))
+    found = with_EP4(ready, [*located(ready, walked), *touched(ready, walked)])
+    merged = _merged(found, free)
+    rows, walked = inserted(walked, merged)
+    points = points_of(ready, walked)
     square, doubled = _doubled(pattern)
     for event, row in zip(merged, rows, strict=True):
         if event.name in doubled:  # a double root of a quadratic factor: exact, or it scatters by 1e-8
-            x[row, unknowns.start + square + 1] = x[row, unknowns.start + square] ** 2 / 4
-    columns = parameters_of(problem, x)
-    u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
-    kinds = pattern.kind(u)
-    for name in (m for m, mark in pattern.marks.items() if vanishes(mark, pattern, u)):
+            b, c = ready.unknowns.start + square, ready.unknowns.start + square + 1
+            points.x[row, c] = points.x[row, b] ** 2 / 4
+    kinds = pattern.kind(points.unknowns)
+    for name in points.special:
         kinds[:] = name
     for event, row in zip(merged, rows, strict=True):
         if event.name in pattern.marks or event.name == "EP4":
             kinds[row] = event.name
-    free = list(problem.free)
-    width = np.diff(x, axis=0)[:, : len(free)] / on.scale[: len(free)]
-    values = values_of(problem, pattern, columns, u)
     named = [(e.name, e.detail, row) for e, row in zip(merged, rows, strict=True)]
     if not walked.closed:
-        ends = zip(walked.ends, (0, len(x) - 1), strict=True)
-        named += [("end", _end_words(problem, pattern, end), row) for end, row in ends]
-    at = [Table({n: float(c[row]) for n, c in columns.items()}) for *_, row in named]
-    met = np.broadcast_to(_residual(values, pattern.monic(u), u), len(x))
-    each = zip(named, at, strict=True)
-    events = [Event(name, detail, place, row, float(met[row])) for (name, detail, row), place in each]
+        ends = zip(walked.ends, (0, len(points) - 1), strict=True)
+        named += [("end", _end_words(ready, end), row) for end, row in ends]
+    off, columns = points.residual, points.parameters
+    events = [
+        Event(name, detail, Table({n: float(c[row]) for n, c in columns.items()}), row, float(off[row]))
+        for name, detail, row in named
+    ]
+    steps = np.diff(walked.y, axis=0)[:, :free]
     return Branch(
         pattern=str(problem.locate),
         parameters=columns,
-        unknowns=dict(zip(pattern.unknowns, u, strict=True)),
-        tangent=dict(zip(free, _natural_tangent(problem, on, x, t).T, strict=True)),
-        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(width, axis=1))]),
+        unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
+        tangent=dict(zip(problem.free, _natural_tangent(points).T, strict=True)),
+        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
         kinds=kinds,
-        stable=stability(pattern.remaining(u), len(x)),
-        heavily_damped=all_real(pattern.remaining(u), len(x)) & ("W" not in pattern.unknowns),
-        satisfied=satisfied(problem, values, len(x)),
-        abscissa=np.broadcast_to(values["abscissa"], len(x)),
+        stable=points.stable,
+        heavily_damped=points.heavily_damped,
+        satisfied=points.satisfied,
+        abscissa=points.column(points.values["abscissa"]),
         events=tuple(sorted(events, key=lambda e: e.index)),
         closed=walked.closed,
-        residual=float(np.max(met)),
-        eigenfrequency=_eigenfrequency(problem, pattern, u),
+        residual=float(np.max(off)),
+        eigenfrequency=_eigenfrequency(points),
     )
 
 
-def _eigenfrequency(problem: Problem, pattern: Pattern, u: list[Array]) -> dict[str, Array] | None:
+def _eigenfrequency(points: Points) -> dict[str, Array] | None:
     """Of a complex system ω = i s of a multiple root, of s² + bs + c less the carrier; None of a real one."""
-    if problem.model.carrier is None:
+    carrier, pattern = points.ready.problem.model.carrier, points.ready.pattern
+    if carrier is None:
         return None
     if not pattern.form.startswith("CEP") or pattern.unknowns[:2] != ("b", "c"):
         return {}
-    b, c = u[:2]
-    return {"omega_re": np.sqrt(c - b * b / 4) - problem.model.carrier, "omega_im": -b / 2}
+    b, c = points.unknowns[:2]
+    return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
 
 
 def _doubled(pattern: Pattern) -> tuple[int, tuple[str, ...]]:
@@ -151,77 +150,51 @@ def _rank(name: str) -> tuple[int, int]:
     return -int(name in ("weave", "capsize")), _KINDS.index(name)
 
 
-def _inserted(walked: Walk, events: list[Found]) -> tuple[list[int], Array, Array]:
-    """Rows of the events, and points and tangents with the events among them."""
-    y, t, rows = list(walked.y), list(walked.t), []
-    for shift, event in enumerate(events):
-        row = event.after + 1 + shift
-        y.insert(row, event.y)
-        t.insert(row, event.t)
-        rows.append(row)
-    return rows, np.array(y), np.array(t)
-
-
-def _natural_tangent(problem: Problem, on: Curve, x: Array, t: Array) -> Array:
+def _natural_tangent(points: Points) -> Array:
     """Derivative of the free parameters by the arclength in widths of the box."""
+    problem, t, scale = points.ready.problem, points.t, points.ready.on.scale
     of = problem.parameter_set
-    columns = [t[:, k] * on.scale[k] / (1 + x[:, k] ** 2 if of[n].tangent else 1.0) for k, n in enumerate(problem.free)]
-    size = np.linalg.norm(t[:, : len(columns)], axis=1)
-    return np.asarray(np.stack(columns, axis=-1) / (size + 1e-300)[:, None])
+    slopes = [1 / (1 + v**2) if of[n].tangent else 1.0 + 0 * v for n, v in zip(problem.free, points.x.T, strict=False)]
+    along = t[:, : len(slopes)]
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(along * scale[: len(slopes)] * np.transpose(slopes) / (size + 1e-300))
 
 
-def _residual(values: Values, monic: list[Any], u: list[Array]) -> Array:
-    """Largest mismatch of a coefficient at each point, relative to the terms that it is made of."""
-    a0 = np.asarray(values.coefficients[0], dtype=float)
-    unit = np.broadcast_to(mean_size(monic), np.shape(u[0]))
-    unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots come to 0, that of the curve
-    worst = np.zeros(np.shape(u[0]))
-    for k, (a, c) in enumerate(zip(values.coefficients, monic, strict=True)):
-        size = np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k
-        worst = np.maximum(worst, np.abs(a - a0 * c) / np.where(size == 0, 1.0, size))  # 0 with roots that are all 0
-    return worst
-
-
-def _trimmed(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Walk:
+def _trimmed(ready: Traced, walked: Walk) -> Walk:
     """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
-    x = walked.y * on.scale
-    u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     with np.errstate(all="ignore"):
-        values = values_of(problem, pattern, parameters_of(problem, x), u)
-        good = np.flatnonzero(_residual(values, pattern.monic(u), u) <= _FITTING)
+        good = np.flatnonzero(points_of(ready, walked).residual <= _FITTING)
     if walked.closed or not good.size:
         return walked
     inside = slice(int(good[0]), int(good[-1]) + 1)
     return replace(walked, y=walked.y[inside], t=walked.t[inside])
 
 
-def _end_words(problem: Problem, pattern: Pattern, end: End) -> str:
+def _end_words(ready: Traced, end: End) -> str:
     if end.limit is None:
         return end.reason if end.reason != CLOSED else ""
-    free = list(problem.free)
+    free = list(ready.problem.free)
     if end.limit < len(free):
         return f"{free[end.limit]}.{end.reason}"
-    name = pattern.unknowns[end.limit - len(free)]
-    return pattern.ends.get(name, "the other roots reach a limit of the search")
+    name = ready.pattern.unknowns[end.limit - len(free)]
+    return ready.pattern.ends.get(name, "the other roots reach a limit of the search")
 
 
-def touched(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Iterator[Found]:
+def touched(ready: Traced, walked: Walk) -> Iterator[Found]:
     """EP4 where a curve of EP2 passes through it in a section: EP3 and 2EP2 touch 0 there, and keep their signs."""
-    if pattern.form != "EP2" or not {*pattern.marks} >= _TOUCHING:
+    if ready.pattern.form != "EP2" or not {*ready.pattern.marks} >= _TOUCHING:
         return
-    x = walked.y * on.scale
-    u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
-    value = np.asarray(sum(np.abs(pattern.marks[name](pattern.reduced(u))) for name in _TOUCHING))
+    points = points_of(ready, walked)
+    value = np.asarray(sum(np.abs(points.mark(name)) for name in _TOUCHING))
     least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
-    for k in np.flatnonzero(least) + 1:
-        beside = Found("EP4", "", walked.y[k], walked.t[k], int(k), 0.0)
-        exact = _exact_EP4(problem, pattern, on, beside)
+    for k in (np.flatnonzero(least) + 1).tolist():
+        exact = _exact_EP4(ready, Found("EP4", "", walked.y[k], walked.t[k], k, 0.0))
         if exact is not None:
             s = float(walked.t[k] @ (exact.y - walked.y[k]))
-            yield replace(exact, after=int(k) if s >= 0 else int(k) - 1, s=s)
+            yield replace(exact, after=k if s >= 0 else k - 1, s=s)
 
 
-def with_EP4(problem: Problem, pattern: Pattern, on: Curve, found: list[Found]) -> list[Found]:
+def with_EP4(ready: Traced, found: list[Found]) -> list[Found]:
     """Events in order; EP3 and 2EP2 side by side are one EP4 where there is one, and each EP4 is made exact.
 
     Where symmetry takes a curve through EP4, the traced equations are singular there, and locate it to 1e-6 only.
@@ -231,7 +204,7 @@ def with_EP4(problem: Problem, pattern: Pattern, on: Curve, found: list[Found]) 
         before = result[-1] if result else event
         pair = {event.name, before.name} == {"EP3", "2EP2"}
         if event.name == "EP4" or (pair and np.abs(event.y - before.y).max() <= _NEAR):
-            exact = _exact_EP4(problem, pattern, on, event)
+            exact = _exact_EP4(ready, event)
             if exact is not None:
                 result = [*(result[:-1] if pair else result), exact]
                 continue
@@ -239,34 +212,30 @@ def with_EP4(problem: Problem, pattern: Pattern, on: Curve, found: list[Found]) 
     return result
 
 
-def _exact_EP4(problem: Problem, pattern: Pattern, on: Curve, event: Found) -> Found | None:
+def _exact_EP4(ready: Traced, event: Found) -> Found | None:
     """The EP4 beside an event, by its own equations; None if there is none."""
+    problem, pattern, scale = ready.problem, ready.pattern, ready.on.scale
     free = len(problem.free)
     special = pattern_of("EP4", problem.model.degree)
-    start = event.y * on.scale
-    u = list(start[free : free + len(pattern.unknowns)])
-    z = np.concatenate([roots(np.array(f, dtype=float)) for f in pattern.factors(u)])
-    guess = special.guesses(z)[0]
+    start = event.y * scale
+    factors = pattern.factors(list(start[ready.unknowns]))
+    guess = special.guesses(np.concatenate([roots(np.array(f, dtype=float)) for f in factors]))[0]
     size = float(mean_size(special.monic(guess))) or 1.0
-    scale = np.array([*on.scale[:free], *(size**power for power in special.powers)])
-    y = ca.SX.sym("y", free + len(special.unknowns))
-    x = y * ca.DM(scale)
-    symbols = {n: ca.atan(x[k]) if problem.parameter_set[n].tangent else x[k] for k, n in enumerate(problem.free)}
-    a = Values(problem.model, problem.parameter_set, problem.ordered(symbols)).coefficients
-    matched = [a[0] * c for c in special.monic(ca.vertsplit(x[free:]))]
-    rows = [(p - q) / size**k for k, (p, q) in enumerate(zip(a, matched, strict=True))][1:]
-    terms = [(ca.fabs(p) + ca.fabs(q)) / size**k for k, (p, q) in enumerate(zip(a, matched, strict=True))][1:]
-    equations = ca.vertcat(*rows)
-    mismatch = ca.Function("mismatch", [y], [equations / ca.vertcat(*terms)])
+    unit = np.array([*scale[:free], *(size**power for power in special.powers)])
+    y = ca.SX.sym("y", len(unit))
+    x = ca.vertsplit(y * ca.DM(unit))
+    a = Values(problem.model, problem.parameter_set, problem.ordered(symbols_of(problem, x))).coefficients
+    pairs = [(p / size**k, a[0] * c / size**k) for k, (p, c) in enumerate(zip(a, special.monic(x[free:]), strict=True))]
+    equations = ca.vertcat(*(p - q for p, q in pairs[1:]))
+    terms = ca.vertcat(*(ca.fabs(p) + ca.fabs(q) for p, q in pairs[1:]))
     system = ca.Function("EP4", [y], [ca.densify(equations), ca.densify(ca.jacobian(equations, y))])
-    end = project(system, np.array([*start[:free], *guess]) / scale)
+    end = project(system, np.array([*start[:free], *guess]) / unit)
     if end is None or np.abs(end[:free] - event.y[:free]).max() > _NEAR:
         return None
-    if np.any(np.abs(np.array(mismatch(end)).ravel()) > _EXACT):
+    if np.any(np.abs(ca.Function("mismatch", [y], [equations / terms])(end).full()) > _EXACT):
         return None  # a section beside an EP4, not through it
     exact = event.y.copy()
     exact[:free] = end[:free]
-    factors = special.factors([float(v) for v in (end * scale)[free:]])
-    fourfold = np.concatenate([roots(np.array(f, dtype=float)) for f in factors])
-    exact[free : free + len(u)] = np.array(pattern.guesses(fourfold)[0]) / on.scale[free : free + len(u)]
+    fourfold = [roots(np.array(f, dtype=float)) for f in special.factors((end * unit)[free:].tolist())]
+    exact[ready.unknowns] = np.array(pattern.guesses(np.concatenate(fourfold))[0]) / scale[ready.unknowns]
     return replace(event, name="EP4", detail="", y=exact)

@@ -13,12 +13,13 @@ import numpy as np
 
 from tmsopt.models import Values
 from tmsopt.problem.problem import Problem
+from tmsopt.program.formulate import variables_of
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.tracing.continuation import Curve, Walk, between, both_ways, contains, curve
-from tmsopt.tracing.equations import design_at, sizes
+from tmsopt.tracing.equations import design_at, sizes, symbols_of
 from tmsopt.tracing.monitors import margins, sign_changes
 from tmsopt.tracing.seeds import unexplained
 from tmsopt.tracing.solving import crossing, projected, rows_of
@@ -50,29 +51,27 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
     """Every curve a0 = 0 found in the box of a problem with two free parameters."""
     x = ca.SX.sym("x", 2)
     of = problem.parameter_set
-    symbols = {n: ca.atan(x[k]) if of[n].tangent else x[k] for k, n in enumerate(problem.free)}
-    a = Values(problem.model, of, problem.ordered(symbols)).coefficients
+    a = Values(problem.model, of, problem.ordered(symbols_of(problem, ca.vertsplit(x)))).coefficients
     if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
         return
-    ends = [[np.tan(e) if of[n].tangent else e for e in problem.free[n]] for n in problem.free]
-    lower, upper = np.array(ends).T
+    ends = (dict(zip(problem.free, side, strict=True)) for side in zip(*problem.free.values(), strict=True))
+    lower, upper = (np.array(variables_of(problem, end)) for end in ends)
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], along))])
-    usual = float(sizes(problem).of[-1])
+    usual = float(sizes(problem)[-1])
     for walked in _walks(problem, on, step, starts, seed):
         x_on, bounds, changes = _judged(on, walked, rest, usual)
         yield Infinity(design_at(problem, x_on), *bounds, changes)
 
 
 def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> Iterator[Walk]:
-    of = problem.parameter_set
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
 
     def found(designs: Sequence[Mapping[str, float]], first: int) -> Array:
-        at = [[np.tan(v) if of[n].tangent else v for n, v in d.items()] for d in designs]
-        return projected(on.evaluate, np.array(at) / on.scale, [(first + k) % 2 for k in range(len(designs))])
+        at = np.array([variables_of(problem, d) for d in designs]) / on.scale
+        return projected(on.evaluate, at, [(first + k) % 2 for k in range(len(designs))])
 
     spots = list(islice(spread(problem, seed), starts))
     missed = (found([d], k)[0] for k, d in enumerate(unexplained(problem, lambda a: a[0], lines), starts))

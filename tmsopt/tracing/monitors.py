@@ -1,20 +1,20 @@
-"""Quantities along a traced curve: parameters, values, stability, and the functions whose zeros are events."""
+"""Points along a traced curve: parameters, values, stability, and the functions of them whose zeros are events."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from tmsopt.models import Values
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.expression import Expression
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.records import Array, Complex, Truth
-from tmsopt.roots import Pattern, is_stable, lienard_chipart, roots
+from tmsopt.roots import lienard_chipart, roots
 from tmsopt.roots.meetings import CLOSED, balance, nearest_two
-
-Function = Callable[[Array, Array], Array]
+from tmsopt.roots.patterns.pattern import mean_size
+from tmsopt.tracing.equations import Traced
 
 NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
 
@@ -26,22 +26,112 @@ _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e
 
 
 @dataclass(frozen=True)
+class Points:
+    """Points x of a traced curve in natural units, and its tangents t, both of shape (n, variables)."""
+
+    ready: Traced
+    x: Array
+    t: Array
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def unknowns(self) -> list[Array]:
+        """Those of the pattern, shape (n,) each."""
+        return list(self.x[:, self.ready.unknowns].T)
+
+    @cached_property
+    def parameters(self) -> dict[str, Array]:
+        """Every parameter of the problem, shape (n,) each."""
+        problem = self.ready.problem
+        of = problem.parameter_set
+        free = {
+            n: _within(np.arctan(v) if of[n].tangent else v, *problem.free[n])
+            for n, v in zip(problem.free, self.x.T, strict=False)
+        }
+        return {n: np.array(np.broadcast_to(v, len(self)), dtype=float) for n, v in problem.ordered(free).items()}
+
+    @cached_property
+    def values(self) -> Values:
+        """Quantities; those of the roots come from the factors, where multiple roots are exact."""
+        z = roots_along(self.ready.pattern.factors(self.unknowns), len(self))
+        formulas = {
+            "abscissa": lambda _: z.real.max(axis=-1),
+            "damping_ratio": lambda _: np.min(-z.real / (np.abs(z) + 1e-300), axis=-1),
+            ANGULAR_FREQUENCY: lambda _: z.imag.max(axis=-1),
+        }
+        extra = [*(replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS]
+        problem = self.ready.problem
+        return Values(problem.model, problem.parameter_set, self.parameters, extra=extra)
+
+    @cached_property
+    def stable(self) -> Truth:
+        """Where the other roots lie left of the imaginary axis by more than rounding; none count as stable."""
+        return np.asarray(np.all(self._others.real < -_ROUNDED * np.abs(self._others), axis=-1))
+
+    @property
+    def heavily_damped(self) -> Truth:
+        """Where the other roots are real and negative, and the pattern has none but those."""
+        real = np.all(np.abs(self._others.imag) <= _REAL * np.abs(self._others), axis=-1)
+        return np.asarray(self.stable & real & ("W" not in self.ready.pattern.unknowns))
+
+    @property
+    def satisfied(self) -> Truth:
+        """Where every inequality constraint holds."""
+        inside = np.ones(len(self), dtype=bool)
+        for condition in self.ready.problem.conditions.values():
+            if not condition.equality:
+                inside &= condition.holds(self.excess(condition))
+        return inside
+
+    @property
+    def residual(self) -> Array:
+        """Largest mismatch of a coefficient, relative to the terms that it is made of."""
+        monic = self.ready.pattern.monic(self.unknowns)
+        a0 = self.column(self.values.coefficients[0])
+        unit = self.column(mean_size(monic))
+        unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots come to 0, that of the curve
+        worst = np.zeros(len(self))
+        for k, (a, c) in enumerate(zip(self.values.coefficients, monic, strict=True)):
+            size = np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k
+            worst = np.maximum(worst, np.abs(a - a0 * c) / np.where(size == 0, 1.0, size))  # 0: roots that are all 0
+        return worst
+
+    def excess(self, condition: Expression) -> Array:
+        """The difference of the sides of a constraint."""
+        return self.column(condition(self.values))
+
+    @property
+    def special(self) -> list[str]:
+        """Special cases of the pattern that are met along the whole curve, up to rounding."""
+        return [name for name in self.ready.pattern.marks if np.median(np.abs(self.mark(name))) <= NOTHING]
+
+    def mark(self, name: str) -> Array:
+        """What vanishes at a special case of the pattern."""
+        pattern = self.ready.pattern
+        return self.column(pattern.marks[name](pattern.reduced(self.unknowns)))
+
+    def column(self, value: Any) -> Array:
+        """A value at each point."""
+        return np.broadcast_to(np.asarray(value, dtype=float), len(self))
+
+    @cached_property
+    def _others(self) -> Complex:
+        """The roots that the pattern does not tie."""
+        return roots_along(self.ready.pattern.remaining(self.unknowns), len(self))
+
+
+Monitor = Callable[[Points], Array]
+
+
+@dataclass(frozen=True)
 class Mark:
-    """A function of points x and tangents t, both of shape (n, variables), whose zeros are events."""
+    """A function of points whose zeros are events."""
 
     name: str
     detail: str
-    value: Function
-
-
-def parameters_of(problem: Problem, x: Array) -> dict[str, Array]:
-    """Every parameter of the problem along traced variables, shape (n,) each."""
-    of = problem.parameter_set
-    free = {
-        n: _within(np.arctan(v) if of[n].tangent else v, *problem.free[n])
-        for n, v in zip(problem.free, x.T, strict=False)
-    }
-    return {n: np.array(np.broadcast_to(v, len(x)), dtype=float) for n, v in problem.ordered(free).items()}
+    value: Monitor
 
 
 def _within(v: Array, low: float, high: float) -> Array:
@@ -50,123 +140,50 @@ def _within(v: Array, low: float, high: float) -> Array:
     return np.where(np.abs(v - limited) <= _ROUNDED * (1 + np.abs(v)), limited, v)
 
 
-def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], u: list[Array]) -> Values:
-    """Quantities along a curve; those of the roots come from the factors, where multiple roots are exact."""
-
-    def factor_roots() -> Complex:
-        parts = [np.stack(np.broadcast_arrays(*f, u[0]), axis=-1)[:, :-1] for f in pattern.factors(u)]
-        return np.concatenate([_roots(part) for part in parts], axis=-1)
-
-    def damping_ratio(_: Any) -> Array:
-        z = factor_roots()
-        return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
-
-    formulas = {
-        "abscissa": lambda _: np.asarray(factor_roots().real.max(axis=-1)),
-        "damping_ratio": damping_ratio,
-        ANGULAR_FREQUENCY: lambda _: np.asarray(factor_roots().imag.max(axis=-1)),
-    }
-    extra = [*(replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS]
-    return Values(problem.model, problem.parameter_set, columns, extra=extra)
-
-
-def stability(factors: list[list[Any]], count: int) -> Truth:
-    """Where every factor has its roots left of the imaginary axis, from coefficients; no factor counts as stable.
-
-    Roots that stay on the axis up to rounding are not left of it, whatever the sign of that.
-    """
-    stable = on_axis(factors, count) < 0
+def roots_along(factors: list[list[Any]], count: int) -> Complex:
+    """Roots of factors along a curve, shape (count, roots); nan where one is beyond doubles, as beside infinity."""
+    found = [np.zeros((count, 0), dtype=complex)]
     for factor in factors:
-        if len(factor) - 1 > CLOSED:
-            stable &= is_stable(_rows(factor, count))
-            continue
-        for quantity in lienard_chipart(factor):
-            stable &= np.broadcast_to(np.asarray(quantity, dtype=float) > 0, count)
-    return stable
+        rows = np.stack([np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor], axis=-1)
+        known = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
+        found.append(np.full((count, len(factor) - 1), np.nan, dtype=complex))
+        found[-1][known] = roots(rows[known])
+    return np.concatenate(found, axis=-1)
 
 
-def on_axis(factors: list[list[Any]], count: int) -> Array:
-    """Square of the modulus of the fastest root on the imaginary axis, up to rounding; −1 where none lies there."""
-    fastest = np.full(count, -1.0)
-    for factor in factors:
-        z = _roots(_rows(factor, count))
-        tied = np.where(np.abs(z.real) <= _ROUNDED * np.abs(z), np.abs(z) ** 2, -1.0)
-        fastest = np.maximum(fastest, tied.max(axis=-1, initial=-1.0))
-    return fastest
+def on_axis(z: Complex) -> Truth:
+    """Which roots lie on the imaginary axis, up to rounding."""
+    return np.asarray(np.abs(z.real) <= _ROUNDED * np.abs(z))
 
 
-def all_real(factors: list[list[Any]], count: int) -> Truth:
-    """Where every root of the factors is real and negative."""
-    real = stability(factors, count)
-    for factor in factors:
-        z = _roots(_rows(factor, count))
-        real &= np.all(np.abs(z.imag) <= _REAL * np.abs(z), axis=-1)
-    return real
+def marks(points: Points) -> Iterator[Mark]:
+    """Everything that may be an event of a curve."""
+    ready, problem = points.ready, points.ready.problem
 
+    def margin(number: int, k: int) -> Monitor:
+        return lambda p: margins(ready.pattern.remaining(p.unknowns)[number])[k]
 
-def _roots(rows: Array) -> Complex:
-    """Roots of one factor along a curve; nan where it is beyond doubles, as beside infinity."""
-    known = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
-    found = np.full((len(rows), rows.shape[1] - 1), np.nan, dtype=complex)
-    found[known] = roots(rows[known])
-    return found
+    def turn(k: int) -> Monitor:  # by the arclength in the parameters: the unknowns may move much faster
+        return lambda p: p.t[:, k] / (np.linalg.norm(p.t[:, : len(problem.free)], axis=1) + 1e-300)
 
-
-def _rows(factor: list[Any], count: int) -> Array:
-    """Coefficients of one factor along a curve, shape (count, degree + 1)."""
-    return np.stack([np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor], axis=-1)
-
-
-def satisfied(problem: Problem, values: Values, count: int) -> Truth:
-    inside = np.ones(count, dtype=bool)
-    for condition in problem.conditions.values():
-        if not condition.equality:
-            inside &= condition.holds(np.broadcast_to(np.asarray(condition(values), dtype=float), count))
-    return inside
-
-
-def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[str]) -> Iterator[Mark]:
-    def of_unknowns(function: Callable[[list[Array]], Any]) -> Function:
-        return lambda x, t: np.asarray(function([x[:, k] for k in range(unknowns.start, unknowns.stop)]))
-
-    def of_factor(number: int, k: int) -> Function:
-        return of_unknowns(lambda u: margins(pattern.remaining(u)[number])[k])
-
-    def of_tangent(k: int) -> Function:
-        free = len(problem.free)  # by the arclength in the parameters: the unknowns may move much faster
-        return lambda x, t: np.asarray(t[:, k] / (np.linalg.norm(t[:, :free], axis=1) + 1e-300))
-
-    for name, special in pattern.marks.items():
-        yield Mark(name, "", of_unknowns(partial(_reduced, pattern, special)))
-    if pattern.form == "EP2" and "2EP2" in within:  # q(r) has a double zero where r is the double root of q
-        yield Mark("EP4", "", of_unknowns(lambda u: u[0] - nearest_two(pattern.factors(u)[-1])))
-    example = [np.ones(1)] * len(pattern.unknowns)
-    for number, factor in enumerate(pattern.remaining(example)):
-        for k in range(len(margins(factor))):
-            name = "capsize" if k == 0 else "weave"  # the first quantity is the constant term
-            yield Mark(name, CHANGES, of_factor(number, k))
+    for name in ready.pattern.marks:
+        yield Mark(name, "", partial(Points.mark, name=name))
+    if ready.pattern.form == "EP2" and "2EP2" in points.special:
+        # q(r) has a double zero where r is the double root of q
+        yield Mark("EP4", "", lambda p: p.unknowns[0] - nearest_two(ready.pattern.factors(p.unknowns)[-1]))
+    for number, factor in enumerate(ready.pattern.remaining(points.unknowns)):
+        for k in range(len(margins(factor))):  # the first quantity is the constant term
+            yield Mark("weave" if k else "capsize", CHANGES, margin(number, k))
     for k, parameter in enumerate(problem.free):
-        yield Mark("fold", parameter, of_tangent(k))
+        yield Mark("fold", parameter, turn(k))
     for name, condition in problem.conditions.items():
         if not condition.equality:
-            yield Mark("constraint", name, _condition(problem, pattern, unknowns, condition))
-
-
-def _reduced(pattern: Pattern, special: Callable[[Sequence[Any]], Any], u: list[Array]) -> Any:
-    return special(pattern.reduced(u))
+            yield Mark("constraint", name, partial(Points.excess, condition=condition))
 
 
 def margins(factor: list[Any]) -> list[Any]:
     """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
     return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], balance(factor)]
-
-
-def _condition(problem: Problem, pattern: Pattern, unknowns: slice, condition: Callable[[Values], Any]) -> Function:
-    def value(x: Array, t: Array) -> Array:
-        u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
-        return np.asarray(condition(values_of(problem, pattern, parameters_of(problem, x), u)), dtype=float)
-
-    return value
 
 
 def sign_changes(value: Array) -> Truth:
@@ -177,8 +194,3 @@ def sign_changes(value: Array) -> Truth:
     for k in range(1, len(sign)):
         sign[k] = sign[k] or sign[k - 1]
     return np.asarray(sign[1:] * sign[:-1] < 0)
-
-
-def vanishes(special: Callable[[Sequence[Any]], Any], pattern: Pattern, u: list[Array]) -> bool:
-    """Whether a mark of a pattern is 0 along the whole curve, up to rounding."""
-    return bool(np.median(np.abs(special(pattern.reduced(u)))) <= NOTHING)

@@ -192,5 +192,5 @@ def _on_curve(ready: Traced, x: Sequence[Array], held: Sequence[int | None]) -> 
     inside = np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12), axis=1)  # not where it is nan
     inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, on.lower, on.upper)
-    inside[inside] = ready.size.leads(coefficients(ready.problem, design_at(ready.problem, y[inside] * on.scale)))
+    inside[inside] = ready.leads(coefficients(ready.problem, design_at(ready.problem, y[inside] * on.scale)))
     return y, inside

@@ -73,42 +73,33 @@ def _lower(y: Array, value: Array, size: Array) -> Truth:
 
 def crossing(function: Callable[[float], float], end: float) -> float:
     """Where a function that changes sign on [0, end] is 0."""
-    return float(crossings(lambda s, _: np.array([function(float(x)) for x in s]), np.array([end]))[0])
+    return float(crossings(lambda s: np.array([function(float(s[0]))]), np.array([end]))[0])
 
 
-def crossings(function: Callable[[Array, NDArray[np.intp]], Array], ends: Array) -> Array:
-    """`crossing` on many intervals [0, end] at once, by Chandrupatla's method; nan where the sign does not change.
-
-    Args:
-        function: of the places and of the rows that they belong to.
-    """
-    every: NDArray[np.intp] = np.arange(len(ends))
+def crossings(function: Callable[[Array], Array], ends: Array) -> Array:
+    """`crossing` on many intervals [0, end] at once, by Chandrupatla's method; nan where the sign does not change."""
     a, b = ends.astype(float), np.zeros(len(ends))
-    fa, fb = function(a, every), function(b, every)
+    fa, fb = function(a), function(b)
     found = np.where(fb == 0, b, np.where(fa == 0, a, np.nan))
-    rows = np.flatnonzero(np.sign(fa) * np.sign(fb) < 0)
-    a, b, fa, fb, least = a[rows], b[rows], fa[rows], fb[rows], _FINE * np.abs(ends[rows])
-    share = np.full(len(rows), 0.5)
+    open_ = np.sign(fa) * np.sign(fb) < 0
+    share = np.full(len(ends), 0.5)
     for _ in range(_HALVINGS):
-        if not rows.size:
+        if not np.any(open_):
             break
         x = a + share * (b - a)
-        fx = function(x, rows)
+        fx = function(x)
         kept = np.sign(fx) == np.sign(fa)  # the sign of which end; a is the newest place, c the one before it
         c, fc = np.where(kept, a, b), np.where(kept, fa, fb)
         b, fb = np.where(kept, b, a), np.where(kept, fb, fa)
         a, fa = x, fx
-        best = np.where(np.abs(fa) < np.abs(fb), a, b)
-        found[rows] = best
+        found = np.where(open_, np.where(np.abs(fa) < np.abs(fb), a, b), found)
         with np.errstate(all="ignore"):
-            limit = (least + _EPS * np.abs(best)) / (2 * np.abs(b - a))
+            limit = (_FINE * np.abs(ends) + _EPS * np.abs(found)) / (2 * np.abs(b - a))
             xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
             inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
             share = np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi), inverse, 0.5)
-        share = np.clip(share, limit, 1 - limit)
-        open_ = (limit <= 0.5) & (fa != 0) & (fb != 0) & np.isfinite(share)
-        a, b, fa, fb, least, share = (part[open_] for part in (a, b, fa, fb, least, share))
-        rows = rows[open_]
+        open_ &= (limit <= 0.5) & (fa != 0) & (fb != 0) & np.isfinite(share)
+        share = np.where(open_, np.clip(share, limit, 1 - limit), 0.0)
     return found
 
 
@@ -119,20 +110,32 @@ def evaluated(system: ca.Function, y: Array) -> tuple[Array, Array]:
 
 
 def rows_of(function: ca.Function, *arguments: Array) -> list[Array]:
-    """A function of dense columns at every row of its arguments, without the cost of converting them."""
-    count = len(arguments[0])
-    room = 1 << max(count - 1, 0).bit_length()  # few sizes, for a map costs more to make than to call
-    buffer: Any
-    buffer, trigger = _mapped(function, room).buffer()
-    taken = [np.zeros((room, a.shape[1])) for a in arguments]
-    given = [np.empty((room, function.numel_out(k))) for k in range(function.n_out())]
-    for k, (memory, a) in enumerate(zip(taken, arguments, strict=True)):
-        memory[:count] = a
-        buffer.set_arg(k, memoryview(memory.data))
-    for k, memory in enumerate(given):
-        buffer.set_res(k, memoryview(memory.data))
-    trigger()
-    return [memory[:count] for memory in given]
+    """A function of dense columns at every row of its arguments."""
+    room = 1 << max(len(arguments[0]) - 1, 0).bit_length()  # few sizes, for a map costs more to make than to call
+    return Rows(function, room)(*arguments)
+
+
+class Rows:
+    """A function of dense columns at up to so many rows, without the cost of converting its arguments."""
+
+    def __init__(self, function: ca.Function, count: int) -> None:
+        self._taken = [np.zeros((count, function.numel_in(k))) for k in range(function.n_in())]
+        self._given = [np.empty((count, function.numel_out(k))) for k in range(function.n_out())]
+        buffer: Any
+        buffer, self._trigger = _mapped(function, count).buffer()
+        self._buffer = buffer  # kept alive with the memory that it points to
+        for k, memory in enumerate(self._taken):
+            buffer.set_arg(k, memoryview(memory.data))
+        for k, memory in enumerate(self._given):
+            buffer.set_res(k, memoryview(memory.data))
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """The results, a row each; as many as there are arguments."""
+        count = len(arguments[0])
+        for memory, a in zip(self._taken, arguments, strict=True):
+            memory[:count] = a
+        self._trigger()
+        return [memory[:count].copy() for memory in self._given]
 
 
 @lru_cache(maxsize=64)

@@ -29,7 +29,7 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
 from tmsopt.tracing.branch import Branch, Event, Trace
 from tmsopt.tracing.continuation import SINGULAR, Walk, both_ways, contains, same
-from tmsopt.tracing.equations import Traced, design_at, prepare
+from tmsopt.tracing.equations import design_at, prepare
 from tmsopt.tracing.events import describe
 from tmsopt.tracing.seeds import beyond_infinity, missed, seeds
 
@@ -97,7 +97,8 @@ def trace(
                 walks.append(found)
                 lines.append(design_at(problem, found.y * ready.on.scale))
                 left = left[~contains(ready.on, found, left)]
-    branches = (b for b in (branch_of(ready, w) for w in walks) if b.residual <= _MET)  # not where it is nan
+    with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
+        branches = [b for b in (describe(ready, w) for w in walks) if b.residual <= _MET]  # not where it is nan
     ordered = _meeting(sorted(branches, key=lambda b: -float(b.arclength[-1])), problem)
     return Trace(problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)
 
@@ -120,12 +121,6 @@ def _meeting(branches: Sequence[Branch], problem: Problem) -> tuple[Branch, ...]
         return replace(event, detail=words)
 
     return tuple(replace(b, events=tuple(said(e) for e in b.events)) for b in branches)
-
-
-def branch_of(ready: Traced, walked: Walk) -> Branch:
-    """A walked curve with its events, in the parameters of the problem."""
-    with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
-        return describe(ready.problem, ready.pattern, ready.on, ready.unknowns, walked)
 
 
 def _asked(problem: Problem, name: str | None) -> Problem:

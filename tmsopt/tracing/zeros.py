@@ -4,13 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tmsopt.problem.problem import Problem
 from tmsopt.records import Array
-from tmsopt.roots import Pattern
-from tmsopt.tracing.continuation import Curve, Walk, between
-from tmsopt.tracing.monitors import CHANGES, NOTHING, Mark, marks, sign_changes, stability, vanishes
+from tmsopt.tracing.continuation import Walk, between
+from tmsopt.tracing.equations import Traced
+from tmsopt.tracing.monitors import CHANGES, NOTHING, Mark, Points, marks, sign_changes
 from tmsopt.tracing.solving import crossings
 
 TOGETHER = 1e-6
@@ -34,12 +32,16 @@ class Found:
     s: float
 
 
-def refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Walk:
+def points_of(ready: Traced, walked: Walk) -> Points:
+    """The points of a walk."""
+    return Points(ready, walked.y * ready.on.scale, walked.t)
+
+
+def refined(ready: Traced, walked: Walk) -> Walk:
     """The walk with a point wherever a mark comes nearest to 0 between two steps, so that two zeros show two signs."""
-    x = walked.y * on.scale
     steps = np.sum(walked.t[:-1] * np.diff(walked.y, axis=0), axis=1)
-    added: dict[tuple[int, float], tuple[Array, Array]] = {}
-    for mark, value in _live(problem, pattern, unknowns, x, walked.t):
+    added: list[Found] = []
+    for mark, value in _live(points_of(ready, walked)):
         side = np.sign(value[1:-1])
         left, here, right = side * value[:-2], side * value[1:-1], side * value[2:]
         with np.errstate(all="ignore"):
@@ -47,70 +49,73 @@ def refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             forward = (steps[:-1] > 0) & (steps[1:] > 0)
             dips = forward & (here <= left) & (here <= right) & (bend > 0) & (slope**2 / (2 * bend) > _DIP * here)
         for k in (np.flatnonzero(dips & (here > 0)) + 1).tolist():
+            at = walked.y[[k]], walked.t[[k]]
 
-            def height(s: float, k: int = k, mark: Mark = mark, sign: float = float(side[k - 1])) -> float:
-                return sign * float(_at(on, mark, walked.y[[k]], walked.t[[k]], np.array([s]))[0])
+            def height(s: float, mark: Mark = mark, at: tuple[Array, Array] = at, sign: float = side[k - 1]) -> float:
+                return sign * float(_at(ready, mark, *at, np.array([s]))[0])
 
-            ends = (-steps[k - 1], steps[k])
             from scipy.optimize import minimize_scalar  # a fifth of a second, paid only where it is needed
 
+            ends = (-steps[k - 1], steps[k])
             s = float(minimize_scalar(height, bounds=ends, method="bounded", options={"xatol": 1e-14}).x)
-            beside = between(on, walked.y[[k]], walked.t[[k]], np.array([s]))
-            (y,), (t,) = between(on, *beside, np.zeros(1))  # once more: beside a singular point Newton is slow
+            beside = between(ready.on, *at, np.array([s]))
+            (y,), (t,) = between(ready.on, *beside, np.zeros(1))  # once more: beside a singular point Newton is slow
             if np.abs(y - walked.y[k]).max() <= _ASTRAY * abs(s) and t @ walked.t[k] > 0:
-                added[(k, s) if s >= 0 else (k - 1, steps[k - 1] + s)] = y, t
-    ys, ts = list(walked.y), list(walked.t)
-    for shift, (after, s) in enumerate(sorted(added)):
-        ys.insert(after + 1 + shift, added[after, s][0])
-        ts.insert(after + 1 + shift, added[after, s][1])
-    return replace(walked, y=np.array(ys), t=np.array(ts))
+                place = (k, s) if s >= 0 else (k - 1, steps[k - 1] + s)
+                if all((f.after, f.s) != place for f in added):
+                    added.append(Found(mark.name, "", y, t, *place))
+    return inserted(walked, sorted(added, key=lambda f: (f.after, f.s)))[1]
 
 
-def located(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Iterator[Found]:
+def inserted(walked: Walk, found: list[Found]) -> tuple[list[int], Walk]:
+    """Rows of what was found, in order, and the walk with it among its points."""
+    y, t, rows = list(walked.y), list(walked.t), []
+    for shift, event in enumerate(found):
+        row = event.after + 1 + shift
+        y.insert(row, event.y)
+        t.insert(row, event.t)
+        rows.append(row)
+    return rows, replace(walked, y=np.array(y), t=np.array(t))
+
+
+def located(ready: Traced, walked: Walk) -> Iterator[Found]:
     """Every zero of a mark along a walk, between the rows that show its change of sign."""
-    x = walked.y * on.scale
-    u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
-    stable = stability(pattern.remaining(u), len(x))
-    for mark, value in _live(problem, pattern, unknowns, x, walked.t):
+    points = points_of(ready, walked)
+    for mark, value in _live(points):
         rows = np.flatnonzero(sign_changes(value))
         if mark.detail == CHANGES:
-            rows = rows[stable[rows] != stable[rows + 1]]
+            rows = rows[points.stable[rows] != points.stable[rows + 1]]
         here, along = walked.y[rows], walked.t[rows]
+        ends = np.sum(along * (walked.y[rows + 1] - here), axis=1)
 
-        def at(s: Array, k: NDArray[np.intp], mark: Mark = mark, here: Array = here, along: Array = along) -> Array:
-            return _at(on, mark, here[k], along[k], s)
+        def at(s: Array, mark: Mark = mark, here: Array = here, along: Array = along) -> Array:
+            return _at(ready, mark, here, along, s)
 
         if rows.size:
-            s = crossings(at, np.sum(along * (walked.y[rows + 1] - here), axis=1))
-            real = np.isfinite(s)  # else a jump through infinity, noise, or nan
-            yield from _true(problem, walked, mark, rows[real], s[real], *between(on, here[real], along[real], s[real]))
+            every = crossings(at, ends)
+            real = np.isfinite(every)  # else a jump through infinity, noise, or nan
+            y, t = between(ready.on, here[real], along[real], every[real])
+            for i, s, y_at, t_at in zip(rows[real].tolist(), every[real].tolist(), y, t, strict=True):
+                if np.abs(y_at - walked.y[i]).max() > _ASTRAY * s + TOGETHER:
+                    continue  # on another curve
+                if mark.name != "fold" or _turns(walked, i, y_at, list(ready.problem.free).index(mark.detail)):
+                    yield Found(mark.name, mark.detail, y_at, t_at, i, s)
 
 
-def _true(
-    problem: Problem, walked: Walk, mark: Mark, rows: NDArray[np.intp], s: Array, y: Array, t: Array
-) -> Iterator[Found]:
-    """Zeros of a mark without those that lie on another curve, and folds that are none."""
-    astray = np.abs(y - walked.y[rows]).max(axis=1) > _ASTRAY * s + TOGETHER
-    for k in np.flatnonzero(~astray):
-        i = int(rows[k])
-        if mark.name != "fold" or _turns(walked, i, y[k], list(problem.free).index(mark.detail)):
-            yield Found(mark.name, mark.detail, y[k], t[k], i, float(s[k]))
-
-
-def _live(problem: Problem, pattern: Pattern, unknowns: slice, x: Array, t: Array) -> Iterator[tuple[Mark, Array]]:
+def _live(points: Points) -> Iterator[tuple[Mark, Array]]:
     """The marks that are not 0 all along the curve, with their values."""
-    u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
-    within = [name for name, special in pattern.marks.items() if vanishes(special, pattern, u)]
-    for mark in marks(problem, pattern, unknowns, within):
-        value = np.broadcast_to(mark.value(x, t), len(x))
-        if mark.name not in within and (mark.name != "fold" or np.abs(value).max() > NOTHING):
+    special = points.special
+    for mark in marks(points):
+        value = points.column(mark.value(points))
+        if mark.name not in special and (mark.name != "fold" or np.abs(value).max() > NOTHING):
             yield mark, value
 
 
-def _at(on: Curve, mark: Mark, y: Array, t: Array, s: Array) -> Array:
+def _at(ready: Traced, mark: Mark, y: Array, t: Array, s: Array) -> Array:
     """A mark at arclengths s from points of the curve."""
-    new, tangent = between(on, y, t, s)
-    return np.array(np.broadcast_to(mark.value(new * on.scale, tangent), len(s)))
+    new, tangent = between(ready.on, y, t, s)
+    points = Points(ready, new * ready.on.scale, tangent)
+    return np.array(points.column(mark.value(points)))
 
 
 def _parabola(left: Array, here: Array, right: Array, before: Array, after: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from benchmarks.suites import PROBLEMS
 from benchmarks.timing import best, ipopt_runs
 from tmsopt import Study, load, over_grid, run_study
 from tmsopt.executor import Executor, cluster, here, processes
-from tmsopt.studies import Solver, fill, open_store
+from tmsopt.studies import Solver
 
 
 def quick_rows(rows: int) -> Study:
@@ -40,16 +40,16 @@ def overhead(study: Study, rounds: int) -> dict[str, float]:
     solver = Solver(study)
     solver((0,))
     ways: Mapping[str, Callable[[], Any]] = {
-        "study": lambda: _stored(study, solver),
+        "study": lambda: _stored(study),
         "solves": lambda: [solver((number,)) for number in range(len(study))],
         "ipopt": lambda: [run.again() for run in list(runs)],
     }
     return best(ways, rounds) | {"runs": float(len(runs))}
 
 
-def _stored(study: Study, solver: Solver) -> None:
-    with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s.sqlite", study) as store:
-        fill(study, store, workers=1)
+def _stored(study: Study) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        run_study(study, Path(folder) / "s.sqlite", workers=1)
 
 
 def scaling(study: Study, workers: int) -> float:

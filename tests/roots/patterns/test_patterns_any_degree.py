@@ -15,7 +15,7 @@ from tmsopt.roots import pattern, product
         ("weave+CEP2+EP3", 9, "EP3+CEP2+weave"),
     ],
 )
-def test_each_pattern_has_one_name(written: str, degree: int, name: str) -> None:
+def test_each_pattern_has_one_name(written, degree, name):
     """Real roots first, the highest multiplicity first, each kind once."""
     assert pattern(written, degree).name == name
     assert pattern(written, degree) is pattern(written, degree)
@@ -34,7 +34,7 @@ def test_each_pattern_has_one_name(written: str, degree: int, name: str) -> None
         ("weave", [-3.0], False),
     ],
 )
-def test_pairs_and_two_real_roots_are_told_apart_by_a_sign(name: str, quadratic: list[float], belongs: bool) -> None:
+def test_pairs_and_two_real_roots_are_told_apart_by_a_sign(name, quadratic, belongs):
     form = pattern(name, 7)
     u = quadratic + [1.0] * (len(form.unknowns) - len(quadratic))
     assert all(x >= 0 for x in form.nonnegative(u)) is belongs
@@ -53,9 +53,7 @@ def test_pairs_and_two_real_roots_are_told_apart_by_a_sign(name: str, quadratic:
         ("capsize", 5, "double zero", [], [[1, 0], [1, 1], [1, 2, 2]], None),
     ],
 )
-def test_marks_vanish_where_more_roots_meet(
-    name: str, degree: int, mark: str, tied: list[float], rest: list[list[float]], beside: list[float] | None
-) -> None:
+def test_marks_vanish_where_more_roots_meet(name, degree, mark, tied, rest, beside):
     """And not where they do not: with other tied roots, or with the rest (s + 4)(s + 6)(s + 8) … instead."""
     form = pattern(name, degree)
     others = product(*rest)[1:]

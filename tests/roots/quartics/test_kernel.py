@@ -188,7 +188,7 @@ def made(family: str, n: int = COUNT) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_factors_give_the_coefficients_back(family: str) -> None:
+def test_the_factors_give_the_coefficients_back(family):
     a = made(family)
     found = quartic_factors(*a.T)
     error = joint_error(a, found.roots)
@@ -196,7 +196,7 @@ def test_the_factors_give_the_coefficients_back(family: str) -> None:
     assert error[worst] <= JOINTLY_RIGHT, f"{error[worst]} of {a[worst].tolist()}"
 
 
-def test_abscissa_is_that_of_ball_arithmetic() -> None:
+def test_abscissa_is_that_of_ball_arithmetic():
     """Roots at least a tenth of the largest apart move by less than (2/0.1)³ times the error of the coefficients."""
     rng = np.random.default_rng(5)
     z = drawn(rng, 4000, log(rng, -0.5, 0.5))
@@ -211,7 +211,7 @@ def test_abscissa_is_that_of_ball_arithmetic() -> None:
 
 
 @pytest.mark.parametrize("family", ["normal", "random roots", "two-mass-skate designs", "near EP4", "roots at 0"])
-def test_abscissa_and_damping_are_those_of_the_roots(family: str) -> None:
+def test_abscissa_and_damping_are_those_of_the_roots(family):
     a = made(family)
     found = abscissa_and_damping(*a.T)
     z = quartic_factors(*a.T).roots
@@ -238,13 +238,13 @@ def test_abscissa_and_damping_are_those_of_the_roots(family: str) -> None:
         ([[1, -2e200, 0], [1, 3, 2]], 2e200, -1.0),
     ],
 )
-def test_abscissa_and_damping_by_hand(factors: list[list[float]], abscissa: float, ratio: float) -> None:
+def test_abscissa_and_damping_by_hand(factors, abscissa, ratio):
     found = abscissa_and_damping(*np.polymul(*factors))
     assert found.abscissa == pytest.approx(abscissa, rel=1e-14, abs=1e-320)
     assert found.damping_ratio == pytest.approx(ratio, rel=1e-14, abs=1e-320)
 
 
-def test_options_of_earlier_versions_are_accepted() -> None:
+def test_options_of_earlier_versions_are_accepted():
     with pytest.warns(DeprecationWarning, match="compiled= is no longer needed"):
         assert quartic_is_stable(1, 4, 6, 4, 1, compiled=False)  # type: ignore[call-arg]
 
@@ -252,7 +252,7 @@ def test_options_of_earlier_versions_are_accepted() -> None:
 # Fallback, shapes and what has no roots
 
 
-def test_eigenvalues_are_the_last_resort_and_are_counted() -> None:
+def test_eigenvalues_are_the_last_resort_and_are_counted():
     a = np.array([[1.0, 2.0, 3.0, 4.0, 5.0], DOUBT, DOUBT])
     assert quartic_factors(*a.T).fallbacks == 2
     found = abscissa_and_damping(*a.T)
@@ -262,13 +262,13 @@ def test_eigenvalues_are_the_last_resort_and_are_counted() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_root_beyond_all_doubles_is_infinite_without_a_warning() -> None:
+def test_a_root_beyond_all_doubles_is_infinite_without_a_warning():
     """5e-324 (s⁴ + …) − 1e308 s³ has a root at 2e631."""
     found = abscissa_and_damping(5e-324, -1e308, 1.0, 1.0, 1.0)
     assert found.abscissa == np.inf
 
 
-def test_what_has_no_roots_is_nan_and_undefined() -> None:
+def test_what_has_no_roots_is_nan_and_undefined():
     a = np.ones((12, 5))
     a[0, 0] = 0
     a[np.arange(1, 6), np.arange(5)] = np.nan
@@ -284,7 +284,7 @@ def test_what_has_no_roots_is_nan_and_undefined() -> None:
     assert not quartic_is_stable(*a.T).any()
 
 
-def test_coefficients_broadcast() -> None:
+def test_coefficients_broadcast():
     a3, a4 = np.linspace(1, 2, 3)[:, None], np.linspace(0.1, 0.2, 4)
     given = (1.0, 4.0, 6.0, a3, a4)
     full = [np.broadcast_to(c, (3, 4)).copy() for c in given]
@@ -323,7 +323,7 @@ def on_a_boundary(rng: np.random.Generator, n: int) -> np.ndarray:
     return a + 10 ** rng.uniform(-17, -9, (2 * n, 1)) * rng.uniform(-1, 1, (2 * n, 5)) * [0, 1, 1, 1, 1]
 
 
-def test_classes_are_those_of_the_definitions() -> None:
+def test_classes_are_those_of_the_definitions():
     """On 1e5 designs, and where rounding decides or exact arithmetic must: near boundaries and exceptional points."""
     rng = np.random.default_rng(3)
     few = [made(f, 20) for f in FAMILIES]  # exact arithmetic takes a tenth of a second for 200 of them
@@ -338,7 +338,7 @@ def test_classes_are_those_of_the_definitions() -> None:
     assert 0 < found.doubtful < 2000
 
 
-def test_classes_are_those_of_exact_arithmetic() -> None:
+def test_classes_are_those_of_exact_arithmetic():
     """Away from the boundary of stability, where the Routh table in doubles is right."""
     a = np.stack(tms.coefficients(wide_designs(8, 60_000)), axis=-1)
     found = quartic_classes(*a.T)
@@ -351,7 +351,7 @@ def test_classes_are_those_of_exact_arithmetic() -> None:
             assert {1: positive + zero > 0, 2: positive + zero == 0, 3: negative < 4, 4: negative == 4}[code]
 
 
-def test_real_roots_beside_a_double_one_are_counted_exactly() -> None:
+def test_real_roots_beside_a_double_one_are_counted_exactly():
     """A double root, real or of a pair of pairs, whose coefficients are an ulp or so off: rounding cannot tell."""
     rng = np.random.default_rng(8)
     r, b, c = rng.uniform(0.2, 2.0, (3, 200))

@@ -22,7 +22,7 @@ def _chunks() -> Iterator[np.ndarray]:
 
 
 @pytest.mark.slow
-def test_both_verdicts_agree_on_a_million_designs() -> None:
+def test_both_verdicts_agree_on_a_million_designs():
     """|abscissa| has a density of order 1 at 0, so of a million about 1e-3 fall below 1e-9: next to none is left out."""
     count = 0
     for coefficients in _chunks():
@@ -35,7 +35,7 @@ def test_both_verdicts_agree_on_a_million_designs() -> None:
     assert count >= DESIGNS - 20
 
 
-def test_the_verdict_is_that_of_an_exact_routh_table() -> None:
+def test_the_verdict_is_that_of_an_exact_routh_table():
     """Exact arithmetic on the very doubles; as many stable designs as unstable ones."""
     coefficients = next(_chunks())
     verdict = is_stable(coefficients)
