@@ -4,7 +4,7 @@ To add one, write a function `NAME_figure` that takes nothing and returns a Figu
 Item with it. The module is imported when the figure is made, so that listing the figures loads nothing heavy.
 """
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -47,13 +47,8 @@ def find(name: str) -> Item:
     for item in GALLERY.values():
         if name in (item.name, item.alias):
             return item
-    raise refusal(f"found '{name}'; {suggest(name, _names())}", "NAME")
-
-
-def _names() -> Iterator[str]:
-    """Everything that `find` accepts, names first."""
-    yield from GALLERY
-    yield from (item.alias for item in GALLERY.values() if item.alias)
+    accepted = [*GALLERY, *(item.alias for item in GALLERY.values() if item.alias)]
+    raise refusal(f"found '{name}'; {suggest(name, accepted)}", "NAME")
 
 
 _ITEMS = (
