@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
@@ -199,7 +200,7 @@ def _merged(parts: Sequence[Part]) -> Part:
     }
 
 
-def _causes(problem: Problem, judged: Part) -> NDArray[Any]:
+def _judged_causes(problem: Problem, judged: Part) -> NDArray[Any]:
     """Why rows are infeasible that were judged without a solver."""
     texts, unstable = judged["cause"], np.zeros(len(judged["cause"]), dtype=bool)
     for name, condition in problem.conditions.items():
@@ -233,8 +234,6 @@ class RowTable(Sequence[Row]):
         self.numbers: NDArray[np.int64] = self._kept["number"]
         status = self._kept["status"]
         self._unsolved = (status == "failed") | (status == "quarantined")
-        judged = np.flatnonzero((status == "infeasible") & (self._kept["cause"] == ""))
-        self._kept["cause"][judged] = _causes(study.problem, {head: x[judged] for head, x in self._kept.items()})
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -277,6 +276,14 @@ class RowTable(Sequence[Row]):
             made.append(Row(**{f.name: f.type(row[f.name]) for f in _FIELDS}))
         return made
 
+    @cached_property
+    def _causes(self) -> NDArray[Any]:
+        """Why rows are not optimal; of those that were judged without a solver it follows from their numbers."""
+        texts = self._kept["cause"]
+        judged = np.flatnonzero((self._kept["status"] == "infeasible") & (texts == ""))
+        texts[judged] = _judged_causes(self.study.problem, {head: x[judged] for head, x in self._kept.items()})
+        return texts
+
     def values(self, head: str) -> NDArray[Any]:
         """One column; nan where a row has no value."""
         column = self.column(head)
@@ -291,6 +298,8 @@ class RowTable(Sequence[Row]):
         match name:
             case "seed":
                 values = column_of([self.study.seed_of(number) for number in numbers.tolist()], int)
+            case "cause":
+                values = self._causes[at]
             case "stable":
                 ideal, realised = self._kept["abscissa"][at], self._kept["abscissa_realised"][at]
                 values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)

@@ -37,7 +37,8 @@ SCHEMA = 3
 LARGEST = 2**27
 """Bytes of one value: more than a column of the study with the most rows takes."""
 
-_SQL = {int: "INTEGER", bool: "INTEGER", float: "REAL", str: "TEXT"}
+_INTEGER = "INTEGER NOT NULL DEFAULT 0"
+_SQL = {int: _INTEGER, bool: _INTEGER, float: "REAL DEFAULT 0", str: "TEXT NOT NULL DEFAULT ''"}
 _TABLES = f"""
 PRAGMA application_id={APPLICATION};
 PRAGMA user_version={SCHEMA};
@@ -139,9 +140,11 @@ class Store:
             absent = np.full(len(part["number"]), np.nan)
             table = np.column_stack([part.get(head, absent) for head in (*heads, *new)] or [absent])
             table[np.isnan(table)] = np.frombuffer(8 * _ABSENT)[0]
-            blobs = [line.tobytes().rstrip(_ABSENT) for line in table.astype("<f8")]
-            lines = zip(*(part[name].tolist() for name in SAVED), blobs, strict=True)
-            query = f"INSERT OR IGNORE INTO rows VALUES ({', '.join('?' * (len(SAVED) + 1))})"
+            doubles, size = table.astype("<f8").tobytes(), 8 * table.shape[1]
+            blobs = [doubles[k : k + size].rstrip(_ABSENT) for k in range(0, len(doubles), size)]
+            told = ["number", *(name for name in list(SAVED)[1:] if part[name].any())]  # the others are as by default
+            lines = zip(*(part[name].tolist() for name in told), blobs, strict=True)
+            query = f"INSERT OR IGNORE INTO rows ({', '.join(told)}, numbers) VALUES ({'?, ' * len(told)}?)"
             added = self._connection.executemany(query, lines).rowcount
             self._connection.execute("UPDATE sessions SET rows = rows + ? WHERE id = ?", (max(added, 0), self._session))
 
