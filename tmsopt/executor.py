@@ -315,7 +315,7 @@ class _LokyPool:
         dead = pool is not None and any(worker.exitcode is not None for worker in [*pool._processes.values()])
         if dead and self._stuck:
             for worker in [*pool._processes.values()]:
-                worker.kill()
+                worker.terminate()  # loky's have no kill
             pool._result_queue._writer.close()  # the last one; the pool reads the end of the file, and breaks
         self._stuck = dead
 
