@@ -92,7 +92,7 @@ def report(asked: Asked) -> str:
         "`problems/two_mass_spring.toml`: five parameters in ±20, nothing said of the pattern (`minimize` = abscissa). "
         "Uniform starts are in the box; normal ones of standard deviation 1 are what HANSO and PyGRANSO take by "
         "default, and what the rivals have here, who search without bounds. The optimum, all six poles at −√15/5, is "
-        "proved in `tests/solver/test_published.py`. A method on eigenvalues states its best eigenvalue, ours the root "
+        "proved in `tests/search/test_published.py`. A method on eigenvalues states its best eigenvalue, ours the root "
         "of the factored form. *As stored* is the true abscissa of the parameters in double precision, at 60 digits: "
         "rounding them moves a 6-fold root by some 2e-3, whatever found them. HANSO is MATLAB: its two phases are "
         "written here after the papers. None of those that could be read prints digits for this problem."
