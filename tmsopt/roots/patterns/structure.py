@@ -180,7 +180,8 @@ def _named(fit: Fit, found: Roots, unit: float) -> Structure:
     each += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
     right = max(z.real for z, _ in each)
     line = [(multiplicity, z.imag == 0) for z, multiplicity in each if z.real == right]
-    roots = [Root(w.real, w.imag, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,))]
+    pairs = ((w, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,)))
+    roots = [Root(float(w.real), float(w.imag), m) for w, m in pairs]
     name = "2EP2" if [(root.im, root.multiplicity) for root in roots] == _TWO_DOUBLE else _line_name(line)
     return Structure(name, _sorted(roots), fit.distance)
 
