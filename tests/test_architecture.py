@@ -4,7 +4,6 @@ import ast
 import graphlib
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -41,7 +40,7 @@ FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names}
 GROUND = FLOORS[0]
 
 
-def sources() -> dict[str, str]:
+def sources():
     """Module name → source of the whole package."""
     found = {}
     for path in sorted((ROOT / PACKAGE).rglob("*.py")):
@@ -54,12 +53,12 @@ SOURCES = sources()
 
 
 @cache
-def nodes(source: str) -> tuple[ast.AST, ...]:
+def nodes(source):
     """Every node of a source, parsed once for all tests."""
     return tuple(ast.walk(ast.parse(source)))
 
 
-def imports(module: str, modules: Mapping[str, str]) -> Iterator[str]:
+def imports(module, modules):
     """Modules that a module imports, at its top or anywhere inside; relative imports and import_module resolved."""
     is_package = any(other.startswith(f"{module}.") for other in modules)
     for node in nodes(modules[module]):
@@ -80,12 +79,12 @@ def imports(module: str, modules: Mapping[str, str]) -> Iterator[str]:
                 yield name
 
 
-def stage(module: str) -> str:
+def stage(module):
     """The folder or file directly below the package; "" for the package itself."""
     return module.split(".")[1] if "." in module else ""
 
 
-def breaches(modules: Mapping[str, str]) -> list[str]:
+def breaches(modules):
     """Imports that run up, or along a floor."""
     found = []
     for module in modules:
@@ -111,7 +110,7 @@ def breaches(modules: Mapping[str, str]) -> list[str]:
     return found
 
 
-def cycles(modules: Mapping[str, str]) -> list[str]:
+def cycles(modules):
     pairs = {m: {(m, t) for t in imports(m, modules) if t in modules and t != m} for m in modules if m != PACKAGE}
     graph = {m: {t for _, t in found - ASKED_ABOVE} for m, found in pairs.items()}
     try:
@@ -121,7 +120,7 @@ def cycles(modules: Mapping[str, str]) -> list[str]:
     return []
 
 
-def names_called(source: str) -> Iterator[str]:
+def names_called(source):
     """Names and attributes that are called, and every name that is used at all: f, a.f."""
     for node in nodes(source):
         match node:
@@ -129,7 +128,7 @@ def names_called(source: str) -> Iterator[str]:
                 yield name
 
 
-def calls(source: str, *functions: str) -> list[int]:
+def calls(source, *functions):
     """Lines that call a builtin by its bare name, or builtins.name."""
     return [
         node.lineno
@@ -147,7 +146,7 @@ def calls(source: str, *functions: str) -> list[int]:
     ]
 
 
-def writes(source: str) -> list[int]:
+def writes(source):
     """Lines that write to the terminal: print, sys.stdout and sys.stderr, input."""
     streams = [
         node.lineno
@@ -175,7 +174,7 @@ WRITERS = (
 )
 
 
-def written(module: str, source: str) -> Iterator[str]:
+def written(module, source):
     """Functions that write a file but not to the place that `files.write_atomic` or `write_text` gives."""
     for function in nodes(source):
         if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
@@ -190,7 +189,7 @@ def written(module: str, source: str) -> Iterator[str]:
             yield f"{module}.{function.name}"
 
 
-def _writes_file(call: ast.Call) -> bool:
+def _writes_file(call):
     name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
     if name in ("open", "fdopen"):
         given = [*call.args, *(k.value for k in call.keywords if k.arg == "mode")]
@@ -199,7 +198,7 @@ def _writes_file(call: ast.Call) -> bool:
     return (name in WRITERS and isinstance(call.func, ast.Attribute)) or ast.unparse(call.func) == "np.save"
 
 
-def callers_of_ipopt(modules: Mapping[str, str]) -> list[str]:
+def callers_of_ipopt(modules):
     """Modules that build a solver: CasADi's nlpsol, by name or as text, or its Opti stack."""
     return [m for m, source in modules.items() if {"nlpsol", "Opti", "OptiAdvanced"} & set(names_called(source))]
 
@@ -233,7 +232,7 @@ def test_what_is_asked_above_is_asked_when_it_is_needed():
 
 
 def test_a_class_name_has_one_meaning():
-    homes: dict[str, list[str]] = {}
+    homes = {}
     for module, source in SOURCES.items():
         for node in nodes(source):
             if isinstance(node, ast.ClassDef):
@@ -273,7 +272,7 @@ def test_commands_call_the_public_functions():
     assert {pair for pair in taken if not exported(*pair[1].rsplit(".", 1))} == set()
 
 
-def exported(package: str, name: str) -> bool:
+def exported(package, name):
     """Whether a face hands a name on, which a room of the package may have too; a lazy one by its stub."""
     stub = ROOT / package.replace(".", "/") / "__init__.pyi"
     source = stub.read_text(encoding="utf-8") if stub.exists() else SOURCES[package]
@@ -345,7 +344,7 @@ def test_import_and_help_are_light(heavy, modules_loaded):
     scope="module",
     params=["import tmsopt", "from tmsopt.cli.commands import every; every(['--help'], standalone_mode=False)"],
 )
-def modules_loaded(request: pytest.FixtureRequest) -> set[str]:
+def modules_loaded(request):
     script = f"{request.param}; import sys; print(*sys.modules, file=sys.stderr)"
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, check=True)
     return set(ended.stderr.split())

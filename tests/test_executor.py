@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -23,7 +23,7 @@ Start = Callable[..., Executor]
 
 
 @pytest.fixture(scope="module")
-def address() -> Iterator[str]:
+def address():
     """A cluster whose scheduler gives up a task after the first worker it ended."""
     distributed = pytest.importorskip("distributed")
     import dask
@@ -42,7 +42,7 @@ def address() -> Iterator[str]:
 
 
 @pytest.fixture(params=["processes", "cluster"])
-def start(request: pytest.FixtureRequest) -> Start:
+def start(request):
     """The executors whose workers can be killed."""
     if request.param == "processes":
         return lambda note=print: processes(2, note)
@@ -50,7 +50,7 @@ def start(request: pytest.FixtureRequest) -> Start:
     return lambda note=print: cluster(at, note)
 
 
-def values(results: dict[int, Any]) -> dict[int, Any]:
+def values(results):
     return {place: result if isinstance(result, Crash) else result[0] for place, result in results.items()}
 
 
@@ -79,7 +79,7 @@ def test_what_a_worker_builds_stays(start):
 class _Counter:
     calls = 0
 
-    def __call__(self, item: int) -> int:
+    def __call__(self, item):
         self.calls += 1
         return self.calls
 
@@ -102,7 +102,7 @@ def test_work_that_cannot_be_loaded_is_an_end_with_a_reason(start, tmp_path):
 @pytest.mark.slow
 def test_a_crash_costs_its_item_alone(start, tmp_path):
     """Item 11 kills once and comes when it is tried again, item 23 kills whenever it is tried."""
-    notes: list[str] = []
+    notes = []
     with start(notes.append) as executor:
         found = list(executor.map(Fake(tmp_path, 0.01, once=[11], always=[23]), range(40)))
     assert Counter(place for place, _ in found) == Counter(range(40))
@@ -112,7 +112,7 @@ def test_a_crash_costs_its_item_alone(start, tmp_path):
 
 @pytest.mark.slow
 def test_a_process_tells_how_it_ended(tmp_path):
-    notes: list[str] = []
+    notes = []
     with processes(2, notes.append) as executor:
         found = dict(executor.map(Fake(tmp_path, always=[1], leaves=[2]), range(3)))
     assert (found[1], found[2]) == (Crash("signal 9"), Crash("exit code 3"))
@@ -190,7 +190,7 @@ def test_workers_end_with_the_program(how, tmp_path):
     assert not [pid for pid in workers if running(pid)]
 
 
-def running(pid: int) -> bool:
+def running(pid):
     """Whether a process exists and is not a zombie that its reaper has still to read."""
     ended = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True, check=False)
     return bool(ended.stdout.strip()) and not ended.stdout.startswith("Z")

@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import stat
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +20,13 @@ posix = pytest.mark.skipif(os.name != "posix", reason="devices, pipes and limits
 
 
 @pytest.fixture(scope="module")
-def plane() -> Any:
+def plane():
     return tmsopt.chart("problems/chart.toml", points=(60, 50), boundaries=False)
 
 
 FAILED = [Row(k, 0, Table({"mu": 0.1}), "failed", cause=f"{k} " * 500) for k in range(100)]
 ROWS = RowTable(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1] * 100}), [part_of(FAILED)])
-WRITERS: dict[str, Callable[[Path, Any], None]] = {
+WRITERS = {
     "a.txt": lambda path, _: write_text(path, "a line\n" * 10_000),
     "a.csv": lambda path, _: write_csv(path, [{"x": k, "y": 0.1} for k in range(10_000)], {"x": "m"}),
     "a.npz": lambda path, plane: plane.save(path),
@@ -38,7 +37,7 @@ WRITERS: dict[str, Callable[[Path, Any], None]] = {
 
 
 @pytest.fixture
-def little_room() -> Iterator[None]:
+def little_room():
     """No file may grow beyond some kilobytes, as on a full disk."""
     import resource
 
@@ -82,7 +81,7 @@ def test_an_interruption_leaves_the_earlier_file(tmp_path):
     path.write_text("before")
 
     class Rows(list[Any]):
-        def __iter__(self) -> Iterator[Any]:
+        def __iter__(self):
             yield self[0]
             raise KeyboardInterrupt
 

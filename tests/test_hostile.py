@@ -8,7 +8,6 @@ import json
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable
 from contextlib import closing, suppress
 from datetime import timedelta
 from pathlib import Path
@@ -110,7 +109,7 @@ BYTES = st.sampled_from(
 
 
 @st.composite
-def spoiled(draw: st.DrawFn, text: str) -> bytes:
+def spoiled(draw, text):
     """A text with values, keys or bytes exchanged, lines twice or missing, or without its end."""
     for _ in range(draw(st.integers(1, 3))):
         lines = text.splitlines(keepends=True) or [""]
@@ -137,7 +136,7 @@ def spoiled(draw: st.DrawFn, text: str) -> bytes:
     return raw
 
 
-def answered(ask: Callable[[], object]) -> None:
+def answered(ask):
     """A question is answered, or refused in printable words that do not flood a screen."""
     try:
         ask()
@@ -190,7 +189,7 @@ def test_bicycle_files_are_read_or_refused(data, ending, tmp_path):
     sense=st.sampled_from(["minimize", "maximize"]),
 )
 def test_formulas_are_computed_or_refused(text, sense):
-    def ask() -> None:
+    def ask():
         problem = tmsopt.Problem(
             model=tmsopt.models.tms,
             fixed={"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1},
@@ -206,7 +205,7 @@ def test_formulas_are_computed_or_refused(text, sense):
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory):
     """A finished chart and a finished study."""
     folder = tmp_path_factory.mktemp("made")
     (folder / "c.toml").write_text(PLANE)
@@ -233,7 +232,7 @@ def test_charts_are_opened_or_refused(data, tmp_path, made):
         raw = raw[:at] + data.draw(BYTES) + data.draw(st.sampled_from([raw[at:], raw[at + 1 :], b"", raw]))
     file.write_bytes(raw)
 
-    def ask() -> None:
+    def ask():
         opened = tmsopt.open_chart(tmp_path / "c.chart")
         assert all(layer.sum() is not None for layer in opened.layers.values())
         opened.to_json()

@@ -40,7 +40,7 @@ def _sixty_digits():
         yield
 
 
-def designs(count: int, seed: int) -> dict[str, np.ndarray]:
+def designs(count, seed):
     """Random designs of both signs of lambda_s, half of them with chi_H near 1, as floats."""
     rng = np.random.default_rng(seed)
     near = rng.uniform(size=count) < 0.5
@@ -55,7 +55,7 @@ def designs(count: int, seed: int) -> dict[str, np.ndarray]:
     }
 
 
-def one(parameters: dict[str, np.ndarray], i: int) -> dict[str, float]:
+def one(parameters, i):
     return {name: float(values[i]) for name, values in parameters.items()}
 
 
@@ -68,12 +68,12 @@ EXPRESSIONS, SYMBOLS = oracles.symbolic_copo()
 TERM_SIZES = [sympy.lambdify(list(SYMBOLS.values()), sum(map(abs, e.args))) for e in EXPRESSIONS]
 
 
-def term_sizes(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T) -> list[float]:
+def term_sizes(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T):
     """Sum of the absolute terms of each coefficient: what rounding of the parameters is relative to."""
     return [float(size(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)) for size in TERM_SIZES]
 
 
-def ep4_defect(design: laws.EP4, mu: float, chi_H: float, zeta_B: float, zeta_H: float) -> float:
+def ep4_defect(design, mu, chi_H, zeta_B, zeta_H):
     """Largest |a_i - a0 C(4, i) (-omega0)^i| over the sizes of the terms in it, computed exactly."""
     values = (design.Fr, mu, design.chi_B, chi_H, zeta_B, zeta_H, design.tan_lambda_s)
     a, sizes = oracles.polynomial_exact(*values), term_sizes(*values)
@@ -458,7 +458,7 @@ def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H):
     design = laws.ep4_chi_H_1(zeta_B, zeta_H)
     assert (chi_B, bound) == pytest.approx((design.chi_B, design.tan_lambda_s), rel=1e-13)
 
-    def heavily_damped(tilt: float) -> bool:
+    def heavily_damped(tilt):
         speeds = design.Fr * np.linspace(0.5, 2, 101)
         end = laws.epset(zeta_B, zeta_H, np.arctan(tilt))  # near the EP4 the range of speeds is short and ends here
         speeds = np.append(speeds, [] if np.isnan(end) else end * (1 - np.geomspace(1e-6, 0.1, 50)))
@@ -583,7 +583,7 @@ def test_every_label_is_a_law():
 # The oracles themselves
 
 
-def _fraction(number) -> Fraction:
+def _fraction(number):
     """An mpf as it is stored, a dyadic rational."""
     sign, mantissa, exponent, _ = number._mpf_
     return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent

@@ -1,9 +1,7 @@
 """Progress of long work: the same record from every verb."""
 
 import math
-from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import pytest
 
@@ -16,7 +14,7 @@ EP4 = tmsopt.load("problems/ep4.toml")
 STUDY = tmsopt.over_grid(EP4, {"mu": [0.1, 0.2, 0.3]})
 DRAWN = tmsopt.Sampling(EP4, 20, tolerances={"mu": 0.01})
 
-VERBS: list[tuple[str, Callable[..., Any]]] = [
+VERBS = [
     ("searching", lambda **told: tmsopt.solve(EP4, **told)),
     ("searching", lambda **told: tmsopt.solve_all("problems/ep4_matching.toml", seconds=0, **told)),
     ("proving that no design is missed", lambda **told: tmsopt.solve_all("problems/ep4_matching.toml", **told)),
@@ -49,11 +47,11 @@ VERBS: list[tuple[str, Callable[..., Any]]] = [
 
 
 @cache
-def optimum() -> tmsopt.Solution:
+def optimum():
     return tmsopt.solve(EP4)
 
 
-def _space() -> tmsopt.Problem:
+def _space():
     return tmsopt.Problem(
         model=tmsopt.models.tms,
         fixed={"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1},
@@ -65,7 +63,7 @@ def _space() -> tmsopt.Problem:
 @pytest.mark.parametrize(("what", "verb"), VERBS, ids=[f"{k}-{what}" for k, (what, _) in enumerate(VERBS)])
 def test_every_verb_tells_the_same_content(what, verb, monkeypatch):
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
-    told: list[tmsopt.Progress] = []
+    told = []
     verb(progress=told.append)
     assert what in {t.what for t in told}
     assert all(t.what and t.seconds >= 0 for t in told)
@@ -88,13 +86,13 @@ def test_what_cannot_be_called_is_refused(what, verb):
 
 
 def test_a_page_is_told_of(tmp_path):
-    told: list[tmsopt.Progress] = []
+    told = []
     tmsopt.save_report(optimum(), tmp_path / "design.html", progress=told.append)
     assert "writing the page" in {t.what for t in told}
 
 
 def test_an_infeasible_problem_tells_of_its_limits():
-    told: list[tmsopt.Progress] = []
+    told = []
     asked = tmsopt.Problem(
         model=EP4.model, fixed=EP4.fixed, free=EP4.free, constraints={"no": "abscissa <= -100"}, minimize="Fr"
     )
@@ -105,15 +103,15 @@ def test_an_infeasible_problem_tells_of_its_limits():
 class Clock:
     """A clock that is set by hand."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.now = 100.0
 
-    def perf_counter(self) -> float:
+    def perf_counter(self):
         return self.now
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock(monkeypatch):
     made = Clock()
     monkeypatch.setattr("tmsopt.progress.time", made)
     return made
@@ -121,7 +119,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 def test_time_left_is_that_of_the_rate_since_the_first_count(clock):
     """40 rows of 100 were there; 20 more took 4 s, so the other 40 take 8."""
-    told: list[tmsopt.Progress] = []
+    told = []
     steps = start_steps(told.append, "solving rows", "row")
     assert steps is not None
     steps(40, 100)
@@ -148,7 +146,7 @@ def test_time_left_is_that_of_the_rate_since_the_first_count(clock):
     ],
 )
 def test_time_left_is_told_once_the_rate_is_one(clock, steps, most, seconds, left):
-    told: list[tmsopt.Progress] = []
+    told = []
     counts = start_steps(told.append, "solving rows", "row")
     assert counts is not None
     counts(0, most)
@@ -158,7 +156,7 @@ def test_time_left_is_told_once_the_rate_is_one(clock, steps, most, seconds, lef
 
 
 def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock):
-    told: list[tmsopt.Progress] = []
+    told = []
     steps = start_steps(told.append, "bounding the optimum", "s")
     assert steps is not None
     steps(2.0, 60.0)
@@ -167,7 +165,7 @@ def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock):
 
 def test_nobody_is_told_oftener_than_he_can_read(clock):
     """A million rows in a second, and a callback every 50 ms; the first and the last are told whenever they are."""
-    told: list[tmsopt.Progress] = []
+    told = []
     steps = start_steps(told.append, "solving rows", "row")
     assert steps is not None
     for done in range(1, 1001):
@@ -179,7 +177,7 @@ def test_nobody_is_told_oftener_than_he_can_read(clock):
 
 def test_beginnings_first_counts_and_ends_are_told_at_once(clock):
     """Three pieces of work in no time: nine records, whatever else is counted."""
-    told: list[tmsopt.Progress] = []
+    told = []
     steps = Steps(told.append)
     for what in ("tracing weave", "tracing capsize", "tracing EP2"):
         steps.begin(what, "start")
@@ -190,9 +188,9 @@ def test_beginnings_first_counts_and_ends_are_told_at_once(clock):
 
 def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock):
     """A hundred steps of 0.1 s, and a listener that takes as long: it is left alone for nine times that."""
-    called: list[float] = []
+    called = []
 
-    def listen(told: tmsopt.Progress) -> None:
+    def listen(told):
         called.append(told.done)
         clock.now += 0.1
 
@@ -206,7 +204,7 @@ def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock):
 
 def test_work_that_is_begun_anew_goes_on_counting(clock):
     """12 of 64 starts on one side of the box, then 3 of 64 on the other; and after another piece of work, 5 of 8."""
-    told: list[tmsopt.Progress] = []
+    told = []
     steps = Steps(told.append)
     steps.begin("searching", "start")
     for done, most in ((1, 64), (12, 64), (1, 64), (3, 64)):

@@ -6,11 +6,9 @@ import pickle
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +19,7 @@ from tmsopt.studies import stored
 PROBLEMS = Path(__file__).parents[1] / "problems"
 EP4, PLANE = PROBLEMS / "ep4.toml", PROBLEMS / "chart.toml"
 
-ASKED: dict[str, Callable[[Any], Any]] = {
+ASKED = {
     "solve": lambda given: tmsopt.solve(given).parameters,
     "compare": lambda given: [row.numeric for row in tmsopt.compare(given).laws],
     "prove": lambda given: tmsopt.prove(given).parameters,
@@ -35,7 +33,7 @@ ASKED: dict[str, Callable[[Any], Any]] = {
 }
 """Verbs about a design: a problem is solved first."""
 
-DRAWN: dict[str, Callable[[Any], Any]] = {
+DRAWN = {
     "chart": lambda given: tmsopt.chart(given, points=(12, 9), boundaries=False).kind.tolist(),
     "trace": lambda given: len(tmsopt.trace(given, "capsize", starts=4).branches),
     "domain": lambda given: tmsopt.domain(given, starts=4).to_json(),
@@ -79,7 +77,7 @@ def test_what_is_no_path_is_refused_in_words(reader, wrong):
 @pytest.mark.parametrize("wrong", [5, b"x"], ids=repr)
 def test_what_is_no_file_to_write_is_refused_in_words(wrong):
     study = tmsopt.over_grid(tmsopt.load(EP4), {"mu": [0.1]})
-    calls: list[Callable[[], Any]] = [
+    calls = [
         lambda: tmsopt.run_study(study, wrong),
         lambda: tmsopt.run_study(study, workers=1).export(wrong),
         lambda: tmsopt.chart(PLANE, points=(4, 4), folder=wrong),
@@ -160,7 +158,7 @@ def test_what_arguments_and_results_are_made_of_is_public():
     assert all(isinstance(band, tmsopt.Band) for band in tmsopt.load(PROBLEMS / "speed_band.toml").scenarios.values())
 
 
-WRONG: list[tuple[Callable[[], Any], str]] = [
+WRONG = [
     (lambda: posed(constraints=["nu_H >= 0.02"]), r"constraints: found \['nu_H.*such as \{'trail': 'nu_H >= 0.02'\}"),
     (lambda: posed(constraints="nu_H >= 0.02"), r"constraints: found 'nu_H"),
     (lambda: posed(constraints={"trail": 3}), "constraints.trail: found 3; accepted: an expression in quotes"),
@@ -205,7 +203,7 @@ WRONG: list[tuple[Callable[[], Any], str]] = [
 ]
 
 
-def posed(**changed: Any) -> tmsopt.Problem:
+def posed(**changed):
     """The EP4 problem with some of its arguments changed."""
     return replace(tmsopt.load(EP4), **changed)
 

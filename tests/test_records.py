@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ class Outer:
     absent: Inner | None = None
 
     @property
-    def size(self) -> np.float64:
+    def size(self):
         return np.float64(len(self.values))
 
 
@@ -33,7 +32,7 @@ class Outer:
 class Said:
     seconds: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self):
         return {"time": self.seconds}
 
 

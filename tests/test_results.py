@@ -3,12 +3,10 @@
 import inspect
 import json
 import pickle
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -26,43 +24,43 @@ VOID = {"img", "br", "meta"}
 
 
 @cache
-def design() -> tmsopt.Solution:
+def design():
     return tmsopt.solve(replace(tmsopt.load(PROBLEMS / "ep4.toml"), title=TITLE))
 
 
 @cache
-def plane() -> tmsopt.Problem:
+def plane():
     """s⁴ + 4s³ + 6s² + b s + c: stable, EP4 at b = 4, c = 1."""
     return tmsopt.Problem(from_coefficients([1, 4, 6, "b", "c"]), free={"b": (2.0, 6.0), "c": (-1.0, 3.0)}, title=TITLE)
 
 
-def tailed() -> tmsopt.Problem:
+def tailed():
     """The quadratic coefficient free too: the swallowtail around that EP4."""
     box = {"a": (5.5, 6.5), "b": (3.0, 5.0), "c": (0.5, 1.5)}
     return tmsopt.Problem(from_coefficients([1, 4, "a", "b", "c"]), free=box, title=TITLE)
 
 
 @cache
-def traced() -> tmsopt.Trace:
+def traced():
     return tmsopt.trace(plane(), "EP2", starts=4)
 
 
 @cache
-def explained() -> tmsopt.Explanation:
+def explained():
     return tmsopt.explain(design(), resolve=False)
 
 
 @cache
-def charted() -> tmsopt.Chart:
+def charted():
     return tmsopt.chart(plane(), points=(9, 7))
 
 
 @cache
-def studied() -> tmsopt.Results:
+def studied():
     return tmsopt.run_study(tmsopt.over_grid(design().problem, {"mu": [0.1, 0.2]}, starts=4), workers=1)
 
 
-def front() -> tmsopt.Front:
+def front():
     """Of s² + cs + 1: the abscissa is −c/2."""
     problem = tmsopt.Problem(
         from_coefficients([1, "c", 1]), free={"c": (0.5, 1.5)}, pareto=("abscissa", "c"), title=TITLE
@@ -70,11 +68,11 @@ def front() -> tmsopt.Front:
     return tmsopt.pareto(problem, points=2)
 
 
-def every() -> tmsopt.Every:
+def every():
     return tmsopt.solve_all(replace(tmsopt.load(PROBLEMS / "ep4_matching.toml"), title=TITLE), seconds=0, starts=8)
 
 
-def unstable() -> tmsopt.Solution:
+def unstable():
     """Not optimal, without a stable design."""
     problem = tmsopt.Problem(
         plane().model, free={"b": (-3.0, -1.0)}, fixed={"c": 1.0}, minimize="abscissa", title=TITLE
@@ -82,7 +80,7 @@ def unstable() -> tmsopt.Solution:
     return tmsopt.solve(problem, throw=False)
 
 
-RESULTS: dict[str, Callable[[], Any]] = {
+RESULTS = {
     "Solution": design,
     "Solution, not stable": unstable,
     "Front": front,
@@ -128,7 +126,7 @@ each = pytest.mark.parametrize("name", RESULTS)
 class Page(HTMLParser):
     """Tags of a fragment, and whether each is closed."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__()
         self.open: list[str] = []
         self.tags: list[str] = []
@@ -136,7 +134,7 @@ class Page(HTMLParser):
         self.feed(text)
         self.close()
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.tags.append(tag)
         for name, value in attrs:
             assert name not in ("href", "onclick", "onload")
@@ -145,10 +143,10 @@ class Page(HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         self.said.append(data)
 
 
@@ -209,7 +207,7 @@ def test_its_page_is_whole_and_escaped(name):
 def test_new_figures_are_shown_by_pyplot(monkeypatch):
     """In a notebook, and by plt.show(); those of the page are not, nor those of the user again."""
 
-    def draws(data: object, ax: Axes | None = None) -> Axes:
+    def draws(data, ax=None):
         ax = ax or tmsopt.plots.new_figure(3, 2).subplots()
         ax.plot([0, 1], [0, 1])
         return ax
@@ -236,7 +234,7 @@ def test_the_page_of_a_design_has_badges_and_parameters():
 
 @pytest.mark.slow
 def test_a_picture_that_fails_does_not_break_the_page(monkeypatch):
-    def fails(*_: object, **__: object) -> None:
+    def fails(*_, **__):
         raise RuntimeError
 
     whole = str(design())

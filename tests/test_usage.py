@@ -18,7 +18,7 @@ CHECKERS = {
 }
 
 
-def said(checker: str, *paths: Path) -> tuple[int, str]:
+def said(checker, *paths):
     pytest.importorskip(checker)
     command = [sys.executable, "-m", checker, *CHECKERS[checker], *map(str, paths)]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -3,7 +3,6 @@
 import math
 import re
 from fractions import Fraction
-from typing import Any
 
 import flint
 import numpy as np
@@ -18,14 +17,14 @@ from tmsopt.problem import parse_comparison, parse_value
 HALF = flint.fmpq(1, 2)
 
 
-def middle(ball: Any) -> Fraction:
+def middle(ball):
     if isinstance(ball, flint.fmpq):
         return Fraction(int(ball.p), int(ball.q))
     mantissa, exponent = ball.mid().man_exp()
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
-def series(x: float) -> flint.arb_series:
+def series(x):
     return flint.arb_series([flint.arb(x), 1], prec=2)
 
 

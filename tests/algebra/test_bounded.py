@@ -1,15 +1,12 @@
 """Numbers with bounds of their errors: the bounds hold, by ball arithmetic at 300 bits, and are not far too wide."""
 
-from collections.abc import Callable
-from typing import Any
-
 import flint
 import numpy as np
 import pytest
 
 from tmsopt.algebra import Bounded, as_bounded, greater, lesser, power, quotient
 
-FORMULAS: dict[str, Callable[[Any, Any], Any]] = {
+FORMULAS = {
     "mixed": lambda a, b: (a * b + a) * (b / a) - 1 / b,
     "root": lambda a, b: abs(a * a + b).sqrt(),
     "cancels": lambda a, b: (a + b) * (a - b) - (a * a - b * b) + a,

@@ -1,7 +1,6 @@
 """What users' formulas are in other arithmetics, against Python's own functions; every operation is met."""
 
 import math
-from collections.abc import Callable
 
 import casadi as ca
 import flint
@@ -12,7 +11,7 @@ from tmsopt.algebra import ARRAYS, BALLS, Formulas, operation_name, steps
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 
-OPERATIONS: dict[int, tuple[ca.SX, Callable[[float, float], float]]] = {
+OPERATIONS = {
     ca.OP_ADD: (x + y, lambda a, b: a + b),
     ca.OP_SUB: (x - y, lambda a, b: a - b),
     ca.OP_MUL: (x * y, lambda a, b: a * b),

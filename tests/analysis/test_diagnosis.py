@@ -5,9 +5,7 @@ for each system here; where a law is said to hold, the roots themselves are foun
 """
 
 import json
-from collections.abc import Mapping, Sequence
 from math import factorial, sqrt
-from typing import Any
 
 import casadi as ca
 import flint
@@ -18,16 +16,16 @@ from helpers.oracles import polynomial_60, roots_60
 from mpmath import mp
 
 import tmsopt
-from tmsopt.analysis import Diagnosis, Response, diagnosed
+from tmsopt.analysis import Response, diagnosed
 from tmsopt.cli import every as main
-from tmsopt.models import Model, from_coefficients, from_hamiltonian, from_matrices, tms
+from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices, tms
 from tmsopt.report import diagnosis_lines
 from tmsopt.roots import jordan, structure
 
 # Jordan chains
 
 
-def conjugated(blocks: Sequence[tuple[int, int]], rng: np.random.Generator) -> list[list[int]]:
+def conjugated(blocks, rng):
     """S J S⁻¹ of whole numbers, J of Jordan blocks given as (eigenvalue, size), S with determinant 1."""
     n = sum(size for _, size in blocks)
     J = np.zeros((n, n), dtype=int)
@@ -81,7 +79,7 @@ def test_chains_of_matrices_with_a_known_jordan_form(chains, others):
 # Systems
 
 
-def diagnosis_of(model: Model, **design: float) -> Diagnosis:
+def diagnosis_of(model, **design):
     """The one multiple root of a design of a model's first parameter set."""
     of = model.sets[0]
     found = structure([float(c) for c in model.coefficients(design, of)], 1e-11)
@@ -89,11 +87,11 @@ def diagnosis_of(model: Model, **design: float) -> Diagnosis:
     return diagnosis
 
 
-def response(diagnosis: Diagnosis, name: str) -> Response:
+def response(diagnosis, name):
     return next(r for r in diagnosis.responses if r.parameter == name)
 
 
-def symbols(names: str) -> Any:
+def symbols(names):
     return [ca.SX.sym(n) for n in names.split()]
 
 
@@ -275,7 +273,7 @@ def test_every_parameter_is_listed_with_its_law_by_how_far_it_moves_the_root():
 # The EP4 of the two-mass-skate bicycle
 
 
-def ep4() -> dict[str, float]:
+def ep4():
     """Compact closed form for χ_H = 1, with r = √(ζ_B/ζ_H) and h = √(ζ_B ζ_H), rounded to doubles."""
     with mp.workdps(40):
         r, h = mp.sqrt(2), mp.sqrt(mp.mpf("0.08"))
@@ -293,11 +291,11 @@ def ep4() -> dict[str, float]:
 
 
 @pytest.fixture(scope="module")
-def bicycle() -> Diagnosis:
+def bicycle():
     return diagnosis_of(tms, **ep4())
 
 
-def changed(design: Mapping[str, float], name: str, eps: float) -> dict[str, Any]:
+def changed(design, name, eps):
     with mp.workdps(80):
         return {**{n: mp.mpf(x) for n, x in design.items()}, name: mp.mpf(design[name]) * (1 + mp.mpf(eps))}
 
@@ -334,7 +332,7 @@ def test_the_law_holds_as_far_as_said_and_no_further(bicycle, name):
         assert off(bicycle, name, sign * end * 1e-3) < 0.05
 
 
-def off(bicycle: Diagnosis, name: str, eps: float) -> float:
+def off(bicycle, name, eps):
     """The largest relative deviation of a root's shift from the law."""
     shifts = [complex(z) - bicycle.re for z in roots_60(polynomial_60(**changed(ep4(), name, eps)))]
     law = response(bicycle, name).laws[0].branches

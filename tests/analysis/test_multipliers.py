@@ -6,8 +6,6 @@ limits are the gains. Polynomial and quantities are those of test_digits, from t
 """
 
 import json
-from collections.abc import Mapping, Sequence
-from typing import Any
 
 import pytest
 from helpers.hunt import PROBLEMS
@@ -21,13 +19,13 @@ from tmsopt.models import from_coefficients
 STEP = mp.mpf(10) ** -20  # of central differences at 80 digits: slopes right to 38
 
 
-def names_60(parameters: Mapping[str, Any], unknowns: Sequence[Any]) -> dict[str, Any]:
+def names_60(parameters, unknowns):
     """What the objectives and limits below speak of; the first unknown is the abscissa."""
     q = native_60(parameters)
     nu_H = (q["chi_H"] - 1) * mp.cos(q["lambda_s"]) - q["zeta_H"] * mp.sin(q["lambda_s"])
     centre = (q["chi_B"] + q["mu"] * q["chi_H"]) / (1 + q["mu"])
 
-    def determinant(Fr: int) -> Any:
+    def determinant(Fr):
         a0, a1, a2, a3, a4 = polynomial_60(**{**q, "Fr": mp.mpf(Fr)})
         return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
 
@@ -47,20 +45,20 @@ def names_60(parameters: Mapping[str, Any], unknowns: Sequence[Any]) -> dict[str
     return found
 
 
-def gains_60(data: Mapping[str, Any], problem: tmsopt.Problem) -> dict[str, Any]:
+def gains_60(data, problem):
     """Gain of each active limit, at the printed parameters."""
     free = list(problem.free)
     z = [mp.mpc(r["re"], r["im"]) for r in data["roots"] for _ in range(r["multiplicity"])]
     if data["structure"] == "pair":
         unknowns = [z[0].real, z[0].imag ** 2, -(z[2] + z[3]).real, (z[2] * z[3]).real]
 
-        def factors(*u: Any) -> list[list[Any]]:
+        def factors(*u):
             return [pair(u[0], u[1]), [1, u[2], u[3]]]
     else:
         factors, _, of_roots = FORMS[data["structure"]]
         unknowns = of_roots(z)
 
-    def every(y: Sequence[Any]) -> list[Any]:
+    def every(y):
         """Objective, the four equations of the structure, and what each limit forbids to be positive."""
         p = {name: mp.mpf(v) for name, v in data["parameters"].items()} | dict(zip(free, y, strict=False))
         names = {**names_60(p, y[len(free) :]), "abs": abs, "__builtins__": {}}

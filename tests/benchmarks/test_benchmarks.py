@@ -4,7 +4,6 @@ import ast
 import inspect
 import math
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,9 +16,8 @@ from click.testing import CliRunner
 import tmsopt
 from benchmarks import command, timing
 from benchmarks.command import SECTIONS, Section, chosen
-from benchmarks.reports import Asked
 from benchmarks.reports.designs import details, overview
-from benchmarks.rivals import OWN, Heat, Moment, Reduced, Run, Seeker, Watch, median_ratio, own, run, slopes
+from benchmarks.rivals import OWN, Heat, Moment, Reduced, Run, Seeker, median_ratio, own, run, slopes
 from benchmarks.suites import random_problem
 from benchmarks.timing import best, exponent
 from tmsopt import Problem, models
@@ -37,14 +35,14 @@ PROBLEM = Problem(models.tms, fixed=HEIGHTS, free=BOX, minimize="abscissa")
 GOAL = OPTIMUM * (1 - 1e-3)  # double roots of a rounded EP4 scatter by 4e-4
 
 
-def test_sections_have_letters_names_and_a_report() -> None:
+def test_sections_have_letters_names_and_a_report():
     assert [s.letter for s in SECTIONS] == sorted(s.letter for s in SECTIONS)
     assert len({s.name for s in SECTIONS}) == len(SECTIONS)
     for section in SECTIONS:
         assert list(inspect.signature(section.report()).parameters) == ["asked"]
 
 
-def test_packages_have_faces() -> None:
+def test_packages_have_faces():
     """As in the package: a docstring that says what it is for."""
     room = Path(command.__file__).parent
     lines = {path: path.read_text(encoding="utf-8").splitlines() for path in room.rglob("*.py")}
@@ -53,7 +51,7 @@ def test_packages_have_faces() -> None:
         assert 2 <= len([line for line in face.splitlines() if line]) <= 5
 
 
-def test_benchmarks_open_packages_by_their_faces() -> None:
+def test_benchmarks_open_packages_by_their_faces():
     """Rooms of the package may be rebuilt and benchmarks stay."""
     package = Path(tmsopt.__file__).parent
     for path in Path(command.__file__).parent.rglob("*.py"):
@@ -63,7 +61,7 @@ def test_benchmarks_open_packages_by_their_faces() -> None:
                 assert place.is_dir() or place.parent == package, f"{path.name} line {node.lineno}: {node.module}"
 
 
-def test_sections_are_chosen_by_letter_or_name() -> None:
+def test_sections_are_chosen_by_letter_or_name():
     assert [s.name for s in chosen("", SECTIONS)] == [s.name for s in SECTIONS if not s.long]
     assert [s.name for s in chosen("solve, b", SECTIONS)] == ["charts", "kernels", "solve"]
     assert [s.name for s in chosen("growth, a", SECTIONS)] == ["solving", "growth"]
@@ -71,11 +69,11 @@ def test_sections_are_chosen_by_letter_or_name() -> None:
         chosen("x", SECTIONS)
 
 
-def test_a_section_that_fails_says_so_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def fails(asked: Asked) -> str:
+def test_a_section_that_fails_says_so_and_the_others_go_on(monkeypatch, tmp_path):
+    def fails(asked):
         raise RuntimeError("out of luck")
 
-    fakes: dict[str, Callable[[Asked], str]] = {"fails": fails, "works": lambda a: f"## Works\n\n`{a.command}`\n"}
+    fakes = {"fails": fails, "works": lambda a: f"## Works\n\n`{a.command}`\n"}
     for name, report in fakes.items():
         monkeypatch.setitem(sys.modules, f"fake_{name}", SimpleNamespace(report=report))
     names = ("fails", "absent", "works")
@@ -91,7 +89,7 @@ def test_a_section_that_fails_says_so_and_the_others_go_on(monkeypatch: pytest.M
     assert kept.index("<!-- fails -->") < kept.index("<!-- absent -->") < kept.index("<!-- works -->")
 
 
-def test_quick_numbers_are_kept_nowhere_by_default(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_quick_numbers_are_kept_nowhere_by_default(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "fake_works", SimpleNamespace(report=lambda asked: "## Works\n"))
     monkeypatch.setattr(command, "SECTIONS", (Section("a", "works", "fake_works", "about"),))
     monkeypatch.chdir(tmp_path)
@@ -101,12 +99,12 @@ def test_quick_numbers_are_kept_nowhere_by_default(monkeypatch: pytest.MonkeyPat
     assert not list(tmp_path.iterdir())
 
 
-def test_methods_take_turns_and_the_least_time_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_methods_take_turns_and_the_least_time_counts(monkeypatch):
     clock = [0.0]
     turns = []
 
-    def work(name: str, seconds: list[float]) -> Callable[[], None]:
-        def one() -> None:
+    def work(name, seconds):
+        def one():
             turns.append(name)
             clock[0] += seconds.pop(0)
 
@@ -117,16 +115,16 @@ def test_methods_take_turns_and_the_least_time_counts(monkeypatch: pytest.Monkey
     assert turns == ["a", "b"] * 3
 
 
-def test_exponent_of_a_power() -> None:
+def test_exponent_of_a_power():
     assert exponent([1, 10, 1000], [3.0, 300.0, 3e6]) == pytest.approx(2, abs=1e-12)
     assert exponent([1, 10, 100], [5.0, 50.0, math.nan]) == pytest.approx(1, abs=1e-12)
     assert math.isnan(exponent([1], [3.0]))
 
 
-def seen(*designs: dict[str, float]) -> Seeker:
+def seen(*designs):
     """A rival that evaluates some designs and claims an abscissa of −100 for each."""
 
-    def search(problem: Problem, watch: Watch) -> None:
+    def search(problem, watch):
         for design in designs:
             watch(np.array([[design[n]] for n in problem.free]), np.array([-100.0]))
 
@@ -136,24 +134,24 @@ def seen(*designs: dict[str, float]) -> Seeker:
 FAR = {"Fr": 2.0, "chi_B": 1.4, "lambda_s": 0.4}
 
 
-def test_a_rival_is_credited_with_what_it_saw_and_not_with_what_it_claims() -> None:
+def test_a_rival_is_credited_with_what_it_saw_and_not_with_what_it_claims():
     found = run("fake", seen(FAR, EP4, FAR), PROBLEM, GOAL, math.inf)
     assert [m.evaluations for m in found.moments] == [1, 2]  # the third was never asked for: the goal was seen
     assert found.moments[0].value == pytest.approx(Reduced(PROBLEM).abscissa(np.array(list(FAR.values()))), abs=1e-12)
     assert found.moments[1].value == pytest.approx(OPTIMUM, abs=1e-3)
 
 
-def test_designs_that_violate_something_are_not_credited() -> None:
+def test_designs_that_violate_something_are_not_credited():
     narrow = replace(PROBLEM, constraints={"c": "Fr >= 3"})
     assert run("fake", seen(FAR, EP4), narrow, GOAL, math.inf).moments == ()
     outside = run("fake", seen({**EP4, "lambda_s": -0.4}), PROBLEM, GOAL, math.inf)  # judged at the end of its range
     assert outside.best > GOAL
 
 
-def test_time_ends_a_rival_and_an_error_keeps_what_it_had() -> None:
+def test_time_ends_a_rival_and_an_error_keeps_what_it_had():
     assert len(run("fake", seen(FAR, EP4), PROBLEM, GOAL, 0.0).moments) == 1
 
-    def search(problem: Problem, watch: Watch) -> None:
+    def search(problem, watch):
         seen(FAR).search(problem, watch)
         raise ArithmeticError("lost")
 
@@ -163,10 +161,10 @@ def test_time_ends_a_rival_and_an_error_keeps_what_it_had() -> None:
     assert (absent.moments, absent.note) == ((), "not installed: no_such_package")
 
 
-def test_ratios_compare_two_sides_at_equal_accuracy() -> None:
+def test_ratios_compare_two_sides_at_equal_accuracy():
     """Ours is there after 2 s; a rival within 1e-3 after 6 s, within 1e-6 after 20 s, and never within 1e-8."""
 
-    def moment(error: float, seconds: float) -> Moment:
+    def moment(error, seconds):
         return Moment(-1 + error, seconds, int(10 * seconds), EP4)
 
     ours = Run(OWN, (moment(0, 2.0),), 2.0, 20)
@@ -185,7 +183,7 @@ def test_ratios_compare_two_sides_at_equal_accuracy() -> None:
     assert details([heat]).count("never: best error 5e-01") == 3
 
 
-def test_ours_is_as_good_as_it_says() -> None:
+def test_ours_is_as_good_as_it_says():
     """The optimum in closed form, with IPOPT's evaluations counted."""
     found = own(PROBLEM)
     assert found.best == pytest.approx(OPTIMUM, rel=1e-12)
@@ -193,7 +191,7 @@ def test_ours_is_as_good_as_it_says() -> None:
 
 
 @pytest.mark.parametrize("index", [3, 39])
-def test_gradients_given_to_rivals(index: int) -> None:
+def test_gradients_given_to_rivals(index):
     """Against differences of numpy.roots at a design with simple roots: 1e-7 steps leave 1e-7 of the slope."""
     reduced = Reduced(random_problem(index))
     x = 0.3 * reduced.lower + 0.7 * reduced.upper

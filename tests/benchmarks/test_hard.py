@@ -21,19 +21,19 @@ DAMPED = Problem(model=from_coefficients([1, x, 1], name="one damper"), free={"x
 
 
 @pytest.mark.parametrize("index", [0, 1, 16, 20, 24])
-def test_a_hard_problem_is_the_same_every_time(index: int) -> None:
+def test_a_hard_problem_is_the_same_every_time(index):
     one, other = hard_problem(index), hard_problem(index)
     assert (one.fixed, one.free, one.constraints) == (other.fixed, other.free, other.constraints)
     assert one.model.statement == other.model.statement
 
 
-def test_a_third_are_machines_half_of_them_without_a_limit_of_the_arm() -> None:
+def test_a_third_are_machines_half_of_them_without_a_limit_of_the_arm():
     families = [hard_family(i) for i in range(HARD_COUNT)]
     free, limited = (sum(f.endswith(end) for f in families) for end in ("arm free", "arm limited"))
     assert free == limited == 50
 
 
-def test_the_judge_agrees_with_the_closed_form_beside_and_at_the_double_root() -> None:
+def test_the_judge_agrees_with_the_closed_form_beside_and_at_the_double_root():
     at = Designs(DAMPED)
     # simple roots: eigenvalues are good to rounding
     assert at(np.array([[0.5, 1.0, 1.5]])).value == pytest.approx([-0.25, -0.5, -0.75], abs=1e-14)
@@ -44,7 +44,7 @@ def test_the_judge_agrees_with_the_closed_form_beside_and_at_the_double_root() -
     assert values[1] == pytest.approx(-1, abs=1e-13)
 
 
-def test_the_judge_of_a_stored_design_knows_a_small_value_that_doubles_lose() -> None:
+def test_the_judge_of_a_stored_design_knows_a_small_value_that_doubles_lose():
     """√((x + 1)² − 1 − 2x) = |x|, and its inverse tangent: 0 in doubles at x = 2e-9."""
     cancelled = "sqrt((x + 1)**2 - 1 - 2*x)"
     problem = replace(DAMPED, minimize=f"atan({cancelled})", constraints={"c": f"{cancelled} <= 1e-9"})
@@ -62,18 +62,18 @@ def test_the_judge_of_a_stored_design_knows_a_small_value_that_doubles_lose() ->
         (replace(DAMPED, minimize=None, maximize="damping_ratio", constraints={"c": "abscissa >= -0.4"}), 1.0),
     ],
 )
-def test_the_search_finds_the_optimum_of_a_closed_form(problem: Problem, best: float) -> None:
+def test_the_search_finds_the_optimum_of_a_closed_form(problem, best):
     found = best_known(problem)
     assert found.violation <= 1e-9
     assert found.value == pytest.approx(best, abs=2e-9)  # limits are met to 1e-9
 
 
-def test_the_search_knows_when_nothing_is_feasible() -> None:
+def test_the_search_knows_when_nothing_is_feasible():
     assert not best_known(replace(DAMPED, constraints={"c": "abscissa <= -1.01"})).feasible
 
 
 @pytest.mark.slow
-def test_verdicts_say_what_is_wrong() -> None:
+def test_verdicts_say_what_is_wrong():
     index = next(i for i in range(HARD_COUNT) if hard_family(i) == "unstable")
     known = Target(index, "unstable", math.nan, 1.0, {}, "nobody", 0.0)
     first = judged(index, 1, known)
@@ -87,7 +87,7 @@ def test_verdicts_say_what_is_wrong() -> None:
 
 
 @pytest.mark.long
-def test_infeasible_is_wrong_where_a_design_is_known() -> None:
+def test_infeasible_is_wrong_where_a_design_is_known():
     index = next(
         i for i in range(HARD_COUNT) if "damping_ratio >= 1.0" in " ".join(hard_problem(i).constraints.values())
     )
@@ -97,7 +97,7 @@ def test_infeasible_is_wrong_where_a_design_is_known() -> None:
 
 
 @pytest.mark.slow
-def test_ends_of_several_formulations_are_told_apart() -> None:
+def test_ends_of_several_formulations_are_told_apart():
     """Beside a pole a search goes on with a0 as a variable; evolution on eigenvalues found -1.168982558."""
     problem = hard_problem(158, 3)
     design = solve(problem)

@@ -13,7 +13,7 @@ from tmsopt import Problem, models
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 
 
-def test_worst_roots_of_known_factors() -> None:
+def test_worst_roots_of_known_factors():
     """(s + 1)(s + 2)(s² + 2 s + 5): abscissa −1, damping ratio 1/√5; (s − 1)(s + 2)(s + 3)(s + 4): 1 and −1."""
     first = np.polymul(np.polymul([1, 1], [1, 2]), [1, 2, 5])
     second = np.poly([1, -2, -3, -4])
@@ -22,7 +22,7 @@ def test_worst_roots_of_known_factors() -> None:
     assert damping == pytest.approx([1 / math.sqrt(5), -1], abs=1e-12)
 
 
-def test_scatter_of_a_fourfold_root_is_granted() -> None:
+def test_scatter_of_a_fourfold_root_is_granted():
     """The EP4 of the paper: abscissa −(zeta_B zeta_H)^(−1/4), which eigenvalues of the rounded design miss by 1e-4."""
     design = {
         "chi_B": math.sqrt(2),
@@ -42,7 +42,7 @@ def test_scatter_of_a_fourfold_root_is_granted() -> None:
     assert verdict(too_low, {**HEIGHTS, **design}).violation > 1e-3
 
 
-def test_worst_case_is_that_of_the_band_and_the_tolerance() -> None:
+def test_worst_case_is_that_of_the_band_and_the_tolerance():
     """load_front = (chi_B + mu chi_H)/(1 + mu) is largest at the upper ends of chi_B and, for chi_H < chi_B, lower of mu."""
     problem = Problem(
         model=models.tms,
@@ -55,7 +55,7 @@ def test_worst_case_is_that_of_the_band_and_the_tolerance() -> None:
     assert Judge(problem).of({"chi_B": 1.5}).value[0] == pytest.approx((1.6 + 0.1 * 0.9) / 1.1, rel=1e-14)
 
 
-def test_proof_ends_at_the_weave_boundary() -> None:
+def test_proof_ends_at_the_weave_boundary():
     """At chi_H = 1 stable exactly above Fr_c, Fr_c² = chi_B T (zeta_B − zeta_H)/((chi_B − 1)(zeta_B − zeta_H chi_B))."""
     design = {**HEIGHTS, "chi_B": 1.3, "lambda_s": 0.2}
     critical = math.sqrt(1.3 * math.tan(0.2) * -0.2 / (0.3 * (-0.4 + 0.2 * 1.3)))
@@ -68,21 +68,21 @@ def test_proof_ends_at_the_weave_boundary() -> None:
     assert not abscissa_below(design, 1.2, 2.4, highest - 1e-4)[0]
 
 
-def test_backward_tilt_has_a_negative_leading_coefficient() -> None:
+def test_backward_tilt_has_a_negative_leading_coefficient():
     """Never stable at chi_H = 1 with chi_B > 1; far to the right of its roots the proof succeeds all the same."""
     design = {**HEIGHTS, "chi_B": 1.3, "lambda_s": -0.2}
     assert not abscissa_below(design, 1.2, 2.4, 0.0)[0]
     assert abscissa_below(design, 1.2, 2.4, 100.0)[0]
 
 
-def test_every_conflict_lacks_something() -> None:
+def test_every_conflict_lacks_something():
     found = conflicts(50)
     assert all(c.short > 0 for c in found)
     assert len({c.kind for c in found}) == 10
     assert conflict(7).problem == found[7].problem
 
 
-def test_limits_are_moved_outwards() -> None:
+def test_limits_are_moved_outwards():
     problem = Problem(
         model=models.tms,
         fixed=HEIGHTS,
@@ -98,5 +98,5 @@ def test_limits_are_moved_outwards() -> None:
 
 
 @pytest.mark.parametrize("index", [0, 13, 104])
-def test_a_varied_problem_is_the_same_every_time(index: int) -> None:
+def test_a_varied_problem_is_the_same_every_time(index):
     assert varied_problem(index) == varied_problem(index)

@@ -4,7 +4,6 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import click
 import pytest
@@ -23,14 +22,14 @@ HEIGHTS = {"mu": 0.1, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 
 FUNCTIONS = {f: getattr(mp, f) for f in ("sin", "cos", "tan", "sqrt", "exp", "log")} | {"abs": abs, "max": max}
 
 
-def weave_squared(p: dict[str, Any]) -> Any:
+def weave_squared(p):
     """Fr² where the Hurwitz determinant vanishes, which is linear in it once a factor Fr² is divided out.
 
     Where zeta_B = zeta_H the determinant is 0 at any speed and the limit counts: hence the shift.
     """
     shifted = {**p, "zeta_B": mp.mpf(p["zeta_B"]) * (1 + mp.mpf("1e-25"))}
 
-    def hurwitz(Fr: int) -> Any:
+    def hurwitz(Fr):
         a0, a1, a2, a3, a4 = polynomial_60(**{**shifted, "Fr": Fr})
         return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
 
@@ -38,14 +37,14 @@ def weave_squared(p: dict[str, Any]) -> Any:
     return 1 - 3 * one / (two - one) if two != one else mp.nan
 
 
-def least_weave(p: dict[str, float]) -> Any:
+def least_weave(p):
     """The least Fr_c of the designs that round to this one: a root turns a rounding at 0 into 1e-8."""
     squared = weave_squared(p)
     spread = sum(abs(weave_squared({**p, n: mp.mpf(p[n]) * (1 + mp.mpf(2) ** -53)}) - squared) for n in p)
     return mp.sqrt(max(squared - spread, 0)) if squared + spread >= 0 else mp.nan
 
 
-def quantities(p: dict[str, float]) -> dict[str, Any]:
+def quantities(p):
     """What the constraints of the suite name, from definitions: moments, geometry, product of the roots."""
     x = {n: mp.mpf(v) for n, v in p.items()}
     a = polynomial_60(**p)
@@ -56,7 +55,7 @@ def quantities(p: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def violation(constraint: str, p: dict[str, float]) -> Any:
+def violation(constraint, p):
     """Relative to the size of the two sides, at 60 digits."""
     comparison = next(c for c in ("<=", ">=", "==") if c in constraint)
     known = FUNCTIONS | quantities(p)
@@ -67,14 +66,14 @@ def violation(constraint: str, p: dict[str, float]) -> Any:
     return max(beyond, 0) / max(1, abs(left), abs(right)) if mp.isfinite(beyond) else mp.inf
 
 
-def test_every_problem_is_there() -> None:
+def test_every_problem_is_there():
     assert sorted(KEPT) == list(range(200))
     assert len(SOLVABLE) > 150  # the suite has a few that contradict themselves
     assert not any(one.doubtful for one in KEPT.values())
 
 
 @pytest.mark.parametrize("index", SOLVABLE)
-def test_a_kept_design_is_feasible(index: int) -> None:
+def test_a_kept_design_is_feasible(index):
     """Free parameters in the box, the others as given, every constraint at 60 digits within what the row says."""
     problem, one = random_problem(index), KEPT[index]
     assert {n: one.parameters[n] for n in problem.fixed} == dict(problem.fixed)
@@ -86,7 +85,7 @@ def test_a_kept_design_is_feasible(index: int) -> None:
 
 
 @pytest.mark.parametrize("index", SOME)
-def test_the_stored_design_has_the_realised_abscissa(index: int) -> None:
+def test_the_stored_design_has_the_realised_abscissa(index):
     """Roots at 60 digits of the polynomial from the matrices; the kept number is that, rounded to a double."""
     one = KEPT[index]
     found = abscissa_60(polynomial_60(**one.parameters))
@@ -94,7 +93,7 @@ def test_the_stored_design_has_the_realised_abscissa(index: int) -> None:
 
 
 @pytest.mark.parametrize("index", [i for i in SOLVABLE if KEPT[i].value != pytest.approx(KEPT[i].realised, rel=1e-8)])
-def test_the_ideal_value_is_the_middle_of_a_scattered_root(index: int) -> None:
+def test_the_ideal_value_is_the_middle_of_a_scattered_root(index):
     """Rounding of coefficients scatters a multiple root as a cluster, whose mean it moves by no more than itself."""
     one = KEPT[index]
     real = sorted((float(root.real) for root in roots_60(polynomial_60(**one.parameters))), reverse=True)
@@ -103,7 +102,7 @@ def test_the_ideal_value_is_the_middle_of_a_scattered_root(index: int) -> None:
     assert one.value <= one.realised
 
 
-def test_the_value_is_the_least_known() -> None:
+def test_the_value_is_the_least_known():
     for i in SOLVABLE:
         one = KEPT[i]
         assert one.by
@@ -116,7 +115,7 @@ def test_the_value_is_the_least_known() -> None:
 # Claims at exceptional points
 
 
-def test_the_rounded_point_of_the_paper_confirms_its_value_and_no_other() -> None:
+def test_the_rounded_point_of_the_paper_confirms_its_value_and_no_other():
     """EP4: abscissa −(zeta_B zeta_H)^(−1/4), which the stored design misses by 1e-4 and its coefficients by 1e-15."""
     root = math.sqrt(2)
     design = {"Fr": 3 * math.sqrt(110 * root - 120) / 8, "chi_B": root, "lambda_s": math.atan(15 / 4 - 75 * root / 32)}
@@ -125,7 +124,7 @@ def test_the_rounded_point_of_the_paper_confirms_its_value_and_no_other() -> Non
     problem = Problem(model=models.tms, fixed=fixed, free=box, minimize="abscissa")
     claimed = -((0.4 * 0.2) ** -0.25)
 
-    def says(value: float, Fr: float = design["Fr"]) -> bool:
+    def says(value, Fr=design["Fr"]):
         return confirmed(problem, {**fixed, **design, "Fr": Fr}, value)
 
     assert says(claimed)
@@ -144,27 +143,27 @@ PROBLEM = Problem(
 )
 
 
-def claim(source: str, Fr: float, violation: float = 0.0, excess: float = 0.0) -> Attempt:
+def claim(source, Fr, violation=0.0, excess=0.0):
     """A claim of `solve`, true but for the excess; the violation is the judge's."""
     value = float(abscissa_60(polynomial_60(**{**HEIGHTS, "Fr": Fr}))) + excess
     return Attempt(source, "optimal", value, {**HEIGHTS, "Fr": Fr}, 0.1, 1, violation)
 
 
-def test_a_violating_claim_and_a_false_one_do_not_count() -> None:
+def test_a_violating_claim_and_a_false_one_do_not_count():
     claims = [claim("default", 1.5), claim("starts", 1.5, violation=2e-9), claim("from evolution", 1.5, excess=-1e-6)]
     found = best_of(PROBLEM, 0, claims, [])
     assert found.value == found.known["default"] == claims[0].value
     assert (found.by, found.doubtful) == (("default",), ("from evolution", "starts"))
 
 
-def test_of_equal_values_the_cleanest_design_is_kept() -> None:
+def test_of_equal_values_the_cleanest_design_is_kept():
     lower, other = sorted((claim("a", 1.5), claim("b", 1.5 - 1e-11)), key=lambda c: c.value)
     assert 0 < other.value - lower.value < 1e-10
     found = best_of(PROBLEM, 0, [replace(lower, violation=5e-10), other], [])
     assert (found.value, found.violation, set(found.by)) == (other.value, 0.0, {"a", "b"})
 
 
-def test_an_end_of_evolution_counts_with_its_exact_abscissa_and_only_if_feasible() -> None:
+def test_an_end_of_evolution_counts_with_its_exact_abscissa_and_only_if_feasible():
     ends = [{**HEIGHTS, "Fr": Fr} for Fr in (1.2, 1.5, 1.5 + 1e-10, 1.9)]
     found = best_of(PROBLEM, 0, [claim("default", 1.1, violation=1.0)], ends)
     least = min(abscissa_60(polynomial_60(**end)) for end in ends[:2])
@@ -173,7 +172,7 @@ def test_an_end_of_evolution_counts_with_its_exact_abscissa_and_only_if_feasible
     assert found.violation == 0
 
 
-def test_without_a_feasible_design_the_least_violation_is_kept() -> None:
+def test_without_a_feasible_design_the_least_violation_is_kept():
     """Fr = 1.9 exceeds 1.5 by 0.4, relative to 1.9; Fr = 1.8 by 0.3, relative to 1.8."""
     found = best_of(PROBLEM, 0, [], [{**HEIGHTS, "Fr": Fr} for Fr in (1.9, 1.8)])
     assert not found.solvable
@@ -181,7 +180,7 @@ def test_without_a_feasible_design_the_least_violation_is_kept() -> None:
     assert found.violation == pytest.approx(0.3 / 1.8, rel=1e-13)
 
 
-def test_what_is_kept_is_not_computed_again(tmp_path: Path) -> None:
+def test_what_is_kept_is_not_computed_again(tmp_path):
     """A value in the file that no computation could give is still there after a run."""
     path = tmp_path / "references.json"
     row = {

@@ -11,7 +11,7 @@ import tmsopt
 from tmsopt.models import from_matrices
 
 
-def _system(seed: int, degree: int, count: int) -> tmsopt.Problem:
+def _system(seed, degree, count):
     """A random stable matrix with some of its entries as parameters."""
     rng = np.random.default_rng(seed)
     numbers = rng.normal(size=(degree, degree)) * 0.5 - np.eye(degree) * 2.5
@@ -59,7 +59,7 @@ def test_no_point_of_heavy_damping_that_is_known_is_nearer(system, inside):
     assert found.distance < np.linalg.norm(inside) / 1000
 
 
-def _characteristic(seed: int, degree: int, count: int, parameters: dict[str, Fraction]) -> list[Fraction]:
+def _characteristic(seed, degree, count, parameters):
     """det(s − A) of the system at other parameters, highest power first."""
     drawn = np.random.default_rng(seed).normal(size=(degree, degree)) * 0.5 - np.eye(degree) * 2.5
     assert len(parameters) == count

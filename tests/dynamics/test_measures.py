@@ -5,7 +5,6 @@ import json
 import math
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,11 +23,11 @@ BENCHMARK = PROBLEMS / "whipple_benchmark.toml"
 
 
 @cache
-def ep4() -> tmsopt.Solution:
+def ep4():
     return tmsopt.solve(PROBLEMS / "ep4.toml")
 
 
-def spring(damping: float) -> tmsopt.Problem:
+def spring(damping):
     """q″ + 2 ζ q′ + q = 0."""
     return tmsopt.Problem(from_matrices(M=[[1]], D=[["2*zeta"]], K=[[1]]), fixed={"zeta": damping})
 
@@ -44,7 +43,7 @@ def test_the_overshoot_of_an_oscillator_is_that_of_every_textbook(damping):
     assert (found.peak, found.at) == (1.0, 0.0)
     assert found.overshoot == pytest.approx(math.exp(-math.pi * damping / root), rel=1e-12)
 
-    def q(t: Any) -> Any:
+    def q(t):
         return mp.exp(-damping * t) * (mp.cos(root * t) + damping / root * mp.sin(root * t))
 
     turns = [k * math.pi / root for k in range(400)]
@@ -145,7 +144,7 @@ def test_the_benchmark_in_noise_has_the_variance_of_its_frequency_response():
     p = motion.parameters
     M, C1, K0, K2 = (np.array(m, dtype=float) for m in canonical(p))
 
-    def response(w: float, row: int) -> float:
+    def response(w, row):
         L = -(w**2) * M + 1j * w * p["v"] * C1 + p["g"] * K0 + p["v"] ** 2 * K2
         return float(abs(np.linalg.solve(L, [0, 1])[row]) ** 2)
 
@@ -159,7 +158,7 @@ def test_the_benchmark_in_noise_has_the_variance_of_its_frequency_response():
 
 def test_noise_and_a_push_add_up():
     """The equations are linear."""
-    asked: dict[str, Any] = {"seconds": 4, "points": 101}
+    asked = {"seconds": 4, "points": 101}
     both = tmsopt.simulate(BENCHMARK, lean=5, noise=1.0, **asked)
     parts = [tmsopt.simulate(BENCHMARK, **one, **asked) for one in ({"lean": 5}, {"noise": 1.0})]
     for name in both.columns:
@@ -228,7 +227,7 @@ def test_modes_that_only_cross_keep_their_shapes():
 # The command
 
 
-def run(*words: str) -> tuple[int, str, str]:
+def run(*words):
     done = CliRunner().invoke(main, list(words))
     return done.exit_code, done.stdout, done.stderr
 

@@ -2,10 +2,8 @@
 
 import math
 import pickle
-from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +13,6 @@ from scipy.integrate import solve_ivp
 import tmsopt
 from tmsopt.dynamics import system_of
 from tmsopt.models import canonical, from_matrices, matrices, tms, whipple
-from tmsopt.records import Array
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK, EP4 = PROBLEMS / "whipple_benchmark.toml", PROBLEMS / "ep4.toml"
@@ -23,15 +20,15 @@ STATES = ("phi", "delta", "phidot", "deltadot")
 
 
 @cache
-def ep4() -> tmsopt.Solution:
+def ep4():
     return tmsopt.solve(EP4)
 
 
-def table(motion: tmsopt.Simulation, names: Sequence[str]) -> Array:
+def table(motion, names):
     return np.array([motion[name] for name in names])
 
 
-def integrated(right: Callable[[Array], Array], start: Array, times: Array) -> Array:
+def integrated(right, start, times):
     """By an explicit Runge–Kutta method of order 8, to 1e-13."""
     found = solve_ivp(
         lambda t, x: right(x), (0, times[-1]), start, "DOP853", t_eval=times, rtol=1e-13, atol=1e-14, max_step=0.01
@@ -39,12 +36,12 @@ def integrated(right: Callable[[Array], Array], start: Array, times: Array) -> A
     return np.asarray(found.y)
 
 
-def rolling(p: Mapping[str, float]) -> Callable[[Array], Array]:
+def rolling(p):
     """x′ of a Whipple bicycle: lean, steer, rates, yaw, rear contact aside; equations 5.3 and B of Meijaard et al."""
     M, C1, K0, K2 = (np.array(m, dtype=float) for m in canonical(p))
     v, g, c, w, cosine = p["v"], p["g"], p["c"], p["w"], math.cos(p["lambda_s"])
 
-    def right(x: Array) -> Array:
+    def right(x):
         q, r = x[:2], x[2:4]
         turn = (v * q[1] + c * r[1]) * cosine / w
         return np.r_[r, -np.linalg.solve(M, v * C1 @ r + (g * K0 + v**2 * K2) @ q), turn, v * x[4]]
@@ -74,7 +71,7 @@ def test_a_dimensionless_bicycle_moves_as_an_integrator_says():
     dimensions = {n: x for n, x in p.items() if n != "lambda_s"}
     M, V, P = map(np.array, matrices(**dimensions, sine=math.sin(0.2), cosine=math.cos(0.2)))
 
-    def right(x: Array) -> Array:
+    def right(x):
         turn = p["Fr"] * math.cos(0.2) * x[1]
         return np.r_[x[2:4], -np.linalg.solve(M, V @ x[2:4] + P @ x[:2]), turn, p["Fr"] * x[4]]
 
@@ -83,7 +80,7 @@ def test_a_dimensionless_bicycle_moves_as_an_integrator_says():
     assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found, abs=1e-10)
 
 
-def as_whipple(p: Mapping[str, float]) -> dict[str, float]:
+def as_whipple(p):
     """Two masses on skates as a Whipple bicycle without wheels and trail."""
     return {n: p[n] for n in ("w", "v", "g", "lambda_s", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")}
 
@@ -103,7 +100,7 @@ def test_two_masses_in_si_move_as_whipple_without_wheels():
         assert (a.re, a.im, a.steer_per_lean) == pytest.approx((b.re, b.im, b.steer_per_lean), rel=1e-9)
 
 
-def ideal_ep4() -> tuple[Any, Any]:
+def ideal_ep4():
     """A and the fourfold root of EP4 at χ_H = 1, ζ_B = −0.4, ζ_H = −0.2 from the closed form, at the digits of mp."""
     zeta_B, zeta_H = mp.mpf("-0.4"), mp.mpf("-0.2")
     r, h = mp.sqrt(zeta_B / zeta_H), mp.sqrt(zeta_B * zeta_H)
@@ -193,7 +190,7 @@ GAINS = np.array([-60.0, 18.0, -9.0, 2.5])
 LAG = 0.05
 
 
-def steered(lag: float | None) -> dict[str, float]:
+def steered(lag):
     return dict(zip((f"k_{name}" for name in STATES), GAINS, strict=True)) | ({"lag": lag} if lag else {})
 
 
@@ -205,7 +202,7 @@ def test_a_controller_steers_and_its_torque_is_told(lag):
     motion = tmsopt.simulate(robot, lean=4, push=0.2, seconds=2, points=101)
     passive, M = rolling(p), np.array(canonical(p)[0], dtype=float)
 
-    def right(x: Array) -> Array:
+    def right(x):
         torque = -GAINS @ x[:4] if lag is None else x[6]
         moved = passive(x[:6])
         moved[2:4] += np.linalg.solve(M, [0, torque])
@@ -231,7 +228,7 @@ def test_a_motor_of_skates_has_its_torque_in_newton_metres(lag):
     p = {**tmsopt.load(PROBLEMS / "benchmark.toml").fixed, "v": 3.5}
     wheels = tmsopt.Problem(whipple, fixed=as_whipple(p) | steered(lag))
     driven = tmsopt.Problem(tms, fixed=p | steered(lag))
-    asked: dict[str, Any] = {"lean": 2, "push": 0.05, "seconds": 0.4, "points": 41}
+    asked = {"lean": 2, "push": 0.05, "seconds": 0.4, "points": 41}
     skates, same = (tmsopt.simulate(q, **asked) for q in (driven, wheels))
     for name in (*STATES, "T_delta", "psi", "y_rear", "y_front"):
         scale = np.abs(same[name]).max()

@@ -1,7 +1,6 @@
 """Motion of ψ′ = −i H ψ against the exponential of H itself, shapes by hand."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,21 +13,21 @@ DIMER = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
 """Two modes that lose; of g2 = −g1 PT symmetric. EP2 at d = 0, k = |g1 − g2|/2, with ω = −i (g1 + g2)/2."""
 
 
-def dimer(**values: float) -> tmsopt.Problem:
+def dimer(**values):
     return tmsopt.Problem(DIMER, fixed={"d": 0.0, "g1": 1.0, "g2": 0.2, "k": 0.4} | values)
 
 
-def ring(a: float, loss: float, b: float) -> tmsopt.Problem:
+def ring(a, loss, b):
     H = [["a - 1j*loss", "b"], [0, "a - 1j*loss"]]
     return tmsopt.Problem(from_hamiltonian(H), fixed={"a": a, "loss": loss, "b": b})
 
 
-def waves(motion: Any, size: int) -> Any:
+def waves(motion, size):
     """ψ at each time, shape (points, size)."""
     return np.array([np.add(motion[f"psi{k}_re"], 1j * np.asarray(motion[f"psi{k}_im"])) for k in range(1, size + 1)]).T
 
 
-def omegas(motion: Any) -> list[complex]:
+def omegas(motion):
     return [m.eigenfrequency for m in motion.modes]
 
 
@@ -38,7 +37,7 @@ def test_it_is_the_exponential_of_h(seed):
     rng = np.random.default_rng(seed)
     n = 1 + seed % 5
     H = rng.normal(size=(n, n)) + 1j * rng.normal(size=(n, n)) + 10 * rng.normal() * np.eye(n)
-    rows: list[list[Any]] = H.tolist()
+    rows = H.tolist()
     rows[0][0] = f"x + 1j*({float(H[0, 0].imag)!r})"
     start = rng.normal(size=n) + 1j * rng.normal(size=n)
     asked = {

@@ -12,9 +12,7 @@ the nearest polynomial, those below a thousandth of the median |z| counted as th
 import json
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import flint
 import numpy as np
@@ -38,7 +36,7 @@ SLOW = ("tolerant", "ep_set")  # a search for the radius in every step; a search
 NO_DESIGN = ("chart", "pareto")  # a chart and a front are not solved for one design
 
 
-def in_case(p: Mapping[str, float], case: Mapping[str, Mapping[str, float]] | None) -> dict[str, Any]:
+def in_case(p, case):
     """The parameters in a printed case, offsets added without rounding."""
     found = {name: mp.mpf(value) for name, value in p.items()}
     if case:
@@ -47,7 +45,7 @@ def in_case(p: Mapping[str, float], case: Mapping[str, Mapping[str, float]] | No
     return found
 
 
-def quantities_60(p: Mapping[str, Any]) -> dict[str, Any]:
+def quantities_60(p):
     """Every derived quantity but those of the roots; None where it does not exist."""
     q = native_60(p)
     _, mu, chi_B, chi_H, zeta_B, zeta_H, lam = (q[name] for name in NATIVE)
@@ -81,10 +79,10 @@ def quantities_60(p: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def weave(q: Mapping[str, Any]) -> Any:
+def weave(q):
     """Zero in Fr² of the Hurwitz determinant over Fr², which is linear in Fr²: from its values at two speeds."""
 
-    def determinant(Fr: int) -> Any:
+    def determinant(Fr):
         a0, a1, a2, a3, a4 = polynomial_60(**{**q, "Fr": mp.mpf(Fr)})
         return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
 
@@ -101,7 +99,7 @@ def weave(q: Mapping[str, Any]) -> Any:
 # The nearest polynomial with a structure, as factors with unknowns
 
 
-def nearest_60(structure: str, coefficients: Sequence[Any], printed: Sequence[Mapping[str, Any]]) -> list[Any]:
+def nearest_60(structure, coefficients, printed):
     """Roots of the nearest polynomial: least squares, the weights renewed, until 60 digits stand."""
     factors, roots, unknowns = FORMS[structure]
     z = [mp.mpc(r["re"], r["im"]) for r in printed for _ in range(r["multiplicity"])]
@@ -132,7 +130,7 @@ def nearest_60(structure: str, coefficients: Sequence[Any], printed: Sequence[Ma
     return roots(*u)
 
 
-def roots_of(data: Mapping[str, Any], case: Mapping[str, Any] | None) -> tuple[list[Any], list[Any]]:
+def roots_of(data, case):
     """Roots of the design in a case as stored, and of the ideal one."""
     coefficients = polynomial_60(**native_60(in_case(data["parameters"], case)))
     stored = roots_60(coefficients)
@@ -142,15 +140,15 @@ def roots_of(data: Mapping[str, Any], case: Mapping[str, Any] | None) -> tuple[l
     return stored, nearest_60(data["structure"], coefficients, data["roots"])
 
 
-def damping_60(roots: Sequence[Any]) -> Any:
+def damping_60(roots):
     return min(-mp.re(z) / abs(z) for z in roots)
 
 
-def wrong_digits(data: Mapping[str, Any]) -> list[str]:
+def wrong_digits(data):
     """Everything printed that is not the double nearest to the number that it stands for."""
     wrong = []
 
-    def compare(what: str, printed: float | None, true: Any) -> None:
+    def compare(what, printed, true):
         if true is not None and abs(true) < mp.mpf(10) ** -DIGITS:
             true = mp.mpf(0)  # as χ_B − χ_H times rounding
         if printed != (None if true is None else float(true)):
@@ -203,14 +201,14 @@ def wrong_digits(data: Mapping[str, Any]) -> list[str]:
     return wrong
 
 
-def readings_60(p: Mapping[str, Any], true: Mapping[str, Any], abscissa: Any, roots: Sequence[Any]) -> dict[str, Any]:
+def readings_60(p, true, abscissa, roots):
     """Times in s, frequencies in Hz, and lengths, speeds and angles to 15 digits in mm, km/h and degrees."""
     rate = mp.sqrt(p["g"] / p["w"])
     hertz = sorted({mp.nstr(z.imag, 50): z.imag for z in map(mp.mpc, roots) if z.imag > 0}.values())
     if len(hertz) > 1:  # rightmost first, as the roots are
         order = sorted((z for z in map(mp.mpc, roots) if z.imag > 0), key=lambda z: (-z.real, -z.imag))
         hertz = [z.imag for z in order]
-    found: dict[str, Any] = {
+    found = {
         "decay_time_s": -1 / (abscissa * rate) if abscissa < 0 else None,
         "growth_time_s": 1 / (abscissa * rate) if abscissa > 0 else None,
         "frequencies_Hz": [f * rate / (2 * mp.pi) for f in hertz],
@@ -231,11 +229,11 @@ def readings_60(p: Mapping[str, Any], true: Mapping[str, Any], abscissa: Any, ro
     return found
 
 
-def read(x: Any) -> Any:
+def read(x):
     return None if x is None else mp.mpf(float(mp.nstr(x, 15)))
 
 
-def printed(design: tmsopt.Solution) -> Any:
+def printed(design):
     """What reaches the reader: the text and nothing else."""
     return json.loads(json.dumps(design.to_json()))
 

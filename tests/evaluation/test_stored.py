@@ -1,9 +1,7 @@
 """Limits on the roots hold for the parameters as they are stored: roots at 60 digits of the doubles."""
 
-from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +17,7 @@ multiple_roots_exist = import_module("tmsopt.evaluation.stored").multiple_roots_
 KEPT = 1e-9  # relative to the greater of 1 and the limit
 
 
-def least_sum(n: int, limits: Mapping[str, str], top: float = 30.0, **more: Any) -> tmsopt.Solution:
+def least_sum(n, limits, top=30.0, **more):
     """The polynomial sⁿ + a sⁿ⁻¹ + … with the least sum of coefficients."""
     names = "abcde"[:n]
     free = dict.fromkeys(names, (0.0, top))
@@ -27,7 +25,7 @@ def least_sum(n: int, limits: Mapping[str, str], top: float = 30.0, **more: Any)
     return tmsopt.solve(tmsopt.Problem(model, free=free, minimize=" + ".join(names), constraints=limits, **more))
 
 
-def stored_roots(found: tmsopt.Solution, coefficients: Sequence[Any] | None = None) -> list[Any]:
+def stored_roots(found, coefficients=None):
     return list(roots_60([mp.mpf(1), *(mp.mpf(x) for x in coefficients or found.parameters.values())]))
 
 

@@ -4,7 +4,6 @@ import math
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import casadi as ca
 import mpmath
@@ -13,7 +12,7 @@ import pytest
 import sympy as sp
 
 import tmsopt
-from tmsopt.global_search import Completeness, available, completeness
+from tmsopt.global_search import available, completeness
 from tmsopt.models import from_coefficients
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -24,18 +23,18 @@ x, y, z = (ca.SX.sym(n) for n in "xyz")
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="codac is not installed")]
 
 
-def of_file(name: str, **changes: Any) -> Completeness:
+def of_file(name, **changes):
     return completeness(replace(tmsopt.load(PROBLEMS / f"{name}.toml"), **changes))
 
 
-def of_row(row: list[Any], pattern: str, box: tuple[float, float] = (-4.0, 4.0), **asked: Any) -> Completeness:
+def of_row(row, pattern, box=(-4.0, 4.0), **asked):
     """The designs of a polynomial in x, y, z with a pattern."""
     model = from_coefficients(row)
     names = [n for n in "xyz" if n in model.sets[0].names]
     return completeness(tmsopt.Problem(model=model, free=dict.fromkeys(names, box), locate=pattern, **asked))
 
 
-def agree(found: Completeness, designs: list[list[Any]]) -> bool:
+def agree(found, designs):
     """Whether these are the designs, to the last digits."""
     own = [[mpmath.mpf(n.value) for n in design.values()] for design in found.designs]
     assert all(len(limits) == 0 for limits in found.limits)
@@ -48,7 +47,7 @@ def agree(found: Completeness, designs: list[list[Any]]) -> bool:
 
 
 @pytest.fixture(autouse=True)
-def digits() -> Any:
+def digits():
     with mpmath.workdps(40):
         yield
 
@@ -125,7 +124,7 @@ def test_roots_of_any_size(size):
 # Beside elimination
 
 
-def _by_elimination(conditions: list[Any], box: tuple[int, int]) -> int:
+def _by_elimination(conditions, box):
     """Common zeros in a box of two polynomials in x and y with fractions: real roots of the resultant, each lifted."""
     u, v = sp.symbols("x y")
     count = 0
@@ -289,7 +288,7 @@ def test_doubles_are_rounded_here_as_they_were():
 
 
 def test_progress_is_told_in_seconds():
-    told: list[tuple[float, float]] = []
+    told = []
     completeness(tmsopt.load(PROBLEMS / "coupled_pair.toml"), 30, lambda done, most, _: told.append((done, most)))
     assert told
     assert all(0 <= done <= most == 30 for done, most in told)
@@ -309,7 +308,7 @@ def test_limits_on_derived_quantities_take_part():
 def test_ctrl_c_is_no_end():
     """Whatever was in hand is undecided."""
 
-    def stop(*_: Any) -> None:
+    def stop(*_):
         raise KeyboardInterrupt
 
     found = completeness(tmsopt.load(PROBLEMS / "coupled_pair.toml"), progress=stop)
@@ -318,7 +317,7 @@ def test_ctrl_c_is_no_end():
     assert found.reason == "interrupted"
     assert found.undecided[0].ranges["c2"] == (-3.0, 3.0)
 
-    def later(told: tmsopt.Progress) -> None:
+    def later(told):
         if told.unit == "s" and told.most > 0:
             stop()
 

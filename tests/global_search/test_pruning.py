@@ -1,7 +1,6 @@
 """What branch and prune is made of: boxes that never lose a zero, and identities of angles."""
 
 from fractions import Fraction
-from typing import Any
 
 import flint
 import numpy as np
@@ -15,7 +14,7 @@ NAMES = ("x", "y", "z")
 ROUNDS = 60
 
 
-def drawn(rng: np.random.Generator, depth: int) -> tuple[Any, Any]:
+def drawn(rng, depth):
     """A formula in x, y, z, and the same as a function of fractions."""
     if depth == 0:
         k = int(rng.integers(5))

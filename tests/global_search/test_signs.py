@@ -1,8 +1,6 @@
 """That no design of a box is stable, by signs: never said where one is, by eigenvalues on dense grids."""
 
-from collections.abc import Sequence
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,11 +15,11 @@ x, y = ca.SX.sym("x"), ca.SX.sym("y")
 GRID = 33
 
 
-def stated(coefficients: Sequence[Any], free: Any, **asked: Any) -> tmsopt.Problem:
+def stated(coefficients, free, **asked):
     return tmsopt.Problem(from_coefficients(list(coefficients)), free=free, **{"minimize": "abscissa", **asked})
 
 
-def least_abscissa(terms: np.ndarray) -> float:
+def least_abscissa(terms):
     """Least abscissa on a grid of [−1, 1]², of coefficients c0 + c1 x + c2 y + c3 x y, by NumPy's eigenvalues."""
     u, v = np.meshgrid(*[np.linspace(-1, 1, GRID)] * 2)
     a = np.tensordot(np.stack([np.ones_like(u), u, v, u * v], axis=-1), terms, axes=(-1, 1)).reshape(GRID**2, -1)

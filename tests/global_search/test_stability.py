@@ -3,7 +3,6 @@
 import time
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import pytest
@@ -21,7 +20,7 @@ X, Y = ca.SX.sym("x"), ca.SX.sym("y")
 DAMPED = (1, X - 2, 1)
 
 
-def problem(coefficients: Any, free: Any, **asked: Any) -> Problem:
+def problem(coefficients, free, **asked):
     return Problem(from_coefficients(list(coefficients)), free=free, **{"minimize": "abscissa", **asked})
 
 
@@ -95,7 +94,7 @@ def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch):
 def test_an_interrupt_goes_on(when, monkeypatch):
     """While the question is asked, or while its answer is looked at: the tasks within limits do that."""
 
-    def stop(self: SolverPool, tasks: Any, tick: Any = None) -> list[Decision]:
+    def stop(self, tasks, tick=None):
         if when == "asked" or tasks[0].within:
             raise KeyboardInterrupt
         return [Decision(INFEASIBLE)]

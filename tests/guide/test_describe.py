@@ -16,7 +16,7 @@ PROBLEMS = sorted(Path("problems").glob("*.toml"))
 BUILT_IN = ("tms", "whipple")
 
 
-def names(found: tmsopt.Description) -> set[str]:
+def names(found):
     return {s.name for of in found.sets for s in (*of.parameters, *of.quantities)}
 
 

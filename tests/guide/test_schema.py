@@ -3,7 +3,6 @@
 import json
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import jsonschema
 import pytest
@@ -17,7 +16,7 @@ SCHEMA = tmsopt.schema()
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 
 
-def faults(text: str) -> list[str]:
+def faults(text):
     """Where a file does not fit, each as keys joined by dots."""
     return [".".join(map(str, e.absolute_path)) for e in VALIDATOR.iter_errors(tomllib.loads(text))]
 
@@ -149,7 +148,7 @@ def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind, tmp_path)
 
 def test_parameters_are_explained_by_their_meanings():
     for name in ("tms", "whipple"):
-        explained: dict[str, Any] = SCHEMA["$defs"][f"parameters_{name}"]["properties"]
+        explained = SCHEMA["$defs"][f"parameters_{name}"]["properties"]
         model = getattr(tmsopt.models, name)
         assert set(explained) == {n for of in model.sets for n in of.names} | set(gain_names(name))
         assert set(SCHEMA["$defs"][f"feedback_{name}"]["properties"]) == set(gain_names(name))

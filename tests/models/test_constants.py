@@ -17,13 +17,13 @@ NUMBERS = ["0.1", "8/3", "2/7", "1.8", "sqrt(2)", "pi", "2", "0.5", "(1/3 - 0.3)
 NAMES = {name: getattr(mp, name) for name in ("sqrt", "exp", "sin")} | {"pi": mp.pi, "mpf": mp.mpf, "__builtins__": {}}
 
 
-def truth(text: str, x: str, y: str) -> mp.mpf:
+def truth(text, x, y):
     """The value at 60 digits; a number is made of its digits."""
     exactly = re.sub(r"\d+\.?\d*(e-?\d+)?", lambda found: f"mpf('{found[0]}')", text)
     return mp.mpf(eval(exactly, {**NAMES, "x": mp.mpf(x), "y": mp.mpf(y)}))
 
 
-def random_text(rng: random.Random, depth: int) -> str:
+def random_text(rng, depth):
     """Sums, products and quotients of numbers and of x and y, which CasADi would like to gather."""
     if depth == 0:
         return rng.choice([*NUMBERS, "x", "y", "x", "y"])

@@ -2,26 +2,25 @@
 
 import math
 import pickle
-from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import tmsopt
-from tmsopt.models import Model, Unfit, from_hamiltonian
+from tmsopt.models import Unfit, from_hamiltonian
 
 DIMER = [["w1 - 1j*g1", "k"], ["k", "w2 - 1j*g2"]]
 
 
-def frequencies(model: Model, parameters: dict[str, float]) -> list[complex]:
+def frequencies(model, parameters):
     """Eigenfrequencies of a design as it is reported, each as often as it counts, by real part."""
     found = tmsopt.solve(tmsopt.Problem(model, fixed=parameters)).eigenfrequencies
     every = [complex(z.re, z.im) for z in found for _ in range(z.multiplicity)]
     return sorted(every, key=lambda z: (round(z.real, 9), z.imag))
 
 
-def of_numpy(matrix: Any) -> list[complex]:
+def of_numpy(matrix):
     found = np.linalg.eigvals(np.array(matrix, dtype=complex))
     return sorted(map(complex, found), key=lambda z: (round(z.real, 9), z.imag))
 
@@ -81,7 +80,7 @@ def test_the_carrier_is_no_part_of_the_problem():
     """Two problems written the same are equal, whatever model objects were made on the way."""
     free = {"k": (0.1, 2.0)}
 
-    def stated() -> tmsopt.Problem:
+    def stated():
         fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
         return tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free=free, locate="EP2")
 

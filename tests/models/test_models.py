@@ -2,8 +2,6 @@
 
 import math
 import pickle
-from collections.abc import Mapping
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -19,7 +17,6 @@ from tmsopt import laws
 from tmsopt.models import (
     GRAVITY,
     MODELS,
-    ParameterSet,
     Range,
     Values,
     copo,
@@ -50,7 +47,7 @@ BENCHMARK = {
 """Equation `bench` of the paper."""
 
 
-def quantities(parameters: Mapping[str, Any], of: ParameterSet = NATIVE) -> Values:
+def quantities(parameters, of=NATIVE):
     return Values(tms, of, parameters)
 
 
@@ -82,7 +79,7 @@ length = st.floats(1e-3, 1e3)
 
 
 @st.composite
-def si_designs(draw: st.DrawFn) -> dict[str, float]:
+def si_designs(draw):
     return {
         "w": draw(length),
         "v": draw(length),
@@ -97,7 +94,7 @@ def si_designs(draw: st.DrawFn) -> dict[str, float]:
     }
 
 
-def within_ulps(got: float, expected: float, ulps: int) -> bool:
+def within_ulps(got, expected, ulps):
     return abs(got - expected) <= ulps * math.ulp(expected)
 
 

@@ -3,8 +3,6 @@
 import keyword
 import pickle
 from fractions import Fraction
-from pathlib import Path
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -55,24 +53,24 @@ PARAMETERS = "\n[parameters]\nk = { min = 1, max = 2 }\n"
 k, c = ca.SX.sym("k"), ca.SX.sym("c")
 
 
-def written(folder: Path, text: str, name: str = "own") -> Path:
+def written(folder, text, name="own"):
     file = folder / f"{name}.toml"
     file.write_text(text, encoding="utf-8")
     return file
 
 
-def loaded(folder: Path, text: str) -> tmsopt.Problem:
+def loaded(folder, text):
     return tmsopt.load(written(folder, text))
 
 
-def command(*arguments: Any) -> Any:
+def command(*arguments):
     """A command's result; it may end as it likes, but not in a traceback."""
     result = CliRunner().invoke(main, [str(a) for a in arguments])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exc_info
     return result
 
 
-def eigenvalues(M: Any, D: Any, K: Any) -> Any:
+def eigenvalues(M, D, K):
     """Roots of det(M s² + D s + K) as eigenvalues of the first companion form."""
     n = len(M)
     return np.linalg.eigvals(
@@ -88,7 +86,7 @@ def test_pendulums_of_a_file_are_solved(tmp_path):
     problem = loaded(tmp_path, PENDULUMS)
     design = tmsopt.solve(problem)
 
-    def matrices(k1: float, c1: float, c2: float) -> tuple[Any, Any, Any]:
+    def matrices(k1, c1, c2):
         M = np.diag([1 * 1**2 + 0.2, 2 * 0.8**2 + 0.1])
         return M, np.array([[c1 + 0.1, -0.1], [-0.1, c2 + 0.1]]), np.array([[k1, -0.7], [-0.7, 3]])
 

@@ -1,7 +1,5 @@
 """What a user of a complex H is told."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from tmsopt.models import Unfit, from_hamiltonian
 HEAD = '[model]\nH = [["d - 1j*g", "k"], ["k", "-1j*l"]]\n[parameters]\nd = 0\nl = 0.7\ng = { min = 0, max = 2 }\n'
 
 
-def refused(tmp_path: Path, text: str) -> str:
+def refused(tmp_path, text):
     path = tmp_path / "own.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(tmsopt.InputError) as found:

@@ -2,7 +2,6 @@
 
 import math
 import re
-from pathlib import Path
 
 import pytest
 
@@ -27,7 +26,7 @@ arm = "LIMIT"
 """
 
 
-def answered(path: Path, text: str) -> list[str]:
+def answered(path, text):
     """The faults of a file, each without its path."""
     path.write_text(text, encoding="utf-8")
     with pytest.raises(tmsopt.InputError) as caught:

@@ -60,7 +60,7 @@ PHI = "k_phi = { min = -100, max = 100 }"
 OBJECTIVE = "[objective]"
 
 
-def fault(tmp_path: Path, text: str) -> list[str]:
+def fault(tmp_path, text):
     file = tmp_path / "robot.toml"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(tmsopt.InputError) as caught:
@@ -68,13 +68,13 @@ def fault(tmp_path: Path, text: str) -> list[str]:
     return str(caught.value).removeprefix(f"{file}:").split(f"\n{file}:")
 
 
-def read(tmp_path: Path, text: str) -> tmsopt.Problem:
+def read(tmp_path, text):
     file = tmp_path / "robot.toml"
     file.write_text(text, encoding="utf-8")
     return tmsopt.load(file)
 
 
-def line(text: str, found: str) -> int:
+def line(text, found):
     return next(k for k, written in enumerate(text.splitlines(), 1) if written.startswith(found))
 
 
@@ -197,7 +197,7 @@ def test_faults_of_a_study_are_in_its_own_table(tmp_path):
 # The problems of the gallery
 
 
-def eigenvalues(v: float, k: dict[str, float]) -> np.ndarray:
+def eigenvalues(v, k):
     """Of the benchmark bicycle by the appendix, with the gains in the row of the steer torque."""
     M, C1, K0, K2 = (
         np.array(m, dtype=float) for m in appendix(BENCHMARK, math.sin(math.pi / 10), math.cos(math.pi / 10))
@@ -210,7 +210,7 @@ def eigenvalues(v: float, k: dict[str, float]) -> np.ndarray:
     return np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ D]]))
 
 
-def abscissa(v: float, k: dict[str, float]) -> float:
+def abscissa(v, k):
     return float(eigenvalues(v, k).real.max())
 
 
@@ -232,7 +232,7 @@ def test_no_search_on_eigenvalues_beats_what_is_found():
     design = tmsopt.solve("problems/gain_schedule.toml")
     box = list(design.problem.free.values())
 
-    def cost(x: np.ndarray) -> float:
+    def cost(x):
         k = dict(zip(design.problem.free, x.tolist(), strict=True))
         worst = max(abscissa(v, k) for v in (1.0, 2.0, 4.0, 6.0))
         return 1000 * max(worst + 0.5, 0.0) - k["k_phidot"] - k["k_phidot_v"]
@@ -255,7 +255,7 @@ def test_balance_assist_is_certified_and_proved():
 # Every verb
 
 
-def problems(tmp_path: Path) -> dict[str, tmsopt.Problem]:
+def problems(tmp_path):
     lagged = WHEELS.replace(OBJECTIVE, 'lag = "50 ms"\n[objective]')
     return {
         n: read(tmp_path, t) for n, t in (("wheels", WHEELS), ("skates", SKATES), ("plain", PLAIN), ("lag", lagged))

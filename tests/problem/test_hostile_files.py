@@ -18,7 +18,7 @@ SECONDS = 5.0
 """Of the processor. What is linear takes 0.01 to 1; what was quadratic or exponential took 20 and more, or no end."""
 
 
-def refused(path: Path, text: str | bytes, read=tmsopt.load) -> list[str]:
+def refused(path, text, read=tmsopt.load):
     """The lines of the message for a file of that text, which is all that may happen."""
     path.write_bytes(text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass"))
     began = time.process_time()
@@ -191,8 +191,8 @@ def test_a_title_from_the_name_of_a_file_is_shown_as_it_is(tmp_path):
     assert tmsopt.load(path).title == r"a\n\x1b[31m"
 
 
-def deep(layers: int) -> list:
-    found: list = []
+def deep(layers):
+    found = []
     for _ in range(layers):
         found = [found]
     return found

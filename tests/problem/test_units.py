@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
@@ -29,8 +28,8 @@ class _TooSlowError(BaseException):
 
 
 @contextmanager
-def at_once() -> Iterator[None]:
-    def ring(*_: object) -> None:
+def at_once():
+    def ring(*_):
         raise _TooSlowError
 
     before = signal.signal(signal.SIGALRM, ring)
@@ -47,7 +46,7 @@ def at_once() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _pint_is_warm() -> None:
+def _pint_is_warm():
     by_pint("m", "m")
 
 

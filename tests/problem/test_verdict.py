@@ -1,7 +1,5 @@
 """One rule for each word: what is stable, marginally stable, growing, an exceptional point."""
 
-from collections.abc import Mapping
-
 import flint
 import pytest
 
@@ -133,7 +131,7 @@ def test_the_longest_chain_in_fractions(sizes):
     assert exact_nullity(pencil, factor) == len(sizes)
 
 
-def judged(model: tmsopt.models.Model, pattern: str, at: Mapping[str, float]) -> tuple[int | None, int]:
+def judged(model, pattern, at):
     problem = tmsopt.Problem(model, free=dict.fromkeys(at, (-1.0, 1.0)), locate=pattern)
     assert problem.pattern is not None
     met = located_meetings(problem, problem.pattern, problem.ordered(at))[0]

@@ -1,7 +1,6 @@
 """Designs judged many at once are worth, and violate, what the recheck says of each: other code, without arrays."""
 
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -28,7 +27,7 @@ LIMITS = {
 SIMPLE = 1e-7  # of random designs, whose roots are simple: two algorithms, 1e-9 or so near the worst conditioned
 
 
-def problem(**asked: Any) -> tmsopt.Problem:
+def problem(**asked):
     free = {
         "Fr": (0.0, 8.0),
         "mu": (0.01, 40.0),
@@ -42,7 +41,7 @@ def problem(**asked: Any) -> tmsopt.Problem:
     return tmsopt.Problem(TMS, free={n: e for n, e in free.items() if n not in drop}, constraints=LIMITS, **asked)
 
 
-def judged(stated: tmsopt.Problem, drawn: list[dict[str, float]]) -> Any:
+def judged(stated, drawn):
     return judgement.evaluate(stated, {n: np.array([d[n] for d in drawn]) for n in stated.free})
 
 

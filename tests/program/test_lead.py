@@ -11,7 +11,7 @@ from tmsopt.program import formulate, initial_point
 NAMES = [f"c{k}" for k in range(6)]
 
 
-def asked(degree: int, objective: str) -> tmsopt.Problem:
+def asked(degree, objective):
     """All coefficients free."""
     names = NAMES[: degree + 1]
     free = dict.fromkeys(names, (-9.0, 9.0))

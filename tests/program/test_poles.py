@@ -1,7 +1,6 @@
 """Quotients and tangents with a pole in the box: optima in closed form beside poles."""
 
 import math
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -16,14 +15,12 @@ SQUARE = {"x": (0.0, 1.0), "y": (0.0, 1.0)}
 MET = 1e-8  # what is asked of every value
 
 
-def near(u: float, v: float) -> Any:
+def near(u, v):
     """s + 4 − (x − u)² − (y − v)²: the abscissa is least at (u, v), or as near to it as limits allow."""
     return from_coefficients([1, 4 - (x - u) ** 2 - (y - v) ** 2])
 
 
-def problem(
-    limits: tuple[str, ...], at: tuple[float, float] = (0.3, 0.7), free: Any = None, **asked: Any
-) -> tmsopt.Problem:
+def problem(limits, at=(0.3, 0.7), free=None, **asked):
     constraints = {f"limit{k}": text for k, text in enumerate(limits)}
     asked = asked or {"minimize": "abscissa"}
     return tmsopt.Problem(near(*at), free=free or SQUARE, constraints=constraints, **asked)
@@ -32,13 +29,13 @@ def problem(
 # Limits, the point aimed at, and the nearest that they allow
 
 
-def line(u: float, v: float, gap: float) -> tuple[float, float]:
+def line(u, v, gap):
     """The nearest point with x − y = gap."""
     step = (gap - (u - v)) / 2
     return u + step, v - step
 
 
-CASES: tuple[tuple[tuple[str, ...], tuple[float, float], tuple[float, float]], ...] = (
+CASES = (
     (("1/(x - y) >= 30",), (0.7, 0.3), line(0.7, 0.3, 1 / 30)),
     (("1/(x - y) >= 1000",), (0.7, 0.3), line(0.7, 0.3, 1e-3)),
     (("1/(x - y) <= -30",), (0.3, 0.7), line(0.3, 0.7, -1 / 30)),

@@ -12,7 +12,7 @@ from tmsopt.roots import product
 from tmsopt.search import same_objective
 
 
-def powers(rate: float, **asked: str) -> tmsopt.Problem:
+def powers(rate, **asked):
     """2 (s + r)⁵ for r about a rate."""
     r = ca.SX.sym("r")
     model = from_coefficients([2 * c for c in product(*[[1, r]] * 5)])

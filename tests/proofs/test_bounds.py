@@ -2,9 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
 
 import casadi as ca
 import flint
@@ -23,13 +21,13 @@ scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 # any, on the axis too.
 
 
-def drawn_factors(rng: np.random.Generator, degree: int, rightmost: int) -> list[list[Fraction]]:
+def drawn_factors(rng, degree, rightmost):
     """Factors with roots left of the axis and on it, some of them several times; one to the right of it if asked."""
 
-    def size() -> Fraction:
+    def size():
         return Fraction(int(rng.integers(1, 9)), int(rng.integers(1, 5)))
 
-    factors: list[list[Fraction]] = []
+    factors = []
     if rightmost:
         real = [Fraction(1), -size()]
         pair = [Fraction(1), -size() / 4, size()]
@@ -44,7 +42,7 @@ def drawn_factors(rng: np.random.Generator, degree: int, rightmost: int) -> list
     return factors
 
 
-def squares_exactly(c: Sequence[Fraction]) -> list[Any] | None:
+def squares_exactly(c):
     """The zeros of the second part as balls of 600 bits, largest first; None where one is not real."""
     second = [x if k % 2 == 0 else -x for k, x in enumerate(c[1::2])]
     scale = math.lcm(*(x.denominator for x in second))
@@ -53,11 +51,11 @@ def squares_exactly(c: Sequence[Fraction]) -> list[Any] | None:
     return sorted((z.real for z in zeros), key=lambda x: -float(x)) if all(z.imag == 0 for z in zeros) else None
 
 
-def as_ball(x: Any) -> Any:
+def as_ball(x):
     return x if isinstance(x, flint.arb) else flint.arb(flint.fmpq(x.numerator, x.denominator))
 
 
-def holds(c: Sequence[Fraction], squares: Sequence[Any]) -> bool:
+def holds(c, squares):
     """Whether the conditions hold. A number of such small heights that is not 0 is far larger than a ball of 600 bits."""
     balls = [as_ball(x) for x in c]
     equations, nonnegative = interlacing(balls, [(x, 1) for x in map(as_ball, squares)])
@@ -139,7 +137,7 @@ EXPRESSIONS = (
 )
 
 
-def function(text: str, names: Sequence[str] = ("x", "y", "z")) -> ca.Function:
+def function(text, names=("x", "y", "z")):
     """x → the value of an expression."""
     x = {name: ca.SX.sym(name) for name in names}
     return ca.Function("f", [ca.vertcat(*x.values())], [ca.SX(parse_value(text, names).symbolic(x))])
@@ -239,7 +237,7 @@ ONE_OF_EACH = {
 }
 
 
-def least(text: str, ends: tuple[float, float], sign: float = 1.0) -> NLP:
+def least(text, ends, sign=1.0):
     """minimise ± an expression of one x."""
     x = ca.SX.sym("x")
     f = ca.Function("f", [x], [sign * ca.SX(parse_value(text, ("x",)).symbolic({"x": x})), ca.SX(0, 1)])
@@ -273,7 +271,7 @@ def test_no_value_is_below_the_bound(text):
         assert lowest - 1e-5 * (1 + abs(lowest)) <= decision.bound <= lowest
 
 
-def constrained(texts: Sequence[str], ends: Sequence[tuple[float, float]], most: float = 0.0) -> NLP:
+def constrained(texts, ends, most=0.0):
     """Whether there are x, y with every expression ≤ most."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     rows = [ca.SX(parse_value(text, ("x", "y")).symbolic({"x": x, "y": y})) for text in texts]
@@ -322,7 +320,7 @@ def test_hardly_any_room_is_room(text, width):
     )
 
 
-def drawn_expression(rng: np.random.Generator, depth: int) -> str:
+def drawn_expression(rng, depth):
     """Any expression of x and y."""
     if depth == 0 or rng.random() < 0.15:
         return str(rng.choice(["x", "y", "x", "y", f"{rng.uniform(-2, 2):.3g}"]))

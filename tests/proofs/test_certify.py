@@ -7,12 +7,10 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,11 +19,10 @@ from helpers import hunt, timid
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from benchmarks.suites import REFERENCES, random_problem, references
-from tmsopt import InputError, Problem, Progress, Solution, certify, load, models, solve
+from tmsopt import InputError, Problem, certify, load, models, solve
 from tmsopt.cli import every as main
 from tmsopt.global_search import SCIP, GlobalSolver, SolverPool
 from tmsopt.problem import Band, Bound
-from tmsopt.records import Array
 from tmsopt.report import design_report
 
 answering = import_module("tmsopt.global_search.answer")
@@ -45,45 +42,45 @@ CLOSED = 1e-4  # a gap that counts as closed, relative to the objective
 SECONDS = 8.0  # five times what any of these needs
 
 
-def problem(free: Mapping[str, tuple[float, float]] = PLANE, **asked: Any) -> Problem:
+def problem(free=PLANE, **asked):
     """A bicycle with the heights of the paper, tilted unless the tilt is free."""
     return Problem(models.tms, {n: v for n, v in TILTED.items() if n not in free}, free, **asked)
 
 
-def growth(**design: Any) -> Array:
+def growth(**design):
     """Abscissae of arrays of designs, by eigenvalues."""
     return hunt.abscissa({**TILTED, **design})
 
 
-def plane(count: int = 120) -> tuple[Array, Array]:
+def plane(count=120):
     """Froude numbers and centres of mass all over the plane, its edges included."""
     Fr, chi_B = np.meshgrid(np.linspace(*PLANE["Fr"], count), np.linspace(*PLANE["chi_B"], count))
     return Fr, chi_B
 
 
 @pytest.fixture(scope="module")
-def slow_plane() -> Solution:
+def slow_plane():
     """The least abscissa of the plane, which is an EP3 at a tilt less than that of the EP4: ω0 does not close the gap."""
     return solve(problem(minimize="abscissa"), starts=8)
 
 
 @pytest.fixture(scope="module")
-def bounded_plane(slow_plane: Solution) -> Solution:
+def bounded_plane(slow_plane):
     return certify(slow_plane, seconds=SECONDS)
 
 
 @pytest.fixture(scope="module")
-def slowest() -> Solution:
+def slowest():
     """The slowest design of the plane with a decay of 0.2, at which weave and capsize meet that line."""
     return solve(problem(constraints={"s": "abscissa <= -0.2"}, minimize="Fr"), starts=8)
 
 
-def unsolved(asked: Problem, of: Solution) -> Solution:
+def unsolved(asked, of):
     """What a search that found nothing at all would leave; the design is another problem's."""
     return replace(of, problem=asked, status="not_converged", value=math.nan, bound=Bound())
 
 
-def is_closed(design: Solution) -> bool:
+def is_closed(design):
     """Whether a bound is as it should be: proved by SCIP, on the right side, and not further than it says."""
     bound, sense = design.bound, -1 if design.problem.sense == "maximize" else 1
     gap = sense * (design.value - bound.value)
@@ -197,7 +194,7 @@ def test_the_slowest_ep4():
     Along it Fr falls with the tilt, so the slowest has the least tilt.
     """
 
-    def law(zeta_H: float) -> tuple[float, float]:
+    def law(zeta_H):
         r, h = math.sqrt(0.4 / -zeta_H), math.sqrt(0.4 * -zeta_H)
         top = r * r + 6 * r + 1
         return (r - 1) * top / (16 * h * (r + 1)), top / (4 * math.sqrt(h) * (r + 1))
@@ -241,7 +238,7 @@ def test_json(slow_plane, bounded_plane):
 # Wrong bounds, made for the purpose
 
 
-def unclaimed(design: Solution, names: str) -> bool:
+def unclaimed(design, names):
     """Whether nothing is claimed, and the reason told."""
     said = [note for note in design.notes if note.startswith("no bound: the question excludes the design")]
     assert len(said) == 1
@@ -255,11 +252,11 @@ def test_a_bound_on_the_roots_that_is_too_small(slowest, monkeypatch):
     assert unclaimed(certify(slowest, seconds=SECONDS), "x1.0")
 
 
-def test_a_wrong_equation(slowest: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_equation(slowest, monkeypatch):
     """c3 + x c1 = 0 for c3 − x c1 = 0: no x for positive coefficients."""
     right = interlaces.interlacing
 
-    def wrong(coefficients: Any, squares: Any) -> Any:
+    def wrong(coefficients, squares):
         ((x, y),) = squares
         return [coefficients[3] * y + x * coefficients[1]], right(coefficients, squares)[1]
 
@@ -272,7 +269,7 @@ def test_a_wrong_sign(slowest, monkeypatch, which):
     """Of one coefficient of p(t − 0.2)."""
     right = interlaces.interlacing
 
-    def wrong(coefficients: Any, squares: Any) -> Any:
+    def wrong(coefficients, squares):
         equations, nonnegative = right(coefficients, squares)
         return equations, [-e if k == which else e for k, e in enumerate(nonnegative)]
 
@@ -412,12 +409,12 @@ def test_a_basin_that_many_starts_miss():
 
 
 @pytest.fixture
-def children(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
+def children(monkeypatch):
     """The processes that are started, none of which is left at the end."""
-    seen: list[Any] = []
+    seen = []
     start = started.start
 
-    def noted(*given: Any) -> Any:
+    def noted(*given):
         seen.append(start(*given))
         return seen[-1]
 
@@ -432,7 +429,7 @@ def test_no_process_is_left(slow_plane, children):
 
 
 def test_an_interrupt_keeps_the_design(slow_plane, children):
-    def stop(told: Progress) -> None:
+    def stop(told):
         if told.done > 0:
             raise KeyboardInterrupt
 
@@ -446,9 +443,9 @@ def test_an_interrupt_keeps_the_design(slow_plane, children):
 @pytest.mark.slow
 def test_a_process_that_crashes_costs_no_result(slow_plane, monkeypatch):
     """At once, every time: nothing is decided, in the time that was given and that of one process more."""
-    crashed: list[Any] = []
+    crashed = []
 
-    def crash(*_: Any) -> Any:
+    def crash(*_):
         command = [sys.executable, "-S", "-c", "import os; os._exit(1)"]
         crashed.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
         return crashed[-1]
@@ -471,7 +468,7 @@ def test_one_crash_of_two(slow_plane, monkeypatch, children):
     """The other one answers."""
     start = started.start
 
-    def every_other(*given: Any) -> Any:
+    def every_other(*given):
         child = start(*given)
         if len(children) % 2:
             child.kill()
@@ -490,7 +487,7 @@ def test_hardly_any_time(slow_plane):
 
 def test_progress_is_told(slow_plane):
     """Seconds, and the gap as it closes."""
-    told: list[Progress] = []
+    told = []
     certify(slow_plane, seconds=SECONDS, progress=told.append)
     assert {t.what for t in told} == {"bounding the optimum"}
     assert [t.done for t in told] == sorted(t.done for t in told)
@@ -501,7 +498,7 @@ def test_progress_is_told(slow_plane):
 
 
 def test_a_crew_is_closed_whatever_happens(children):
-    def fail() -> None:
+    def fail():
         with SolverPool(SCIP) as crew:
             crew.ahead(2)
             raise ZeroDivisionError
@@ -534,7 +531,7 @@ def test_that_branch_and_bound_cannot_take_a_radius_is_said():
 
 
 @pytest.fixture
-def without_scip(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_scip(monkeypatch):
     missing = replace(SCIP, module="no_such_module")
     monkeypatch.setattr(certifying, "SOLVER", missing)
 
@@ -588,13 +585,13 @@ Fr = { min = 0.5, max = 3 }
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path):
     path = tmp_path / "plane.toml"
     path.write_text(FILE + 'minimize = "abscissa"\n')
     return path
 
 
-def run(*arguments: str | Path) -> tuple[int, str, str]:
+def run(*arguments):
     result = CliRunner().invoke(main, [*map(str, arguments)])
     return result.exit_code, result.stdout, result.stderr
 

@@ -5,7 +5,6 @@ from fractions import Fraction
 from functools import cache
 from importlib import import_module
 from itertools import product as every
-from typing import Any
 
 import casadi as ca
 import flint
@@ -14,11 +13,10 @@ import pytest
 from mpmath import mp
 
 import tmsopt
-from tmsopt.algebra import Number
 from tmsopt.evaluation import omega0_bound, relation_bound
 from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, Question, task
-from tmsopt.models import Model, from_coefficients, from_matrices
-from tmsopt.proofs import Proof, prove_design
+from tmsopt.models import from_coefficients, from_matrices
+from tmsopt.proofs import prove_design
 from tmsopt.roots import Root, product, roots
 from tmsopt.roots.patterns import implies, shown_patterns
 
@@ -29,33 +27,33 @@ scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 R6 = math.sqrt(15) / 5
 
 
-def symbols(names: str) -> list[Any]:
+def symbols(names):
     return [ca.SX.sym(n) for n in names.split()]
 
 
-def free_polynomial(degree: int, **given: Any) -> Model:
+def free_polynomial(degree, **given):
     """s^n + a1 s^(n−1) + …, every coefficient a parameter but those given as functions of the others."""
     a = [ca.SX(1), *(ca.SX.sym(f"a{k}_") for k in range(1, degree + 1))]
     return from_coefficients([given[f"a{k}"](a) if f"a{k}" in given else c for k, c in enumerate(a)])
 
 
-def boxed(model: Model, lower: float = -20.0, upper: float = 20.0, **asked: Any) -> tmsopt.Problem:
+def boxed(model, lower=-20.0, upper=20.0, **asked):
     return tmsopt.Problem(model, free=dict.fromkeys(model.sets[0].names, (lower, upper)), **asked)
 
 
 @cache
-def two_mass_spring() -> tmsopt.Solution:
+def two_mass_spring():
     """(s⁴ + 2s²)(x0 + x1 s + s²) + y0 + y1 s + y2 s²."""
     x0, x1, y0, y1, y2 = symbols("x0 x1 y0 y1 y2")
     model = from_coefficients([1, x1, x0 + 2, 2 * x1, 2 * x0 + y2, y1, y0])
     return tmsopt.solve(boxed(model, -10.0, 10.0, minimize="abscissa"))
 
 
-def holds(found: Number, truth: Any) -> bool:
+def holds(found, truth):
     return bool(abs(mp.mpf(found.value) - truth) <= mp.mpf(found.radius) + mp.mpf(10) ** (5 - mp.dps))
 
 
-def rebuilt(proof: Proof) -> list[Any]:
+def rebuilt(proof):
     """Monic coefficients from the proved roots."""
     c = [mp.mpf(1)]
     for root in proof.roots:
@@ -109,7 +107,7 @@ def test_no_polynomial_of_a_family_with_one_relation_is_below_its_bound(degree):
         b = rng.integers(-6, 7, degree + 1).astype(float)
         b[1] = 2.0 + abs(b[1])
 
-        def rest(a: Any, b: Any = b) -> Any:
+        def rest(a, b=b):
             return -(b[0] + sum(b[k] * a[k] for k in range(2, degree + 1))) / b[1]
 
         bound = relation_bound(boxed(free_polynomial(degree, a1=rest), minimize="abscissa"))
@@ -170,7 +168,7 @@ def test_more_parameters_than_have_corners():
 # Branch and bound
 
 
-def verdict(problem: tmsopt.Problem, limit: float | None) -> set[str]:
+def verdict(problem, limit):
     question = Question(problem, limit=limit)
     return {SCIP.decide(task(question.program(sign), 20.0)).verdict for sign in question.signs()}
 
@@ -347,7 +345,7 @@ def test_exact_fractions_are_decided_without_rounding():
     assert sorted(z.multiplicity for z in proof.roots) == [2, 2, 3]
 
 
-def roots_of(*places: tuple[complex, int]) -> list[Root]:
+def roots_of(*places):
     return [Root(w.real, w.imag, m) for z, m in places for w in ((z, z.conjugate()) if z.imag else (z,))]
 
 

@@ -1,9 +1,7 @@
 """Designs known to be feasible must be admitted by every question whose limit they reach: traps for false proofs."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -19,13 +17,13 @@ CAPSIZE = {**FIXED, "chi_H": 1.2, "mu": 5.0}  # a4 < 0 for tan λ_s < 5/3: one r
 WEAVE = {**FIXED, "zeta_B": -0.1, "zeta_H": -0.1, "chi_B": 0.5}  # reversed rake: one root s > 2 at any speed below 3
 
 
-def question(free: Mapping[str, tuple[float, float]], *constraints: str, base: Any = None, **asked: str) -> Question:
+def question(free, *constraints, base=None, **asked):
     fixed = {name: value for name, value in (base or FIXED).items() if name not in free}
     named = {f"c{k}": text for k, text in enumerate(constraints)}
     return Question(Problem(tms, fixed, free, named, **(asked or {"minimize": next(iter(free))})))
 
 
-def verdicts(asked: Question) -> set[str]:
+def verdicts(asked):
     return {SCIP.decide(task(asked.program(sign), 5.0)).verdict for sign in asked.signs()}
 
 
@@ -88,14 +86,14 @@ def test_the_least_leading_coefficient_of_one_case_bounds_no_roots_of_another():
 @pytest.mark.parametrize("degree", [3, 4, 5, 6])
 def test_squared_frequencies_of_equal_roots_are_within_their_range(degree):
     """(t + 1)ⁿ has its roots at −R, R = 1, and F and S alternate up to the frequency cot(π/n)."""
-    upper: list[float] = []
+    upper = []
 
     class Rows:
-        def variable(self, name: str, lower: float, most: float) -> float:
+        def variable(self, name, lower, most):
             upper.append(most)
             return 0.0
 
-        def row(self, *_: object) -> None: ...
+        def row(self, *_): ...
 
     coefficients = [float(math.comb(degree, k)) for k in range(degree + 1)]
     interlace(Rows(), 0, coefficients, 1.0, False)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -21,23 +20,23 @@ SECONDS = 20.0  # ten times what any of these needs
 X = ca.SX.sym("x")
 
 
-def problem(**asked: Any) -> tmsopt.Problem:
+def problem(**asked):
     """s² + x s + 1: for 0 < x < 2 the abscissa is −x/2; 1 at x = 1 for every objective below."""
     return tmsopt.Problem(from_coefficients([1, X, 1]), free={"x": (0.1, 1.9)}, **asked)
 
 
 @pytest.fixture
-def lost(monkeypatch: pytest.MonkeyPatch) -> None:
+def lost(monkeypatch):
     """An IPOPT that converges nowhere, once the first search is over."""
     solve = tmsopt.solve
 
-    def failing(asked: tmsopt.Problem, **options: Any) -> tmsopt.Solution:
+    def failing(asked, **options):
         return replace(solve(asked, **options), status="not_converged", value=float("nan"))
 
     monkeypatch.setattr(improving, "solve", failing)
 
 
-def worse(asked: tmsopt.Problem, **changed: Any) -> tmsopt.Solution:
+def worse(asked, **changed):
     """The best design of a smaller box, 1 ≤ x ≤ 1.2, sold as that of the whole one."""
     return replace(tmsopt.solve(replace(asked, free={"x": (1.0, 1.2)}), throw=False), problem=asked, **changed)
 
@@ -84,7 +83,7 @@ def test_a_feasible_design_is_never_called_infeasible(status):
 def test_what_is_better_only_beyond_a_limit_is_no_alarm(off, monkeypatch):
     """x ≥ 1 is met to a tolerance, and 1 + 1000 (x − 1) is less by a thousand times that."""
 
-    def race(self: SolverPool, tasks: Any, tick: Any = None) -> list[Decision]:
+    def race(self, tasks, tick=None):
         beyond = Decision(FOUND, point=np.array([1 - off]))
         return [Decision(UNDECIDED) if task.within else beyond for task in tasks]
 

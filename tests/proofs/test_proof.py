@@ -3,13 +3,11 @@
 import json
 import math
 import pickle
-from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import flint
 import numpy as np
@@ -34,20 +32,20 @@ SQRT2 = math.sqrt(2)
 
 
 @cache
-def solved(name: str) -> tmsopt.Solution:
+def solved(name):
     return tmsopt.solve(tmsopt.load(PROBLEMS / f"{name}.toml"))
 
 
-def located(pattern: str, held: Mapping[str, float], free: Mapping[str, tuple[float, float]]) -> tmsopt.Solution:
+def located(pattern, held, free):
     return tmsopt.solve(tmsopt.Problem(tmsopt.models.tms, fixed={**HEIGHTS, **held}, free=free, locate=pattern))
 
 
-def holds(found: Number, truth: Any) -> bool:
+def holds(found, truth):
     """Whether an mpmath number is within the radius of a decimal, to the precision of mpmath."""
     return bool(abs(mp.mpf(found.value) - truth) <= mp.mpf(found.radius) + mp.mpf(10) ** (5 - mp.dps))
 
 
-def ep4_of_heights(zeta_B: Any, zeta_H: Any) -> dict[str, Any]:
+def ep4_of_heights(zeta_B, zeta_H):
     """Compact forms of χ_B, T, Fr and the 4-fold root at χ_H = 1 (equations chib1, tls, frep4, w01)."""
     r, h = mp.sqrt(zeta_B / zeta_H), mp.sqrt(zeta_B * zeta_H)
     T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
@@ -55,14 +53,14 @@ def ep4_of_heights(zeta_B: Any, zeta_H: Any) -> dict[str, Any]:
     return {"chi_B": r, "T": T, "Fr": Fr, "r": -1 / mp.sqrt(h)}
 
 
-def ep_set(T: Any) -> Any:
+def ep_set(T):
     """Fr² on the EP set of ζ_B = −0.4, ζ_H = −0.2 (equation epset)."""
     r = mp.sqrt(2)
     h = r / 5
     return 4 * (r + 1) ** 2 * h * T**2 / ((r - 1) * (4 * h * T * (r + 1) - r * (r - 1)))
 
 
-def on_ep_set(lambda_s: float, kind: str) -> tuple[tmsopt.Problem, dict[str, float]]:
+def on_ep_set(lambda_s, kind):
     """The design of the EP set at a tilt in doubles, and the problem that locates it in Fr and χ_B."""
     fixed = {**HEIGHTS, "lambda_s": lambda_s}
     free = {"Fr": (0.1, 6.0), "chi_B": (1.01, 3.0)}
@@ -122,7 +120,7 @@ def test_a_triple_root_and_its_derivatives():
     with mp.workdps(60):
         T = mp.tan(mp.mpf(proof.parameters["lambda_s"].value))
 
-        def conditions(Fr: Any, chi_B: Any, s: Any) -> list[Any]:
+        def conditions(Fr, chi_B, s):
             a = tmsopt.models.tms.polynomial(Fr, mp.mpf("0.1"), chi_B, mp.mpf(1), -mp.mpf("0.4"), -mp.mpf("0.2"), T)
             d1, d2 = [4 * a[0], 3 * a[1], 2 * a[2], a[3]], [12 * a[0], 6 * a[1], 2 * a[2]]
             return [mp.polyval(p, s) for p in (a, d1, d2)]
@@ -173,7 +171,7 @@ def test_uniqueness_ends_before_the_other_solution():
     assert all(0 < p.uniqueness < apart for p in proofs)
 
 
-def polished(design: dict[str, float]) -> dict[str, float]:
+def polished(design):
     """The same with tan λ_s on the EP set to the last digit: numpy's roots near a fold lose a few."""
     with mp.workdps(30):
         T = mp.findroot(lambda x: ep_set(x) - mp.mpf(repr(design["Fr"])) ** 2, mp.tan(design["lambda_s"]))
@@ -281,7 +279,7 @@ def test_an_angle_in_degrees_is_exact_where_it_is_given_so():
     assert "not an angle in degrees" not in proof_text(problem, exact)
 
 
-def fractions(**changed: float) -> tmsopt.Solution:
+def fractions(**changed):
     """ζ_B = −2, ζ_H = −1/2, χ_B = 2: the compact forms give tan λ_s = 17/48, Fr = 17/12, s = −1."""
     fixed = {"Fr": 17 / 12, "mu": 0.1, "chi_B": 2.0, "chi_H": 1.0, "zeta_B": -2.0, "zeta_H": -0.5}
     return tmsopt.solve(
@@ -290,7 +288,7 @@ def fractions(**changed: float) -> tmsopt.Solution:
 
 
 def test_a_pattern_in_fractions_needs_no_free_parameter():
-    exact: dict[str, Any] = {"Fr": Fraction(17, 12), "tan(lambda_s)": "17/48"}
+    exact = {"Fr": Fraction(17, 12), "tan(lambda_s)": "17/48"}
     proof = tmsopt.prove(fractions(), exact=exact)
     assert (proof.proved, proof.pattern, proof.method) == (True, "EP4", "exact factorisation")
     assert [(z.re.value.rstrip("0"), z.re.radius, z.multiplicity) for z in proof.roots] == [("-1.", "0", 4)]
@@ -554,7 +552,7 @@ def test_signs_that_cannot_be_told_are_not():
 # The test itself
 
 
-def quadratic(constant: str) -> Any:
+def quadratic(constant):
     return lambda at: [at["x"] * at["x"] + flint.arb(constant)]
 
 
@@ -574,7 +572,7 @@ def test_krawczyk_on_a_square():
         assert enclosed(close, refined(close, at, ["x"], 45), ["x"], 45).uniqueness < 2e-20
 
 
-def refined_and_enclosed(system: Any) -> Any:
+def refined_and_enclosed(system):
     return enclosed(system, refined(system, {"x": flint.arb("0.3")}, ["x"], 45), ["x"], 45)
 
 
@@ -617,7 +615,7 @@ def test_a_band_is_proved_in_its_worst_case():
     assert "worst case" in proof_text(problem, proof)
 
 
-def run(*arguments: str) -> Any:
+def run(*arguments):
     return CliRunner().invoke(main, ["prove", *arguments])
 
 

@@ -5,7 +5,6 @@ which take any two rigid bodies; a point mass is a body without inertia of its o
 """
 
 import math
-from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -27,14 +26,14 @@ Body = tuple[Any, Any, Any]
 """A point mass m at x forward and z downward."""
 
 
-def values(p: dict[str, Any], of: Any = NATIVE) -> Values:
+def values(p, of=NATIVE):
     return Values(tms, of, p)
 
 
 # The lateral dynamics of two assemblies of point masses
 
 
-def rigid(bodies: Sequence[Body]) -> tuple[Any, ...]:
+def rigid(bodies):
     """Mass, centre, and the moments and product of inertia about it of bodies that are fixed to one another."""
     m = sum(b[0] for b in bodies)
     x, z = (sum(b[0] * b[k] for b in bodies) / m for k in (1, 2))
@@ -44,7 +43,7 @@ def rigid(bodies: Sequence[Body]) -> tuple[Any, ...]:
     return m, x, z, Ixx, Ixz, Izz
 
 
-def lateral(rear: Sequence[Body], front: Sequence[Body], w: Any, v: Any, g: Any, sine: Any, cosine: Any) -> Any:
+def lateral(rear, front, w, v, g, sine, cosine):
     """M, v C1 and g K0 + v² K2 of lean and steer, without trail and without the mass of wheels."""
     bodies = dict.fromkeys(BODIES.split(), 0) | {"w": w, "r_R": 1, "r_F": 1}
     for end, masses in (("B", rear), ("H", front)):
@@ -67,7 +66,7 @@ def test_the_equations_used_here_are_those_of_the_model():
     assert [sympy.expand(e) for e in np.ravel(np.array(paper) - np.array(general))] == [0] * 12
 
 
-def changes(rear: Sequence[Body], front: Sequence[Body]) -> list[Any]:
+def changes(rear, front):
     """Entries of the matrices less those of the bicycle of two masses."""
     difference = np.array(lateral(rear, front, *SCALES)) - np.array(lateral([B], [H], *SCALES))
     return [sympy.cancel(e) for e in difference.ravel()]
@@ -96,7 +95,7 @@ def test_ballast_above_the_contact_does_change_the_motion():
 # Statics
 
 
-def loads(bodies: Iterable[Body], w: Any) -> tuple[Any, Any]:
+def loads(bodies, w):
     """Vertical forces at front and rear, per g, that balance force and moment; moments about a point off both."""
     bodies, p = list(bodies), Fraction(-7, 3)
     force, moment = sum(b[0] for b in bodies), sum(b[0] * (b[1] - p) for b in bodies)
@@ -104,7 +103,7 @@ def loads(bodies: Iterable[Body], w: Any) -> tuple[Any, Any]:
     return ((0 - p) * force - moment) / determinant, (moment - (w - p) * force) / determinant
 
 
-def exact(p: dict[str, float]) -> dict[str, Fraction]:
+def exact(p):
     return {name: Fraction(value) for name, value in p.items()}
 
 

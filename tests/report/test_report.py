@@ -6,14 +6,13 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from helpers.designs import ROBOT
 
 import tmsopt
 from tmsopt.models import tms
-from tmsopt.problem import Relaxation, Solution
+from tmsopt.problem import Relaxation
 from tmsopt.records import Table
 from tmsopt.report import design_report, si_parameters
 
@@ -41,35 +40,35 @@ TWO_PAIRS = {
 UNITS = {"x_B": "cm", "z_B": "cm", "x_H": "cm", "z_H": "cm", "v": "km/h", "lambda_s": "deg"}
 
 
-def solved(**changes: Any) -> Solution:
+def solved(**changes):
     """The benchmark bicycle in SI, with changes; nothing is free, so this is an evaluation."""
     return tmsopt.solve(tmsopt.Problem(tms, fixed={**BENCHMARK, **changes}, units=UNITS))
 
 
-def full(solution: Solution, *scale: float) -> str:
+def full(solution, *scale):
     si = si_parameters(solution, *scale) if scale else None
     return design_report(solution, full=True, si=si)
 
 
-def rows(report: str) -> list[list[str]]:
+def rows(report):
     """Cells of each line that belongs to a table."""
     return [re.split(r"\s{2,}", line.strip()) for line in report.splitlines() if line.startswith("  ")]
 
 
-def read(report: str, symbol: str) -> tuple[float, str]:
+def read(report, symbol):
     """Number and unit that follow a symbol in a table."""
     cells = next(row[row.index(symbol) :] for row in rows(report) if symbol in row)
     return float(cells[1]), cells[2]
 
 
-def line(report: str, start: str) -> str:
+def line(report, start):
     """The one line that begins so, with what it is continued by."""
     found = re.findall(rf"^{start}.*(?:\n  .*)*", report, re.MULTILINE)
     assert len(found) == 1
     return " ".join(str(found[0]).split())
 
 
-def balance(solution: Solution) -> str:
+def balance(solution):
     """Of the loads, what follows the numbers."""
     return line(design_report(solution), "front wheel ").split("; ", 1)[1]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import tmsopt
-from tmsopt.problem import Solution, unit_of
+from tmsopt.problem import unit_of
 from tmsopt.report import design_report
 
 NUMBER = r"-?\d[\d.]*(?:e[+-]?\d+)?"
@@ -19,7 +19,7 @@ FILES = sorted(p for p in Path("problems").glob("*.toml") if not re.match("study
 LINES, COLUMNS = 30, 100
 
 
-def one_each(names: list[str], report: str) -> dict[str, set[str]]:
+def one_each(names, report):
     """Units that stand behind the numbers of each name: ``v  3.7 m/s``, ``v = 4 m/s``, ``v.max:  <= 4 m/s``."""
     found = defaultdict(set)
     for name in names:
@@ -70,7 +70,7 @@ def test_it_fits_a_screen_in_one_unit_each(file):
 
 
 @pytest.fixture(scope="module")
-def robot() -> Solution:
+def robot():
     return tmsopt.solve(tmsopt.load("problems/benchmark.toml"))
 
 

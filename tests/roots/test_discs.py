@@ -12,7 +12,7 @@ from tmsopt.roots import exact_roots
 enclose_motions = import_module("tmsopt.roots.discs").enclose_motions
 
 
-def polynomials(degree: int) -> np.ndarray:
+def polynomials(degree):
     """Some at random, some near a root of the multiplicity of the degree, some with roots of very different size."""
     rng = np.random.default_rng(degree)
     near = np.stack([np.poly(-1 - e * rng.uniform(-1, 1, degree)) for e in np.geomspace(1e-3, 1, 60)])

@@ -3,7 +3,6 @@
 Roots are judged by the coefficients that they rebuild, in exact arithmetic on the very doubles returned.
 """
 
-from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -35,11 +34,11 @@ rational = st.fractions(min_value=-20, max_value=20, max_denominator=12)
 polynomial = st.lists(rational, min_size=1, max_size=7)
 
 
-def poly(coefficients: Sequence[Fraction]) -> sympy.Poly:
+def poly(coefficients):
     return sympy.Poly([sympy.Rational(c.numerator, c.denominator) for c in coefficients], s, domain="QQ")
 
 
-def fractions(p: sympy.Poly, length: int) -> list[Fraction]:
+def fractions(p, length):
     """Coefficients of a SymPy polynomial, padded with leading zeros."""
     found = [Fraction(int(c.p), int(c.q)) for c in p.all_coeffs()]
     return [Fraction(0)] * (length - len(found)) + found
@@ -64,7 +63,7 @@ def test_shift_is_composition_with_t_plus_gamma(p, gamma):
     assert shift(p, gamma) == fractions(poly(p).compose(argument), len(p))
 
 
-def _random_matrix(rng: np.random.Generator, n: int, length: int) -> list[list[list[Fraction]]]:
+def _random_matrix(rng, n, length):
     return [[[Fraction(int(x), 7) for x in rng.integers(-9, 10, length)] for _ in range(n)] for _ in range(n)]
 
 
@@ -87,7 +86,7 @@ def test_quadratic_pencil_is_det_of_M_s2_D_s_K(n):
 # Numeric roots
 
 
-def exact_elementary(values: Sequence[complex]) -> list[tuple[Fraction, Fraction]]:
+def exact_elementary(values):
     """Coefficients of ∏ (s − value) as exact (real, imaginary) parts."""
     result = [(Fraction(1), Fraction(0))]
     for z in values:
@@ -100,11 +99,11 @@ def exact_elementary(values: Sequence[complex]) -> list[tuple[Fraction, Fraction
     return result
 
 
-def exact_monic(coefficients: Sequence[float]) -> list[Fraction]:
+def exact_monic(coefficients):
     return [Fraction(float(c)) / Fraction(float(coefficients[0])) for c in coefficients]
 
 
-def errors(coefficients: Sequence[float], found: Sequence[complex]) -> tuple[Fraction, Fraction]:
+def errors(coefficients, found):
     """Joint error of roots by their exactly rebuilt coefficients, componentwise and normwise.
 
     Componentwise against the same symmetric function of |roots|, as `backward_error` has it; normwise in the
@@ -121,7 +120,7 @@ def errors(coefficients: Sequence[float], found: Sequence[complex]) -> tuple[Fra
     return componentwise, max(o / unit**k for k, o in enumerate(off)) / largest
 
 
-def assert_jointly_right(coefficients: Sequence[float]) -> None:
+def assert_jointly_right(coefficients):
     found = roots(coefficients)
     componentwise, normwise = errors(coefficients, found)
     assert componentwise <= JOINTLY_RIGHT, f"{float(componentwise)} of {list(coefficients)!r}"
@@ -130,14 +129,14 @@ def assert_jointly_right(coefficients: Sequence[float]) -> None:
     assert backward_error(coefficients, found) == pytest.approx(float(componentwise), abs=4e-15)
 
 
-def coefficients_of(values: Sequence[complex], leading: float = 1.0) -> list[float]:
+def coefficients_of(values, leading=1.0):
     """Exact coefficients of given roots, each rounded once."""
     return [float(re * Fraction(leading)) for re, _ in exact_elementary(values)]
 
 
-def random_roots(rng: np.random.Generator, degree: int) -> list[complex]:
+def random_roots(rng, degree):
     """Real roots and pairs of either sign, sizes over two decades."""
-    values: list[complex] = []
+    values = []
     while len(values) < degree:
         size, angle = 10 ** rng.uniform(-1, 1), rng.uniform(0, np.pi)
         if len(values) <= degree - 2 and rng.uniform() < 0.5:
@@ -175,12 +174,12 @@ def test_roots_sixteen_decades_apart(degree):
 
 
 @st.composite
-def near_ep4(draw: st.DrawFn) -> list[complex]:
+def near_ep4(draw):
     """Four roots within a relative 1e-16 … 1e-1 of a negative number, real or in pairs."""
     centre = -draw(st.floats(0.1, 10))
     spread = 10 ** draw(st.floats(-16, -1))
     offset = st.floats(-1, 1)
-    values: list[complex] = []
+    values = []
     for is_pair in draw(st.sampled_from([(True, True), (True, False), (False, False)])):
         a, b = draw(offset), draw(offset)
         if is_pair:
@@ -283,7 +282,7 @@ def test_roots_refuse_what_has_none(bad):
 # Stability and discriminant
 
 
-def random_exact(degree: int) -> list[list[Fraction]]:
+def random_exact(degree):
     """Rational polynomials, a0 of both signs: products of factors with Re s about 0, some changed a little."""
     rng = np.random.default_rng(degree)
     chosen = []

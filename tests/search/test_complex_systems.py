@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ EXACT = 1e-12
 """What print and closed forms are met to: some hundred roundings."""
 
 TWO = complex(1 + math.cos(math.pi - 2), -math.sin(2))
-PUBLISHED: dict[str, tuple[dict[str, float], complex, int]] = {
+PUBLISHED = {
     "loss_only_dimer": ({"k": 0.4, "d": 0}, -0.6j, 2),
     "pt_trimer": ({"gain": math.sqrt(2), "loss": math.sqrt(2), "d1": 0, "d3": 0}, 0j, 3),
     "ep3_sensor": ({"gain": math.sqrt(2), "loss": math.sqrt(2), "d1": 0, "d3": 0}, 0j, 3),
@@ -127,7 +126,7 @@ def test_the_optimum_of_a_lossy_dimer_is_its_trace():
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_the_optimum_where_nothing_is_stable_is_the_mean_gain(size):
     """No greatest gain is below the mean one, which symmetric chains reach; a search for EPs of full order leads on."""
-    rows: list[list[str]] = [
+    rows = [
         [
             "k" if abs(i - j) == 1 else f"1j*{size - i} + d" if i == j == 0 else f"1j*{size - i}" if i == j else "0"
             for j in range(size)
@@ -151,7 +150,7 @@ def test_no_words_of_the_double_are_shown(command):
 
 
 def test_json_has_eigenfrequencies_beside_roots():
-    found: dict[str, Any] = tmsopt.solve("problems/loss_only_dimer.toml").to_json()
+    found = tmsopt.solve("problems/loss_only_dimer.toml").to_json()
     (root,) = found["roots"]
     of_block = {"multiplicity": 2, "defective": True, "geometric_multiplicity": 1}  # an EP2: one eigenvector
     assert found["eigenfrequencies"] == [{"re": -root["im"], "im": root["re"], **of_block}]

@@ -91,7 +91,7 @@ BOUNDS = tmsopt.Problem(
 )
 
 
-def named(problem: tmsopt.Problem, reached):
+def named(problem, reached):
     """What `irreducible` makes of it; the nearest design moves b."""
     near = {**problem.fixed, "x": 0.8, "y": 0.5}
     relaxation = tmsopt.solve(replace(problem, minimize="x"), throw=False).relaxation

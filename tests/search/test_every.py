@@ -4,7 +4,6 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,18 +19,18 @@ pytestmark = pytest.mark.slow
 c1, c2 = ca.SX.sym("c1"), ca.SX.sym("c2")
 
 
-def oscillators(k: float, w: float, box: tuple[float, float] = (-2, 2), **asked: Any) -> tmsopt.Problem:
+def oscillators(k, w, box=(-2, 2), **asked):
     """Two masses 1 with dampers c1, c2 and springs 1, w, coupled by k."""
     model = from_matrices([[1, 0], [0, 1]], [[c1, 0], [0, c2]], [[1 + k, -k], [-k, w + k]])
     return tmsopt.Problem(model=model, free={"c1": box, "c2": box}, **{"locate": "CEP2", **asked})
 
 
-def all_of(problem: tmsopt.Problem, **options: Any) -> tmsopt.Every:
+def all_of(problem, **options):
     """All solutions that a search finds, from no more starts than the least that settle it."""
     return tmsopt.solve_all(problem, **{"starts": 48, "seconds": 0, **options})
 
 
-def meeting(k: float, w: float) -> tuple[float, float]:
+def meeting(k, w):
     """c1 and c2 of the CEP2 with a stable mean.
 
     (s² + c1 s + A)(s² + c2 s + B) − k² = (s² + bs + c)² with A = 1 + k, B = w + k needs b = (c1 + c2)/2,

@@ -21,11 +21,11 @@ EP4 = Problem(
 )
 
 
-def with_fixed(problem: Problem, **values: float) -> Problem:
+def with_fixed(problem, **values):
     return replace(problem, fixed={**problem.fixed, **values})
 
 
-def limited(problem: Problem, name: str, value: float) -> Problem:
+def limited(problem, name, value):
     return replace(problem, constraints={**problem.constraints, name: with_limit(problem.constraints[name], value)})
 
 

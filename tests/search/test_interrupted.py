@@ -2,10 +2,8 @@
 
 import os
 import signal
-from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -25,34 +23,34 @@ LEAST = min(np.roots([1, 0, -1, 0.1]).real.tolist())  # where the slope is 0, in
 MET = 1e-9  # feasibility to which a design is checked
 
 
-def depth(at: Any) -> Any:
+def depth(at):
     return at**4 / 4 - at**2 / 2 + at / 10 - 1
 
 
-def problem(limit: str = "x <= 2", **asked: Any) -> tmsopt.Problem:
+def problem(limit="x <= 2", **asked):
     model = from_coefficients([1, -depth(x)])
     return tmsopt.Problem(model, free={"x": (-2.0, 2.0)}, minimize="abscissa", constraints={"limit": limit}, **asked)
 
 
-def stop(*_: Any) -> Any:
+def stop(*_):
     raise KeyboardInterrupt
 
 
-def third(done: float, most: float) -> bool:
+def third(done, most):
     return done == 3
 
 
-def when(chosen: Callable[[float, float], bool], how: Callable[[], Any] = stop) -> Any:
+def when(chosen, how=stop):
     """A progress callback by which the user stops a search."""
     return lambda told: how() if told.unit == "start" and chosen(told.done, told.most) else None
 
 
 @pytest.fixture(autouse=True)
-def _every_step_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def _every_step_is_told(monkeypatch):
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
 
 
-def pressed() -> None:
+def pressed():
     os.kill(os.getpid(), signal.SIGINT)
 
 
@@ -90,7 +88,7 @@ def test_a_part_of_the_box_that_was_done_counts():
     ep4 = tmsopt.load("problems/ep4.toml")
     free = {**ep4.free, "lambda_s": (-1.4, 1.4)}
 
-    def again(told: tmsopt.Progress) -> None:
+    def again(told):
         if told.note.endswith("reversed rake"):
             raise KeyboardInterrupt
 
@@ -115,14 +113,14 @@ def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatc
     """s² + (x − 2) s + 1, stable where x > 2: at x = 1 the roots are 1/2 ± i √3/2."""
     monkeypatch.setattr(asking, "none_stable", lambda problem: False)
     asked = tmsopt.Problem(from_coefficients([1, x - 2, 1]), free={"x": (0, 1)}, minimize="abscissa")
-    told: list[tmsopt.Progress] = []
+    told = []
     done = tmsopt.solve(asked, progress=told.append)
     assert (done.any_stable, done.interrupted) == (False, False)
     passed = [t for t in told if t.what == "looking for a stable design"]
     assert [t.done for t in passed] == sorted(t.done for t in passed)
     assert {t.most for t in passed[1:]} == {5.0}
 
-    def meanwhile(told: tmsopt.Progress) -> None:
+    def meanwhile(told):
         if told.unit == "s":
             stop()
 

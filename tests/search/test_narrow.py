@@ -24,7 +24,7 @@ minimize = "abscissa"
 """
 
 
-def triple_abscissa(k_phi: float, k_deltadot: float) -> float:
+def triple_abscissa(k_phi, k_deltadot):
     """By NumPy's eigenvalues, which scatter beside a triple root and are no better than it is."""
     D = np.array([[0.687, 0.667], [1.2108, 0.507 + k_deltadot]])
     K = np.array([[1.088, -0.058], [0.895 + k_phi, -0.03792]])

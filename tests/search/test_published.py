@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import casadi as ca
 import mpmath  # type: ignore[import-untyped]
@@ -33,14 +32,14 @@ MET = 1e-9  # of a design: regular in the factored form, so IPOPT's 1e-12 times 
 
 
 @cache
-def polynomial(name: str) -> sp.Poly:
+def polynomial(name):
     """Characteristic polynomial of a file's model, its coefficients exact in the parameters."""
     model = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["model"]
 
-    def exact(text: str) -> sp.Expr:
+    def exact(text):
         return sp.sympify(text, locals={n: sp.Symbol(n) for n in ("gain", "k", "y", "p")}, rational=True)
 
-    def matrix(key: str) -> sp.Matrix:
+    def matrix(key):
         return sp.Matrix([[exact(text) for text in row] for row in model[key]])
 
     if "coefficients" in model:
@@ -54,14 +53,14 @@ def polynomial(name: str) -> sp.Poly:
     return sp.Poly(determinant * (-1) ** pencil.rows, s)
 
 
-def at(name: str, values: Mapping[str, Any]) -> sp.Poly:
+def at(name, values):
     """The same with numbers for the parameters, fixed ones from the file."""
     written = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["parameters"]
     fixed = {n: sp.Rational(str(v)) for n, v in written.items() if not isinstance(v, dict)}
     return sp.Poly(polynomial(name).as_expr().subs({**fixed, **values}), s)
 
 
-def vanishes(p: sp.Poly | sp.Expr) -> bool:
+def vanishes(p):
     """Whether every coefficient is 0, at 60 digits: algebraic numbers of this size are 0 then."""
     return all(abs(sp.N(c, 60)) < 1e-50 for c in sp.Poly(p, s).all_coeffs())
 
@@ -80,21 +79,21 @@ class Answer:
     value: sp.Expr | None = None
 
 
-def two_mass_spring() -> Answer:
+def two_mass_spring():
     """(s + r)⁶, where s³ has twice the coefficient of s⁵: 20 r³ = 12 r."""
     r = sp.sqrt(15) / 5
     found = {"x0": 7, "x1": 6 * r, "y0": r**6, "y1": 6 * r**5, "y2": 15 * r**4 - 14}
     return Answer(found, (s + r) ** 6, -r, "EP6", -r)
 
 
-def freitas_lancaster(k: Any = 4) -> Answer:
+def freitas_lancaster(k=4):
     """(s + r)⁴ with r⁴ = k: the trace of D is 4 r, d1 k + d2 = 4 r³, det D = 6 r² − 1 − k."""
     r = sp.root(k, 4)
     found = {"d1": 4 * r / (r**2 + 1), "d2": 4 * r**3 / (r**2 + 1), "d12": (r**2 - 1) ** 2 / (r**2 + 1)}
     return Answer(found, (s + r) ** 4, -r, "EP4", -r)
 
 
-def chocolate(delta: Any = 9 * TENTH) -> Answer:
+def chocolate(delta=9 * TENTH):
     """(s + r)⁵ with a and b of the file: y = p/b at the roots e^(±it) of a must be real, so 5 arg(e^(it) + r) = t + π/2.
 
     No other polynomial is better: at e^(it) a factor s + c with c > r, or a pair left of −r, turns by less than s + r
@@ -110,10 +109,10 @@ def chocolate(delta: Any = 9 * TENTH) -> Answer:
 
 
 @cache
-def chocolate_limit() -> Answer:
+def chocolate_limit():
     """The delta at which r is 0.1."""
 
-    def excess(t: Any) -> Any:
+    def excess(t):
         f = (t + mpmath.pi / 2) / 5
         return mpmath.sin(t - f) - mpmath.sin(f) / 10
 
@@ -123,7 +122,7 @@ def chocolate_limit() -> Answer:
     return Answer(found, (s + TENTH) ** 5, -TENTH, "EP5", delta)
 
 
-def three_masses() -> Answer:
+def three_masses():
     """Of six complex solutions the one with real parts and imaginary parts above 0.
 
     det(L + x − K) = x³: with u = mu + 1 − L, v = nu + 1 − L, S = u + v, uv = S² + 2 and S (uv + 1) = 0.
@@ -133,43 +132,43 @@ def three_masses() -> Answer:
     return Answer(found, (s**2 - 4 * s + 7) ** 3, sp.S(2), "CEP3")
 
 
-def three_masses_pt() -> Answer:
+def three_masses_pt():
     """The case S = 0."""
     return Answer({"a": sp.S(1), "g": sp.sqrt(2)}, (s - 2) ** 3, sp.S(2), "EP3")
 
 
-def pt_pair(loss: Any = TENTH) -> Answer:
+def pt_pair(loss=TENTH):
     """s³ and s vanish for gain = loss and k = 1 only; then (s² + 1)² − loss² s² − eps² is a square."""
     eps = loss * sp.sqrt(1 - loss**2 / 4)
     return Answer({"gain": loss, "k": sp.S(1), "eps": eps}, (s**2 + 1 - loss**2 / 2) ** 2, sp.S(0), "CEP2")
 
 
-def pt_pair_strong() -> Answer:
+def pt_pair_strong():
     """s⁴ + (2 − loss²) s² + 1 − eps²."""
     return Answer({"eps": sp.S(1)}, s**2 * (s**2 + sp.Rational(199, 100)), sp.S(0), "EP2+pair")
 
 
-def ziegler(b: Any = TENTH) -> Answer:
+def ziegler(b=TENTH):
     """2 s⁴ + 7 b s³ + (7 − 2 p + b²) s² + 2 b s + 1, and Hurwitz' determinant of it: 57/14 = 7 − 2 p + b²."""
     p = sp.Rational(41, 28) + b**2 / 2
     w = sp.Rational(2, 7)
     return Answer({"p": p}, (s**2 + w) * (2 * s**2 + 7 * b * s + 1 / w), sp.S(0), "pair", p)
 
 
-def ziegler_undamped() -> Answer:
+def ziegler_undamped():
     """2 s⁴ + (7 − 2 p) s² + 1."""
     p = sp.Rational(7, 2) - sp.sqrt(2)
     return Answer({"b1": sp.S(0), "b2": sp.S(0), "p": p}, 2 * (s**2 + 1 / sp.sqrt(2)) ** 2, sp.S(0), "CEP2")
 
 
-def brake_squeal(c1: Any = TENTH, c2: Any = TENTH) -> Answer:
+def brake_squeal(c1=TENTH, c2=TENTH):
     """s⁴ + (c1 + c2) s³ + (4 + c1 c2) s² + 2 (c1 + c2) s + 3 + Delta, and Hurwitz' determinant of it."""
     Delta = 1 + 2 * c1 * c2
     factors = (s**2 + 2) * (s**2 + (c1 + c2) * s + 2 + c1 * c2)
     return Answer({"Delta": Delta}, factors, sp.S(0), "pair", Delta)
 
 
-def brake_squeal_coupling(c1: Any = 4 * TENTH, c2: Any = TENTH) -> Answer:
+def brake_squeal_coupling(c1=4 * TENTH, c2=TENTH):
     """(s² + c1 s + k) (s² + c2 s + 2) − 1 + Delta = (s² + b s + c)²: b by s³, c by s², k by s, Delta by 1."""
     k = 2 + (c1**2 - c2**2) / 4
     b, c = (c1 + c2) / 2, (k + 2 - (c1 - c2) ** 2 / 4) / 2
@@ -177,7 +176,7 @@ def brake_squeal_coupling(c1: Any = 4 * TENTH, c2: Any = TENTH) -> Answer:
 
 
 @cache
-def transport_aircraft() -> Answer:
+def transport_aircraft():
     """A double pair at −b ± i w, by Newton's method at 70 digits on p = p' = 0."""
     p = polynomial("transport_aircraft")
     k_n, k_q = sp.symbols("k_n k_q")
@@ -185,7 +184,7 @@ def transport_aircraft() -> Answer:
     value = sp.lambdify((s, k_n, k_q), p.as_expr(), "mpmath")
     derivative = sp.lambdify((s, k_n, k_q), slope.as_expr(), "mpmath")
 
-    def residuals(n: Any, q: Any, b: Any, w: Any) -> list[Any]:
+    def residuals(n, q, b, w):
         root = mpmath.mpc(-b, w)
         u, v = value(root, n, q), derivative(root, n, q)
         return [u.real, u.imag, v.real, v.imag]
@@ -228,16 +227,16 @@ def test_answer_is_exact(name):
 
 
 @cache
-def problem(name: str) -> tmsopt.Problem:
+def problem(name):
     return tmsopt.load(PROBLEMS / f"{name}.toml")
 
 
 @cache
-def solved(name: str) -> tmsopt.Solution:
+def solved(name):
     return tmsopt.solve(problem(name))
 
 
-def ends_at(design: tmsopt.Solution, answer: Answer) -> None:
+def ends_at(design, answer):
     """The design has the parameters, abscissa, structure and value of a closed form."""
     assert design.status == "optimal"
     for parameter, value in answer.parameters.items():

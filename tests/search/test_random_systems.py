@@ -30,7 +30,7 @@ DAMPED = System(
 """Critically damped at d = 2 √2, with a double root at −√2."""
 
 
-def middle(system: System) -> dict[str, float]:
+def middle(system):
     return {n: 0.4 * lo + 0.6 * hi for n, (lo, hi) in system.free.items()}
 
 
@@ -113,7 +113,7 @@ def test_the_section_runs():
 # Rounding and structures
 
 
-def steep(slope: float) -> Problem:
+def steep(slope):
     """s² + 2 d s + 1e-4 with d = slope · x − slope/3 + 0.01: a double root at −0.01, and a coefficient that cancels."""
     x, k = ca.SX.sym("x"), ca.SX.sym("k")
     model = models.from_coefficients([1, 2 * (slope * x - (slope / 3 - 0.01)), k], name="steep")

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -23,7 +22,7 @@ x, y = ca.SX.sym("x"), ca.SX.sym("y")
 MET = 1e-8  # what is asked of every value
 
 
-def problem(coefficients: Any, free: Any = None, limits: tuple[str, ...] = (), **asked: Any) -> tmsopt.Problem:
+def problem(coefficients, free=None, limits=(), **asked):
     constraints = {f"limit{k}": text for k, text in enumerate(limits)}
     asked = asked or {"minimize": "abscissa"}
     return tmsopt.Problem(
@@ -31,7 +30,7 @@ def problem(coefficients: Any, free: Any = None, limits: tuple[str, ...] = (), *
     )
 
 
-def own_roots(design: tmsopt.Solution, coefficients: Any) -> Any:
+def own_roots(design, coefficients):
     """By NumPy, of the design's parameters."""
     at = {"x": design.parameters["x"], "y": design.parameters.get("y", 0.0)}
     f = ca.Function("a", [x, y], [ca.vertcat(*map(ca.SX, coefficients))])
@@ -45,15 +44,15 @@ WIDE = {"x": (-2.0, 2.0)}
 LEFT, HUMP, RIGHT = sorted(np.roots([1, 0, -1, 0.1]).real.tolist())
 
 
-def depth(at: float) -> float:
+def depth(at):
     return at**4 / 4 - at**2 / 2 + at / 10 - 1
 
 
-def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> None:
+def stuck(monkeypatch, at, feasible=True):
     """Whatever a start is, its end is that of another one."""
     real = multistart.Runner.solve_from
 
-    def ended(self: Any, design: Any, near: bool = False, hopeful: bool = True) -> Any:
+    def ended(self, design, near=False, hopeful=True):
         found = real(self, {"x": at}, near, hopeful)
         return found if feasible else replace(found, feasible=False)
 
@@ -72,7 +71,7 @@ def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch):
     """Where neither the sample nor the starts know of the other basin."""
     real = sampling.Sampler.sample
 
-    def half(self: Any) -> Any:
+    def half(self):
         whole = real(self)
         kept = (seen.take(np.flatnonzero(seen.u[:, 0] > 0.6)) for seen in (whole.refined, whole.boldest))
         return replace(whole, **dict(zip(("refined", "boldest"), kept, strict=True)))
@@ -138,12 +137,12 @@ def test_a_design_that_meets_all_limits_forbids_infeasible(limits, monkeypatch):
 # A singular mass matrix: the best is where one root is at infinity, and the design is none
 
 
-def slow(*fast: Any) -> list[Any]:
+def slow(*fast):
     """(x s + 1)(s + 2 − x) …: the abscissa is x − 2 for small x, −2 at best where x = 0, and −1/x is far off."""
     return product([x, 1], [1, 2 - x], *fast)
 
 
-def swaying(*fast: Any) -> list[Any]:
+def swaying(*fast):
     """(x s + 1)(s² + 2 z s + 1) …, z = 0.5 − 0.3 x: the damping ratio."""
     return product([x, 1], [1, 1 - 0.6 * x, 1], *fast)
 
@@ -261,7 +260,7 @@ def test_a_damping_ratio_of_1_in_all_cases_and_one_that_is_not_reached():
 def test_long_work_tells_how_far_it_is(monkeypatch):
     """Starts that an unstable best spends, though others of the box are stable, and those of a relaxation."""
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
-    told: list[tmsopt.Progress] = []
+    told = []
     asked = problem([1, x, 1], WIDE, ("x <= -1",))
     found = tmsopt.solve(asked, progress=told.append, stability=0)
     assert not found.stable

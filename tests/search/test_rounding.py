@@ -3,7 +3,6 @@
 from dataclasses import replace
 from importlib import import_module
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 import pytest
@@ -15,9 +14,9 @@ x = ca.SX.sym("x")
 PLAIN = tmsopt.Problem(from_coefficients([1, 3 + x, 2]), free={"x": (0.0, 1.0)}, minimize="abscissa")
 
 
-def unclear(roots: list[tuple[float, int]], stored: float, asked: str = "abscissa") -> bool:
+def unclear(roots, stored, asked="abscissa"):
     """Of real roots with multiplicities, the rightmost of which the stored design has elsewhere."""
-    listed: list[Any] = [SimpleNamespace(re=re, im=0.0, multiplicity=m) for re, m in roots]
+    listed = [SimpleNamespace(re=re, im=0.0, multiplicity=m) for re, m in roots]
     structure = SimpleNamespace(roots=listed, abscissa=max(re for re, _ in roots))
     checked = SimpleNamespace(structure=structure, realised=stored)
     problem = replace(PLAIN, minimize=None, maximize=asked) if asked == "damping_ratio" else PLAIN
@@ -51,7 +50,7 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch, off, status):
     module = import_module("tmsopt.search.solve")
     plain = module.certified_numbers
 
-    def exact(*given: Any) -> Any:
+    def exact(*given):
         numbers = plain(*given)
         return replace(numbers, value=numbers.value + off)
 

@@ -1,7 +1,6 @@
 """The sample of the whole box: what it looks at, how it comes nearer to limits, and basins that starts alone miss."""
 
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -19,7 +18,7 @@ SQUARE = {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}
 LINEAR = from_coefficients([1, 2 + x + y], name="s + 2 + x + y")
 
 
-def problem(limits: tuple[str, ...] = (), free: Any = None, model: Any = LINEAR, **asked: Any) -> tmsopt.Problem:
+def problem(limits=(), free=None, model=LINEAR, **asked):
     constraints = {f"limit{k}": text for k, text in enumerate(limits)}
     return tmsopt.Problem(model, free=free or SQUARE, constraints=constraints, **(asked or {"minimize": "abscissa"}))
 
@@ -27,7 +26,7 @@ def problem(limits: tuple[str, ...] = (), free: Any = None, model: Any = LINEAR,
 # The box as a cube
 
 
-def cube() -> Any:
+def cube():
     """A tangent, decades, two ranges that are not, one of them negative."""
     fixed = {"chi_H": 1.0, "zeta_H": -0.2}
     free = {
@@ -61,10 +60,10 @@ def test_ranges_end_exactly_and_are_run_through_in_order():
 
 
 def test_every_design_that_is_judged_is_counted(monkeypatch):
-    seen: list[int] = []
+    seen = []
     real = sampling.evaluate
 
-    def counting(stated: Any, columns: Any) -> Any:
+    def counting(stated, columns):
         seen.append(len(columns["x"]))
         return real(stated, columns)
 
@@ -99,7 +98,7 @@ def test_the_sample_stands_for_its_seed():
 # Nearer to limits, and better
 
 
-def sought(stated: tmsopt.Problem, seed: int = 0, count: int = 64) -> tuple[Any, Any, Any]:
+def sought(stated, seed=0, count=64):
     """A sampler, designs that violate its limits, and what becomes of them."""
     sampler = Sampler(stated, seed)
     drawn = sampler.draw()
@@ -125,7 +124,7 @@ def test_limits_are_met_by_the_way_of_newton(limits, share, seed):
     assert arrived.mean() >= share
     assert np.all((ends.u >= 0) & (ends.u <= 1))
     assert np.all(ends.violation <= start.violation)
-    at: dict[str, Any] = {n: v[arrived] for n, v in sampler.space.designs(ends.u).items()}
+    at = {n: v[arrived] for n, v in sampler.space.designs(ends.u).items()}
     at |= {"sin": np.sin, "abs": np.abs, "abscissa": -2 - at["x"] - at["y"]}
     for text in limits:
         for sense in ("==", "<=", ">="):
@@ -222,7 +221,7 @@ KNOWN = {
 """By differential evolution on eigenvalues, 20 000 designs for each of 500 rounds; of four runs one found no stable design."""
 
 
-def robot_holds(d: dict[str, Any]) -> Any:
+def robot_holds(d):
     """Whether both wheels stay down and the steer arm is long enough, but for 1e-8."""
     weight, front = 9.81 * (12 + d["m_H"]), hunt.centre(d)
     return min(weight * front, weight * (1 - front)) >= 20 - 2e-7 and abs(hunt.arm(d)) * 0.25 >= 0.005 * (1 - 1e-8)

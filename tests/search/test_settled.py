@@ -2,7 +2,6 @@
 
 from importlib import import_module
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -16,12 +15,10 @@ x = ca.SX.sym("x")
 PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x")
 
 
-def settled(ends: list[float | None], share: float, far_off: bool = False, left: int = 0) -> bool:
+def settled(ends, share, far_off=False, left=0):
     """Of starts that ended at these objectives, None where at nothing feasible; so many refined designs are left."""
     nlp = SimpleNamespace(size=1.0)
-    candidates: list[Any] = [
-        SimpleNamespace(objective=1.0 if e is None else e, feasible=e is not None, nlp=nlp) for e in ends
-    ]
+    candidates = [SimpleNamespace(objective=1.0 if e is None else e, feasible=e is not None, nlp=nlp) for e in ends]
     refined = SimpleNamespace(violation=np.zeros(left))
     sample = SimpleNamespace(met=round(share * 1000), size=1000, far_off=far_off, refined=refined)
     work = SimpleNamespace(part=PLAIN, sample=sample)
@@ -75,7 +72,7 @@ def test_the_estimate_is_that_of_boender_and_rinnooy_kan():
 
 
 def test_the_words_follow_from_the_numbers():
-    def words(tried: int, at_best: int, optima: int) -> str:
+    def words(tried, at_best, optima):
         return ", ".join(tmsopt.Starts(tried, tried, at_best, optima=optima).sureness)
 
     assert words(64, 1, 30) == "found by 1 of 64 starts, a better one is likely"

@@ -4,7 +4,6 @@ import re
 import time
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
 
 import casadi as ca
 import pytest
@@ -23,14 +22,14 @@ NONE = "no design in the box is stable (proved)"
 UNKNOWN = "no stable design found, not proved"
 
 
-def found(most: float, coefficients: Any = (1, X - 2, 1), stability: float = 10.0, **asked: Any) -> tmsopt.Solution:
+def found(most, coefficients=(1, X - 2, 1), stability=10.0, **asked):
     problem = tmsopt.Problem(
         from_coefficients(list(coefficients)), free={"x": (0, most)}, **{"minimize": "abscissa", **asked}
     )
     return tmsopt.solve(problem, throw=False, stability=stability)
 
 
-def headline(design: tmsopt.Solution) -> list[str]:
+def headline(design):
     """How it ended, and what is said of stability."""
     first = re.match(r"[^\n]*\n((?:[^\n]|\n  (?! ))*)", design_report(design))  # wrapped lines go on two columns in
     assert first

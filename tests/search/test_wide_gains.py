@@ -5,17 +5,16 @@ import pytest
 
 import tmsopt
 from tmsopt.models import canonical, whipple
-from tmsopt.records import Array
 
 STATES = ("k_phi", "k_phidot", "k_delta", "k_deltadot")
 
 
-def placed(parameters: dict[str, float], root: float) -> Array:
+def placed(parameters, root):
     """The gains with all four roots at one place: the determinant is linear in them."""
     M, C1, K0, K2 = (np.array(x, dtype=float) for x in canonical(parameters))
     v, g = parameters["v"], parameters["g"]
 
-    def coefficients(gains: Array) -> Array:
+    def coefficients(gains):
         phi, phidot, delta, deltadot = gains
         D, K = v * C1, g * K0 + v * v * K2
         D[1] += phidot, deltadot

@@ -5,16 +5,13 @@ import json
 import math
 import struct
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
-from typing import Any
 
 import pytest
 from helpers.rows import faults
 
-from tmsopt import Problem, Progress, load, models
+from tmsopt import Problem, load, models
 from tmsopt.files import headed, write_csv
 from tmsopt.records import Table
 from tmsopt.studies import FORMATS, Row, RowTable, Study, check_export, export, header, part_of
@@ -38,7 +35,7 @@ PROBLEM = load("problems/ep4.toml")
 LIMITED = replace(PROBLEM, constraints={"trail": "nu_H >= 0.02"})
 
 
-def table_of(*rows: Row, problem: Problem = LIMITED) -> RowTable:
+def table_of(*rows, problem=LIMITED):
     """Rows of a study that has them, in which all may vary that varies in one."""
     columns = {name: [0.1] * (1 + max((row.number for row in rows), default=0)) for row in rows for name in row.varied}
     for row in rows:
@@ -47,7 +44,7 @@ def table_of(*rows: Row, problem: Problem = LIMITED) -> RowTable:
     return RowTable(Study(problem, columns or {"mu": [0.1]}, report=["Fr / Fr_c"]), [part_of(rows)])
 
 
-def solved(number: int, x: float = 0.1, **varied: float) -> Row:
+def solved(number, x=0.1, **varied):
     return Row(
         number,
         0,
@@ -64,42 +61,42 @@ def solved(number: int, x: float = 0.1, **varied: float) -> Row:
     )
 
 
-def broken(number: int, **given: Any) -> Row:
+def broken(number, **given):
     return Row(number, 0, Table({"mu": 0.2}), "failed", **{"cause": 'two\nlines, "quoted"'} | given)
 
 
 ROWS = table_of(*(solved(n, x) for n, x in enumerate(SPECIAL)), broken(len(SPECIAL), violations=Table({"trail": 0.5})))
 
 
-def read_csv(path: Path) -> dict[str, list[Any]]:
+def read_csv(path):
     with path.open(newline="", encoding="utf-8") as stream:
         header, *lines = csv.reader(stream)
     return {name: list(values) for name, values in zip(header, zip(*lines, strict=True), strict=True)}
 
 
-def read_parquet(path: Path) -> dict[str, list[Any]]:
+def read_parquet(path):
     return pytest.importorskip("pyarrow.parquet").read_table(path).to_pydict()
 
 
-def read_netcdf(path: Path, group: str | None = None) -> dict[str, list[Any]]:
+def read_netcdf(path, group=None):
     with pytest.importorskip("xarray").open_dataset(path, engine="netcdf4", group=group) as opened:
         return {v.attrs.get("long_name", name): v.values.tolist() for name, v in opened.load().variables.items()}
 
 
-READERS: dict[str, Callable[[Path], dict[str, list[Any]]]] = {
+READERS = {
     "csv": read_csv,
     "parquet": read_parquet,
     "nc": read_netcdf,
 }
 
 
-def bits(value: Any) -> bytes:
+def bits(value):
     """Of a double; a blank is nan."""
     return struct.pack("<d", math.nan if value in ("", None) else float(value))
 
 
 @pytest.mark.parametrize("ending", FORMATS)
-def test_every_double_comes_back_bit_by_bit(ending: str, tmp_path: Path) -> None:
+def test_every_double_comes_back_bit_by_bit(ending, tmp_path):
     path = tmp_path / f"rows.{ending}"
     export(ROWS, path, METADATA)
     found = READERS[ending](path)
@@ -117,7 +114,7 @@ def test_every_double_comes_back_bit_by_bit(ending: str, tmp_path: Path) -> None
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
-def test_the_headers() -> None:
+def test_the_headers():
     """In the order of a row's fields; a table's names have a prefix, but for parameters."""
     heads = list(ROWS.headers)
     assert ",".join(heads[:11]) == (
@@ -131,7 +128,7 @@ def test_the_headers() -> None:
     assert header("parameters", "seed") == "parameter.seed"
 
 
-def test_whether_a_row_is_stable(tmp_path: Path) -> None:
+def test_whether_a_row_is_stable(tmp_path):
     """Ideal and as stored; of a row without a design, and of one with a root at infinity, that is not known."""
     ends = [(-1.0, -1.0), (1.0, 1.0), (-1e-6, 1e-4), (0.0, 0.0), (math.nan, math.nan), (math.inf, math.inf)]
     rows = table_of(*(replace(solved(k), abscissa=a, abscissa_realised=b) for k, (a, b) in enumerate(ends)))
@@ -145,7 +142,7 @@ def test_whether_a_row_is_stable(tmp_path: Path) -> None:
     assert str(read_netcdf(tmp_path / "rows.nc")["stable"]) == "[1.0, 0.0, 0.0, 0.0, nan, nan]"
 
 
-def test_absent_and_nan_differ_in_parquet(tmp_path: Path) -> None:
+def test_absent_and_nan_differ_in_parquet(tmp_path):
     path = tmp_path / "rows.parquet"
     pytest.importorskip("pyarrow")
     export(ROWS, path)
@@ -154,7 +151,7 @@ def test_absent_and_nan_differ_in_parquet(tmp_path: Path) -> None:
     assert found[-1] is None
 
 
-def test_what_the_rows_are_of(tmp_path: Path) -> None:
+def test_what_the_rows_are_of(tmp_path):
     parquet, xarray = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("xarray")
     for ending in ("parquet", "nc"):
         export(ROWS, tmp_path / f"rows.{ending}", METADATA)
@@ -168,7 +165,7 @@ def test_what_the_rows_are_of(tmp_path: Path) -> None:
 GRID = [(mu, fr) for mu in (0.3, 0.1) for fr in (1.0, 2.0, 3.0)]
 
 
-def test_a_full_grid_has_its_own_dimensions_too(tmp_path: Path) -> None:
+def test_a_full_grid_has_its_own_dimensions_too(tmp_path):
     xarray = pytest.importorskip("xarray")
     path, given = tmp_path / "rows.nc", [{"mu": mu, "Fr.min": fr, "zeta_B": -0.4} for mu, fr in GRID]
     export(table_of(*(solved(n, 10 * v["mu"] + v["Fr.min"], **v) for n, v in enumerate(given))), path)
@@ -190,7 +187,7 @@ def test_a_full_grid_has_its_own_dimensions_too(tmp_path: Path) -> None:
         [(0.1, 1.0)],
     ],
 )
-def test_rows_that_fill_no_grid_have_none(points: list[tuple[float, float]], tmp_path: Path) -> None:
+def test_rows_that_fill_no_grid_have_none(points, tmp_path):
     pytest.importorskip("xarray")
     path = tmp_path / "rows.nc"
     export(table_of(*(solved(n, **{"mu": mu, "Fr.min": fr}) for n, (mu, fr) in enumerate(points))), path)
@@ -199,7 +196,7 @@ def test_rows_that_fill_no_grid_have_none(points: list[tuple[float, float]], tmp
 
 
 @pytest.mark.parametrize("ending", FORMATS)
-def test_no_rows_are_a_table_too(ending: str, tmp_path: Path) -> None:
+def test_no_rows_are_a_table_too(ending, tmp_path):
     path = tmp_path / f"rows.{ending}"
     export(table_of(), path)
     if ending != "csv":
@@ -209,14 +206,14 @@ def test_no_rows_are_a_table_too(ending: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("ending", "module"), [("parquet", "pyarrow"), ("nc", "xarray"), ("nc", "netCDF4")])
-def test_a_missing_package_is_named(ending: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_named(ending, module, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
     message = faults(export, ROWS, tmp_path / f"rows.{ending}")
     assert f'{module} is not installed; pip install "tmsopt[data]"' in message
     assert list(tmp_path.iterdir()) == []
 
 
-def test_files_that_cannot_be_written(tmp_path: Path) -> None:
+def test_files_that_cannot_be_written(tmp_path):
     assert "accepted: a file name ending in .csv, .parquet, .nc" in faults(export, ROWS, tmp_path / "rows.xls")
     assert "does not exist" in faults(check_export, tmp_path / "no" / "rows.csv")
     (tmp_path / "folder.csv").mkdir()
@@ -224,13 +221,11 @@ def test_files_that_cannot_be_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
-def test_a_file_is_replaced_as_a_whole_or_not_at_all(
-    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_is_replaced_as_a_whole_or_not_at_all(ending, tmp_path, monkeypatch):
     path = tmp_path / f"rows.{ending}"
     path.write_text("before")
 
-    def interrupt(now: Progress) -> None:
+    def interrupt(now):
         if now.done:
             raise KeyboardInterrupt
 
@@ -242,7 +237,7 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(
 
 
 @pytest.mark.parametrize("first", ["=", "+", "-", "@", "\t", "\r", "\n"])
-def test_no_cell_of_a_csv_is_a_formula(first: str, tmp_path: Path) -> None:
+def test_no_cell_of_a_csv_is_a_formula(first, tmp_path):
     """Texts get an apostrophe, heads too; numbers, negative ones first of all, stay numbers."""
     name = f"{first}cmd|' /C calc'!A0"
     model = models.from_coefficients(["1", "mu"])
@@ -256,7 +251,7 @@ def test_no_cell_of_a_csv_is_a_formula(first: str, tmp_path: Path) -> None:
     assert read_csv(tmp_path / "points.csv") == {f"{quoted} (m)": ["-1.0"], "label": [quoted], "none": [""]}
 
 
-def test_heads_of_csv_name_units() -> None:
+def test_heads_of_csv_name_units():
     """Of a parameter, what varies, a report and a violation; of an end or a limit those of its name."""
     bare = import_module("tmsopt.studies.export")._bare
     names = ("v", "varied.lambda_s.max", "varied.arm.limit", "report.u_H", "violation.arm", "law.w0")
@@ -265,10 +260,10 @@ def test_heads_of_csv_name_units() -> None:
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
-def test_rows_are_counted_while_they_are_written(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_are_counted_while_they_are_written(ending, tmp_path, monkeypatch):
     monkeypatch.setattr(import_module("tmsopt.studies.export"), "BLOCK", 2)
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
-    told: list[Progress] = []
+    told = []
     export(table_of(*map(solved, range(5))), tmp_path / f"x.{ending}", progress=told.append)
     assert [(p.done, p.most) for p in told][1:] == [(2, 5), (4, 5), (5, 5)]
     assert {(p.what, p.unit) for p in told} == {(f"writing x.{ending}", "row")}

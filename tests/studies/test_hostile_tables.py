@@ -28,7 +28,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-def refused(read, *given) -> str:
+def refused(read, *given):
     began = time.process_time()
     with pytest.raises(tmsopt.InputError) as caught:
         read(*given)

@@ -9,7 +9,6 @@ from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,22 +29,22 @@ OWN = models.from_coefficients(["m", "a", "b + 0.1", "c*a", "d/k"], name="own qu
 FIXED = {"m": 1.0, "a": 4.0, "b": 6.0, "c": 1.0, "d": 1.0, "k": 1.0}
 
 
-def built(rows: int, share: float = 1.0, **more: Any) -> Study:
+def built(rows, share=1.0, **more):
     return monte_carlo(PROBLEMS / "ep4.toml", rows, 1, "normal", {n: share * x for n, x in SPREAD.items()}, **more)
 
 
-def whipple() -> Study:
+def whipple():
     design = solve(PROBLEMS / "whipple_ep4.toml")
     return monte_carlo(design, 40, 2, tolerances={n: abs(x) / 100 for n, x in design.parameters.items() if x})
 
 
-def limited() -> Study:
+def limited():
     problem = solve(PROBLEMS / "realistic.toml").problem
     design = solve(problem)
     return monte_carlo(design, 60, 3, tolerances={n: abs(x) / 500 for n, x in design.parameters.items() if x})
 
 
-def own(limits: dict[str, str] | None = None, **asked: Any) -> Study:
+def own(limits=None, **asked):
     rng = np.random.default_rng(4)
     problem = Problem(model=OWN, fixed=FIXED, constraints=limits or {}, **(asked or {"minimize": "abscissa"}))
     drawn = {n: x * (1 + 0.3 * rng.uniform(-1, 1, 60)) for n, x in FIXED.items()}
@@ -55,7 +54,7 @@ def own(limits: dict[str, str] | None = None, **asked: Any) -> Study:
     return Study(problem, drawn)
 
 
-def constant() -> Study:
+def constant():
     """The trace, 0.1 + 0.7, is no double: one in its place would move nearly double roots, at k = 0.09, by 1e-14."""
     model = models.from_matrices(A=[["-0.1", "1"], ["-k", "-0.7"]], name="a trace that is no double")
     problem = Problem(model=model, fixed={"k": 0.01}, minimize="abscissa")
@@ -78,7 +77,7 @@ STUDIES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
-def test_rows_judged_at_once_are_those_of_one_by_one(name: str) -> None:
+def test_rows_judged_at_once_are_those_of_one_by_one(name):
     study = STUDIES[name]()
     assert judge.applies(study)
     at_once = RowTable(study, list(judge.judged(study, np.arange(len(study)))))
@@ -88,7 +87,7 @@ def test_rows_judged_at_once_are_those_of_one_by_one(name: str) -> None:
     assert [row.number for row in run_study(study, workers=1).rows] == list(range(len(study)))
 
 
-def test_rows_do_not_depend_on_others() -> None:
+def test_rows_do_not_depend_on_others():
     study = replace(built(300), report=["sin(Fr) + exp(chi_B)/tan(lambda_s)", "Fr**0.3", "abscissa*log(Fr)"])
     whole = run_study(study).rows
     for size in (1, 7, 64):
@@ -99,7 +98,7 @@ def test_rows_do_not_depend_on_others() -> None:
     assert_same([solve_row(study, 17).row], [whole[17]])
 
 
-def test_what_is_searched_or_listed_is_not_judged_at_once() -> None:
+def test_what_is_searched_or_listed_is_not_judged_at_once():
     study = built(2)
     for problem in (
         replace(
@@ -114,7 +113,7 @@ def test_what_is_searched_or_listed_is_not_judged_at_once() -> None:
     assert verdicts(study.problem, {"Fr": np.array([2.0])}) is not None
 
 
-def test_columns_and_summary_are_those_of_the_rows() -> None:
+def test_columns_and_summary_are_those_of_the_rows():
     """Whether parameters and causes follow from the study, or are kept with every row."""
     for study in (own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}), built(50, report=["Fr_c"])):
         quick = run_study(study).rows
@@ -130,7 +129,7 @@ def test_columns_and_summary_are_those_of_the_rows() -> None:
         assert quick[-1].number == len(study) - 1
 
 
-def test_a_store_gives_back_the_same_rows(tmp_path: Path) -> None:
+def test_a_store_gives_back_the_same_rows(tmp_path):
     study, path = own({"decay": "abscissa <= -0.3"}), tmp_path / "own.sqlite"
     kept, plain = run_study(study, path, workers=1), run_study(study, workers=1)
     again = run_study(study, path)
@@ -164,7 +163,7 @@ run_study(study, sys.argv[2], progress=told)
 
 
 @pytest.mark.long
-def test_kill_9_loses_no_block_and_doubles_none(tmp_path: Path) -> None:
+def test_kill_9_loses_no_block_and_doubles_none(tmp_path):
     study, path = built(600_000), tmp_path / "built.sqlite"
     whole = run_study(study).rows
     had = [0]
@@ -190,7 +189,7 @@ def test_kill_9_loses_no_block_and_doubles_none(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("study", [own(), built(12)], ids=["own", "drawn"])
-def test_what_is_judged_is_called_feasible_and_not_optimal(study: Study) -> None:
+def test_what_is_judged_is_called_feasible_and_not_optimal(study):
     """Also where it is not stable: it is as given, and nobody looked for a better one."""
     results, row = run_study(study), solve_row(study, 9)
     assert row.row.status == "optimal"
@@ -212,7 +211,7 @@ DRAWN = Sampling(load(PROBLEMS / "ep4.toml"), 20, 1, "normal", SPREAD)
 
 
 @pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def drawn(tmp_path_factory):
     path = tmp_path_factory.mktemp("drawn") / "s.sqlite"
     run_study(DRAWN, path)
     return path
@@ -231,7 +230,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ],
     ids=lambda given: next(iter(given)) if isinstance(given, dict) else "is",
 )
-def test_a_changed_study_is_refused_before_its_design_is_solved(drawn, changed, line, monkeypatch) -> None:
+def test_a_changed_study_is_refused_before_its_design_is_solved(drawn, changed, line, monkeypatch):
     monkeypatch.setattr(SOLVES, "solve", lambda *_, **__: pytest.fail("a design was solved"))
     with pytest.raises(InputError) as refused:
         run_study(replace(DRAWN, **changed), drawn)
@@ -241,7 +240,7 @@ def test_a_changed_study_is_refused_before_its_design_is_solved(drawn, changed, 
 
 
 @pytest.mark.slow
-def test_a_study_whose_design_alone_may_have_changed_is_solved_and_goes_on_where_it_has_not(drawn: Path) -> None:
+def test_a_study_whose_design_alone_may_have_changed_is_solved_and_goes_on_where_it_has_not(drawn):
     narrower = replace(DRAWN.problem, free={**DRAWN.problem.free, "chi_B": (1.5, 5.0)})
     assert run_study(DRAWN, drawn).solved == 0
     with pytest.raises(InputError, match=r"problem\.fixed\.chi_B"):
@@ -249,7 +248,7 @@ def test_a_study_whose_design_alone_may_have_changed_is_solved_and_goes_on_where
     assert run_study(replace(DRAWN, seed=2), drawn, fresh=True).solved == 20
 
 
-def test_the_columns_of_a_study_are_those_of_its_file_whatever_is_drawn(tmp_path: Path) -> None:
+def test_the_columns_of_a_study_are_those_of_its_file_whatever_is_drawn(tmp_path):
     """At tilts of either sign, designs on and off the weave boundary, feasible or not, other laws and limits apply."""
     heads = set()
     for seed, chi_H in ((1, 1.0), (2, 1.0), (3, 1.1)):
@@ -268,6 +267,6 @@ def test_the_columns_of_a_study_are_those_of_its_file_whatever_is_drawn(tmp_path
     assert len(heads) == 1
 
 
-def test_laws_have_the_names_of_their_columns() -> None:
+def test_laws_have_the_names_of_their_columns():
     design = solve(DRAWN.problem)
     assert tuple(row.name for row in law_rows(design)) == LAWS

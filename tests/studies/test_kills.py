@@ -21,7 +21,7 @@ GRACE = 0.5  # s between the looks of a worker at its parent
 PATIENCE = 60.0  # s for the first row of a study that starts
 
 
-def acknowledged_by(path: Path) -> set[int]:
+def acknowledged_by(path):
     """Numbers of the rows that the store has acknowledged."""
     try:
         with read_store(path) as store:
@@ -30,7 +30,7 @@ def acknowledged_by(path: Path) -> set[int]:
         return set()
 
 
-def workers_of(pid: int) -> list[int]:
+def workers_of(pid):
     found = subprocess.run(
         ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False
     )
@@ -39,7 +39,7 @@ def workers_of(pid: int) -> list[int]:
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="finds workers by ps --ppid")
-def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
+def test_nothing_is_lost_or_solved_twice(tmp_path):
     """What the store has acknowledged stays there and is never solved again; rows are those of any other run."""
     (tmp_path / "built.toml").write_text(  # of the angular frequency each row is judged for itself
         f'title = "built"\n[study]\nmethod = "sobol"\nrows = {ROWS}\n[vary]\nFr = {{ min = 1, max = 3 }}\n'
@@ -51,7 +51,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
     path, rng = tmp_path / "s.sqlite", random.Random(0)
     command = [sys.executable, "-m", "tmsopt", "study", "built.toml", "--workers", "2", "--store", str(path), "--json"]
 
-    def start() -> "subprocess.Popen[bytes]":
+    def start():
         return subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     process, acknowledged, killed, workers = start(), set[int](), {"study": 0, "worker": 0}, set[int]()

@@ -10,11 +10,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from helpers.rows import STUDY, faults, part, row
@@ -23,20 +21,20 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
 from tmsopt.records import Table
-from tmsopt.studies import Row, RowTable, Study, check_same, open_store, read_store, run_study, stored
+from tmsopt.studies import RowTable, Study, check_same, open_store, read_store, run_study, stored
 
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 OLD = Path(__file__).parent / "stores"
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
 
 
-def rows_of(path: Path, study: Study = STUDY) -> list[Row]:
+def rows_of(path, study=STUDY):
     with read_store(path) as opened:
         return list(RowTable(study, opened.parts()))
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Iterator[Path]:
+def path(tmp_path):
     """Of a store to be: in memory where the system has such files, since ``kill -9`` asks nothing of a disk."""
     memory = Path("/dev/shm")
     with tempfile.TemporaryDirectory(dir=memory if os.access(memory, os.W_OK) else tmp_path) as folder:
@@ -66,7 +64,7 @@ with open_store(path, STUDY) as opened:
 
 
 @contextmanager
-def writer(path: Path, task: str = "write") -> Iterator[tuple["subprocess.Popen[str]", int]]:
+def writer(path, task="write"):
     """A process that has the store open, and its id; killed with SIGKILL in the end."""
     command = [sys.executable, "-c", WRITER, str(path), task]
     root = Path(__file__).parents[2]
@@ -82,7 +80,7 @@ def writer(path: Path, task: str = "write") -> Iterator[tuple["subprocess.Popen[
 
 
 @pytest.mark.slow
-def test_no_acknowledged_row_is_lost_by_kill_9(path: Path) -> None:
+def test_no_acknowledged_row_is_lost_by_kill_9(path):
     """The process prints how many rows `add` has acknowledged; whatever it printed must be there, row by row."""
     chance, acknowledged = random.Random(0), 0
     for _ in range(4):
@@ -101,7 +99,7 @@ def test_no_acknowledged_row_is_lost_by_kill_9(path: Path) -> None:
     assert acknowledged > 0
 
 
-def test_reading_while_another_process_writes(path: Path) -> None:
+def test_reading_while_another_process_writes(path):
     with writer(path) as (process, _):
         for _ in range(5):
             acknowledged = int(process.stdout.readline())
@@ -111,7 +109,7 @@ def test_reading_while_another_process_writes(path: Path) -> None:
                 assert len(RowTable(STUDY, opened.parts())) >= there
 
 
-def test_a_second_writer_is_refused_until_the_first_is_gone(path: Path) -> None:
+def test_a_second_writer_is_refused_until_the_first_is_gone(path):
     with writer(path, "hold") as (process, number):
         message = faults(open_store, path, STUDY)
         assert f"process {number} on " in message
@@ -132,7 +130,7 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(path: Path) -> None:
 # Rows
 
 
-def test_numbers_come_back_and_rows_are_in_order(path: Path) -> None:
+def test_numbers_come_back_and_rows_are_in_order(path):
     """Also nan where it is a value, and names that differ in capitals alone."""
     limits = {"c": "Fr <= 2", "C": "Fr <= 3", 'it\'s "c"': "Fr <= 4"}
     study = replace(STUDY, report=["Fr"], problem=replace(STUDY.problem, constraints=limits))
@@ -157,7 +155,7 @@ def test_numbers_come_back_and_rows_are_in_order(path: Path) -> None:
     assert list(map(str, found)) == list(map(str, kept[:-1]))
 
 
-def test_a_store_holds_more_numbers_than_a_table_of_sqlite_has_columns(path: Path) -> None:
+def test_a_store_holds_more_numbers_than_a_table_of_sqlite_has_columns(path):
     study = replace(STUDY, report=[f"Fr + {k}" for k in range(1000)])
     limits = {f"c{k}": f"Fr <= {k}" for k in range(1000)}
     study = replace(study, problem=replace(STUDY.problem, constraints=limits))
@@ -167,7 +165,7 @@ def test_a_store_holds_more_numbers_than_a_table_of_sqlite_has_columns(path: Pat
     assert rows_of(path, study) == [one]
 
 
-def test_a_row_is_never_overwritten_and_may_be_forgotten(path: Path) -> None:
+def test_a_row_is_never_overwritten_and_may_be_forgotten(path):
     with open_store(path, STUDY) as opened:
         opened.add(part(row(1), row(2)))
         opened.add(part(row(1, seconds=9.0, host="elsewhere"), row(3)))
@@ -181,7 +179,7 @@ def test_a_row_is_never_overwritten_and_may_be_forgotten(path: Path) -> None:
 # What the store knows of its study
 
 
-def test_what_a_store_says_of_itself(path: Path) -> None:
+def test_what_a_store_says_of_itself(path):
     with open_store(path, STUDY) as opened:
         opened.add(part(row(0)))
     with open_store(path, STUDY) as opened:
@@ -219,7 +217,7 @@ SMALL = Study(STUDY.problem, {"mu": [0.1, 0.2, 0.3], "zeta_B": [-0.4, -0.5, -0.6
     ],
     ids=str,
 )
-def test_the_store_of_a_changed_study_is_refused(path: Path, change: dict[str, Any], line: str) -> None:
+def test_the_store_of_a_changed_study_is_refused(path, change, line):
     with open_store(path, SMALL) as opened:
         opened.add(part(row(0)))
     before = path.read_bytes()
@@ -233,7 +231,7 @@ def test_the_store_of_a_changed_study_is_refused(path: Path, change: dict[str, A
         assert opened.done().tolist() == [0]
 
 
-def test_fresh_moves_aside_and_never_deletes(path: Path) -> None:
+def test_fresh_moves_aside_and_never_deletes(path):
     for number in range(3):
         with open_store(path, replace(STUDY, seed=number), fresh=True) as opened:
             assert opened.warnings == (
@@ -248,7 +246,7 @@ def test_fresh_moves_aside_and_never_deletes(path: Path) -> None:
     assert len(list(path.parent.iterdir())) == 3
 
 
-def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path: Path) -> None:
+def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path):
     with writer(path) as (process, _):
         acknowledged = [int(process.stdout.readline()) for _ in range(3)][-1]
         process.kill()
@@ -260,7 +258,7 @@ def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path: Path) -> None:
         assert len(opened.done()) >= acknowledged
 
 
-def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path: Path) -> None:
+def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path):
     with writer(path) as (process, _):
         process.stdout.readline()
         process.kill()
@@ -271,7 +269,7 @@ def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path: 
     assert path.with_name("study.1.sqlite-wal").exists()
 
 
-def test_other_versions_are_a_warning(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_versions_are_a_warning(path, monkeypatch):
     with open_store(path, STUDY) as opened:
         opened.add(part(row(0)))
         there = opened.about()["versions"]["tmsopt"]
@@ -285,12 +283,12 @@ def test_other_versions_are_a_warning(path: Path, monkeypatch: pytest.MonkeyPatc
 # Files that are no store, damage, and places that cannot be written
 
 
-def other_database(path: Path) -> None:
+def other_database(path):
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("CREATE TABLE mine (x)")
 
 
-def newer_store(path: Path) -> None:
+def newer_store(path):
     open_store(path, STUDY).close()
     spoil(path, "PRAGMA user_version=4")
 
@@ -305,7 +303,7 @@ def newer_store(path: Path) -> None:
         (newer_store, "its schema is 4, this version reads up to 3"),
     ],
 )
-def test_a_file_that_is_no_store_is_not_touched(path: Path, make: Callable[[Path], Any], expected: str) -> None:
+def test_a_file_that_is_no_store_is_not_touched(path, make, expected):
     make(path)
     before = path.read_bytes()
     calls = (lambda: read_store(path), lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True))
@@ -315,7 +313,7 @@ def test_a_file_that_is_no_store_is_not_touched(path: Path, make: Callable[[Path
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
 
-def test_places_where_no_store_can_be(tmp_path: Path) -> None:
+def test_places_where_no_store_can_be(tmp_path):
     assert "no regular file" in faults(open_store, tmp_path, STUDY)
     assert "does not exist" in faults(open_store, tmp_path / "no" / "a.sqlite", STUDY)
     assert "no such file" in faults(read_store, tmp_path / "a.sqlite")
@@ -326,7 +324,7 @@ def test_places_where_no_store_can_be(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def spoil(path: Path, script: str) -> None:
+def spoil(path, script):
     """Change a store as any other program can."""
     with closing(sqlite3.connect(path)) as connection, connection:
         connection.executescript(script)
@@ -355,15 +353,15 @@ NESTED = "[" * 100_000 + "]" * 100_000
         "UPDATE study SET value = '[]' WHERE key = 'definition'",
     ],
 )
-def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script: str, path: Path) -> None:
+def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script, path):
     """Nothing of it is run or believed."""
 
-    def read_whole() -> None:
+    def read_whole():
         check_same(path, STUDY)
         with read_store(path) as opened:
             opened.about(), opened.sessions(), opened.parts()
 
-    def go_on() -> None:
+    def go_on():
         with open_store(path, STUDY) as opened:
             opened.parts()
 
@@ -379,7 +377,7 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script: str, path: 
     assert sorted(p.name for p in path.parent.iterdir()) == ["study.1.sqlite", "study.sqlite"]
 
 
-def test_a_damaged_file_is_said_to_be(path: Path) -> None:
+def test_a_damaged_file_is_said_to_be(path):
     with open_store(path, STUDY) as opened:
         opened.add(part(*map(row, range(1000))))
     whole = path.read_bytes()
@@ -394,7 +392,7 @@ def test_a_damaged_file_is_said_to_be(path: Path) -> None:
 
 
 @posix
-def test_a_full_disk_costs_no_row_that_was_acknowledged(path: Path) -> None:
+def test_a_full_disk_costs_no_row_that_was_acknowledged(path):
     """A limit on the size of files stands for the disk: SQLite calls the one an I/O error and the other full."""
     import resource
 
@@ -444,7 +442,7 @@ STUDIES = {
 }
 
 
-def assert_same_table(one: Path, other: Path, ignored: tuple[str, ...] = ()) -> None:
+def assert_same_table(one, other, ignored=()):
     """Texts are equal, and numbers to 1e-9 of their size; rounding errors of laws by themselves."""
     tables = [list(csv.DictReader(path.read_text(encoding="utf-8").splitlines())) for path in (one, other)]
     assert list(tables[0][0]) == list(tables[1][0])
@@ -455,7 +453,7 @@ def assert_same_table(one: Path, other: Path, ignored: tuple[str, ...] = ()) -> 
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_a_store_of_version_1_is_read_exported_and_goes_on(name: str, path: Path, tmp_path: Path) -> None:
+def test_a_store_of_version_1_is_read_exported_and_goes_on(name, path, tmp_path):
     study, exported = STUDIES[name], tmp_path / "rows.csv"
     shutil.copy(OLD / f"{name}.sqlite", path)
     before = path.read_bytes()
@@ -475,7 +473,7 @@ def test_a_store_of_version_1_is_read_exported_and_goes_on(name: str, path: Path
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
 
-def test_a_damaged_store_of_version_1_is_refused(path: Path) -> None:
+def test_a_damaged_store_of_version_1_is_refused(path):
     for name, script in (
         ("solved", "UPDATE rows SET data = '[]'"),
         ("solved", "UPDATE columns SET doubles = x'00'"),

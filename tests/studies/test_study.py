@@ -8,19 +8,17 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 from helpers import oracles
 from helpers.rows import assert_same, row as row_of
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from tmsopt import Progress, laws
+from tmsopt import laws
 from tmsopt.cli import every as main
 from tmsopt.errors import InputError
 from tmsopt.evaluation import law_rows
@@ -69,12 +67,12 @@ zeta_H = [-0.2, -0.3, -0.35]
 """
 
 
-def command(*arguments: object) -> Result:
+def command(*arguments):
     return CliRunner().invoke(main, ["study", *map(str, arguments)])
 
 
 @pytest.fixture
-def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "heights.toml"
     path.write_text(FILE, encoding="utf-8")
@@ -85,7 +83,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.slow
-def test_every_row_obeys_the_laws_of_ep4() -> None:
+def test_every_row_obeys_the_laws_of_ep4():
     found = run_study(GRID, workers=1)
     for row in found.rows:
         heights = dict(row.varied)
@@ -103,7 +101,7 @@ def test_every_row_obeys_the_laws_of_ep4() -> None:
 
 
 @pytest.mark.long
-def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -> None:
+def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path):
     here, backwards = run_study(GRID, workers=1).rows, Solver(GRID)
     assert_same([backwards((k,))[0] for k in reversed(range(6))], here)
     assert_same([solve_row(GRID, k).row for k in range(6)], here)
@@ -111,17 +109,17 @@ def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
     """Interrupted after three rows; the rest is solved later, and nothing twice."""
     path = tmp_path / "s.sqlite"
-    tried: list[int] = []
+    tried = []
     original = Solver.answers
 
-    def counting(self: Solver, numbers: Sequence[int]) -> Any:
+    def counting(self, numbers):
         tried.extend(numbers)
         return original(self, numbers)
 
-    def interrupt(told: Progress) -> None:
+    def interrupt(told):
         if told.done == 3:
             raise KeyboardInterrupt
 
@@ -139,7 +137,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pyte
 
 
 @pytest.mark.slow
-def test_a_store_of_another_study_is_refused(tmp_path: Path) -> None:
+def test_a_store_of_another_study_is_refused(tmp_path):
     path = tmp_path / "s.sqlite"
     run_study(GRID, path, workers=1)
     other = over_grid(replace(EP4, fixed={**EP4.fixed, "mu": 0.2}), HEIGHTS, report=["nu_H", "2*Fr"])
@@ -150,7 +148,7 @@ def test_a_store_of_another_study_is_refused(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("*.sqlite"))) == 2  # the old one is beside it
 
 
-def test_failures_are_rows_with_a_cause() -> None:
+def test_failures_are_rows_with_a_cause():
     """One box is empty, one limit cannot be met (the trail of EP4 is 0.08), one row is as it should be."""
     problem = replace(EP4, constraints={"trail": "nu_H >= 0.02"})
     study = Study(problem, {"lambda_s.min": [0.02, 1.5, 0.02], "trail.limit": [0.02, 0.02, 50.0]})
@@ -167,8 +165,8 @@ def test_failures_are_rows_with_a_cause() -> None:
     assert sum(told.causes.values()) == 2
 
 
-def test_a_row_that_breaks_the_program_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object, **__: object) -> None:
+def test_a_row_that_breaks_the_program_is_a_row(monkeypatch):
+    def broken(*_, **__):
         raise ZeroDivisionError("of a bug")
 
     monkeypatch.setattr("tmsopt.studies.solving.solve", broken)
@@ -177,7 +175,7 @@ def test_a_row_that_breaks_the_program_is_a_row(monkeypatch: pytest.MonkeyPatch)
     assert rows[0].cause == "ZeroDivisionError: of a bug"
 
 
-def test_rows_are_drawn_around_a_design() -> None:
+def test_rows_are_drawn_around_a_design():
     """First-order: moving Fr alone by dFr moves each coefficient as the polynomial in Fr says; here only that rows are
     those designs, evaluated: their abscissa is that of `solve` with nothing free."""
     design = solve(EP4)
@@ -194,7 +192,7 @@ def test_rows_are_drawn_around_a_design() -> None:
     assert told.stable.count == 5
 
 
-def test_a_summary_of_rows_is_what_its_numbers_are_by_definition() -> None:
+def test_a_summary_of_rows_is_what_its_numbers_are_by_definition():
     """Rows that are made up: one of them unstable, three not solved for causes that differ in their numbers or not."""
     given = [(2.0, 1e-9), (1.0, -1e-3), (3.0, 1e-6), (7.0, 0.0)]
     made = [row_of(k, GRID, objective=v, abscissa=v - 6, laws=Table({"w01": law})) for k, (v, law) in enumerate(given)]
@@ -210,7 +208,7 @@ def test_a_summary_of_rows_is_what_its_numbers_are_by_definition() -> None:
 
 
 @pytest.mark.slow
-def test_results_are_columns_and_files(tmp_path: Path) -> None:
+def test_results_are_columns_and_files(tmp_path):
     found = run_study(GRID, workers=1)
     np.testing.assert_array_equal(found.column("varied.zeta_H"), [-0.2, -0.3, -0.35] * 2)
     np.testing.assert_array_equal(found.column("chi_B"), [row.parameters["chi_B"] for row in found.rows])
@@ -224,7 +222,7 @@ def test_results_are_columns_and_files(tmp_path: Path) -> None:
         found.column("chi_b")
 
 
-def test_calls_that_make_no_sense_are_refused() -> None:
+def test_calls_that_make_no_sense_are_refused():
     with pytest.raises(InputError, match="accepted: a Study"):
         run_study(EP4)  # type: ignore[arg-type]
     for workers in (0, True, 1.5):
@@ -256,7 +254,7 @@ THREE = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1
     ],
     ids=["overtaken by the far end", "found on the way and carried both ways", "hills"],
 )
-def test_the_best_valley_is_kept(asked: dict[str, Any], sign: int, most: float) -> None:
+def test_the_best_valley_is_kept(asked, sign, most):
     """What is better follows the sense of the objective."""
     values = np.linspace(0.0, 1.0, 16).tolist()
     rows = run_study(over_grid(replace(TWO, **asked), {"mu": values}, warm=True), workers=1).rows
@@ -269,7 +267,7 @@ def test_the_best_valley_is_kept(asked: dict[str, Any], sign: int, most: float) 
 
 
 @pytest.mark.slow
-def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
+def test_warm_rows_are_the_same_alone_and_by_processes():
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 24).tolist()}, warm=True)
     here = run_study(study, workers=1).rows
     assert_same(run_study(study, workers=2).rows, here)
@@ -277,7 +275,7 @@ def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
 
 
 @pytest.mark.slow
-def test_warm_starts_find_the_optima_of_cold_ones() -> None:
+def test_warm_starts_find_the_optima_of_cold_ones():
     problem = replace(EP4, constraints={"trail": "nu_H >= 0.05"})
     limits = {"trail.limit": np.linspace(0.05, 0.15, 8).tolist()}
     warm = run_study(over_grid(problem, limits, warm=True), workers=1).rows
@@ -287,12 +285,12 @@ def test_warm_starts_find_the_optima_of_cold_ones() -> None:
         assert a.objective == pytest.approx(b.objective, rel=1e-10)
 
 
-def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch):
     """No design has Fr above 4: such rows are solved from many starts once each."""
-    tried: Counter[int] = Counter()
+    tried = Counter()
     original = Solver._answer
 
-    def counting(self: Solver, number: int, neighbour: Row | None = None, afar: int = 0) -> Any:
+    def counting(self, number, neighbour=None, afar=0):
         if neighbour is None or neighbour.status != "optimal":
             tried[number] += 1
         return original(self, number, neighbour, afar)
@@ -305,7 +303,7 @@ def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch:
     assert dict(tried) == {0: 1, 4: 1, 5: 1}
 
 
-def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_path: Path) -> None:
+def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_path):
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 10).tolist()}, warm=True)
     whole = run_study(study, workers=1).rows
     with open_store(tmp_path / "s.sqlite", study) as store:
@@ -318,25 +316,23 @@ def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_pat
 class Crashing:
     """An executor whose workers die of row 3."""
 
-    def __enter__(self) -> Any:
+    def __enter__(self):
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, *error):
         pass
 
-    def map(self, function: Any, items: Sequence[Any]) -> Iterator[Any]:
+    def map(self, function, items):
         for place, numbers in enumerate(items):
             yield place, Crash("signal 9") if 3 in numbers else function(numbers)
 
 
 @pytest.mark.parametrize("warm", [False, True])
-def test_a_row_that_ends_its_worker_costs_itself_alone(
-    warm: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_row_that_ends_its_worker_costs_itself_alone(warm, monkeypatch, tmp_path):
     """Of a block of neighbours too, which is taken apart."""
     monkeypatch.setattr("tmsopt.studies.run.processes", lambda *_: Crashing())
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 6).tolist()}, warm=warm)
-    notes: list[str] = []
+    notes = []
     run_study(study, tmp_path / "s.sqlite", workers=2, note=notes.append)
     rows = stored(study, tmp_path / "s.sqlite").rows
     assert [row.status for row in rows] == ["optimal"] * 3 + ["quarantined"] + ["optimal"] * 2
@@ -349,12 +345,12 @@ def test_a_row_that_ends_its_worker_costs_itself_alone(
 
 @pytest.mark.slow
 def test_a_row_is_solved_from_its_own_seed_with_the_starts_of_the_study_on_one_thread(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     """Sums of several threads have other last digits, so that rows would depend on the machine."""
-    seen: list[tuple[int, int]] = []
+    seen = []
 
-    def spied(problem: Problem, **options: Any) -> Any:
+    def spied(problem, **options):
         assert {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"} <= {1}
         seen.append((options["seed"], options["starts"]))
         return solve(problem, **options)
@@ -366,7 +362,7 @@ def test_a_row_is_solved_from_its_own_seed_with_the_starts_of_the_study_on_one_t
     assert seen == [(study.seed_of(row), 3) for row in range(6)]
 
 
-def test_a_row_tells_how_far_its_design_is_from_the_laws() -> None:
+def test_a_row_tells_how_far_its_design_is_from_the_laws():
     """The residuals are those that `tmsopt compare` shows, each under a label of its own."""
     answer = solve_row(GRID, 4)
     assert answer.solution is not None
@@ -379,7 +375,7 @@ def test_a_row_tells_how_far_its_design_is_from_the_laws() -> None:
 
 
 @pytest.mark.slow
-def test_the_command_solves_stores_and_shows_rows(file: Path) -> None:
+def test_the_command_solves_stores_and_shows_rows(file):
     first = command(file, "--workers", 1, "--json", "--export", "rows.csv")
     assert first.exit_code == 0
     told = json.loads(first.stdout)
@@ -408,7 +404,7 @@ def test_the_command_solves_stores_and_shows_rows(file: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_command_refuses_what_it_cannot_do(file: Path) -> None:
+def test_the_command_refuses_what_it_cannot_do(file):
     missing = command(file, "--row", 6)
     assert missing.exit_code == 2
     assert "0 to 5" in missing.stderr
@@ -435,14 +431,14 @@ def test_the_command_refuses_what_it_cannot_do(file: Path) -> None:
 @pytest.mark.parametrize("ending", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
 @pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
-def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
+def test_a_killed_command_goes_on(file, ending):
     """Killed once some rows are stored, then run again: those rows are there, and all rows are as if nothing happened."""
     many = FILE.replace("zeta_H = [-0.2, -0.3, -0.35]", "zeta_H = { min = -0.35, max = -0.2, points = 18 }")
     file.write_text(many, encoding="utf-8")
     run = [sys.executable, "-m", "tmsopt", "study", str(file), "--workers", "2", "--json"]
     store = file.parent / "heights.sqlite"
     process = subprocess.Popen(run, cwd=file.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    kept: set[int] = set()
+    kept = set()
     while len(kept) < 5:
         assert process.poll() is None
         time.sleep(0.05)
@@ -471,19 +467,19 @@ def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
 
 
 @pytest.mark.parametrize("number", [2, -1])
-def test_rows_that_a_study_cannot_have_are_refused(number: int, tmp_path: Path) -> None:
+def test_rows_that_a_study_cannot_have_are_refused(number, tmp_path):
     """In a store from somebody else: before anything is solved, and where its rows are shown."""
     study, path = over_grid("problems/ep4.toml", {"mu": [0.1, 0.2]}), tmp_path / "s.sqlite"
     with open_store(path, study) as store:
         store.add(part_of([Row(n, 1, Table({"mu": 0.2}), "failed") for n in (1, number)]))
-    told: list[Progress] = []
+    told = []
     for call in (lambda: stored(study, path), lambda: run_study(study, path, progress=told.append)):
         with pytest.raises(InputError, match=f"row {number} is not of this study"):
             call()
     assert {t.what for t in told} == {"waiting for the store", "reading the store"}
 
 
-def test_what_a_row_says_is_printable(tmp_path: Path) -> None:
+def test_what_a_row_says_is_printable(tmp_path):
     study = over_grid("problems/ep4.toml", {"mu": [0.1]})
     rows = RowTable(study, [part_of([Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")])])
     assert "\ufffd[31mred\ufffd" in study_table(study, summary(rows), rows)
@@ -492,7 +488,7 @@ def test_what_a_row_says_is_printable(tmp_path: Path) -> None:
 # By the clock
 
 
-def by_clock(row: Row) -> float:
+def by_clock(row):
     """Eigenvalues of the oracle's polynomial times √(g/w)."""
     p = row.parameters
     w, rate = p["w"], np.sqrt(p["g"] / p["w"])
@@ -501,7 +497,7 @@ def by_clock(row: Row) -> float:
     return float(np.roots([float(c) for c in a]).real.max() * rate)
 
 
-def test_rows_are_ranked_by_the_clock() -> None:
+def test_rows_are_ranked_by_the_clock():
     """On the moon it decays as fast per √(g/w), and the speed of the best design is in the box: not so on the earth."""
     fixed = {"w": 1.0, "m_B": 10.0, "m_H": 1.0, "x_B": 1.3, "z_B": -0.4, "x_H": 1.01, "z_H": -0.2, "lambda_s": 0.2618}
     problem = Problem(tms, fixed, {"v": (1, 6)}, minimize="abscissa")
@@ -517,7 +513,7 @@ def test_rows_are_ranked_by_the_clock() -> None:
     assert found.to_json()["spread"]["abscissa"]["min"] == min(row.abscissa for row in found.rows)
 
 
-def test_quantiles_of_a_monte_carlo_are_by_the_clock() -> None:
+def test_quantiles_of_a_monte_carlo_are_by_the_clock():
     fixed = {"w": 1.0, "g": 9.81, "v": 4.0, "m_B": 10.0, "m_H": 1.0, "x_B": 1.3, "z_B": -0.4, "x_H": 1.01, "z_H": -0.2}
     problem = Problem(tms, {**fixed, "lambda_s": 0.2618}, minimize="abscissa")
     found = run_study(monte_carlo(problem, 41, tolerances={"w": 0.005}), workers=1)

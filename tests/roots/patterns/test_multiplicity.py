@@ -5,7 +5,6 @@ recomputed roots. Perturbations are made at a known distance, to first order: ac
 polynomials with the structure, spanned by exact derivatives, in units of the exact terms of each coefficient.
 """
 
-from collections.abc import Sequence
 from fractions import Fraction as F
 
 import casadi as ca
@@ -35,16 +34,16 @@ Item = tuple[F, F, int]
 WORDS = ("", "pair", "two pairs", "three pairs", "four pairs", "five pairs", "six pairs")
 
 
-def polynomial(items: Sequence[Item]) -> list[F]:
+def polynomial(items):
     factors = [f for re, im, m in items for f in [[F(1), -2 * re, re**2 + im**2] if im else [F(1), -re]] * m]
     return product([F(1)], *factors)
 
 
-def doubles(coefficients: Sequence[F], unit: float = 1.0) -> np.ndarray:
+def doubles(coefficients, unit=1.0):
     return np.array([float(c) for c in coefficients]) * unit ** np.arange(len(coefficients))
 
 
-def named(items: Sequence[Item]) -> str:
+def named(items):
     """What stands on the rightmost line: higher multiplicity first, then pairs, then a simple real root."""
     right = max(re for re, _, _ in items)
     line = [(m, im == 0) for re, im, m in items if re == right]
@@ -53,11 +52,11 @@ def named(items: Sequence[Item]) -> str:
     return "+".join(p for p in [*parts, "real" if (1, True) in line else ""] if p)
 
 
-def every_root(items: Sequence[Item]) -> list[tuple[complex, int]]:
+def every_root(items):
     return [(complex(re, w), m) for re, im, m in items for w in ({float(im), -float(im)})]
 
 
-def assert_same(found: Sequence[object], items: Sequence[Item], unit: float, within: float) -> None:
+def assert_same(found, items, unit, within):
     left = every_root(items)
     assert len(found) == len(left)
     for root in found:
@@ -67,9 +66,9 @@ def assert_same(found: Sequence[object], items: Sequence[Item], unit: float, wit
         left.remove((z, m))
 
 
-def random_items(rng: np.random.Generator, degree: int) -> list[Item]:
+def random_items(rng, degree):
     """Roots in tenths, 0.4 or more apart, of any multiplicities that make up the degree, ties likely."""
-    items: list[Item] = []
+    items = []
     while left := degree - sum(m * (2 if im else 1) for _, im, m in items):
         im = F(int(rng.integers(4, 30)), 10) if rng.random() < 0.5 else F(0)
         re = items[0][0] if items and rng.random() < 0.3 else F(int(rng.integers(-40, 11)), 10)
@@ -132,7 +131,7 @@ def test_exact_ones_come_before_those_that_pass_for_a_higher_multiplicity():
 # Tolerance
 
 
-def across(items: Sequence[Item], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def across(items, rng):
     """The terms of each coefficient, and a relative change of length 1 across the set with the structure."""
     p = polynomial(items)
     size = np.poly([-abs(z) for z, m in every_root(items) for _ in range(m)])
@@ -202,7 +201,7 @@ def test_certified_root_of_the_nearest_sixfold_polynomial():
     c = doubles(polynomial([(F(-13, 10), F(0), 6)])) + 1e-12 * size * change
     with mp.workdps(60):
 
-        def stationary(r: object) -> object:
+        def stationary(r):
             off = [mp.binomial(6, k) * (-r) ** k - mp.mpf(float(c[k])) for k in range(1, 7)]
             slope = [-k * mp.binomial(6, k) * (-r) ** (k - 1) for k in range(1, 7)]
             weight = [mp.binomial(6, k) * abs(r) ** k for k in range(1, 7)]

@@ -4,7 +4,6 @@ Nothing is judged by recomputed roots: multiplicities come from FLINT's certifie
 coefficients, distances from least squares in the exact derivatives of the pattern.
 """
 
-from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 
@@ -51,7 +50,7 @@ EXAMPLES = {
 EVERY = [(name, factors) for name, examples in EXAMPLES.items() for factors in examples]
 
 
-def named_by(roots: Sequence[tuple[complex, int]]) -> str:
+def named_by(roots):
     """The name that exact roots with multiplicities deserve: those on the rightmost line, or two double ones."""
     doubles = [z for z, m in roots if m == 2]
     if len(doubles) == 2:
@@ -72,7 +71,7 @@ def named_by(roots: Sequence[tuple[complex, int]]) -> str:
     return names[real, pairs]
 
 
-def scaled(coefficients: Sequence[float], scale: float, leading: float) -> list[float]:
+def scaled(coefficients, scale, leading):
     """In another unit of time, s → s/scale, with another leading coefficient."""
     return [leading * c * scale**k for k, c in enumerate(coefficients)]
 
@@ -89,9 +88,9 @@ def test_every_kind_is_named_in_any_unit_of_time(name, factors):
 
 
 @st.composite
-def integer_roots(draw: st.DrawFn) -> list[tuple[int, int]]:
+def integer_roots(draw):
     """(re, im) of four integer roots, closed under conjugation, coincidences and shared lines likely."""
-    roots: list[tuple[int, int]] = []
+    roots = []
     while len(roots) < 4:
         re, im = -draw(st.integers(-1, 4)), draw(st.integers(0, 3))
         roots += [(re, im), (re, -im)] if im and len(roots) <= 2 else [(re, 0)]
@@ -131,7 +130,7 @@ UNKNOWNS = {"EP4": [-1], "EP3": [-1, -3], "2EP2": [5, 4], "CEP2": [2, 2], "EP2":
 
 
 @cache
-def relative_derivatives(name: str) -> tuple[np.ndarray, np.ndarray]:
+def relative_derivatives(name):
     """Monic coefficients of a pattern and their derivatives, relative to the terms they are summed from."""
     u = sympy.symbols(f"u0:{len(UNKNOWNS[name])}")
     at = dict(zip(u, UNKNOWNS[name], strict=True))
@@ -146,12 +145,12 @@ def relative_derivatives(name: str) -> tuple[np.ndarray, np.ndarray]:
     return p, jacobian[1:] / size[1:, None]
 
 
-def euclidean_distance(jacobian: np.ndarray, change: np.ndarray) -> float:
+def euclidean_distance(jacobian, change):
     """The smallest root sum of squares of relative changes that leads back to the pattern."""
     return float(np.linalg.norm(change - jacobian @ np.linalg.lstsq(jacobian, change, rcond=None)[0]))
 
 
-def perturbed(name: str, seed: int, distance: float) -> list[float]:
+def perturbed(name, seed, distance):
     """A quartic at a known relative distance from a pattern, to first order."""
     p, jacobian = relative_derivatives(name)
     size = np.abs(p[1:]) if name != "CEP2" else np.array([4, 6, 4, 1]) * 2.0 ** np.array([0.5, 1, 1.5, 2])

@@ -36,7 +36,7 @@ DOUBT = [1.0, 0.3927315003875155, 5.90069031723172, -3.420867305216691e-159, 3.6
 Maker = Callable[[np.random.Generator, int], np.ndarray]
 
 
-def expanded(z: np.ndarray) -> np.ndarray:
+def expanded(z):
     """Coefficients of ∏ (s − z) in the longest doubles of the machine: shape (…, 4) in, (…, 5) out."""
     total = np.ones((len(z), 1), np.clongdouble)
     for k in range(z.shape[1]):
@@ -46,7 +46,7 @@ def expanded(z: np.ndarray) -> np.ndarray:
     return total.real
 
 
-def joint_error(a: np.ndarray, z: np.ndarray) -> np.ndarray:
+def joint_error(a, z):
     """Largest error of a rebuilt coefficient, relative to the same symmetric function of |roots|."""
     off = np.abs(expanded(z) - a.astype(np.longdouble) / a[:, :1])
     size = expanded(-np.abs(z))
@@ -54,7 +54,7 @@ def joint_error(a: np.ndarray, z: np.ndarray) -> np.ndarray:
         return np.where(off == 0, 0, off / size).max(axis=1).astype(float)
 
 
-def drawn(rng: np.random.Generator, n: int, size: Callable[[int], np.ndarray]) -> np.ndarray:
+def drawn(rng, n, size):
     """Four roots each: two times a conjugate pair or two real ones, of either sign."""
     z = np.empty((n, 4), complex)
     for j in (0, 2):
@@ -66,29 +66,29 @@ def drawn(rng: np.random.Generator, n: int, size: Callable[[int], np.ndarray]) -
     return z
 
 
-def log(rng: np.random.Generator, low: float, high: float) -> Callable[[int], np.ndarray]:
+def log(rng, low, high):
     return lambda n: 10 ** rng.uniform(low, high, n)
 
 
-def polynomials(z: np.ndarray) -> np.ndarray:
+def polynomials(z):
     return expanded(z).astype(float)
 
 
-def perturbed(rng: np.random.Generator, a: np.ndarray) -> np.ndarray:
+def perturbed(rng, a):
     """Coefficients off by relative 1e-16 … 1e-2: a k-fold root scatters by the k-th root of it."""
     return a * (1 + 10 ** rng.uniform(-16, -2, (len(a), 1)) * rng.uniform(-1, 1, a.shape))
 
 
-def near_ep4(rng: np.random.Generator, n: int) -> np.ndarray:
+def near_ep4(rng, n):
     spread = 10 ** rng.uniform(-16, -2, (n, 1))
     return polynomials(-(10 ** rng.uniform(-1, 1, (n, 1))) * (1 + spread * drawn(rng, n, log(rng, -1, 0))))
 
 
-def ep4(rng: np.random.Generator, n: int) -> np.ndarray:
+def ep4(rng, n):
     return (-(10 ** rng.uniform(-1, 1, (n, 1)))) ** np.arange(5) * np.array([comb(4, k) for k in range(5)])
 
 
-def ep4_of_the_model(rng: np.random.Generator, n: int) -> np.ndarray:
+def ep4_of_the_model(rng, n):
     """By the closed form for chi_H = 1; the coefficients are those of the model in double precision."""
     zeta_B, zeta_H = -(10 ** rng.uniform(-1, 0.3, (2, n)))
     zeta_B, zeta_H = np.minimum(zeta_B, zeta_H) * 1.05, np.maximum(zeta_B, zeta_H)
@@ -106,21 +106,21 @@ def ep4_of_the_model(rng: np.random.Generator, n: int) -> np.ndarray:
     return np.stack(tms.coefficients(design), axis=-1)
 
 
-def two_equal_factors(rng: np.random.Generator, n: int) -> np.ndarray:
+def two_equal_factors(rng, n):
     z = drawn(rng, n, log(rng, -1, 1))
     z[:, 2:] = z[:, :2]
     return polynomials(z)
 
 
-def triple(rng: np.random.Generator, n: int) -> np.ndarray:
+def triple(rng, n):
     z = drawn(rng, n, log(rng, -1, 1)).real
     return polynomials(np.stack([z[:, 0], z[:, 0], z[:, 0], z[:, 3]], axis=1))
 
 
-def tiny(number: int) -> Maker:
+def tiny(number):
     """Of four roots, some of 1e-300 … 1e-8 times the others: all that doubles can hold."""
 
-    def make(rng: np.random.Generator, n: int) -> np.ndarray:
+    def make(rng, n):
         z = drawn(rng, n, log(rng, -0.5, 0.5))
         if number % 2:
             z = z.real
@@ -130,23 +130,23 @@ def tiny(number: int) -> Maker:
     return make
 
 
-def ending_in_zeros(rng: np.random.Generator, n: int) -> np.ndarray:
+def ending_in_zeros(rng, n):
     a = rng.normal(size=(n, 5))
     a[np.arange(5) > rng.integers(0, 5, n)[:, None]] = 0
     return a
 
 
-def with_holes(rng: np.random.Generator, n: int) -> np.ndarray:
+def with_holes(rng, n):
     a = rng.normal(size=(n, 5)) * (rng.uniform(size=(n, 5)) < 0.6)
     a[:, 0] = 1
     return a
 
 
-def mixed(rng: np.random.Generator, n: int) -> np.ndarray:
+def mixed(rng, n):
     return np.concatenate([rng.normal(size=(n // 2, 5)), near_ep4(rng, n - n // 2)])
 
 
-FAMILIES: dict[str, Maker] = {
+FAMILIES = {
     "normal": lambda rng, n: rng.normal(size=(n, 5)),
     "positive": lambda rng, n: rng.uniform(0.01, 1, size=(n, 5)),
     "sizes over 6 decades": lambda rng, n: rng.normal(size=(n, 5)) * 10 ** rng.uniform(-3, 3, (n, 5)),
@@ -179,7 +179,7 @@ FAMILIES: dict[str, Maker] = {
 }
 
 
-def made(family: str, n: int = COUNT) -> np.ndarray:
+def made(family, n=COUNT):
     return FAMILIES[family](np.random.default_rng(list(FAMILIES).index(family)), n)
 
 
@@ -304,7 +304,7 @@ def test_coefficients_broadcast():
 # Classes
 
 
-def classes_by_definition(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def classes_by_definition(a):
     negative, positive = real_roots(a)
     zero = a[:, 4] == 0
     unstable = np.where((positive > 0) | zero, CLASSES.index("capsize"), CLASSES.index("weave"))
@@ -313,7 +313,7 @@ def classes_by_definition(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.where(is_stable(a), damped, unstable), negative + positive + zero
 
 
-def on_a_boundary(rng: np.random.Generator, n: int) -> np.ndarray:
+def on_a_boundary(rng, n):
     """Weave, capsize and heavy damping within relative 1e-17 … 1e-9 of their boundaries."""
     c = rng.uniform(0.1, 3, (n, 4))
     one = np.ones(n)

@@ -1,7 +1,5 @@
 """Stability by coefficients agrees with stability by roots, on a million random designs."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from helpers.designs import wide_designs
@@ -16,7 +14,7 @@ BOUNDARY = 1e-9
 """Distance of the abscissa from 0, in units of the mean size of the roots, below which a design is not judged."""
 
 
-def _chunks() -> Iterator[np.ndarray]:
+def _chunks():
     for seed in range(DESIGNS // CHUNK):
         yield np.stack(tms.coefficients(wide_designs(seed, CHUNK)), axis=-1)
 
