@@ -290,3 +290,11 @@ def test_exact_roots_of_exactly_multiple_roots():
     found = exact_roots(product(*[[3, 1]] * 3, [1, 0, 2]))
     assert [(r.multiplicity, r.im) for r in found[:2]] == [(1, 2**0.5), (1, -(2**0.5))]
     assert (found[2].re, found[2].im, found[2].multiplicity) == (-1 / 3, 0.0, 3)
+
+
+@pytest.mark.parametrize("c", [[1, 0, 1.99, 0, 0.44784509906620285], [1, 0, 3, 0, 2.25], [1, 0, 14, 0, 49, 0, 36]])
+def test_pairs_of_an_even_polynomial_are_on_the_axis_exactly(c):
+    """All roots of p(s) = q(s²) are imaginary where those of q are negative, here (−1.0 ± 0.74) and −1, −4, −9."""
+    found = structure(c)
+    assert found.abscissa == 0
+    assert all(root.re == 0 for root in found.roots)

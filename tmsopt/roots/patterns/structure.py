@@ -20,6 +20,7 @@ HIGHEST = 12
 """Degree of a polynomial whose structure can be decided."""
 
 _CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
+_NOTHING = np.finfo(float).eps ** 2  # of the largest root: what fitting in doubles leaves of a real part that is 0
 
 
 @dataclass(frozen=True)
@@ -180,8 +181,9 @@ def _named(fit: Fit, found: Roots, unit: float) -> Structure:
     each += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
     right = max(z.real for z, _ in each)
     line = [(multiplicity, z.imag == 0) for z, multiplicity in each if z.real == right]
+    least = _NOTHING * max(abs(z) for z, _ in each)
     pairs = ((w, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,)))
-    roots = [Root(float(w.real), float(w.imag), m) for w, m in pairs]
+    roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in pairs]
     name = "2EP2" if [(root.im, root.multiplicity) for root in roots] == _TWO_DOUBLE else _line_name(line)
     return Structure(name, _sorted(roots), fit.distance)
 
