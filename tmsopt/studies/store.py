@@ -60,6 +60,7 @@ _PACKAGES = ("tmsopt", "casadi", "numpy", "scipy", "python-flint")  # that the n
 DAMAGED = "is damaged; --fresh moves it aside and starts a new store, or give another --store"
 _FULL = "reading or writing fails, or the disk is full; make room and run the same command again, the rows are safe"
 _PLACE = "cannot be opened or written here; give a file in a folder that can be written"
+_BUSY = f"another program kept it locked for {_PATIENCE:g} s; end that and run the same command again"
 _MEANINGS = {
     sqlite3.SQLITE_FULL: _FULL,
     sqlite3.SQLITE_IOERR: _FULL,
@@ -67,7 +68,8 @@ _MEANINGS = {
     sqlite3.SQLITE_PERM: _PLACE,
     sqlite3.SQLITE_CANTOPEN: _PLACE,
     sqlite3.SQLITE_NOTADB: "is no store of tmsopt; give another file",
-    sqlite3.SQLITE_BUSY: f"another program kept it locked for {_PATIENCE:g} s; end that and run the same command again",
+    sqlite3.SQLITE_BUSY: _BUSY,
+    sqlite3.SQLITE_LOCKED: _BUSY,
     sqlite3.SQLITE_PROTOCOL: "locks do not work on this file system; give a --store on another disk",
 }
 

@@ -261,6 +261,14 @@ def test_eigenvalues_are_the_last_resort_and_are_counted():
     assert found.abscissa[1] == pytest.approx(0, abs=1e-100)
 
 
+def test_coefficients_sixty_decades_apart_come_back():
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=(500, 5)) * 10.0 ** rng.uniform(-30, 30, (500, 5))
+    found = quartic_factors(*a.T)
+    assert found.fallbacks > 100
+    assert joint_error(a, found.roots).max() <= JOINTLY_RIGHT
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_root_beyond_all_doubles_is_infinite_without_a_warning():
     """5e-324 (s⁴ + …) − 1e308 s³ has a root at 2e631."""
