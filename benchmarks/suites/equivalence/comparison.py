@@ -21,7 +21,7 @@ SIZE = 1e-9
 SPREAD = 10.0
 """Times the greatest difference between runs of the net: there are only a few of them."""
 
-_UNCOMPARED = ("seconds", "host", "versions", "left")  # keys: how long something took, and where
+_UNCOMPARED = ("seconds", "per_second", "host", "versions", "left")  # keys: how long something took, and where
 _STORED = ("realised", "stored", "roots", "scatter")  # parts of keys: what the doubles of a multiple root do
 _NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _SECONDS = re.compile(r"\b[\d.]+ (?:ms|s)\b")
