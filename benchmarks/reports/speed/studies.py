@@ -19,10 +19,10 @@ from tmsopt.studies import Solver
 
 
 def quick_rows(rows: int) -> Study:
-    """EP4 over masses and heights: one start a row, so that whatever is not solving weighs most."""
+    """The least speed over masses and heights: some 15 starts a row, so that what is not solving weighs most."""
     side = int(np.sqrt(rows))
     axes = {"mu": np.linspace(0.05, 0.5, side).tolist(), "zeta_H": np.linspace(-0.3, -0.1, rows // side).tolist()}
-    return over_grid(load(PROBLEMS / "ep4.toml"), axes, title="EP4, one start a row")
+    return over_grid(load(PROBLEMS / "least_speed.toml"), axes, title="least speed, three parameters")
 
 
 def long_rows(rows: int, warm: bool = False) -> Study:
@@ -80,8 +80,8 @@ def _rate(study: Study, executor: Executor, workers: int) -> float:
 def report(asked: Asked) -> str:
     """The report in Markdown."""
     quick = asked.quick
-    small, long = (quick_rows(36), long_rows(4)) if quick else (quick_rows(100), long_rows(8))
-    many = quick_rows(100 if quick else 400)
+    small, long = (quick_rows(16), long_rows(4)) if quick else (quick_rows(64), long_rows(8))
+    many = quick_rows(36 if quick else 196)
     return page(
         "Studies",
         asked,
@@ -91,7 +91,7 @@ def report(asked: Asked) -> str:
         "does the very same runs again from recorded starts, with the same compiled problem, without choosing starts, "
         "polishing, rechecking, certified numbers and laws.",
         "### Engines",
-        _scalings(many, 1 if quick else 4),
+        _scalings(many, 1 if quick else 3),
         "### Warm starts",
         _warm(6 if quick else 32),
     )
