@@ -319,6 +319,7 @@ def test_no_chart_has_more_tiles_than_are_read(tmp_path):
     ("options", "words"),
     [
         ({"points": (5,)}, "accepted: two whole numbers"),
+        ({"points": (5.9, 5)}, "accepted: two whole numbers"),
         ({"points": (5, 1)}, "each from 2 to 1000000"),
         ({"points": (10**5, 10**5)}, "1e+09 or less"),
         ({"points": 7}, "found 7"),

@@ -230,6 +230,12 @@ def test_roots_at_zero_are_zero(degree):
             assert np.count_nonzero(roots(c) == 0) == zeros
 
 
+@pytest.mark.parametrize(("c", "known"), [([1, 1e155, 1], [-1e155, -1e-155]), ([1, 1e308, 1e308], [-1e308, -1])])
+def test_roots_hundreds_of_decades_apart(c, known):
+    """Their product is the last coefficient and their sum the one before, to all digits."""
+    np.testing.assert_allclose(roots(c), known, rtol=1e-15)
+
+
 def test_conjugate_pairs_are_exact_and_adjacent():
     rng = np.random.default_rng(0)
     for degree in (2, 3, 4, 5, 6):

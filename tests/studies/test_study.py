@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -401,6 +402,24 @@ def test_the_command_solves_stores_and_shows_rows(file):
     solved = json.loads(row.stdout)
     assert_same([Row.from_json(solved)], [Row.from_json(kept)])
     assert solved["solution"]["parameters"] == pytest.approx(kept["parameters"], rel=1e-9)
+
+
+def test_the_command_writes_no_file_twice_and_none_that_it_reads(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = 'problem = "other.toml"\n[study]\nmethod = "csv"\ncsv = "own.csv"\n'
+    Path("own.csv").write_text("zeta_B\n-0.4\n", encoding="utf-8")
+    shutil.copy(Path(__file__).parents[2] / "problems" / "ep4.toml", "other.toml")
+    Path("rows.toml").write_text(text, encoding="utf-8")
+    for words, said in [
+        (("--store", "s.csv", "--export", "./s.csv"), "--export: 's.csv' is what --store writes"),
+        (("--store", "s.html", "--report", "s.html"), "--report: 's.html' is what --store writes"),
+        (("--export", "s.csv", "--export", "s.csv"), "--export: 's.csv' is what --export writes"),
+        (("--export", "own.csv"), "--export: 'own.csv' is what the study is read from"),
+        (("--store", "other.toml"), "--store: 'other.toml' is what the study is read from"),
+    ]:
+        refused = command("rows.toml", *words)
+        assert (refused.exit_code, refused.stderr.strip()) == (2, f"{said}; give another name")
+    assert Path("own.csv").read_text(encoding="utf-8") == "zeta_B\n-0.4\n"
 
 
 @pytest.mark.slow

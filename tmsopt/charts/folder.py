@@ -157,10 +157,8 @@ def _unwritten(path: Path, error: OSError) -> InputError:
 
 
 def _no_chart(path: Path) -> InputError:
-    message = (
-        f"'{path}' is no chart: it has no {_ABOUT}; give the folder that tmsopt chart FILE --output NAME.chart wrote"
-    )
-    return refusal(message)
+    message = f"'{path}' is there and is no chart: it has no {_ABOUT}; give a folder that tmsopt chart --output wrote"
+    return refusal(f"{message}, or a new name to write one")
 
 
 def _check_room(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
@@ -238,7 +236,8 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         record = _own(path, name)
         done, end = _read_record(record, about["tile"], grid)
     except (OSError, ValueError, LookupError, TypeError, OverflowError, EOFError, TokenError) as error:
-        message = f"'{path}' is damaged: {name}: {error!s:.300}; give --fresh to chart anew and move this one aside"
+        said = " ".join(str(error).partition("For further information")[0].split())[:300]
+        message = f"'{path}' is damaged: {name}: {said}; give --fresh to chart anew and move this one aside"
         raise refusal(message) from None
     return about, problem, Tiles(layers, about["tile"], done, (record, end))
 

@@ -1,6 +1,7 @@
 """Grids over two or three parameters, and what is computed of their designs, a few rows at a time."""
 
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -229,7 +230,7 @@ def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, .
 
 def _sizes(points: Any, count: int) -> tuple[int, ...]:
     try:
-        sizes = tuple(int(p) for p in points)
+        sizes = tuple(operator.index(p) for p in points)
     except (TypeError, ValueError):
         sizes = ()
     if len(sizes) != count or min(sizes) < 2 or max(sizes) > LONGEST or math.prod(sizes) > MOST:

@@ -3,7 +3,7 @@
 import math
 import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -108,6 +108,8 @@ def study(
     if row is None:
         check_output("--store", path, (path.suffix.lstrip(".").lower(),))
     stated = load_study(file)
+    written = [("--store", path), *(("--export", target) for target in exports), ("--plot", plot), ("--report", report)]
+    _check_apart(file, [(option, place) for option, place in written if place and row is None])
     if row is None and not fresh:
         check_unchanged(stated, path)
     asked = _planned(stated)
@@ -130,8 +132,23 @@ def study(
 
 def _files(file: Path) -> list[Path]:
     """The study, and the problem where it names one."""
-    named = tomllib.loads(read_text(str(file), "TOML study file")).get("problem")
+    named = _tables(file).get("problem")
     return [file, *([file.parent / named] if isinstance(named, str) else [])]
+
+
+def _tables(file: Path) -> dict[str, Any]:
+    return tomllib.loads(read_text(str(file), "TOML study file"))
+
+
+def _check_apart(file: Path, written: Sequence[tuple[str, Path]]) -> None:
+    """Refuse to write one file twice, or one that the study is read from."""
+    rows = _tables(file).get("study", {}).get("csv")
+    read = [*_files(file), *([file.parent / rows] if isinstance(rows, str) else [])]
+    taken = {path.resolve(): "what the study is read from" for path in read}
+    for option, path in written:
+        if path.resolve() in taken:
+            raise refusal(f"'{path}' is {taken[path.resolve()]}; give another name", option)
+        taken[path.resolve()] = f"what {option} writes"
 
 
 def _check_together(row: int | None, scheduler: str | None, workers: int | None, kept: Mapping[str, object]) -> None:

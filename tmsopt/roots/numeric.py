@@ -36,7 +36,7 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
         raise ValueError("roots takes finite coefficients, two or more, with a leading one other than 0")
     n = c.shape[-1] - 1
-    least = np.abs(c).max(axis=-1) * _LEAST  # else a root is beyond doubles: it is brought to their end
+    least = np.abs(c).max(axis=-1) * _LEAST  # a root that is beyond doubles is brought to their end
     lead = np.copysign(np.maximum(np.abs(c[..., 0]), least), c[..., 0])
     with np.errstate(over="ignore", invalid="ignore"):  # roots 300 orders apart: what overflows is not an improvement
         monic = (c / lead[..., None]).reshape(c[..., 0].size, n + 1)
@@ -46,7 +46,8 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
         factors = _factors(_companion_eigenvalues(scaled))
         found, error = _newton(factors, scaled)
         found = found * scale[:, None]
-    for row in np.flatnonzero(error > _JOINT):
+    brought = (np.abs(c[..., 0]) < least).reshape(-1)
+    for row in np.flatnonzero(brought | ~(error <= _JOINT)):
         found[row] = _isolated(c.reshape(-1, n + 1)[row], found[row])
     return found.reshape(*c.shape[:-1], n)
 

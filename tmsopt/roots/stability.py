@@ -89,9 +89,14 @@ def _column(coefficients: Coefficients) -> Iterator[Any]:
 def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     """Whether all roots have Re s < 0: coefficients of shape (…, n + 1), descending; the answer has shape (…).
 
+    A polynomial with a leading coefficient 0 is not: a root is at infinity.
+
     Args:
         exact: above degree 4, let exact arithmetic answer, from the coefficients as stored, where rounding could change
             a sign: some 0.1 ms each. Up to degree 4 the signs of the few rounded conditions count.
+
+    Raises:
+        ValueError: for fewer than two coefficients.
 
     Example:
         >>> tmsopt.roots.is_stable([[1, 4, 6, 4, 1], [1, 4, 6, 4, -1]])
@@ -100,6 +105,8 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     More: docs/explanation/factors.md
     """
     c = np.asarray(coefficients, dtype=float)
+    if c.ndim == 0 or c.shape[-1] < 2:
+        raise ValueError("is_stable takes two coefficients or more, descending")
     sign = np.sign(c[..., 0])
     if c.shape[-1] - 1 > _SMALL:
         return _by_routh(sign[..., None] * c, exact)

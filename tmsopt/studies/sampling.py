@@ -162,10 +162,10 @@ def column_of_numbers(values: Any) -> Array | None:
     """What a user gave as an array of doubles; None where it is no list of numbers."""
     try:
         array = np.asarray(None if isinstance(values, str | bytes | Mapping) else values)
-        numbers = array.astype(np.float64)
+        wanted = array.ndim == 1 and (array.dtype.kind in "fiu" or not array.size)
+        return array.astype(np.float64) if wanted else None
     except (TypeError, ValueError, OverflowError):
         return None
-    return numbers if array.ndim == 1 and (array.dtype.kind in "fiu" or not array.size) else None
 
 
 def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:

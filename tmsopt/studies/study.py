@@ -311,7 +311,7 @@ def _fills_grid(study: Stated) -> bool:
         return False
     if any(count_faults("points", n, 1) for n in shape.values()) or math.prod(shape.values()) != len(study):
         return False
-    return all(np.array_equal(column, study.columns[name]) for name, column in grid(study.axes).items())
+    return all(np.array_equal(column, study.columns[name], equal_nan=True) for name, column in grid(study.axes).items())
 
 
 def _option_faults(study: Stated) -> Iterator[Fault]:

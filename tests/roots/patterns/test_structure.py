@@ -87,6 +87,15 @@ def test_every_kind_is_named_in_any_unit_of_time(name, factors):
             assert sum(root.multiplicity for root in found.roots) == 4
 
 
+@pytest.mark.parametrize("power", [-78, -66, -58, -52, 90])
+def test_an_ep2_of_degree_8_is_one_in_units_whose_powers_leave_doubles(power):
+    """A power of 2 rounds nothing; the product of the roots is 16,800 times 2 to eight times it, down to 1e-184."""
+    c = product([1, 1], [1, 1], [1, 6, 20], [1, 3], [1, 4], [1, 5], [1, 7])
+    found = structure(scaled(c, 2.0**power, 1.0))
+    assert found.name == "EP2"
+    assert found.abscissa == pytest.approx(-(2.0**power), rel=1e-12)
+
+
 @st.composite
 def integer_roots(draw):
     """(re, im) of four integer roots, closed under conjugation, coincidences and shared lines likely."""

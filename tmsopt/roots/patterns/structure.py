@@ -52,6 +52,7 @@ class Structure:
         return max((root.re for root in self.roots), default=float("nan"))
 
 
+@np.errstate(all="ignore")  # roots 300 orders apart
 def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike | None = None) -> Structure:
     """Structure of the roots of a real polynomial of degree 1 to 12, coefficients descending, shape (n + 1,).
 
@@ -75,12 +76,10 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
     """
     c = _checked(coefficients)
     found = numeric_roots(c)
-    size = _sizes(c, found, off, tolerance)
     nonzero = np.abs(found[found != 0])
-    unit = 2.0 ** np.round(np.mean(np.log2(nonzero))) if nonzero.size else 1.0
-    units = unit ** np.arange(len(c))
-    monic = c / c[0] / units
-    size = size / units
+    power = round(np.mean(np.log2(nonzero))) if nonzero.size else 0
+    unit = 2.0**power
+    monic, size = _in_unit(c, found, power, off, tolerance)
     rounding = ROUNDING * (len(c) - 1) / 4
     fit = decided(monic, size, tolerance + rounding, rounding)
     if fit.distance < tolerance - rounding or not fit.shape.groups:
@@ -106,11 +105,17 @@ def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root
     return found if multiple else None
 
 
-def _sizes(c: Array, found: Roots, off: ArrayLike | None, tolerance: float) -> Array:
+def _in_unit(c: Array, found: Roots, power: int, off: ArrayLike | None, tolerance: float) -> tuple[Array, Array]:
+    """Monic coefficients and their sizes where 2 to a power is the unit of roots; a double may not hold unit⁴."""
+    monic, unit = _scaled(c / c[0], power), 2.0**power
     if off is None:
-        return sizes(found)
-    known = np.abs(np.asarray(off, dtype=float) / c[0])
-    return sizes(found, c / c[0], np.where(np.isfinite(known), known, 0.0), tolerance)
+        return monic, sizes(found / unit)
+    known = np.abs(_scaled(np.asarray(off, dtype=float) / c[0], power))
+    return monic, sizes(found / unit, monic, np.where(np.isfinite(known), known, 0.0), tolerance)
+
+
+def _scaled(monic: Array, power: int) -> Array:
+    return np.asarray(np.ldexp(monic, -power * np.arange(len(monic))))
 
 
 def pattern_distance(
@@ -133,7 +138,7 @@ def pattern_distance(
     except ValueError:
         return float("inf")
     found = numeric_roots(c)
-    size, monic = _sizes(c, found, off, tolerance), c / c[0]
+    monic, size = _in_unit(c, found, 0, off, tolerance)
     fits = [gauss_newton(pattern, np.array(guess, dtype=float), monic, size) for guess in pattern.guesses(found)]
     least = -_CLOSED * np.abs(found).max() ** 2
     inside = [u for u in fits if all(value >= least for value in pattern.nonnegative(list(u)))]
@@ -161,7 +166,9 @@ def _checked(coefficients: ArrayLike) -> Array:
     if c.ndim != 1 or not 2 <= c.size <= HIGHEST + 1:
         raise ValueError(f"found coefficients of shape {c.shape}; accepted: 2 to {HIGHEST + 1} of them, descending")
     if not np.all(np.isfinite(c)) or c[0] == 0:
-        raise ValueError("found a coefficient that is not finite, or a leading 0; accepted: a polynomial's")
+        raise ValueError(
+            "found a coefficient that is not finite, or a leading 0; accepted: finite ones, the leading one not 0"
+        )
     return c
 
 
