@@ -46,12 +46,3 @@ def with_limit(text: str, value: float) -> str:
 
 def _close(side: str) -> str:
     return "".join(side.split())
-
-
-def split_limit(text: str) -> tuple[str, float]:
-    """A constraint ``something <= number`` with 0 for the number, and the number; any other as it is."""
-    rest, _, number = text.rpartition("<=")
-    try:
-        return (f"{rest}<= 0.0", float(number)) if rest else (text, 0.0)
-    except ValueError:
-        return text, 0.0
