@@ -19,7 +19,7 @@ from tmsopt.errors import InputError
 from tmsopt.evaluation import LAWS, law_rows, verdicts
 from tmsopt.plots import draw_histogram
 from tmsopt.report import design_report, row_lines, study_table
-from tmsopt.studies import RowTable, Solver, open_store, part_of, read_store, solve_row, summary
+from tmsopt.studies import RowTable, Solver, open_store, part_of, view_store, solve_row, summary
 
 judge = import_module("tmsopt.studies.solving")
 SOLVES = import_module("tmsopt.studies.monte_carlo")
@@ -175,7 +175,7 @@ def test_kill_9_loses_no_block_and_doubles_none(tmp_path):
         with suppress(ProcessLookupError):
             os.kill(process.pid, signal.SIGKILL)
         process.communicate()
-        with read_store(path) as store:
+        with view_store(path) as store:
             done = store.done()
             assert len(done) == sum(session["rows"] for session in store.sessions())
         assert len(done) >= int(lines[-1] or 0)

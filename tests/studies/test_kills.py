@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from helpers.rows import assert_same
 
-from tmsopt.studies import load_study, planned, read_store, solve_row, stored
+from tmsopt.studies import load_study, planned, view_store, solve_row, stored
 
 ROWS, KILLS, SAMPLE = 20_000, 30, 25
 PAUSE = (0.3, 2.0)
@@ -24,7 +24,7 @@ PATIENCE = 60.0  # s for the first row of a study that starts
 def acknowledged_by(path):
     """Numbers of the rows that the store has acknowledged."""
     try:
-        with read_store(path) as store:
+        with view_store(path) as store:
             return set(store.done().tolist())
     except ValueError:  # not made yet
         return set()
@@ -80,7 +80,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path):
     finally:
         process.kill()
     assert min(killed.values()) >= KILLS // 4
-    with read_store(path) as store:
+    with view_store(path) as store:
         added = sum(session["rows"] for session in store.sessions())
     study = planned(load_study(tmp_path / "built.toml"))
     rows = stored(study, path).rows

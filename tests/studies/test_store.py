@@ -21,7 +21,7 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
 from tmsopt.records import Table
-from tmsopt.studies import RowTable, Study, check_same, open_store, read_store, run_study, stored
+from tmsopt.studies import RowTable, Study, check_same, open_store, view_store, run_study, stored
 
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 OLD = Path(__file__).parent / "stores"
@@ -29,7 +29,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POS
 
 
 def rows_of(path, study=STUDY):
-    with read_store(path) as opened:
+    with view_store(path) as opened:
         return list(RowTable(study, opened.parts()))
 
 
@@ -89,7 +89,7 @@ def test_no_acknowledged_row_is_lost_by_kill_9(path):
             process.kill()
             printed = process.stdout.read().split("\n")[:-1]  # the last line may be cut off
         acknowledged = int(printed[-1]) if printed else acknowledged
-        with read_store(path) as opened:
+        with view_store(path) as opened:
             done = opened.done().tolist()
             assert len(done) >= acknowledged
             assert done == list(range(len(done)))  # batches are kept as a whole or not at all
@@ -103,7 +103,7 @@ def test_reading_while_another_process_writes(path):
     with writer(path) as (process, _):
         for _ in range(5):
             acknowledged = int(process.stdout.readline())
-            with read_store(path) as opened:
+            with view_store(path) as opened:
                 there = len(opened.done())
                 assert there >= acknowledged
                 assert len(RowTable(STUDY, opened.parts())) >= there
@@ -189,7 +189,7 @@ def test_what_a_store_says_of_itself(path):
     assert about["definition"]["seed"] == about["seed"] == 7
     assert "columns" not in about["definition"]
     assert set(about["versions"]) == {"python", "tmsopt", "casadi", "numpy", "scipy", "python-flint", "ipopt"}
-    with read_store(path) as opened:
+    with view_store(path) as opened:
         assert [(s["rows"], s["pid"], s["ended"] is None) for s in opened.sessions()] == [
             (1, os.getpid(), False),
             (0, os.getpid(), False),
@@ -240,7 +240,7 @@ def test_fresh_moves_aside_and_never_deletes(path):
             assert opened.done().size == 0
             opened.add(part(row(number)))
     for name, number in (("study.1.sqlite", 0), ("study.2.sqlite", 1), ("study.sqlite", 2)):
-        with read_store(path.with_name(name)) as opened:
+        with view_store(path.with_name(name)) as opened:
             assert opened.about()["seed"] == number
             assert opened.done().tolist() == [number]
     assert len(list(path.parent.iterdir())) == 3
@@ -254,7 +254,7 @@ def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path):
     assert path.with_name("study.sqlite-wal").exists()
     with open_store(path, STUDY, fresh=True) as opened:
         assert opened.done().size == 0
-    with read_store(path.with_name("study.1.sqlite")) as opened:
+    with view_store(path.with_name("study.1.sqlite")) as opened:
         assert len(opened.done()) >= acknowledged
 
 
@@ -274,7 +274,7 @@ def test_other_versions_are_a_warning(path, monkeypatch):
         opened.add(part(row(0)))
         there = opened.about()["versions"]["tmsopt"]
     monkeypatch.setattr("tmsopt.studies.store._versions", lambda: opened_with | {"tmsopt": "0.9.9"})
-    with read_store(path) as reading:
+    with view_store(path) as reading:
         opened_with = reading.about()["versions"]
     with open_store(path, STUDY) as opened:
         assert opened.warnings == (f"tmsopt: {there} in the store, 0.9.9 now",)
@@ -306,7 +306,7 @@ def newer_store(path):
 def test_a_file_that_is_no_store_is_not_touched(path, make, expected):
     make(path)
     before = path.read_bytes()
-    calls = (lambda: read_store(path), lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True))
+    calls = (lambda: view_store(path), lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True))
     for call in calls:
         assert expected in faults(call)
     assert path.read_bytes() == before
@@ -316,7 +316,7 @@ def test_a_file_that_is_no_store_is_not_touched(path, make, expected):
 def test_places_where_no_store_can_be(tmp_path):
     assert "no regular file" in faults(open_store, tmp_path, STUDY)
     assert "does not exist" in faults(open_store, tmp_path / "no" / "a.sqlite", STUDY)
-    assert "no such file" in faults(read_store, tmp_path / "a.sqlite")
+    assert "no such file" in faults(view_store, tmp_path / "a.sqlite")
     assert "name" in faults(open_store, tmp_path / ("x" * 300), STUDY)
     if sys.platform == "linux":
         assert "written" in faults(open_store, "/proc/a.sqlite", STUDY)
@@ -358,7 +358,7 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script, path):
 
     def read_whole():
         check_same(path, STUDY)
-        with read_store(path) as opened:
+        with view_store(path) as opened:
             opened.about(), opened.sessions(), opened.parts()
 
     def go_on():
@@ -412,7 +412,7 @@ def test_a_full_disk_costs_no_row_that_was_acknowledged(path):
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         assert opened.done().tolist() == list(range(acknowledged))
         opened.add(part(row(acknowledged)))
-    with read_store(path) as opened:
+    with view_store(path) as opened:
         assert opened.done().tolist() == list(range(acknowledged + 1))
 
 

@@ -39,7 +39,7 @@ from tmsopt.studies import (
     open_store,
     over_grid,
     part_of,
-    read_store,
+    view_store,
     run_study,
     solve_row,
     stored,
@@ -128,7 +128,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
     monkeypatch.setattr(Solver, "answers", counting)
     with pytest.raises(KeyboardInterrupt):
         run_study(GRID, path, workers=1, progress=interrupt)
-    with read_store(path) as store:
+    with view_store(path) as store:
         assert store.done().tolist() == [0, 1, 2]
     resumed = run_study(GRID, path, workers=1)
     assert resumed.solved == 3
@@ -463,7 +463,7 @@ def test_a_killed_command_goes_on(file, ending):
         time.sleep(0.05)
         if store.exists():
             try:
-                with read_store(store) as opened:
+                with view_store(store) as opened:
                     kept = set(opened.done().tolist())
             except InputError:
                 continue  # being made

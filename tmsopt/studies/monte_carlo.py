@@ -19,7 +19,7 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Column, Table
 from tmsopt.search.solve import solve, solved_first
 from tmsopt.studies.sampling import MOST_ROWS
-from tmsopt.studies.store import check_same, read_store
+from tmsopt.studies.store import check_same, view_store
 from tmsopt.studies.study import Study, common_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
@@ -178,7 +178,7 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
     path = path_of(store, "an SQLite file")
     if not isinstance(study, Sampling) or not path.exists():
         return
-    with read_store(path) as opened:
+    with view_store(path) as opened:
         known = opened.about()["definition"]
     try:
         design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.parameter_set.names}

@@ -22,7 +22,7 @@ from tmsopt.studies.monte_carlo import Sampling, check_unchanged, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.rows import Part, Row, RowTable, part_of
 from tmsopt.studies.solving import Solver, applies, judged
-from tmsopt.studies.store import Store, open_store, read_store
+from tmsopt.studies.store import Store, open_store, view_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 from tmsopt.versions import SCHEMA
@@ -179,7 +179,7 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
     Raises:
         InputError: where there is no store.
     """
-    with read_store(path_of(store, "an SQLite file")) as opened:
+    with view_store(path_of(store, "an SQLite file")) as opened:
         rows = RowTable(study, _held(study, opened))
         return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
 

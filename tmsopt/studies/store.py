@@ -100,7 +100,7 @@ def explained(path: Path) -> Iterator[None]:
 
 
 class Store:
-    """Rows of one study, open for writing (`open_store`) or reading (`read_store`); a context manager.
+    """Rows of one study, open for writing (`open_store`) or reading (`view_store`); a context manager.
 
     Attributes:
         path: of the file.
@@ -255,7 +255,7 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
         return store
 
 
-def read_store(path: Path | str) -> Store:
+def view_store(path: Path | str) -> Store:
     """Open a store for reading, also while another process writes it.
 
     Raises:
@@ -284,7 +284,7 @@ def check_same(path: Path | str, study: Study) -> None:
     path, schema = _examined(path)
     if not schema:
         return
-    with read_store(path) as store, explained(path):
+    with view_store(path) as store, explained(path):
         there = _pairs(store._connection, "study"), _pairs(store._connection, "columns")
         known, asked = (
             from_json(about["definition"]) | {"columns": {name: array("d", x) for name, x in columns.items()}}
@@ -391,7 +391,7 @@ def _check_content(connection: sqlite3.Connection, path: Path) -> None:
 def _holder(path: Path) -> str:
     """Who writes a store just now, as the store tells it."""
     who = "another process, which has only just begun,"
-    with suppress(InputError, IndexError), read_store(path) as store:  # it may be moved aside just now
+    with suppress(InputError, IndexError), view_store(path) as store:  # it may be moved aside just now
         last = store.sessions()[-1]
         if last["ended"] is None:
             who = f"process {last['pid']} on {last['host']}, since {last['started']},"
