@@ -19,7 +19,7 @@ from tmsopt.errors import InputError
 from tmsopt.evaluation import LAWS, law_rows, verdicts
 from tmsopt.plots import draw_histogram
 from tmsopt.report import design_report, row_lines, study_table
-from tmsopt.studies import RowTable, Solver, open_store, part_of, view_store, solve_row, summary
+from tmsopt.studies import RowTable, Solver, open_store, part_of, solve_row, summary, view_store
 
 judge = import_module("tmsopt.studies.solving")
 SOLVES = import_module("tmsopt.studies.monte_carlo")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from helpers.rows import assert_same
 
-from tmsopt.studies import load_study, planned, view_store, solve_row, stored
+from tmsopt.studies import load_study, planned, solve_row, stored, view_store
 
 ROWS, KILLS, SAMPLE = 20_000, 30, 25
 PAUSE = (0.3, 2.0)

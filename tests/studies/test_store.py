@@ -21,7 +21,7 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
 from tmsopt.records import Table
-from tmsopt.studies import RowTable, Study, check_same, open_store, view_store, run_study, stored
+from tmsopt.studies import RowTable, Study, check_same, open_store, run_study, stored, view_store
 
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 OLD = Path(__file__).parent / "stores"

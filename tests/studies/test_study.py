@@ -39,11 +39,11 @@ from tmsopt.studies import (
     open_store,
     over_grid,
     part_of,
-    view_store,
     run_study,
     solve_row,
     stored,
     summary,
+    view_store,
 )
 
 EP4 = load("problems/ep4.toml")
