@@ -285,7 +285,7 @@ def test_damage_is_seen_and_said(name, tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links and pipes of POSIX")
-@pytest.mark.parametrize("make", ["link", "pipe"])
+@pytest.mark.parametrize("make", ["link", "loop", "pipe"])
 @pytest.mark.parametrize("name", ["about.json", "tiles.jsonl", "layers", "layers/kind.npy"])
 def test_nothing_is_written_through_a_link(name, make, tmp_path):
     """Of a folder that is begun: what the link leads to stays as it is, and the link is named."""
@@ -295,6 +295,8 @@ def test_nothing_is_written_through_a_link(name, make, tmp_path):
     place.rename(kept)
     if make == "link":
         place.symlink_to(kept)
+    elif make == "loop":
+        place.symlink_to(place.name)
     else:
         os.mkfifo(place)
     before = {p: p.read_bytes() for p in (kept, *kept.rglob("*")) if p.is_file()}

@@ -420,6 +420,8 @@ def test_the_command_writes_no_file_twice_and_none_that_it_reads(tmp_path, monke
         refused = command("rows.toml", *words)
         assert (refused.exit_code, refused.stderr.strip()) == (2, f"{said}; give another name")
     assert Path("own.csv").read_text(encoding="utf-8") == "zeta_B\n-0.4\n"
+    Path("rows.toml").write_text(text.replace("other", "{a}}"), encoding="utf-8")
+    assert "rows.toml:1: problem: '{a}}.toml' no such file" in command("rows.toml").stderr
 
 
 @pytest.mark.slow

@@ -36,6 +36,7 @@ from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 
+_DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, OverflowError, EOFError, TokenError)
 _ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
 _LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
 _SYNC = 1.0  # seconds between two records of finished tiles
@@ -235,7 +236,7 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         name = _TILES
         record = _own(path, name)
         done, end = _read_record(record, about["tile"], grid)
-    except (OSError, ValueError, LookupError, TypeError, OverflowError, EOFError, TokenError) as error:
+    except _DAMAGE as error:
         said = " ".join(str(error).partition("For further information")[0].split())[:300]
         message = f"'{path}' is damaged: {name}: {said}; give --fresh to chart anew and move this one aside"
         raise refusal(message) from None

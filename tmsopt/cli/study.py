@@ -5,6 +5,7 @@ import sys
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -116,7 +117,7 @@ def study(
     if row is not None:
         _show_row(asked, row, as_json)
         return
-    path = path.resolve()
+    path = Path(realpath(path))
     results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
     with answering():
         _show(results, path, stopped, as_json)
@@ -144,11 +145,11 @@ def _check_apart(file: Path, written: Sequence[tuple[str, Path]]) -> None:
     """Refuse to write one file twice, or one that the study is read from."""
     rows = _tables(file).get("study", {}).get("csv")
     read = [*_files(file), *([file.parent / rows] if isinstance(rows, str) else [])]
-    taken = {path.resolve(): "what the study is read from" for path in read}
+    taken = {realpath(path): "what the study is read from" for path in read}
     for option, path in written:
-        if path.resolve() in taken:
-            raise refusal(f"'{path}' is {taken[path.resolve()]}; give another name", option)
-        taken[path.resolve()] = f"what {option} writes"
+        if (place := realpath(path)) in taken:
+            raise refusal(f"'{path}' is {taken[place]}; give another name", option)
+        taken[place] = f"what {option} writes"
 
 
 def _check_together(row: int | None, scheduler: str | None, workers: int | None, kept: Mapping[str, object]) -> None:

@@ -384,8 +384,8 @@ def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
 
 def _named(name: str, error: InputError, key: Key) -> list[Fault]:
     """Faults of a file that a study names; those of the whole file where it is named."""
-    message = f"'{name}' {{}}; the name is relative to the study file"
-    return [f if f.line else Fault(message.format(f.message), key) for f in error.faults]
+    more = "the name is relative to the study file"
+    return [f if f.line else Fault(f"'{name}' {f.message}; {more}", key) for f in error.faults]
 
 
 def _read_rows(page: Page, name: str, problem: Problem, faults: list[Fault]) -> dict[str, Column]:
