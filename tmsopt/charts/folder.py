@@ -158,8 +158,7 @@ def _unwritten(path: Path, error: OSError) -> InputError:
 
 
 def _no_chart(path: Path) -> InputError:
-    message = f"'{path}' is there and is no chart: it has no {_ABOUT}; give a folder that tmsopt chart --output wrote"
-    return refusal(f"{message}, or a new name to write one")
+    return refusal(f"'{path}' is no chart: it has no {_ABOUT}; give the folder of one, or a new name")
 
 
 def _check_room(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
