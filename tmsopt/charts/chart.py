@@ -240,7 +240,7 @@ def chart(
                 steps(done, grid.size)
     seconds = time.perf_counter() - began
     for layer in memory.values():
-        layer.flags.writeable = False  # a result is frozen
+        layer.flags.writeable = False
     run = {"engine": "numpy", **({} if path is None else {"designs": done - before}), "seconds": seconds}
     run["per_second"] = (done - before) / seconds
     edges = domain(work.problem, progress=progress) if boundaries and len(grid.axes) == 2 else None

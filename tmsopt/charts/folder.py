@@ -126,9 +126,7 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
         there, _, tiles = read_folder(path)
         ignored = {"versions": None, "tile": None}
         if changed := list(differences(there | ignored, about | ignored)):
-            message = (
-                f"holds another chart ({'; '.join(changed)}); give another name, or --fresh to move this one aside"
-            )
+            message = f"holds another chart ({'; '.join(changed)}); give another name, or --fresh to move it aside"
             raise refusal(message, str(path))
         try:
             yield tiles
@@ -158,7 +156,7 @@ def _unwritten(path: Path, error: OSError) -> InputError:
 
 
 def _no_chart(path: Path) -> InputError:
-    return refusal(f"'{path}' is no chart: it has no {_ABOUT}; give the folder of one, or a new name")
+    return refusal(f"'{path}' is no chart: it has no {_ABOUT}; give a chart's folder, or a new name")
 
 
 def _check_room(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
@@ -236,9 +234,8 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         record = _own(path, name)
         done, end = _read_record(record, about["tile"], grid)
     except _DAMAGE as error:
-        said = " ".join(str(error).partition("For further information")[0].split())[:300]
-        message = f"'{path}' is damaged: {name}: {said}; give --fresh to chart anew and move this one aside"
-        raise refusal(message) from None
+        said = " ".join(str(error).split())[:120]
+        raise refusal(f"'{path}' is damaged: {name}: {said}; give --fresh to move it aside and begin anew") from None
     return about, problem, Tiles(layers, about["tile"], done, (record, end))
 
 

@@ -230,7 +230,7 @@ def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, .
 
 def _sizes(points: Any, count: int) -> tuple[int, ...]:
     try:
-        sizes = tuple(operator.index(p) for p in points)
+        sizes = tuple(map(operator.index, points))
     except (TypeError, ValueError):
         sizes = ()
     if len(sizes) != count or min(sizes) < 2 or max(sizes) > LONGEST or math.prod(sizes) > MOST:
