@@ -36,7 +36,7 @@ from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 
-_DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, OverflowError, EOFError, TokenError)
+_DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, OverflowError, TokenError)
 _ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
 _LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
 _SYNC = 1.0  # seconds between two records of finished tiles
@@ -258,7 +258,7 @@ def _own(path: Path, name: str) -> Path:
     """A regular file in the folder, not reached through a link: what is elsewhere is not written."""
     place = path.resolve() / name
     if place.resolve() != place or not place.is_file():
-        raise ValueError("no file, or a symbolic link")
+        raise ValueError("no file, or a link")
     return place
 
 
