@@ -36,6 +36,7 @@ from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 
+# What reading a damaged folder raises; a link to itself is a RuntimeError.
 _DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, OverflowError, TokenError)
 _ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
 _LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
@@ -234,7 +235,7 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         record = _own(path, name)
         done, end = _read_record(record, about["tile"], grid)
     except _DAMAGE as error:
-        said = " ".join(str(error).split())[:120]
+        said = " ".join(str(error).split())[:300]
         raise refusal(f"'{path}' is damaged: {name}: {said}; give --fresh to move it aside and begin anew") from None
     return about, problem, Tiles(layers, about["tile"], done, (record, end))
 

@@ -46,8 +46,8 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
         factors = _factors(_companion_eigenvalues(scaled))
         found, error = _newton(factors, scaled)
         found = found * scale[:, None]
-    brought = (np.abs(c[..., 0]) < least).reshape(-1)
-    for row in np.flatnonzero(brought | ~(error <= _JOINT)):
+    clamped = (np.abs(c[..., 0]) < least).reshape(-1)
+    for row in np.flatnonzero(clamped | ~(error <= _JOINT)):
         found[row] = _isolated(c.reshape(-1, n + 1)[row], found[row])
     return found.reshape(*c.shape[:-1], n)
 

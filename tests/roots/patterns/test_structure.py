@@ -96,6 +96,10 @@ def test_an_ep2_of_degree_8_is_one_in_units_whose_powers_leave_doubles(power):
     assert found.abscissa == pytest.approx(-(2.0**power), rel=1e-12)
 
 
+def test_the_greatest_root_that_is_a_double():
+    assert structure([1, 1.7e308]).abscissa == -1.7e308
+
+
 @st.composite
 def integer_roots(draw):
     """(re, im) of four integer roots, closed under conjugation, coincidences and shared lines likely."""

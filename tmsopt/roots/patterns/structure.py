@@ -20,6 +20,7 @@ HIGHEST = 12
 """Degree of a polynomial whose structure can be decided."""
 
 _CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
+_GREATEST = 1023  # power of 2 that is a double
 _NOTHING = np.finfo(float).eps ** 2  # of the largest root: what fitting in doubles leaves of a real part that is 0
 
 
@@ -76,8 +77,8 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
     """
     c = _checked(coefficients)
     found = numeric_roots(c)
-    nonzero = np.abs(found[found != 0])
-    power = round(np.mean(np.log2(nonzero))) if nonzero.size else 0
+    nonzero = np.abs(found[(found != 0) & np.isfinite(found)])
+    power = min(round(np.mean(np.log2(nonzero))), _GREATEST) if nonzero.size else 0
     unit = 2.0**power
     monic, size = _in_unit(c, found, power, off, tolerance)
     rounding = ROUNDING * (len(c) - 1) / 4
