@@ -442,6 +442,10 @@ STUDIES = {
 }
 
 
+SCATTER = (128 * sys.float_info.epsilon) ** 0.25
+"""Relative, by which the last bits of a design, other ones on another processor, move its roots where four meet."""
+
+
 def assert_same_table(one, other, ignored=()):
     """Texts are equal, and numbers to 1e-9 of their size; rounding errors of laws by themselves."""
     tables = [list(csv.DictReader(path.read_text(encoding="utf-8").splitlines())) for path in (one, other)]
@@ -449,7 +453,8 @@ def assert_same_table(one, other, ignored=()):
     for a, b in zip(*tables, strict=True):
         for name in a.keys() - set(ignored):
             if a[name] != b[name]:
-                assert float(a[name]) == pytest.approx(float(b[name]), rel=1e-9, abs=1e-13), (name, a["number"])
+                near = SCATTER if name == "abscissa_realised" else 1e-9
+                assert float(a[name]) == pytest.approx(float(b[name]), rel=near, abs=1e-13), (name, a["number"])
 
 
 @pytest.mark.parametrize("name", STUDIES)
