@@ -49,6 +49,7 @@ SECTIONS = (
     Section("e", "explorer", f"{_SPEED}.explorer", "pages of the explorer: size, writing, drawing in Chromium"),
     Section("e", "waiting", f"{_SPEED}.waiting", "what takes longest, beside an earlier checkout", long=True),
     Section("e", "beside", f"{_SPEED}.beside", "time of a solve, beside an earlier checkout", long=True),
+    Section("e", "counters", f"{_SPEED}.counters", "what one solve does, beside an earlier checkout", long=True),
     Section("f", "growth", f"{_SPEED}.growth", "growth with free parameters and scenarios"),
     Section("h", "tiles", f"{_SPEED}.folders", "charts to a folder; 1e8 designs in bounded memory"),
     Section("i", "systems", f"{_SYSTEMS}.sixfold", "a 6-fold root from random starts, beside HANSO and PyGRANSO"),
