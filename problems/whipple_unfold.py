@@ -17,7 +17,7 @@ import flint
 import numpy as np
 
 import tmsopt
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.balls import rational
 from tmsopt.models import whipple
 from tmsopt.roots import exact_roots, shift
 

@@ -1,17 +1,15 @@
-from .arrays import Program as Program, program as program
-from .balls import Number as Number, number as number
-from .elementary import (
-    exact as exact, greater as greater, lesser as lesser, magnitude as magnitude, positive_part as positive_part,
-    printed as printed,
-    power as power, quotient as quotient, sqrt as sqrt, tan as tan,
-)
+from .arrays import on_arrays as on_arrays
+from .balls import Number as Number, exact as exact, number as number, rational as rational
 from .formal import variable as variable
-from .formulas import Formulas as Formulas
+from .formula import (
+    Formula as Formula, Kind as Kind, NotAccepted as NotAccepted, fold as fold, from_casadi as from_casadi,
+    trace as trace,
+)
 from .intervals import (
-    EVERYTHING as EVERYTHING, INTERVALS as INTERVALS, ball as ball, interval as interval, ranges as ranges,
-    root_bound as root_bound, square as square,
+    EVERYTHING as EVERYTHING, ball as ball, interval as interval, ranges as ranges, root_bound as root_bound,
+)
+from .kinds import (
+    BALLS as BALLS, CASADI as CASADI, FLOATS as FLOATS, INTERVALS as INTERVALS, NODES as NODES, values as values,
 )
 from .krawczyk import Refused as Refused, enclosed as enclosed, refined as refined
-from .operations import ARRAYS as ARRAYS, BALLS as BALLS
 from .rounding import Bounded as Bounded, as_bounded as as_bounded
-from .walk import NotAccepted as NotAccepted, operation_name as operation_name, steps as steps, walk as walk

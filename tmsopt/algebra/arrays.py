@@ -1,131 +1,66 @@
-"""A CasADi function on arrays, by NumPy: every step once, on the axes that it depends on.
+"""A formula on large arrays: what has the shape of the whole grid is computed a block at a time, in the cache.
 
 Shapes are those of NumPy's broadcasting. A step that depends on one axis of a grid alone is computed along that axis,
-in shape (1, n) or (m, 1); what depends on no axis is one number. What has the shape of the grid is computed a block at
-a time, whose arrays stay in the cache.
+in shape (1, n) or (m, 1); what depends on no axis is one number.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.operations import ARRAYS
-from tmsopt.algebra.walk import Arithmetic, Instruction, NotAccepted, operation_name, steps
+from tmsopt.algebra.formula import INPUT, Formula, Step, fold
+from tmsopt.algebra.kinds import FLOATS
 
 BLOCK = 2**14
 """Elements of a block: 128 kB an array."""
 
-_POWERS: Mapping[float, Callable[[Any], Any]] = {
-    -1.0: lambda x: np.divide(1.0, x),
-    0.5: np.sqrt,
-    1.0: lambda x: x,
-    2.0: lambda x: x * x,
-    3.0: lambda x: x * x * x,
-    4.0: lambda x: (square := x * x) * square,
-}
+
+def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
+    """The outputs for numbers and arrays, each of the shape that it depends on; nan and inf without a warning."""
+    columns = {name: np.asarray(given[name], dtype=float)[()] for name in formula.inputs}
+    shape = np.broadcast_shapes(*map(np.shape, columns.values()))
+    with np.errstate(all="ignore"):
+        if math.prod(shape) <= BLOCK:
+            return fold(formula, columns, FLOATS)
+        large, sources = _divided(formula, {n: _axes(np.shape(x)) for n, x in columns.items()}, _axes(shape))
+        ends = dict.fromkeys((*sources, *(o for o in formula.outputs if o not in large)))
+        known = dict(zip(map(str, ends), fold(_part(formula, list(ends)), columns, FLOATS), strict=True))
+        found = {str(o): np.empty(shape) for o in formula.outputs if o in large}
+        rest = _part(formula, [int(o) for o in found], sources)
+        for rows, along in _blocks(shape) if found else ():
+            near = {name: _cut({**columns, **known}[name], rows, along) for name in rest.inputs}
+            for into, value in zip(found.values(), fold(rest, near, FLOATS), strict=True):
+                _cut(into, rows, along)[...] = value
+    return [{**known, **found}[str(o)] for o in formula.outputs]
 
 
-def _power(base: Any, exponent: Any) -> Any:
-    """A small power that is written as a number, which is a float, as products and roots, exactly rounded each."""
-    small = _POWERS.get(exponent) if type(exponent) is float else None
-    return np.power(base, exponent) if small is None else small(base)
+def _divided(formula: Formula, given: Mapping[str, int], axes: int) -> tuple[set[int], set[int]]:
+    """The steps that have all the axes of a grid, and those of others that they take."""
+    own: list[int] = []
+    for step in formula.steps:
+        along = given[step.value] if step.op == INPUT else 0
+        for o in step.operands:
+            along |= own[o]
+        own.append(along)
+    large = {k for k, along in enumerate(own) if along == axes}
+    return large, {o for k in large for o in formula.steps[k].operands} - large
 
 
-_OPERATIONS: Arithmetic = {**ARRAYS, ca.OP_POW: _power, ca.OP_CONSTPOW: _power}
-
-
-@dataclass(frozen=True)
-class Program:
-    """Steps of a function of one vector to one vector, in an order in which they can be computed."""
-
-    steps: tuple[Instruction, ...]
-
-    @property
-    def arguments(self) -> set[int]:
-        """Entries of the vector that the results depend on."""
-        return {step.place[1] for step in self.steps if step.operation == ca.OP_INPUT}
-
-    def __call__(self, given: Mapping[int, Any]) -> list[Any]:
-        """The results for numbers and arrays, each of the shape that it depends on.
-
-        Args:
-            given: entry of the vector → its value.
-        """
-        with np.errstate(all="ignore"):
-            return self._results(given)
-
-    def _results(self, given: Mapping[int, Any]) -> list[Any]:
-        leaves = {k: _leaf(step, given) for k, step in enumerate(self.steps) if not step.operands}
-        shape = np.broadcast_shapes(*(np.shape(v) for v in leaves.values()))
-        whole, axes = _axes(shape), {k: _axes(np.shape(v)) for k, v in leaves.items()}
-        values: list[Any] = []  # None where it is left to the blocks
-        left, outputs = list[int](), dict[int, int]()
-        for k, step in enumerate(self.steps):
-            value = leaves.get(k)
-            if step.operation == ca.OP_OUTPUT:
-                outputs[step.place[1]] = step.operands[0]
-            elif step.operands:
-                axes[k] = 0
-                for o in step.operands:
-                    axes[k] |= axes[o]
-                if whole and axes[k] == whole:
-                    left.append(k)
-                else:
-                    value = _OPERATIONS[step.operation](*[values[o] for o in step.operands])
-            values.append(value)
-        for k in outputs.values():
-            if values[k] is None:
-                values[k] = np.empty(shape)
-        self._fill(values, left, set(outputs.values()), shape)
-        return [values[outputs[n]] for n in sorted(outputs)]
-
-    def _fill(self, values: Sequence[Any], left: Sequence[int], wanted: set[int], shape: tuple[int, ...]) -> None:
-        """Compute the steps that are left a block at a time, and put those that are wanted into their arrays."""
-        last = {o: k for k in left for o in self.steps[k].operands}
-        sources = last.keys() - set(left)
-        lines = []
-        for k in left:
-            operands = self.steps[k].operands
-            dead = [o for o in set(operands) if last[o] == k and o not in wanted]
-            lines.append((k, _OPERATIONS[self.steps[k].operation], operands, dead))
-        for rows, columns in _blocks(shape) if left else ():
-            near = {o: _part(values[o], rows, columns) for o in sources}
-            for k, function, operands, dead in lines:
-                near[k] = function(*[near[o] for o in operands])
-                for o in dead:
-                    del near[o]  # so that few arrays are alive
-            for k in wanted.intersection(left):
-                _part(values[k], rows, columns)[...] = near[k]
-
-
-def program(function: ca.Function) -> Program:
-    """Of a function of one vector to one vector without empty entries.
-
-    Raises:
-        NotAccepted: for an operation that arrays do not have.
-    """
-    taken = list(steps(function))
-    for step in taken:
-        if step.operation not in (*_OPERATIONS, ca.OP_INPUT, ca.OP_OUTPUT):
-            raise NotAccepted(operation_name(step.operation))
-    return _pruned(taken)
-
-
-def _pruned(taken: Sequence[Instruction]) -> Program:
-    """Without the steps that no result needs."""
-    needed: set[int] = set()
-    for k in range(len(taken) - 1, -1, -1):
-        if taken[k].operation == ca.OP_OUTPUT or k in needed:
-            needed.update((k, *taken[k].operands))
+def _part(formula: Formula, outputs: Sequence[int], known: Collection[int] = ()) -> Formula:
+    """The formula of some steps, in what is known of others, as inputs that have their numbers for names."""
+    needed = set(outputs)
+    for k in range(len(formula.steps) - 1, -1, -1):
+        if k in needed and k not in known:
+            needed.update(formula.steps[k].operands)
     place = {k: number for number, k in enumerate(sorted(needed))}
-    return Program(tuple(taken[k]._replace(operands=tuple(place[o] for o in taken[k].operands)) for k in place))
-
-
-def _leaf(step: Instruction, given: Mapping[int, Any]) -> Any:
-    return np.asarray(given[step.place[1]], dtype=float)[()] if step.operation == ca.OP_INPUT else step.constant
+    steps = [
+        Step(INPUT, (), str(k)) if k in known else step._replace(operands=tuple(place[o] for o in step.operands))
+        for k, step in enumerate(formula.steps)
+        if k in needed
+    ]
+    return Formula(formula.names, tuple(steps), tuple(place[o] for o in outputs))
 
 
 def _axes(shape: tuple[int, ...]) -> int:
@@ -143,7 +78,7 @@ def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
             yield slice(i, i + high), slice(j, j + wide)
 
 
-def _part(value: Any, rows: slice, columns: slice) -> Any:
+def _cut(value: Any, rows: slice, columns: slice) -> Any:
     """What of a value belongs to a block."""
     shape = np.shape(value)
     if shape and shape[-1] != 1:

@@ -1,4 +1,9 @@
-"""Balls as data that lasts: decimals with a radius, and roots made of them."""
+"""Fractions and balls, what they are made of, and as data that lasts: decimals with a radius, and roots of them.
+
+A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), a power series of
+these (`flint.arb_series`), a formula multiplied out, or an array of numbers with bounds of their errors
+(`rounding.Bounded`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +12,11 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.formal import Formal
+from tmsopt.algebra.rounding import Bounded
+
+DIGITS = 60
+_FARTHEST = 2**20  # exponent of two of a fraction made of a ball
 
 GUARD = 5
 """Decimal digits written beyond those asked for."""
@@ -114,3 +123,48 @@ def lower(ball: Any) -> float:
     bottom = ball.lower()
     value = float(bottom)
     return value if flint.arb(value) <= bottom else value * (1 - 2**-51)
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """An angle by its tangent, which is all that coefficients ask of it."""
+
+    tangent: Any
+
+    def tan(self) -> Any:
+        """The tangent."""
+        return self.tangent
+
+
+def is_ball(x: Any) -> bool:
+    """Whether x is a number of ball arithmetic, exact fractions and formulas of these among them."""
+    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal | Bounded | Tilt)
+
+
+def exact(x: Any) -> Any:
+    """A number as an exact fraction, a double as the binary number that it is; balls unchanged."""
+    if is_ball(x):
+        return x
+    return flint.fmpq(*x.as_integer_ratio())
+
+
+def as_ball(x: Any) -> Any:
+    """An exact fraction as a ball of the working precision; balls and series unchanged."""
+    return flint.arb(x) if isinstance(x, flint.fmpq) else x
+
+
+def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
+    """A number as an exact fraction: floats and fractions unchanged, balls by their middle at `digits`.
+
+    A middle that would have millions of bits, as exp(1e300) and its inverse, is a power of two far beyond doubles.
+    """
+    if isinstance(x, flint.fmpq):
+        return x
+    if isinstance(x, flint.arb):
+        figures, exponent = (int(part) for part in x.mid().man_exp())
+        if abs(exponent) <= _FARTHEST:
+            return x.mid().fmpq()
+        far = flint.fmpq(2) ** (_FARTHEST if exponent > 0 else -_FARTHEST)
+        return far if figures > 0 else -far
+    ratio = Fraction(x)
+    return flint.fmpq(ratio.numerator, ratio.denominator)

@@ -11,7 +11,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.walk import NotAccepted
+from tmsopt.algebra.formula import NotAccepted
 
 _WHOLE = 64  # exponent up to which a power is multiplied out
 _MOST = 20_000  # terms

@@ -5,16 +5,16 @@ tan = sin/cos, √x² = x and |x|² = x². What vanishes for another reason is n
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from typing import Any
 
-import casadi as ca
 import flint
 
-from tmsopt.algebra.walk import Arithmetic, NotAccepted, steps
+from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, Kind, NotAccepted, fold
+from tmsopt.algebra.kinds import FLOATS
 
 _WHOLE = 64  # exponent up to which a power is a product
 _MOST = 10**7  # products of two terms in one multiplication; more take minutes, and more memory than there is
@@ -93,57 +93,51 @@ def _power(a: Any, n: int) -> Any:
 
 
 class Field:
-    """Rational functions of the inputs of a function, and of what else it makes of them; one for each function.
+    """Rational functions of the inputs of a formula, and of what else it makes of them; one for each formula."""
 
-    Args:
-        numbers: what the last inputs are; one that is no fraction is an unknown.
-    """
-
-    def __init__(self, function: ca.Function, numbers: Sequence[Any] = ()) -> None:
-        count = function.nnz_in(0)
-        others = sum(step.operation not in (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST) for step in steps(function))
+    def __init__(self, formula: Formula) -> None:
+        each = [formula, *(step.value for step in formula.steps if isinstance(step.value, Formula))]
+        others = sum(step.op not in (INPUT, CONSTANT) for one in each for step in one.steps)
+        count = len(formula.names)
         context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(count + 2 * others + 1)), "lex")
         self._context, self._one = context, context.constant(1)
-        self.inputs = [self._free(k) for k in range(count)]
-        for k, number in enumerate(numbers, start=count - len(numbers)):
-            if isinstance(number, flint.fmpq):
-                self.inputs[k] = Quotient(number * self._one, self._one)
+        self.inputs = {name: self._free(k) for k, name in enumerate(formula.names)}
         self._used = count
-        self._known: list[tuple[int, tuple[Quotient, ...], Quotient]] = []
+        self._known: list[tuple[str, tuple[Quotient, ...], Quotient]] = []
         self._squares: list[tuple[int, Quotient]] = []
+        self.kind = Kind(
+            {**{op: partial(self._applied, op) for op in FLOATS.operations}, **self._rational()}, self.number
+        )
 
-    def arithmetic(self) -> Arithmetic:
-        """CasADi's operations; numbers are the decimals that they print as."""
-        rational: dict[int, Callable[..., Any]] = {
-            ca.OP_CONST: self.number,
-            ca.OP_ADD: lambda a, b: a + b,
-            ca.OP_SUB: lambda a, b: a - b,
-            ca.OP_MUL: lambda a, b: a * b,
-            ca.OP_DIV: lambda a, b: a / b,
-            ca.OP_INV: lambda a: 1 / a,
-            ca.OP_NEG: lambda a: -a,
-            ca.OP_SQ: lambda a: a * a,
-            ca.OP_TWICE: lambda a: 2 * a,
-            ca.OP_POW: self._power,
-            ca.OP_CONSTPOW: self._power,
-            ca.OP_SQRT: lambda a: self._applied(ca.OP_SQRT, a, square=lambda: a),
-            ca.OP_FABS: lambda a: self._applied(ca.OP_FABS, a, square=lambda: a * a),
-            ca.OP_COS: partial(self._applied, ca.OP_COS),
-            ca.OP_SIN: self._sine,
-            ca.OP_TAN: lambda a: self._sine(a) / self._applied(ca.OP_COS, a),
+    def _rational(self) -> dict[str, Callable[..., Any]]:
+        return {
+            "add": lambda a, b: a + b,
+            "sub": lambda a, b: a - b,
+            "mul": lambda a, b: a * b,
+            "div": lambda a, b: a / b,
+            "neg": lambda a: -a,
+            "square": lambda a: a * a,
+            "pow": self._power,
+            "pi": partial(self._applied, "pi"),
+            "sqrt": lambda a: self._applied("sqrt", a, square=lambda: a),
+            "abs": lambda a: self._applied("abs", a, square=lambda: a * a),
+            "cos": partial(self._applied, "cos"),
+            "sin": self._sine,
+            "tan": lambda a: self._sine(a) / self._applied("cos", a),
         }
-        every = {getattr(ca, name) for name in dir(ca) if name.startswith("OP_")}
-        return {**{op: partial(self._applied, op) for op in every}, **rational}
 
-    def number(self, x: float) -> Quotient:
-        return Quotient(flint.fmpq(*Fraction(repr(x)).as_integer_ratio()) * self._one, self._one)
+    def number(self, x: Constant) -> Quotient:
+        """A constant; one that is no fraction by what is known of its functions."""
+        if isinstance(x, Formula):
+            return fold(x, {}, self.kind)[0]  # type: ignore[no-any-return]
+        return Quotient(flint.fmpq(*Fraction(x).as_integer_ratio()) * self._one, self._one)
 
     def vanishes(self, x: Any) -> bool:
         """Whether an element is 0 for all values; what is true is certain."""
         if not isinstance(x, Quotient):
             return bool(x == 0)
         for at, square in reversed(self._squares):
-            powers, rest = [self.number(1.0)], self.number(0.0)
+            powers, rest = [self.number(Fraction(1))], self.number(Fraction(0))
             for exponents, coefficient in x.over.to_dict().items():
                 while len(powers) <= exponents[at] // 2:
                     powers.append(powers[-1] * square)
@@ -153,7 +147,7 @@ class Field:
             x = rest
         return not x.over
 
-    def _applied(self, operation: int, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
+    def _applied(self, operation: str, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
         """An unknown for what a function makes of its operands, the same for the same."""
         for known, given, made in self._known:
             if known == operation and all(a == b for a, b in zip(given, operands, strict=True)):
@@ -166,14 +160,14 @@ class Field:
         return made
 
     def _sine(self, a: Quotient) -> Quotient:
-        cosine = self._applied(ca.OP_COS, a)
-        return self._applied(ca.OP_SIN, a, square=lambda: 1 - cosine * cosine)
+        cosine = self._applied("cos", a)
+        return self._applied("sin", a, square=lambda: 1 - cosine * cosine)
 
     def _power(self, a: Quotient, b: Quotient) -> Quotient:
         exponent = b.over.leading_coefficient() / b.under.leading_coefficient() if b.over else flint.fmpq(0)
         whole = b.over.is_constant() and b.under.is_constant() and exponent.q == 1
         if not whole or abs(exponent) > _WHOLE:
-            return self._applied(ca.OP_POW, a, b)
+            return self._applied("pow", a, b)
         n = int(exponent.p)
         return a**n if n >= 0 else 1 / a**-n
 

@@ -7,8 +7,8 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.algebra.operations import BALLS
-from tmsopt.algebra.walk import Arithmetic, walk
+from tmsopt.algebra.formula import Formula, fold, from_casadi
+from tmsopt.algebra.kinds import INTERVALS
 
 Interval = tuple[float, float]
 
@@ -35,13 +35,15 @@ def outwards(lower: float, upper: float) -> Interval:
     return (lower, upper) if lower == upper else (math.nextafter(lower, -math.inf), math.nextafter(upper, math.inf))
 
 
-def ranges(function: ca.Function, box: Sequence[Interval]) -> list[list[Interval]]:
-    """Ranges of all outputs of a function of one vector over a box; without bounds where it may not exist.
+def ranges(asked: ca.Function | Formula, box: Sequence[Interval]) -> list[Interval]:
+    """Ranges of the outputs of a function over a box; without bounds where it may not exist.
 
     Raises:
         NotAccepted: for an operation that has no interval arithmetic here.
     """
-    return [[interval(x) for x in row] for row in walk(function, [ball(ends) for ends in box], INTERVALS)]
+    formula = asked if isinstance(asked, Formula) else from_casadi(asked)
+    over = {name: ball(ends) for name, ends in zip(formula.names, box, strict=True)}
+    return [interval(x) for x in fold(formula, over, INTERVALS)]
 
 
 def root_bound(coefficients: Sequence[Interval]) -> float:
@@ -57,25 +59,3 @@ def root_bound(coefficients: Sequence[Interval]) -> float:
         n = len(a) - 1
         terms = [(abs(c).upper() / least / (2 if k == n else 1)).root(k) for k, c in enumerate(a[1:], start=1)]
         return max(interval(2 * t)[1] for t in terms)
-
-
-def square(x: Any) -> Any:
-    """x², not negative."""
-    # abs(x) of a ball around 0 reaches below 0, by as much as the ball has on its lesser side
-    return (x.abs_lower() ** 2).union(x.abs_upper() ** 2) if x.is_finite() else flint.arb(0, math.inf)
-
-
-def _power(x: Any, y: Any) -> Any:
-    """x to the power y; whole powers of any x."""
-    if y.is_integer():
-        exponent = int(float(y))
-        if exponent < 0:
-            return 1 / _power(x, flint.arb(-exponent))
-        if exponent % 2 == 0:
-            return square(x ** (exponent // 2))
-        return x**exponent
-    return x**y
-
-
-INTERVALS: Arithmetic = {**BALLS, ca.OP_CONST: flint.arb, ca.OP_SQ: square, ca.OP_POW: _power, ca.OP_CONSTPOW: _power}
-"""Operations on balls as wide as a box, where an even power must not reach below 0."""

@@ -8,7 +8,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.algebra.elementary import exact
+from tmsopt.algebra.balls import exact
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.model import Matrix
 from tmsopt.roots.polynomial import characteristic_polynomial

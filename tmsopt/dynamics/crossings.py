@@ -13,7 +13,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.balls import rational
 from tmsopt.models import Model
 from tmsopt.models.user_spectrum import user_roots, user_structure_name
 from tmsopt.roots.exact import exact_roots

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.algebra.elementary import exact
+from tmsopt.algebra.balls import exact
 from tmsopt.dynamics.crossings import Crossing, Stretch, crossings, each_told, told
 from tmsopt.dynamics.modes import Mode, modes
 from tmsopt.dynamics.speeds import coefficients_over, speed_of

@@ -7,9 +7,9 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import exact, rational
+from tmsopt.algebra.balls import exact, rational
 from tmsopt.algebra.formal import Formal, variable
-from tmsopt.algebra.walk import NotAccepted
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.boundaries.surroundings import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, told
 from tmsopt.errors import Fault, InputError, short, suggest

@@ -18,14 +18,13 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.algebra.elementary import as_ball, exact, quotient
-from tmsopt.algebra.walk import steps
+from tmsopt.algebra.balls import Tilt, as_ball, exact
+from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, made, trace
+from tmsopt.algebra.kinds import quotient
 from tmsopt.models import Model, ParameterSet
-from tmsopt.models.exact import Tilt
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Bound
 from tmsopt.program.nlp import objective_size
@@ -45,11 +44,8 @@ _MORE = 8  # designs at which a relation is tried beyond those that determine it
 _DEPENDENT = 1e-9  # singular value of the coefficients at random designs, relative, above which there is no relation
 _FINENESS = 2**40  # steps of a range, one of which an exact design takes at random
 
-_RATIONAL = {
-    *(ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST, ca.OP_ADD, ca.OP_SUB, ca.OP_NEG, ca.OP_TWICE, ca.OP_MUL, ca.OP_SQ),
-    *(ca.OP_DIV, ca.OP_INV),
-}
-"""Operations that make rational functions; CasADi writes whole powers with these."""
+_RATIONAL = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div"}
+"""Operations that make rational functions, beside whole powers."""
 
 Box = Mapping[str, tuple[float, float]]
 Exact = Mapping[str, Any]
@@ -268,11 +264,14 @@ def relation_bound(problem: Problem) -> float:
 @lru_cache(maxsize=64)
 def is_rational(model: Model, of: ParameterSet) -> bool:
     """Whether the coefficients are rational functions of the parameters of a set, or of the tangents of angles."""
-    symbols = {n: ca.SX.sym(n) for n in of.names}
-    own = {n: ca.atan(s) if of[n].tangent else s for n, s in symbols.items()}
-    column = ca.vertcat(*map(ca.SX, model.coefficients(own, of)))
-    function = ca.Function("coefficients", [ca.vertcat(*symbols.values())], [ca.densify(column)])
-    return all(step.operation in _RATIONAL for step in steps(function))
+    tangents = {p.name for p in of.parameters if p.tangent}
+    coefficients = trace(
+        lambda x: model.coefficients({n: made("atan", s) if n in tangents else s for n, s in x.items()}, of), of.names
+    )
+    wholes = {k for k, s in enumerate(coefficients.steps) if isinstance(s.value, Fraction) and s.value.denominator == 1}
+    powers = (s.op == "pow" and s.operands[1] in wholes for s in coefficients.steps)
+    rational = (s.op in _RATIONAL and not isinstance(s.value, Formula) for s in coefficients.steps)
+    return all(one or other for one, other in zip(rational, powers, strict=True))
 
 
 def relations(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt import laws
+from tmsopt.algebra.kinds import BALLS
 from tmsopt.algebra.rounding import Bounded, as_bounded
 from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.evaluation.law_rows import SAME_LAW
@@ -102,7 +103,7 @@ def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[st
     doubles = {name: settled(number) for name, number in known.items()}
     for name, number in known.items():
         wide.define(name, number)
-    objective = np.full(m, np.nan) if problem.objective is None else settled(problem.objective.enclosure(wide))
+    objective = np.full(m, np.nan) if problem.objective is None else settled(problem.objective.of(wide, BALLS))
     plain = Values(model, of, {n: np.asarray(x) for n, x in given.items()}, extra=ARRAY_ROOT_QUANTITIES)
     for name, column in (doubles | {ANGULAR_FREQUENCY: found.frequency}).items():
         plain.define(name, column)
@@ -159,7 +160,7 @@ def _violations(problem: Problem, values: Values, found: Motions) -> tuple[dict[
     m = len(found.simple)
     amounts, doubt = {}, np.zeros(m, dtype=bool)
     for name, condition in problem.conditions.items():
-        left, right = (_column(side, m) for side in condition.each(values))
+        left, right = (_column(side, m) for side in condition.sides(values))
         difference = left - right
         excess, size = condition.excess(difference), np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
         relative = excess / size

@@ -12,7 +12,8 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import exact, greater, lesser
+from tmsopt.algebra.balls import exact
+from tmsopt.algebra.kinds import BALLS, greater, lesser
 from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.models import Model, Values
 from tmsopt.models.user_spectrum import user_roots
@@ -213,7 +214,7 @@ class _Design:
             values = self.values(case)
             for name, ball in known.items():
                 values.define(name, ball)
-            found.append(objective.enclosure(values))
+            found.append(objective.of(values, BALLS))
         return reduce(lesser if self.problem.sense == "maximize" else greater, found)
 
 

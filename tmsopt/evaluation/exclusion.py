@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import casadi as ca
 
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.algebra.intervals import ranges
-from tmsopt.algebra.walk import NotAccepted
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.problem.limit import limit_of, limit_side
@@ -53,7 +53,7 @@ def _excluded(problem: Problem) -> bool:
         return False
     rows = ca.Function("rows", [ca.vertcat(*build.x)], [ca.densify(ca.vertcat(*(row[1] for row in build.rows)))])
     try:
-        found = ranges(rows, build.bounds)[0]
+        found = ranges(rows, build.bounds)
     except NotAccepted:
         return False
     return any(

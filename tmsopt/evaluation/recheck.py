@@ -10,8 +10,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.algebra.formula import Formula, NotAccepted, from_casadi
 from tmsopt.algebra.intervals import ranges
-from tmsopt.algebra.walk import NotAccepted
 from tmsopt.boundaries.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
 from tmsopt.models.user_spectrum import public_names
@@ -179,21 +179,21 @@ def _beyond(problem: Problem, condition: Expression, values: Values) -> bool:
     except NotAccepted:
         return False
     with np.errstate(invalid="ignore"):  # a slope may be without bound
-        slack = float(np.abs(around[1]).max(axis=1) @ reach)
+        slack = float(np.abs(around[1:]).max(axis=1) @ reach)
     signs = (1.0, -1.0) if condition.equality else (condition.sign,)
-    return any(min(s * e for e in centre[0][0]) > slack or min(s * e for e in around[0][0]) > 0 for s in signs)
+    return any(min(s * e for e in centre[0]) > slack or min(s * e for e in around[0]) > 0 for s in signs)
 
 
 @lru_cache(maxsize=256)
-def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> ca.Function:
+def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
     """A condition and its slopes, as a function of parameters and root quantities."""
     symbols = {name: ca.SX.sym(name) for name in names}
     of = model.parameter_set(set_name)
     values = Values(model, of, {n: symbols[n] for n in of.names})
     for name in names[len(of.names) :]:
         values.define(name, symbols[name])
-    difference, x = ca.SX(condition.symbolic(values)), ca.vertcat(*symbols.values())
-    return ca.Function("sloped", [x], [difference, ca.densify(ca.gradient(difference, x))])
+    difference, x = ca.SX(condition(values)), ca.vertcat(*symbols.values())
+    return from_casadi(ca.Function("sloped", [x], [difference, ca.densify(ca.gradient(difference, x))]))
 
 
 def excesses(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:

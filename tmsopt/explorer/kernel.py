@@ -1,18 +1,15 @@
-"""The elementwise formulas of polynomials, run on traced numbers, as JavaScript functions: they have no second home.
+"""The elementwise formulas of polynomials, traced, as JavaScript functions: they have no second home.
 
 The names `where` and `one` mean something else in these functions. Those of quartics are taken from
 `tmsopt.roots.quartics`; the conditions of stability of the lower degrees from `lienard_chipart`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
-import numpy as np
-
-from tmsopt.explorer import javascript as js
-from tmsopt.explorer.javascript import Spelling, Step
+from tmsopt.algebra.formula import made, trace
+from tmsopt.explorer.javascript import function
 from tmsopt.roots import lienard_chipart
 from tmsopt.roots.quartics import factors, quartic, signs
 
@@ -31,7 +28,7 @@ def kernel_script(degree: int) -> str:
     parts = [
         _traced("factorAbscissa", ["p", "q"], lambda p, q: [_OF.abscissa(p, q)]),
         _traced("factorDamping", ["p", "q"], lambda p, q: [_OF.damping_ratio(p, q)]),
-        _traced("factorRoots", ["p", "q"], _parts_of_pair, "z"),
+        _traced("factorRoots", ["p", "q"], _OF.root_pair, "z"),
     ]
     if degree < _QUARTIC:
         parts.append(_traced("stableBySigns", a, lambda *c: [_stable(c)]))
@@ -48,106 +45,11 @@ def kernel_script(degree: int) -> str:
     return "\n".join(parts) + "\n"
 
 
-@dataclass
-class _Tape:
-    """Steps in the order in which they were taken, each once."""
-
-    steps: list[Step] = field(default_factory=list)
-    places: dict[Step, int] = field(default_factory=dict)
-
-    def add(self, spelling: Spelling, *operands: "_Traced | float") -> "_Traced":
-        step = Step(spelling, tuple(self.constant(o).place for o in operands))
-        if step not in self.places:
-            self.places[step] = len(self.steps)
-            self.steps.append(step)
-        return _Traced(self, self.places[step], spelling.truth)
-
-    def constant(self, value: "_Traced | float") -> "_Traced":
-        return value if isinstance(value, _Traced) else self.add(js.number(float(value)))
+def _where(condition: Any, yes: Any, no: Any) -> Any:
+    return made("choose", condition, yes, no)
 
 
-def _binary(spelling: Spelling, truths: Spelling | None = None) -> Any:
-    def forward(self: "_Traced", other: Any) -> Any:
-        if isinstance(other, _Pair):
-            return NotImplemented
-        return self.tape.add(truths if truths and self.truth else spelling, self, other)
-
-    return forward
-
-
-def _reflected(spelling: Spelling) -> Any:
-    return lambda self, other: self.tape.add(spelling, other, self)
-
-
-_FUNCTIONS = {
-    np.sqrt: js.call("sqrt"),
-    np.abs: js.call("abs"),
-    np.absolute: js.call("abs"),
-    np.maximum: js.call("max", 2),
-    np.minimum: js.call("min", 2),
-    np.cbrt: js.call("cbrt"),
-}
-
-
-@dataclass(frozen=True, eq=False)
-class _Traced:
-    """A number, or a truth, that is known when the page runs."""
-
-    tape: _Tape
-    place: int
-    truth: bool = False
-
-    __add__, __radd__ = _binary(js.ADD), _reflected(js.ADD)
-    __sub__, __rsub__ = _binary(js.SUBTRACT), _reflected(js.SUBTRACT)
-    __mul__, __truediv__ = _binary(js.MULTIPLY), _binary(js.DIVIDE)
-    __rtruediv__ = _reflected(js.DIVIDE)
-    __lt__, __le__ = _binary(js.LESS), _binary(js.AT_MOST)
-    __gt__, __ge__ = _reflected(js.LESS), _reflected(js.AT_MOST)
-    __eq__, __ne__ = _binary(js.EQUAL, js.SAME), _binary(js.UNEQUAL, js.DIFFERENT)
-    __and__, __or__ = _binary(js.AND), _binary(js.OR)
-    __hash__ = object.__hash__
-
-    def __neg__(self) -> "_Traced":
-        return self.tape.add(js.NEGATE, self)
-
-    def __invert__(self) -> "_Traced":
-        return self.tape.add(js.NOT, self)
-
-    def __rmul__(self, other: Any) -> Any:
-        if isinstance(other, complex):
-            assert other == 1j
-            return _Pair(self.tape.constant(0.0), self)
-        return self.tape.add(js.MULTIPLY, other, self)
-
-    def __array_ufunc__(self, function: Any, method: str, *given: Any) -> Any:
-        return self.tape.add(_FUNCTIONS[function], *given)
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """A complex number: its real and imaginary part."""
-
-    re: _Traced
-    im: _Traced
-
-    def __radd__(self, other: _Traced) -> "_Pair":
-        return _Pair(other, self.im)
-
-    def __rsub__(self, other: _Traced) -> "_Pair":
-        return _Pair(other, -self.im)
-
-
-def _where(condition: _Traced, yes: Any, no: Any) -> Any:
-    if isinstance(yes, _Pair):
-        return _Pair(_where(condition, yes.re, no), _where(condition, yes.im, 0.0))
-    return condition.tape.add(js.CHOOSE, condition, yes, no)
-
-
-def _as_integer(condition: _Traced) -> _Traced:
-    return condition.tape.add(js.CHOOSE, condition, 1.0, 0.0)
-
-
-_KNOWN: dict[str, Any] = {"where": _where, "one": _as_integer}
+_KNOWN: dict[str, Any] = {"where": _where, "one": lambda condition: _where(condition, 1, 0)}
 for _each in (
     factors.ordered,
     factors.largest_root,
@@ -165,7 +67,7 @@ for _each in (
 _OF = SimpleNamespace(**_KNOWN)
 
 
-def _started(*a: Any) -> list[Any]:
+def _started(*a: Any) -> Sequence[Any]:
     monic = _OF.monic(*a)
     found = _OF.start(*monic)
     return [*monic, *found, _OF.error(*monic, *found)]
@@ -181,11 +83,6 @@ def _packed(*a: Any) -> list[Any]:
     return [_where(doubtful, 64.0, kind + 8.0 * count)]
 
 
-def _parts_of_pair(p: Any, q: Any) -> list[Any]:
-    first, second = _OF.root_pair(p, q)
-    return [first.re, first.im, second.re, second.im]
-
-
 def _stable(c: Sequence[Any]) -> Any:
     """As `tmsopt.roots.is_stable` up to degree 4: the signs of the rounded conditions."""
     up, down = c[0] > 0.0, c[0] < 0.0
@@ -196,9 +93,7 @@ def _stable(c: Sequence[Any]) -> Any:
     return held
 
 
-def _traced(name: str, arguments: Sequence[str], formula: Callable[..., list[Any]], into: str = "") -> str:
-    tape = _Tape()
-    results = formula(*(tape.add(Spelling(n)) for n in arguments))
-    places = [tape.constant(r).place for r in results]
+def _traced(name: str, arguments: Sequence[str], compute: Callable[..., Sequence[Any]], into: str = "") -> str:
+    traced = trace(lambda x: compute(*x.values()), arguments)
     taken = [*arguments, into] if into else arguments
-    return js.function(f"function {name}", taken, tape.steps, places, fills=bool(into))
+    return function(f"function {name}", taken, traced, {n: n for n in arguments}, fills=bool(into))

@@ -8,8 +8,8 @@ from itertools import count
 
 import numpy as np
 
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.algebra.intervals import ranges
-from tmsopt.algebra.walk import NotAccepted
 from tmsopt.global_search.question import Question
 from tmsopt.global_search.race import SolverPool
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
@@ -144,7 +144,7 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
         nlp = question.program(sign)
         x = initial_point(nlp, question.problem, design)
         rows = np.array(nlp.at(x)[1]).ravel()
-        reached = ranges(nlp.functions, list(zip(nlp.lower, nlp.upper, strict=True)))[1]
+        _, *reached = ranges(nlp.functions, list(zip(nlp.lower, nlp.upper, strict=True)))
         sizes = np.array([max(map(abs, ends)) for ends in reached])
         sizes = np.where(np.isfinite(sizes), np.maximum(sizes, 1e-300), 1.0)
         off = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / sizes

@@ -11,9 +11,10 @@ import flint
 
 from tmsopt.algebra.balls import Number, number
 from tmsopt.algebra.formal import variable
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.algebra.intervals import interval
+from tmsopt.algebra.kinds import BALLS
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
-from tmsopt.algebra.walk import NotAccepted
 from tmsopt.global_search.conditions import Ends, Sheet, sheets
 from tmsopt.global_search.pruning import Box, Pruned, Puzzle, ends, halves, partial, prune, tree
 from tmsopt.killable import Killable
@@ -244,7 +245,7 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     for condition in sheet.problem.conditions.values():
         if not condition.equality:
             try:
-                limits.append(-condition.sign * condition.enclosure(values))
+                limits.append(-condition.sign * condition.of(values, BALLS))
             except (NotAccepted, TypeError, KeyError, ZeroDivisionError):
                 continue  # it takes no part, and is asked of every design that is found
     box = tuple(_range(ends) for ends in _ends(sheet))
@@ -308,7 +309,7 @@ def _standing(zero: _Zero) -> str | None:
     room += [("", x) for x in sheet.ascending(at)]
     for name, condition in sheet.problem.conditions.items():
         if not condition.equality:
-            excess = condition.sign * flint.arb(condition.enclosure(values))
+            excess = condition.sign * flint.arb(condition.of(values, BALLS))
             if not excess.is_finite() and not _met(sheet.problem, condition, at):
                 return None
             room.append((f"constraint {name}", -excess))

@@ -12,7 +12,8 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import exact, quotient
+from tmsopt.algebra.balls import exact
+from tmsopt.algebra.kinds import BALLS, quotient
 from tmsopt.models import Quantity, Values
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Problem
@@ -119,8 +120,8 @@ def others(
     values: Values, lifted: Sequence[Quantity], equalities: Sequence[Expression], at: Mapping[str, Any]
 ) -> list[Any]:
     """Left sides of the equations beside those of a pattern: of quantities that are unknowns, and == constraints."""
-    left = [q.equation(values, at[q.name]) for q in lifted if q.equation]
-    return left + [e.enclosure(values) for e in equalities]
+    left = [values.fold(q.left_side, {q.name: at[q.name]})[0] for q in lifted if q.equation]
+    return left + [e.of(values, BALLS) for e in equalities]
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def compact(model: Model, values: Values) -> list[Any]:
 def over(build: Builder, expressions: Sequence[Any]) -> list[Interval]:
     """Ranges of expressions over the variables so far, by interval arithmetic."""
     function = ca.Function("over", [ca.vertcat(*build.x)], [ca.densify(ca.vertcat(*map(ca.SX, expressions)))])
-    return ranges(function, build.bounds)[0]
+    return ranges(function, build.bounds)
 
 
 def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lifted:

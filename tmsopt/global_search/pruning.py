@@ -15,8 +15,8 @@ import flint
 import numpy as np
 
 from tmsopt.algebra.formal import Formal, Symbol, by_symbol
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.algebra.intervals import interval
-from tmsopt.algebra.walk import NotAccepted
 
 Tree = tuple[Any, ...]
 """``("x", number of a variable)``, ``("c", least, greatest)``, ``("+", tree, tree)``, ``("*", tree, tree)``,

@@ -12,7 +12,7 @@ from functools import partial
 import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.walk import NotAccepted
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.global_search.half_planes import Frame, bound_unknowns, compact, half_planes, over, sectors
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import rewards_change_of
@@ -114,7 +114,7 @@ def _threshold(condition: Expression, name: str, worse: float) -> float | None:
     if condition.names != (name,) or condition.equality:
         return None
     symbol = ca.SX.sym(name)
-    difference = ca.SX(condition.symbolic({name: symbol}))
+    difference = ca.SX(condition({name: symbol}))
     if not ca.is_linear(difference, symbol):  # |ζ| ≥ 1/2 looks linear from 0 to 1
         return None
     at = [float(condition({name: value})) for value in (0.0, 1.0)]

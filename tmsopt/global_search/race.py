@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 
-from tmsopt.algebra.walk import NotAccepted
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.global_search.tasks import INFEASIBLE, UNDECIDED, Decision, Failed, GlobalSolver, Task
 from tmsopt.killable import Killable, ProcessEnded
 

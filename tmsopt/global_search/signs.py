@@ -3,11 +3,10 @@
 from collections import deque
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from tmsopt.algebra.formula import NotAccepted, formula, symbol
 from tmsopt.algebra.intervals import ranges
-from tmsopt.algebra.walk import NotAccepted
 from tmsopt.problem.problem import Problem
 from tmsopt.roots import hurwitz_minors
 
@@ -22,12 +21,8 @@ def none_stable(problem: Problem) -> bool:
     """
     if problem.cases or not problem.free:
         return False
-    x = ca.SX.sym("x", len(problem.free))
-    a = problem.model.coefficients(
-        problem.ordered(dict(zip(problem.free, ca.vertsplit(x), strict=True))), problem.parameter_set
-    )
-    tests = ca.vertcat(*map(ca.SX, [*a, *_determinants(a)]))
-    function = ca.Function("signs", [x], [ca.densify(tests)], {"cse": True})
+    a = problem.model.coefficients(problem.ordered({n: symbol(n) for n in problem.free}), problem.parameter_set)
+    tests = formula([*a, *_determinants(a)], problem.free)
     left = deque([[(lo, hi) for lo, hi in problem.free.values()]])
     widths = np.array([hi - lo for lo, hi in problem.free.values()])
     for _ in range(_BOXES):
@@ -35,7 +30,7 @@ def none_stable(problem: Problem) -> bool:
             return True
         box = left.popleft()
         try:
-            (ends,) = (np.array(row) for row in ranges(function, box))
+            ends = np.array(ranges(tests, box))
         except NotAccepted:
             return False
         if (ends[:, 0] > 0).any() and (ends[:, 1] < 0).any():

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from tmsopt.algebra.walk import NotAccepted
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.evaluation.recheck import Evaluation, recheck
 from tmsopt.global_search.answer import Answer, Clock, answer, contradicted, doubt
 from tmsopt.global_search.question import Question, unit_of

@@ -7,13 +7,14 @@ what the formula shares, the relaxation shares. Quotients, radicals and arctange
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
-import casadi as ca
 import flint
 
-from tmsopt.algebra.intervals import INTERVALS, Interval, ball, interval
-from tmsopt.algebra.walk import NotAccepted, walk
+from tmsopt.algebra.formula import Kind, NotAccepted, fold, from_casadi
+from tmsopt.algebra.intervals import Interval, ball, interval
+from tmsopt.algebra.kinds import INTERVALS, as_double
 from tmsopt.program.nlp import NLP
 
 FEASIBILITY = 1e-9
@@ -23,6 +24,8 @@ _LEAST_POWER = -60  # of two, of a scale: what is smaller is as good as 0
 _HUGE = 1e15  # beyond which numbers are left to nobody: from 1e20 SCIP takes them for infinite
 _LARGE = 1e3  # numbers up to which a coefficient below 1e-9 counts for nothing: SCIP drops it
 _WHOLE = 1000  # exponent up to which a power is taken
+
+_OVER = INTERVALS.operations
 
 _CANCELLED = 2.0**-10
 """Of the largest summand: rows are not scaled by less, lest they be held to less than a rounding."""
@@ -53,10 +56,11 @@ def translate(nlp: NLP) -> Translated:
     """
     built = _Translation()
     x = [built.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
-    objective, rows = walk(nlp.functions, x, built.arithmetic(), built.variable)
+    formula = from_casadi(nlp.functions)
+    objective, *rows = fold(formula, dict(zip(formula.names, x, strict=True)), built.kind(), built.variable)
     for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
         built.between(row, lower, upper)
-    least = built.variable(objective[0]).expression
+    least = built.variable(objective).expression
     return Translated(built.scip, tuple((v.symbol, v.scale) for v in x), least, built.impossible)
 
 
@@ -152,34 +156,32 @@ class _Translation:
         if math.isfinite(upper):
             self.scip.addCons(term.expression / size <= upper / size)
 
-    def arithmetic(self) -> dict[int, Any]:
-        """CasADi's operations."""
-        functions = {"exp": ca.OP_EXP, "log": ca.OP_LOG, "sin": ca.OP_SIN, "cos": ca.OP_COS}
-        return {
-            ca.OP_CONST: _constant,
-            ca.OP_ADD: lambda a, b: self.sum(a, b, 1.0),
-            ca.OP_SUB: lambda a, b: self.sum(a, b, -1.0),
-            ca.OP_NEG: lambda a: self.times(a, -1.0),
-            ca.OP_TWICE: lambda a: self.times(a, 2.0),
-            ca.OP_MUL: self.product,
-            ca.OP_SQ: self.square,
-            ca.OP_DIV: self.quotient,
-            ca.OP_INV: lambda a: self.quotient(_constant(1.0), a),
-            ca.OP_SQRT: self.root,
-            ca.OP_POW: self.power,
-            ca.OP_CONSTPOW: self.power,
-            ca.OP_TAN: self.tangent,
-            ca.OP_ATAN: lambda a: self.once("angle", self.variable(a), self.arctangent),
-            ca.OP_ASIN: lambda a: self.inverse(a, "sin", ca.OP_ASIN),
-            ca.OP_ACOS: lambda a: self.inverse(a, "cos", ca.OP_ACOS),
-            ca.OP_FABS: self.size,
-            ca.OP_FMAX: lambda a, b: self.extreme(a, b, 0.5),
-            ca.OP_FMIN: lambda a, b: self.extreme(a, b, -0.5),
-            **{op: lambda a, name=name, op=op: self.applied(a, name, op) for name, op in functions.items()},
-        }
+    def kind(self) -> Kind:
+        """Terms as numbers of a formula."""
+        return Kind(
+            {
+                "add": lambda a, b: self.sum(a, b, 1.0),
+                "sub": lambda a, b: self.sum(a, b, -1.0),
+                "neg": lambda a: self.times(a, -1.0),
+                "mul": self.product,
+                "square": self.square,
+                "div": self.quotient,
+                "sqrt": self.root,
+                "pow": self.power,
+                "tan": self.tangent,
+                "atan": lambda a: self.once("angle", self.variable(a), self.arctangent),
+                "asin": lambda a: self.inverse(a, "sin", "asin"),
+                "acos": lambda a: self.inverse(a, "cos", "acos"),
+                "abs": self.size,
+                "max": lambda a, b: self.extreme(a, b, 0.5),
+                "min": lambda a, b: self.extreme(a, b, -0.5),
+                **{name: partial(self.applied, name) for name in ("exp", "log", "sin", "cos")},
+            },
+            lambda value: _constant(float(as_double(value))),
+        )
 
     def sum(self, a: Term, b: Term, sign: float) -> Term:
-        over = INTERVALS[ca.OP_ADD](a.ball, sign * b.ball)
+        over = a.ball + sign * b.ball
         return Term(a.expression + sign * b.expression, max(a.degree, b.degree), over, max(a.size, b.size))
 
     def times(self, a: Term, factor: float) -> Term:
@@ -195,7 +197,7 @@ class _Translation:
         return Term(a.expression * b.expression, 2, a.ball * b.ball, a.size * b.size)
 
     def square(self, a: Term) -> Term:
-        return replace(self.product(a, a), ball=INTERVALS[ca.OP_SQ](a.ball))
+        return replace(self.product(a, a), ball=_OVER["square"](a.ball))
 
     def quotient(self, a: Term, b: Term) -> Term:
         """q with q b = a; where b may vanish, of any size."""
@@ -218,14 +220,14 @@ class _Translation:
         if b.degree > 0:  # a^b = exp(b log a), where a cannot be 0, nor negative with a b that is whole
             if not a.ends[0] > 0:
                 raise NotAccepted("a power with a variable exponent of what may be 0 or negative")
-            return self.applied(self.product(b, self.applied(a, "log", ca.OP_LOG)), "exp", ca.OP_EXP)
+            return self.applied("exp", self.product(b, self.applied("log", a)))
         exponent = b.expression
         if exponent == 0.5:
             return self.root(a)
         if abs(exponent) > _WHOLE:
             raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
         if a.degree > 0 and a.ball.is_finite():
-            _refuse_huge(INTERVALS[ca.OP_POW](a.ball, b.ball), "a power")
+            _refuse_huge(_OVER["pow"](a.ball, b.ball), "a power")
         if exponent < 0:
             return self.quotient(_constant(1.0), self.power(a, _constant(-exponent)))
         if exponent != int(exponent):
@@ -247,17 +249,17 @@ class _Translation:
         self.equal(v.expression, a.expression**exponent, v.scale)
         return v
 
-    def applied(self, a: Term, name: str, operation: int) -> Term:
-        """A function that SCIP has; CasADi itself computes those of numbers, but for the base of a power."""
+    def applied(self, name: str, a: Term) -> Term:
+        """A function that SCIP has; of a number where that is the base of a power."""
         if a.degree == 0:
             return _constant(getattr(math, name)(a.expression))
         if name == "exp":
-            _refuse_huge(INTERVALS[operation](a.ball), "exp")
+            _refuse_huge(_OVER[name](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
             part: Term = self.once("circle", a.tangent, self.on_circle)[name == "sin"]
             return part
         a = self.variable(a)
-        v = self.defined(INTERVALS[operation](a.ball))
+        v = self.defined(_OVER[name](a.ball))
         if name == "log":  # SCIP keeps the argument of its own away from 0
             self.equal(a.expression, self.functions.exp(v.expression), a.scale)
         else:
@@ -284,12 +286,12 @@ class _Translation:
     def tangent(self, a: Term) -> Term:
         if a.tangent is not None:
             return a.tangent
-        return self.quotient(self.applied(a, "sin", ca.OP_SIN), self.applied(a, "cos", ca.OP_COS))
+        return self.quotient(self.applied("sin", a), self.applied("cos", a))
 
-    def inverse(self, a: Term, name: str, operation: int) -> Term:
+    def inverse(self, a: Term, name: str, inverse: str) -> Term:
         """An angle whose sine or cosine is given."""
         ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
-        over = INTERVALS[operation](a.ball)
+        over = _OVER[inverse](a.ball)
         angle = self.defined(over) if over.is_finite() else self.free(*ends)
         self.equal(self.variable(a).expression, getattr(self.functions, name)(angle.expression))
         return angle

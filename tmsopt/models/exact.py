@@ -10,7 +10,9 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import DIGITS, rational
+from tmsopt.algebra.balls import DIGITS, Tilt, rational
+from tmsopt.algebra.formula import fold
+from tmsopt.algebra.kinds import BALLS
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.expression import Expression, parse_value
 from tmsopt.models.model import Model, ParameterSet
@@ -45,7 +47,7 @@ class Exact:
     def ball(self) -> Any:
         """The number, an angle in radians, as a ball at the working precision."""
         value: Any = self.value
-        ball = flint.arb(rational(value) if isinstance(value, Fraction) else value.enclosure({}))
+        ball = flint.arb(rational(value) if isinstance(value, Fraction) else fold(value.formula, {}, BALLS)[0])
         return ball * flint.arb.pi() / 180 if self.degrees else ball
 
     def times(self, factor: Fraction) -> "Exact":
@@ -83,7 +85,7 @@ def constant(text: str) -> Exact:
     except (ValueError, ZeroDivisionError):
         expression = parse_value(text, (), "8/3")
         with flint.ctx.workdps(DIGITS):
-            number = expression.enclosure({})
+            number = fold(expression.formula, {}, BALLS)[0]
         if isinstance(number, flint.fmpq):
             number = Fraction(int(number.p), int(number.q))
         elif number.is_finite():
@@ -190,17 +192,6 @@ class Written:
         if name in self.tangents:
             return f"tan({name})", str(self.tangents[name])
         return name, str(self.values[name])
-
-
-@dataclass(frozen=True)
-class Tilt:
-    """An angle by its tangent, which is all that coefficients ask of it."""
-
-    tangent: Any
-
-    def tan(self) -> Any:
-        """The tangent."""
-        return self.tangent
 
 
 def written(

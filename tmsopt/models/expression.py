@@ -6,22 +6,24 @@ import math
 import re
 import threading
 import warnings
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import lru_cache, reduce
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from tmsopt.algebra import kinds
+from tmsopt.algebra.formula import CONSTANT, PI, Formula, Kind, Node, constant, fold, formula, made, symbol
 from tmsopt.errors import short, suggest
-from tmsopt.models import arithmetics
 from tmsopt.models.advice import advice, call_advice
-from tmsopt.models.arithmetics import BALLS, BINARY, DEGREES, NUMERIC, SYMBOLIC, Arithmetic
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, OUTSIDE
-from tmsopt.models.stated.degree import Degree, DegreeTooHigh
+from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
+_BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.Pow: "pow"}
 _STRICT = {ast.Lt: "<=", ast.Gt: ">="}
 
 _ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
@@ -58,38 +60,39 @@ class Expression:
     text: str
     names: tuple[str, ...]
     comparison: str = ""
+    formula: Formula = field(default=Formula((), (), ()), repr=False, compare=False)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
-        """Value for floats or arrays; of a comparison, left minus right."""
-        return self.evaluate(values, NUMERIC)
+        """Value for numbers of any kind; of a comparison, left minus right.
 
-    def symbolic(self, values: Mapping[str, Any], limit: Any = None) -> Any:
-        """CasADi expression; of a comparison, left minus right, with `limit` in place of the number on one side."""
-        if limit is None:
-            return self.evaluate(values, SYMBOLIC)
-        with np.errstate(all="ignore"):
-            sides = [limit if _is_number(side) else _value(side, values, SYMBOLIC) for side in self._sides()]
-        return sides[0] - sides[1]
-
-    def enclosure(self, values: Mapping[str, Any]) -> Any:
-        """Ball that certainly holds the value, for balls or exact fractions; of a comparison, left minus right.
-
-        A number in the text is the fraction that its digits say, and pi the number π. The ball is nan where the value
+        A number in the text is the fraction that its digits say, and pi the number π. A ball is nan where the value
         does not exist, or may not.
         """
-        return self.evaluate(values, BALLS)
+        left, *right = self.sides(values)
+        return left - right[0] if right else left
+
+    def sides(self, values: Mapping[str, Any]) -> list[Any]:
+        """Both sides of a comparison; of a value, itself."""
+        with np.errstate(all="ignore"):  # what has no value, or no double, is nan or inf
+            return kinds.values(self.formula, values)
+
+    def difference(self, values: Mapping[str, Any], limit: Any) -> Any:
+        """Left minus right, with `limit` in place of the number on one side."""
+        numbers = [self.formula.steps[k].op == CONSTANT for k in self.formula.outputs]
+        left, right = (limit if is_number else x for x, is_number in zip(self.sides(values), numbers, strict=True))
+        return left - right
+
+    def of(self, values: Mapping[str, Any], kind: Kind) -> Any:
+        """Value in numbers of one kind; likewise."""
+        left, *right = fold(self.formula, values, kind)
+        return kind.operations["sub"](left, right[0]) if right else left
 
     def violation(self, values: Mapping[str, Any]) -> float:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
-        left, right = self.sides(values)
+        left, right = map(float, self.sides(values))
         difference = left - right
         excess = float(self.excess(difference))
         return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
-
-    @property
-    def numbers(self) -> list[str]:
-        """Texts of the parts without names."""
-        return arithmetics.constant_texts(_parse(self.text))
 
     @property
     def equality(self) -> bool:
@@ -114,26 +117,6 @@ class Expression:
         """Whether a comparison allows left minus right; not where that does not exist."""
         return self.excess(difference) <= 0
 
-    def sides(self, values: Mapping[str, Any]) -> tuple[float, float]:
-        """Both sides of a comparison for a numeric design."""
-        left, right = map(float, self.each(values))
-        return left, right
-
-    def each(self, values: Mapping[str, Any]) -> list[Any]:
-        """Both sides of a comparison for arrays."""
-        with np.errstate(all="ignore"):
-            return [_value(side, values, NUMERIC) for side in self._sides()]
-
-    def _sides(self) -> list[ast.expr]:
-        body = _parse(self.text)
-        return [body.left, *body.comparators] if isinstance(body, ast.Compare) else [body]
-
-    def evaluate(self, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
-        """Value in any arithmetic; of a comparison, left minus right."""
-        with np.errstate(all="ignore"):  # what has no value, or no double, is nan or inf
-            sides = [arithmetic.number(_value(side, values, arithmetic)) for side in self._sides()]
-            return sides[0] - sides[1] if len(sides) == 2 else sides[0]
-
 
 def parse_value(text: str, accepted: Iterable[str] | None, example: str = "abscissa") -> Expression:
     """Parse an expression for a value, such as an objective; in names of the author's own where none are `accepted`.
@@ -144,7 +127,8 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     body = _parse(_text(text))
     if isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is a comparison; accepted: a value, such as '{example}'")
-    return Expression(text, _checked(body, text, None if accepted is None else list(accepted)))
+    names, value = _read(body, text, None if accepted is None else list(accepted))
+    return Expression(text, names, formula=formula([value], names))
 
 
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
@@ -157,19 +141,19 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     if not isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
-        sides = pairwise(_source(side, text) for side in (body.left, *body.comparators))
+        texts = pairwise(_source(side, text) for side in (body.left, *body.comparators))
         signs = ({**COMPARISONS, **_STRICT}.get(type(op), "==") for op in body.ops)
-        each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(sides, signs, strict=True))
+        each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(texts, signs, strict=True))
         raise ExpressionError(f"{_quoted(text)} joins several comparisons; write one constraint for each, {each}")
-    symbol = COMPARISONS.get(type(body.ops[0]))
-    if symbol is None:
+    sign = COMPARISONS.get(type(body.ops[0]))
+    if sign is None:
         raise ExpressionError(f"{_quoted(text)} compares with another sign than <=, >= or =={_advice(text)}")
     known = list(accepted)
-    left, right = _checked(body.left, text, known), _checked(body.comparators[0], text, known)
-    names = tuple(dict.fromkeys(left + right))
+    sides = [_read(side, text, known) for side in (body.left, *body.comparators)]
+    names = tuple(dict.fromkeys(name for found, _ in sides for name in found))
     if not names:
         raise ExpressionError(f"{_quoted(text)} uses no parameter or quantity, so nothing can satisfy or violate it")
-    return Expression(text, names, symbol)
+    return Expression(text, names, sign, formula([side for _, side in sides], names))
 
 
 def written_sides(text: str) -> tuple[str, str, str]:
@@ -215,9 +199,7 @@ def _parse(text: str) -> ast.expr:
 def _tree(text: str) -> ast.expr:
     with _ONE_AT_A_TIME, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
-        body = ast.parse(text.strip(), mode="eval").body
-    arithmetics.note_constants(body, text.strip())
-    return body
+        return ast.parse(text.strip(), mode="eval").body
 
 
 def _advice(text: str) -> str:
@@ -232,73 +214,102 @@ def _advice(text: str) -> str:
     return advice(text, reads)
 
 
-def _checked(node: ast.expr, text: str, accepted: list[str] | None) -> tuple[str, ...]:
-    """Names that a value uses; raises where it is no accepted arithmetic, or too large to be computed exactly."""
-    names = _checked_names(node, text, accepted)
+class _Part(NamedTuple):
+    """A part of a text: its number, and how large that may become."""
+
+    node: Node
+    degree: Degree
+
+
+def _joined(op: str, *parts: _Part) -> _Part:
+    return _Part(made(op, *(p.node for p in parts)), DEGREES.operations[op](*(p.degree for p in parts)))
+
+
+def _read(body: ast.expr, text: str, accepted: list[str] | None) -> tuple[tuple[str, ...], Node]:
+    """Names that a value uses, and its formula; raises where it is no accepted arithmetic, or too large to compute."""
+    reader = _Reader(text, accepted)
     try:
-        DEGREES.number(_value(node, dict.fromkeys(names, Degree()), DEGREES))
+        node = reader.read(body).node
+        return tuple(reader.names), node
     except DegreeTooHigh as error:
-        part = _source(error.part, text) if error.part else text
+        part = _source(error.part, text)
         whole = "" if part == text.strip() else f"{_quoted(text)}: "
         raise ExpressionError(f"{whole}{_quoted(part)} {error}") from None
-    return names
 
 
 def _quoted(text: str) -> str:
     return f"'{text}'" if len(text) <= _LEGIBLE else f"'{text[: _LEGIBLE - 1]}…'"
 
 
-def _checked_names(  # noqa: PLR0912 - one case per kind of node
-    node: ast.expr, text: str, accepted: list[str] | None, depth: int = 0
-) -> tuple[str, ...]:
-    """Names that an expression uses, of those accepted if these are given; raises on all but accepted arithmetic."""
-    if depth > _DEEPEST:
-        raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
+class _Reader:
+    """Turns a parsed text into nodes, each name an input; discarded after one text."""
 
-    def names_in(*nodes: ast.expr) -> tuple[str, ...]:
-        found = [name for n in nodes for name in _checked_names(n, text, accepted, depth + 1)]
-        return tuple(dict.fromkeys(found))
+    def __init__(self, text: str, accepted: list[str] | None) -> None:
+        self.text, self.accepted = text, accepted
+        self.names: dict[str, Node] = {}
 
-    match node:
-        case ast.Constant(value=bool()):
-            raise ExpressionError(f"{_quoted(text)} uses {node.value!r}; accepted: numbers and names")
-        case ast.Constant(value=int() | float()):
-            _check_number(node, text)
-            return ()
-        case ast.Name(id=name):
-            if name in CONSTANTS:
-                return ()
-            if name in FUNCTIONS:
-                raise ExpressionError(f"{_quoted(text)} names the function {name} without argument; write {name}(…)")
-            if accepted is not None and name not in accepted:
-                raise UnknownName(text, name, accepted)
-            return (name,)
-        case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
-            return names_in(operand)
-        case ast.BinOp(left=left, op=op, right=right):
-            if type(op) not in BINARY:
-                raise ExpressionError(f"{_quoted(text)} uses an operator other than + - * / **{_advice(text)}")
-            return names_in(left, right)
-        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
-            fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
-            if not fewest <= len(args) <= most:
-                wanted = f"{fewest} to {most} arguments, {name}(a, b)" if most > 1 else "one argument"
-                wanted += f"; of one number write {_source(args[0], text)} alone" if 0 < len(args) < fewest else ""
-                raise ExpressionError(f"{_quoted(text)} calls {name} with {len(args)} arguments; accepted: {wanted}")
-            return names_in(*args)
-        case ast.Call():
-            advised = call_advice(called := _source(node.func, text), [_source(a, text) for a in node.args])
-            raise ExpressionError(f"{_quoted(text)} calls '{called}'{advised}; accepted: {' '.join(FUNCTIONS)}")
-        case ast.Attribute():
-            raise ExpressionError(f"{_quoted(text)} uses the attribute '{_source(node, text)}'; accepted: plain names")
-        case _:
-            found = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
-            raise ExpressionError(f"{_quoted(text)} {found}")
+    def read(self, node: ast.expr, depth: int = 0) -> _Part:  # noqa: PLR0911, PLR0912 - one case per kind
+        """The formula of a part; raises on all but accepted arithmetic."""
+        text = self.text
+        if depth > _DEEPEST:
+            raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
 
+        match node:
+            case ast.Constant(value=bool()):
+                raise ExpressionError(f"{_quoted(text)} uses {node.value!r}; accepted: numbers and names")
+            case ast.Constant(value=int() | float() as value):
+                digits = _checked_number(node, text)
+                return _Part(constant(digits), DEGREES.constant(float(value)))
+            case ast.Name(id=name) if name in CONSTANTS:
+                return _Part(PI, DEGREES.constant(math.pi))
+            case ast.Name(id=name):
+                if name in FUNCTIONS:
+                    raise ExpressionError(
+                        f"{_quoted(text)} names the function {name} without argument; write {name}(…)"
+                    )
+                if self.accepted is not None and name not in self.accepted:
+                    raise UnknownName(text, name, self.accepted)
+                return _Part(self.names.setdefault(name, symbol(name)), Degree())
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.read(operand, depth + 1)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return self.applied("neg", node, [operand], depth)
+            case ast.BinOp(left=left, op=op, right=right):
+                if type(op) not in _BINARY:
+                    raise ExpressionError(f"{_quoted(text)} uses an operator other than + - * / **{_advice(text)}")
+                return self.applied(_BINARY[type(op)], node, [left, right], depth)
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
+                fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
+                if not fewest <= len(args) <= most:
+                    wanted = f"{fewest} to {most} arguments, {name}(a, b)" if most > 1 else "one argument"
+                    wanted += f"; of one number write {_source(args[0], text)} alone" if 0 < len(args) < fewest else ""
+                    raise ExpressionError(
+                        f"{_quoted(text)} calls {name} with {len(args)} arguments; accepted: {wanted}"
+                    )
+                return self.applied(name, node, args, depth)
+            case ast.Call():
+                advised = call_advice(called := _source(node.func, text), [_source(a, text) for a in node.args])
+                raise ExpressionError(f"{_quoted(text)} calls '{called}'{advised}; accepted: {' '.join(FUNCTIONS)}")
+            case ast.Attribute():
+                raise ExpressionError(
+                    f"{_quoted(text)} uses the attribute '{_source(node, text)}'; accepted: plain names"
+                )
+            case _:
+                found = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
+                raise ExpressionError(f"{_quoted(text)} {found}")
 
-def _is_number(node: ast.expr) -> bool:
-    """Whether a side is a number and nothing else, but for its sign."""
-    return isinstance(node.operand if isinstance(node, ast.UnaryOp) else node, ast.Constant)
+    def applied(self, op: str, whole: ast.expr, operands: Sequence[ast.expr], depth: int) -> _Part:
+        """An operation on parts, of more than two one after the other."""
+        parts = [self.read(operand, depth + 1) for operand in operands]
+        try:
+            if len(parts) == 1:
+                return _Part(made(op, parts[0].node), DEGREES.operations[op](parts[0].degree))
+            return reduce(
+                lambda a, b: _Part(made(op, a.node, b.node), DEGREES.operations[op](a.degree, b.degree)), parts
+            )
+        except DegreeTooHigh as error:
+            error.part = error.part or whole
+            raise
 
 
 def _source(node: ast.expr, text: str) -> str:
@@ -306,45 +317,13 @@ def _source(node: ast.expr, text: str) -> str:
     return ast.get_source_segment(text.strip(), node) or text
 
 
-def _check_number(node: ast.Constant, text: str) -> None:
+def _checked_number(node: ast.Constant, text: str) -> Fraction:
+    """The number that digits say; a nought may have any exponent, and 10 to that power is not to be computed."""
+    value, source = node.value, _source(node, text)
     try:
-        number = float(node.value)  # type: ignore[arg-type]
+        number = float(value)  # type: ignore[arg-type]
     except OverflowError:
         number = math.inf
-    if not math.isfinite(number) or (number == 0 and re.match(r"[0._]*[1-9]", _source(node, text))):
-        message = f"contains {_source(node, text)[:_LEGIBLE]}, a number beyond double precision"
-        raise ExpressionError(f"{_quoted(text)} {message}")
-
-
-def _value(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
-    """Value of a checked tree; what is `DegreeTooHigh` knows the innermost part that is."""
-    try:
-        return _computed(node, values, arithmetic)
-    except DegreeTooHigh as error:
-        error.part = error.part or node
-        raise
-
-
-def _computed(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
-    number = arithmetic.number
-    if arithmetic.constant and (text := arithmetics.constant_text(node)):
-        return arithmetic.constant(text)
-    match node:
-        case ast.Constant(value=value):
-            return arithmetic.literal(value, arithmetics.constant_text(node))
-        case ast.Name(id=name):
-            return arithmetic.pi() if name in CONSTANTS else values[name]
-        case ast.UnaryOp(op=op, operand=operand):
-            value = _value(operand, values, arithmetic)
-            return -value if isinstance(op, ast.USub) else value
-        case ast.BinOp(left=left, op=op, right=right):
-            a, b = _value(left, values, arithmetic), _value(right, values, arithmetic)
-            return arithmetic.operators[type(op)](number(a), number(b))
-        case ast.Call(func=ast.Name(id=name), args=args):
-            function = arithmetic.functions[name]
-            operands = [number(_value(a, values, arithmetic)) for a in args]
-            result = function(*operands[:2]) if len(operands) > 1 else function(operands[0])
-            for operand in operands[2:]:
-                result = function(result, operand)
-            return result
-    raise AssertionError(ast.dump(node))  # unreachable: the tree was checked when parsed
+    if not math.isfinite(number) or (number == 0 and re.match(r"[0._]*[1-9]", source)):
+        raise ExpressionError(f"{_quoted(text)} contains {source[:_LEGIBLE]}, a number beyond double precision")
+    return Fraction(value) if isinstance(value, int) else Fraction(source.replace("_", "")) if number else Fraction(0)

@@ -5,7 +5,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.balls import rational
 from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.models.built_in import controlled
 from tmsopt.records import Table

@@ -4,21 +4,28 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import flint
 import numpy as np
 
-from tmsopt.algebra.elementary import as_ball, exact
+from tmsopt.algebra.balls import as_ball
+from tmsopt.algebra.formula import Formula, fold, formula, symbol
+from tmsopt.algebra.kinds import kind_of
 
 _BITS = 106  # the parameters' own roundings are all that widens a ball
 _EPSILON = 2.0**-53
 _NOTHING = 1e-9  # of a range
 
-Formula = Callable[[Mapping[str, Any]], Any]
+Computed = Callable[[Mapping[str, Any]], Any]
+"""A number of named ones, by ``+ - * /`` and the operations of `tmsopt.algebra.kinds`: stated once, and traced."""
 
 Matrix = list[list[Any]]
 """Rows of any numbers."""
+
+ROOTS = ("abscissa", "damping_ratio", "angular_frequency")
+"""What quantities may say of the roots."""
 
 
 @dataclass(frozen=True)
@@ -138,14 +145,46 @@ class Quantity:
     unit: str
     meaning: str
     latex: str
-    value: Formula
+    value: Computed
     equation: Callable[[Mapping[str, Any], Any], Any] | None = None
     range: Range = Range()
-    pieces: tuple[Formula, ...] = ()
+    pieces: tuple[Computed, ...] = ()
     counterpart: "Quantity | None" = None
     aside: bool = False
     share: bool = False
     stands_for: str = ""
+
+    @cached_property
+    def formula(self) -> Formula:
+        """Its value."""
+        return formula([self.value(_ANY)])
+
+    @cached_property
+    def left_side(self) -> Formula:
+        """Of its equation, in its own name beside others."""
+        assert self.equation is not None
+        return formula([self.equation(_ANY, symbol(self.name))])
+
+    @cached_property
+    def each_piece(self) -> Formula:
+        """Of its pieces."""
+        return formula(piece(_ANY) for piece in self.pieces)
+
+
+class _Any(Mapping[str, Any]):
+    """A number of every name, not known yet."""
+
+    def __getitem__(self, name: str) -> Any:
+        return symbol(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+_ANY = _Any()
 
 
 @dataclass(frozen=True)
@@ -171,9 +210,9 @@ class ParameterSet:
     parameters: tuple[Parameter, ...]
     native: Callable[[Mapping[str, Any]], dict[str, Any]]
     quantities: tuple[Quantity, ...] = ()
-    rate: Formula | None = None
+    rate: Computed | None = None
     root_unit: str = "1"
-    torque: Formula | None = None
+    torque: Computed | None = None
     needs: Mapping[str, tuple[str, str]] = field(default_factory=dict, hash=False)
 
     @cached_property
@@ -244,8 +283,26 @@ class Model:
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""
-        native = (of or self.sets[0]).native(parameters)
-        return self.polynomial(**self.algebraic(native))
+        return self.computed(of or self.sets[0], parameters)[1]
+
+    def computed(self, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+        """Native parameters and coefficients for values of any kind."""
+        kind, native = kind_of(*parameters.values()), self.sets[0].names
+        with np.errstate(all="ignore"):
+            found = fold(self.formulas[of.name], parameters, kind)
+        rounded = any(isinstance(x, flint.arb | flint.arb_series) for x in parameters.values())
+        coefficients = found[len(native) :]
+        return dict(zip(native, found, strict=False)), [*map(as_ball, coefficients)] if rounded else coefficients
+
+    @cached_property
+    def formulas(self) -> Mapping[str, Formula]:
+        """Native parameters and coefficients, by the name of the parameter set that they are formulas in."""
+        found = {}
+        for of in self.sets:
+            native = of.native({n: symbol(n) for n in of.names})
+            listed = [native[n] for n in self.sets[0].names]
+            found[of.name] = formula([*listed, *self.polynomial(**self.algebraic(native))], of.names)
+        return found
 
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
         """The model for parameters within ranges: of a complex H with a carrier for these, any other itself."""
@@ -320,19 +377,29 @@ class Values(Mapping[str, Any]):
         lift: Callable[[Quantity, "Values"], Any] | None = None,
         ranges: Mapping[str, float] | None = None,
     ) -> None:
-        native = of.native(parameters)
-        self.model, self.coefficients = model, model.polynomial(**model.algebraic(native))
+        native, self.coefficients = model.computed(of, parameters)
+        self.model, self.kind = model, kind_of(*parameters.values())
         self.given, self._ranges = (model, of, dict(parameters)), dict(ranges or {})
         self._known = {**native, **dict(zip(model.coefficient_names(), self.coefficients, strict=True)), **parameters}
-        self._formulas = {q.name: q for q in (*model.quantities, *of.quantities, *extra)}
+        self._formulas = {q.name: q for q in (*model.quantities, *of.quantities)}
+        self._procedures = {q.name: q for q in extra}
         self._lift = lift
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._known:
-            quantity = self._formulas[name]
-            lifted = self._lift(quantity, self) if self._lift else None
-            self._known[name] = quantity.value(self) if lifted is None else lifted
+            quantity = self._procedures.get(name) or self._formulas[name]
+            value = self._lift(quantity, self) if self._lift else None
+            if value is None:
+                value = quantity.value(self) if name in self._procedures else self.fold(quantity.formula)[0]
+            self._known[name] = value
         return self._known[name]
+
+    def fold(self, formula: Formula, own: Mapping[str, Any] = MappingProxyType({})) -> list[Any]:
+        """The outputs of a formula in these values, and others of one's own; nan for what is not known of the roots."""
+        unknown = dict.fromkeys(ROOTS, np.nan)
+        known = {n: own[n] if n in own else self[n] if n in self else unknown[n] for n in formula.inputs}
+        with np.errstate(all="ignore"):
+            return fold(formula, known, self.kind)
 
     def roundings(self) -> list[float]:
         """How far each coefficient of a numeric design may be off as its parameters are rounded to doubles."""
@@ -341,7 +408,7 @@ class Values(Mapping[str, Any]):
         sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NOTHING * width}
         with flint.ctx.workprec(_BITS):
             balls = {n: flint.arb(float(x), sizes[n] * _EPSILON) for n, x in parameters.items()}
-            found = [as_ball(exact(c)) for c in model.coefficients(balls, of)]
+            found = model.coefficients(balls, of)
         return [float(c.rad()) if c.is_finite() else np.inf for c in found]
 
     def define(self, name: str, value: Any) -> None:
@@ -349,7 +416,10 @@ class Values(Mapping[str, Any]):
         self._known[name] = value
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys((*self._known, *self._formulas)))
+        return iter(dict.fromkeys((*self._known, *self._formulas, *self._procedures)))
 
     def __len__(self) -> int:
-        return len(dict.fromkeys((*self._known, *self._formulas)))
+        return len(list(iter(self)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._known or name in self._formulas or name in self._procedures

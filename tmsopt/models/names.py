@@ -2,12 +2,12 @@
 
 import keyword
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
+from fractions import Fraction
 from typing import Any
 
-import casadi as ca
-
-from tmsopt.algebra.walk import operation_name, steps
+from tmsopt.algebra.formula import Constant, Formula, Kind, fold
+from tmsopt.algebra.kinds import FLOATS, as_double
 
 FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
 CONSTANTS = ("pi",)
@@ -40,8 +40,6 @@ _GREEK = re.compile(
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
 )
 _LONG = 80  # characters; what is longer has a number, and is written once
-_INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/", ca.OP_POW: "**", ca.OP_CONSTPOW: "**"}
-_SHORT = {ca.OP_NEG: "(-{})", ca.OP_SQ: "({}**2)", ca.OP_TWICE: "(2*{})", ca.OP_INV: "(1/{})"}
 
 
 def unusable(name: Any, of_H: bool = False) -> str:
@@ -76,31 +74,44 @@ def _upright(word: str) -> str:
     return word if len(word) == 1 or word.isdigit() else rf"\mathrm{{{word}}}"
 
 
-def spelled(function: ca.Function, names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The outputs of a function of one vector as texts, every number in full, and the parts that they share.
+def _called(name: str) -> Callable[..., str]:
+    return lambda *operands: f"{name}({', '.join(operands)})"
 
-    Equal texts are equal formulas; CasADi's own leave out digits.
+
+def number_text(x: Constant) -> str:
+    """A constant in full: a fraction as a decimal if it ends soon, such as 0.1; √2 as ``sqrt(2)``."""
+    if isinstance(x, Formula):
+        return fold(x, {}, Kind(_SPELLED, number_text))[0].removeprefix("(").removesuffix(")")  # type: ignore[no-any-return]
+    double = repr(float(as_double(x))).removesuffix(".0")
+    return double if isinstance(x, float) or Fraction(double) == x else str(x)
+
+
+_SPELLED: Mapping[str, Callable[..., str]] = {
+    **{name: _called(name) for name in FLOATS.operations},
+    "add": lambda a, b: f"({a} + {b})",
+    "sub": lambda a, b: f"({a} - {b})",
+    "mul": lambda a, b: f"({a} * {b})",
+    "div": lambda a, b: f"({a} / {b})",
+    "pow": lambda a, b: f"({a} ** {b})",
+    "neg": lambda a: f"(-{a})",
+    "square": lambda a: f"({a}**2)",
+    "pi": lambda: "pi",
+}
+
+
+def spelled(formula: Formula) -> tuple[list[str], list[str]]:
+    """The outputs of a formula as texts, every number a double in full, and the parts that they share.
+
+    Equal texts are equal formulas.
     """
-    texts: list[str] = []
     shared: list[str] = []
-    outputs = ["0"] * function.nnz_out(0)
-    for step in steps(function):
-        operands = [texts[k] for k in step.operands]
-        match step.operation:
-            case ca.OP_INPUT:
-                text = names[step.place[1]]
-            case ca.OP_CONST:
-                text = repr(step.constant).removesuffix(".0")
-            case ca.OP_OUTPUT:
-                text = outputs[step.place[1]] = operands[0]
-            case operation if operation in _INFIX:
-                text = f"({operands[0]} {_INFIX[operation]} {operands[1]})"
-            case operation if operation in _SHORT:
-                text = _SHORT[operation].format(*operands)
-            case operation:
-                text = f"{operation_name(operation)}({', '.join(operands)})"
-        if len(text) > _LONG and step.operation != ca.OP_OUTPUT:
-            shared.append(text)
-            text = f"[{len(shared)}]"
-        texts.append(text)
-    return outputs, shared
+
+    def part(text: str) -> str:
+        if len(text) <= _LONG:
+            return text
+        shared.append(text)
+        return f"[{len(shared)}]"
+
+    operations = {name: lambda *o, spell=spell: part(spell(*o)) for name, spell in _SPELLED.items()}
+    kind = Kind(operations, lambda x: repr(float(as_double(x))).removesuffix(".0"))
+    return fold(formula, {name: name for name in formula.names}, kind), shared

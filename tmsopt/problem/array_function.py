@@ -1,17 +1,13 @@
 """Expressions of a problem over arrays of designs, all at once: quantities of charts and studies."""
 
-import threading
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.arrays import Program, program
-from tmsopt.algebra.walk import NotAccepted
+from tmsopt.algebra.arrays import on_arrays
+from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Values
 from tmsopt.problem.expression import Expression, ExpressionError
@@ -26,15 +22,13 @@ class ArrayFunction:
     """Expressions as a function of arrays of parameters.
 
     Attributes:
-        program: computes those that CasADi can write down of the parameters and the root quantities.
-        written: names of these.
-        others: those that it cannot, evaluated by the formulas of the model on whole arrays.
+        formula: of the parameters and the root quantities, an output for each expression.
+        names: of the expressions.
     """
 
     problem: Problem
-    program: Program = field(repr=False)
-    written: tuple[str, ...]
-    others: Mapping[str, Expression]
+    formula: Formula = field(repr=False)
+    names: tuple[str, ...]
 
     def __call__(self, columns: Mapping[str, Any]) -> dict[str, Any]:
         """Values of the expressions, of a comparison left minus right; nan where one does not exist.
@@ -47,21 +41,12 @@ class ArrayFunction:
             Name → value, of the shape that the expression depends on, which broadcasts to that of the grid.
         """
         of, known = self.problem.parameter_set, columns
-        names = (*of.names, *_ROOT)
-        inputs = {k: names[k] for k in self.program.arguments}
-        with np.errstate(all="ignore"):
-            if self.others or set(inputs.values()) - set(columns):  # the formulas of the model themselves, on arrays
+        if missing := set(self.formula.inputs) - set(columns):
+            with np.errstate(all="ignore"):
                 given = {n: np.asarray(columns[n], dtype=float)[()] for n in of.names}
-                known = Values(self.problem.model, of, given, extra=ARRAY_ROOT_QUANTITIES)
-                for name in set(_ROOT) & set(columns):
-                    known.define(name, columns[name])
-            found = dict(zip(self.written, self.program({k: known[n] for k, n in inputs.items()}), strict=True))
-            return found | {n: np.asarray(e(known), dtype=float)[()] for n, e in self.others.items()}
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the expressions."""
-        return (*self.written, *self.others)
+                values = Values(self.problem.model, of, given, extra=ARRAY_ROOT_QUANTITIES)
+                known = {**columns, **{n: values[n] for n in missing}}
+        return dict(zip(self.names, on_arrays(self.formula, known), strict=True))
 
 
 def array_function(problem: Problem, expressions: Mapping[str, str | Expression]) -> ArrayFunction:
@@ -73,21 +58,17 @@ def array_function(problem: Problem, expressions: Mapping[str, str | Expression]
     Raises:
         InputError: for a text that is no expression of this problem.
     """
-    of, stated = problem.parameter_set, parse_all(problem, expressions)
-    with _as_written():
-        symbols = {n: ca.SX.sym(n) for n in (*of.names, *_ROOT)}
-        values = Values(problem.model, of, {n: symbols[n] for n in of.names}, extra=(NO_RADIUS,))
-        for name in _ROOT:
-            values.define(name, symbols[name])
-        written = {n: s for n, e in stated.items() if (s := _symbolic(e, values)) is not None}
-        column = ca.densify(ca.vertcat(*written.values())) if written else ca.SX(0, 1)
-        function = ca.Function("f", [ca.vertcat(*symbols.values())], [column], {"cse": True})
-    try:
-        found = program(function)
-    except NotAccepted:  # an operation that only CasADi has: every expression by the formulas
-        written, found = {}, Program(())
-    others = {n: e for n, e in stated.items() if n not in written}
-    return ArrayFunction(problem, found, tuple(written), others)
+    nodes = nodes_of(problem, expressions)
+    return ArrayFunction(problem, formula(nodes.values(), (*problem.parameter_set.names, *_ROOT)), tuple(nodes))
+
+
+def nodes_of(problem: Problem, expressions: Mapping[str, str | Expression]) -> dict[str, Any]:
+    """Expressions as nodes in the parameters and the root quantities; of comparisons left minus right."""
+    of = problem.parameter_set
+    values = Values(problem.model, of, {n: symbol(n) for n in of.names}, extra=(NO_RADIUS,))
+    for name in _ROOT:
+        values.define(name, symbol(name))
+    return {n: e(values) for n, e in parse_all(problem, expressions).items()}
 
 
 def parse_all(problem: Problem, expressions: Mapping[str, str | Expression]) -> dict[str, Expression]:
@@ -106,32 +87,3 @@ def parse_all(problem: Problem, expressions: Mapping[str, str | Expression]) -> 
     if faults:
         raise InputError(faults)
     return found
-
-
-def _symbolic(expression: Expression, values: Values) -> Any:
-    """A scalar CasADi expression, or None for a formula that does not take symbols."""
-    try:
-        found = expression.symbolic(values)
-    except (TypeError, ValueError, AttributeError, NotImplementedError, RuntimeError):
-        return None
-    scalar = ca.SX(found) if isinstance(found, ca.SX | float | int) else None
-    return scalar if scalar is not None and scalar.shape == (1, 1) else None
-
-
-_ONE_AT_A_TIME = threading.Lock()
-
-
-@contextmanager
-def _as_written() -> Iterator[None]:
-    """CasADi without its simplifications, such as x for sqrt(x)**2: they change roundings and where a value exists.
-
-    The switch is one for the whole process; an expression that another thread writes meanwhile is a little longer.
-    """
-    with _ONE_AT_A_TIME, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of NumPy's functions on symbols
-        before = ca.GlobalOptions.getSimplificationOnTheFly()
-        ca.GlobalOptions.setSimplificationOnTheFly(False)
-        try:
-            yield
-        finally:
-            ca.GlobalOptions.setSimplificationOnTheFly(before)

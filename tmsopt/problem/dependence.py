@@ -1,12 +1,12 @@
 """What an expression depends on: the case of a problem, and root quantities in which direction."""
 
 from collections.abc import Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from tmsopt.algebra.formula import formula, symbol
 from tmsopt.models import Model, Quantity, Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.expression import Expression
@@ -138,18 +138,11 @@ def _with(values: Values, expression: Expression, known: dict[str, float]) -> fl
 def _dependencies(model: Model, set_name: str, expression: Expression) -> frozenset[str]:
     """Parameters that an expression depends on, directly or through quantities other than those of the roots."""
     of = model.parameter_set(set_name)
-    symbols = {name: ca.SX.sym(name) for name in of.names}
     extra = (*ROOT_QUANTITIES, NO_RADIUS)
-    values = Values(model, of, symbols, extra=extra, lift=partial(_stand_in, symbols))
-    found = ca.SX(expression.symbolic(values))
-    return frozenset(name for name, symbol in symbols.items() if ca.depends_on(found, symbol))
+    values = Values(model, of, {name: symbol(name) for name in of.names}, extra=extra, lift=_stand_in)
+    return frozenset(formula([expression(values)]).inputs) & frozenset(of.names)
 
 
-def _stand_in(symbols: dict[str, Any], quantity: Quantity, values: Values) -> Any:
-    """In place of a quantity, something that depends on the same parameters; None where its formula can be used."""
-    if quantity.name in ROOT_NAMES:
-        return ca.SX.sym(quantity.name)
-    if quantity.equation is None:
-        return None
-    equation = ca.SX(quantity.equation(values, ca.SX.sym(quantity.name)))
-    return sum((s for s in symbols.values() if ca.depends_on(equation, s)), ca.SX(0))
+def _stand_in(quantity: Quantity, values: Values) -> Any:
+    """In place of a quantity of the roots, itself."""
+    return symbol(quantity.name) if quantity.name in ROOT_NAMES else None

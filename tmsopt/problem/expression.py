@@ -1,9 +1,7 @@
 """Expressions of problems: the language that systems stated in text are written in too, and the units of its values."""
 
-import ast
 from collections.abc import Mapping
 
-from tmsopt.models.arithmetics import BINARY, Arithmetic
 from tmsopt.models.expression import (
     COMPARISONS,
     Expression,
@@ -13,7 +11,7 @@ from tmsopt.models.expression import (
     parse_value,
     written_sides,
 )
-from tmsopt.problem.units import dimensions
+from tmsopt.problem.units.dimensions import UNITS, Dimension
 
 __all__ = [
     "COMPARISONS",
@@ -26,14 +24,11 @@ __all__ = [
     "written_sides",
 ]
 
-_DIMENSIONS = Arithmetic(dimensions.FUNCTIONS, lambda x: x, {**BINARY, ast.Pow: dimensions.power}, dimensions.Dimension)
 
-
-def dimension(expression: Expression, units: Mapping[str, str]) -> dimensions.Dimension:
+def dimension(expression: Expression, units: Mapping[str, str]) -> Dimension:
     """What a value has units of, for the units of what it names; of a comparison, of both sides."""
     try:
-        named = {n: dimensions.Dimension.of(units.get(n, "1")) for n in expression.names}
-        found = expression.evaluate(named, _DIMENSIONS)
+        found = expression.of({n: Dimension.of(units.get(n, "1")) for n in expression.names}, UNITS)
     except ArithmeticError:  # a number divided by 0
         found = None
-    return found if isinstance(found, dimensions.Dimension) else dimensions.Dimension()
+    return found if isinstance(found, Dimension) else Dimension()

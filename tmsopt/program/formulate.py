@@ -277,9 +277,10 @@ class Builder:
                 self.row("objective", value - self.objective, -np.inf, 0.0)
 
     def in_each_case(self, expression: Expression, limit: Any = None) -> list[Any]:
-        """The expression's value in every case that it differs in, or the nominal one; see `Expression.symbolic`."""
+        """The expression's value in every case that it differs in, or the nominal one; see `Expression.difference`."""
         covered = self.covered if depends_on_case(self.problem, expression, self.cases) else [0]
-        return [expression.symbolic(self.values[k], limit) for k in covered]
+        each = [self.values[k] for k in covered]
+        return [expression(v) if limit is None else expression.difference(v, limit) for v in each]
 
     def pattern(self, pattern: Pattern) -> None:
         unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
@@ -345,9 +346,9 @@ class Builder:
         symbol, lift = lift_quantity(self, name, case, ends)
         self.lifts.append(lift)
         if quantity.equation is not None:
-            self.row(name, quantity.equation(values, symbol), 0.0, 0.0)
-        for piece in quantity.pieces:
-            above = ca.SX(symbol - piece(values))
+            self.row(name, values.fold(quantity.left_side, {name: symbol})[0], 0.0, 0.0)
+        for piece in values.fold(quantity.each_piece):
+            above = ca.SX(symbol - piece)
             # A limit that equals a constant piece would share its multiplier with it.
             varies_with_design = any(ca.depends_on(above, x) for x in self.x if x is not symbol)
             self.row(name, above, 0.0 if varies_with_design else -_LEEWAY, np.inf)

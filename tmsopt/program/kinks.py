@@ -16,8 +16,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.intervals import INTERVALS, ball, interval, ranges
-from tmsopt.algebra.walk import NotAccepted, walk
+from tmsopt.algebra.formula import Kind, NotAccepted, fold, from_casadi
+from tmsopt.algebra.intervals import ball, interval, ranges
+from tmsopt.algebra.kinds import CASADI, INTERVALS
 from tmsopt.models import Values
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.program.nlp import NLP, AddedVariable, Contact, MaximumVariable
@@ -80,15 +81,19 @@ def _suspect(nlp: NLP) -> bool:
     Not of those with settings, whose functions have two vectors.
     """
 
-    def divided(operation: int, *operands: Any) -> Any:
-        lower, upper = interval(INTERVALS[ca.OP_COS](*operands) if operation == ca.OP_TAN else operands[-1])
+    known = INTERVALS.operations
+
+    def divided(op: str, *operands: Any) -> Any:
+        lower, upper = interval(known["cos"](*operands) if op == "tan" else operands[-1])
         if lower <= 0 <= upper:
             raise NotAccepted
-        return INTERVALS[operation](*operands)
+        return known[op](*operands)
 
-    known = {o: f for o, f in INTERVALS.items() if o not in _PIECES} | {o: partial(divided, o) for o in _POLES}
+    smooth = {op: f for op, f in known.items() if op not in _PIECES} | {op: partial(divided, op) for op in _POLES}
+    formula = from_casadi(nlp.functions)
+    box = {name: ball(ends) for name, ends in zip(formula.names, zip(nlp.lower, nlp.upper, strict=True), strict=True)}
     try:
-        walk(nlp.functions, [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)], known)
+        fold(formula, box, Kind(smooth, INTERVALS.constant))
     except NotAccepted:
         return True
     return False
@@ -107,31 +112,30 @@ class _Unfolding:
     def expressions(self) -> tuple[Any, Any, Any, Any]:
         """Variables, settings, objective and rows, without a kink."""
         x, p = ca.SX.sym("x", len(self.x)), ca.SX.sym("p", len(self.p))
-        stacked = ca.Function("stacked", [ca.vertcat(x, p)], self.nlp.at(x, p))
-        (f,), g = walk(stacked, [*self.x, *self.p], {op: partial(self.applied, op) for op in _OPERATIONS})
+        formula = from_casadi(ca.Function("stacked", [ca.vertcat(x, p)], self.nlp.at(x, p)))
+        kind = Kind({op: partial(self.applied, op) for op in CASADI.operations}, CASADI.constant, CASADI.number)
+        f, *g = fold(formula, dict(zip(formula.names, [*self.x, *self.p], strict=True)), kind)
         rows = ca.densify(ca.vertcat(*g, *self.rows))
-        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(f), rows
+        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(ca.SX(f)), rows
 
-    def applied(self, operation: int, *operands: Any) -> Any:
+    def applied(self, op: str, *operands: Any) -> Any:
         """The result of an operation; of a kink that depends on variables, a new one."""
-        if operation == ca.OP_CONST:
-            return ca.SX(operands[0])
-        if operation in _POLES:
-            return self._divided(operation, *operands)
-        pieces = _PIECES.get(operation)
-        if pieces is None or not any(ca.depends_on(e, ca.vertcat(*self.x)) for e in operands):
-            return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
+        if op in _POLES:
+            return self._divided(op, *operands)
+        pieces = _PIECES.get(op)
+        if pieces is None or not any(ca.depends_on(ca.SX(e), ca.vertcat(*self.x)) for e in operands):
+            return CASADI.operations[op](*operands)
         first, t = len(self.nlp.rows) + len(self.rows), ca.SX.sym(KINK)
         every = pieces(*operands)
         self.kinks.append(MaximumVariable(len(self.x), tuple(range(first, first + len(every)))))
         self.x.append(t)
         self.rows += [t - piece for piece in every]
-        return -t if operation == ca.OP_FMIN else t
+        return -t if op == "min" else t
 
-    def _divided(self, operation: int, *operands: Any) -> Any:
+    def _divided(self, op: str, *operands: Any) -> Any:
         """A quotient or tangent; as a new variable where the denominator may be 0 in the box."""
-        numerator, denominator = _POLES[operation](*operands)
-        plain = (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
+        numerator, denominator = map(ca.SX, _POLES[op](*operands))
+        plain = CASADI.operations[op](*operands)
         known = self.x[: len(self.nlp.variables)]
         if not ca.depends_on(denominator, ca.vertcat(*known)) or ca.depends_on(
             denominator, ca.vertcat(*self.x[len(known) :], *self.p)
@@ -139,7 +143,7 @@ class _Unfolding:
             return plain
         ends = list(zip(self.nlp.lower, self.nlp.upper, strict=True))
         try:
-            ((lower, upper),) = ranges(ca.Function("d", [ca.vertcat(*known)], [denominator]), ends)[0]
+            ((lower, upper),) = ranges(ca.Function("d", [ca.vertcat(*known)], [denominator]), ends)
         except NotAccepted:
             return plain
         if lower > 0 or upper < 0:
@@ -151,17 +155,15 @@ class _Unfolding:
         return t
 
 
-_POLES: Mapping[int, Callable[..., tuple[Any, Any]]] = {
-    ca.OP_DIV: lambda a, b: (a, b),
-    ca.OP_INV: lambda b: (ca.SX(1), b),
-    ca.OP_TAN: lambda e: (ca.sin(e), ca.cos(e)),
+_POLES: Mapping[str, Callable[..., tuple[Any, Any]]] = {
+    "div": lambda a, b: (a, b),
+    "tan": lambda e: (ca.sin(e), ca.cos(e)),
 }
-_PIECES: Mapping[int, Callable[..., Sequence[Any]]] = {
-    ca.OP_FABS: lambda e: (e, -e),
-    ca.OP_FMAX: lambda a, b: (a, b),
-    ca.OP_FMIN: lambda a, b: (-a, -b),
+_PIECES: Mapping[str, Callable[..., Sequence[Any]]] = {
+    "abs": lambda e: (e, -e),
+    "max": lambda a, b: (a, b),
+    "min": lambda a, b: (-a, -b),
 }
-_OPERATIONS = {getattr(ca, name) for name in dir(ca) if name.startswith("OP_")}
 
 
 def _slopes(jacobian: Any, variable: int) -> dict[int, Any]:

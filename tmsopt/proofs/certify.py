@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from functools import partial
 
-from tmsopt.algebra.walk import NotAccepted
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.errors import Fault, InputError
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import recheck

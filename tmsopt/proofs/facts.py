@@ -5,7 +5,8 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.balls import rational
+from tmsopt.algebra.kinds import BALLS
 from tmsopt.models import Values
 from tmsopt.models.exact import Written
 from tmsopt.problem.problem import Problem
@@ -131,7 +132,7 @@ def limits(problem: Problem, found: Existing) -> dict[str, str]:
         values.define(name, nothing if value is None else value)
     verdicts = {}
     for name, condition in problem.conditions.items():
-        difference = flint.arb(condition.enclosure(values))
+        difference = flint.arb(condition.of(values, BALLS))
         if condition.equality:
             verdicts[name] = _equal(difference, equations=found.method == "Krawczyk")
         else:

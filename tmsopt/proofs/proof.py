@@ -12,6 +12,7 @@ from tmsopt.algebra.balls import Number, ProvedRoot, fraction, number
 from tmsopt.algebra.krawczyk import Refused
 from tmsopt.errors import Fault, InputError, count_faults
 from tmsopt.models.exact import Written, written
+from tmsopt.models.names import number_text
 from tmsopt.models.user_spectrum import pattern_of, user_roots, user_structure_name
 from tmsopt.problem.cases import Case
 from tmsopt.problem.files import Given
@@ -345,7 +346,8 @@ def _assembled(
 
 def _numbers(problem: Problem) -> tuple[str, ...]:
     """Texts of the numbers in formulas that are not whole."""
-    equalities = [n for c in problem.conditions.values() if c.equality for n in c.numbers if not n.isdigit()]
+    constants = [x for c in problem.conditions.values() if c.equality for x in c.formula.constants]
+    equalities = [text for x in constants if not (text := number_text(x)).lstrip("-").isdigit()]
     return tuple(dict.fromkeys([*problem.model.numbers, *equalities]))
 
 

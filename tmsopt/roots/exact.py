@@ -5,7 +5,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import DIGITS, rational
+from tmsopt.algebra.balls import DIGITS, rational
 from tmsopt.roots.polynomial import Root
 
 

@@ -1,6 +1,6 @@
 """Section *counters*: what one solve does, beside the checkout that ``TMSOPT_BEFORE`` names.
 
-Counted by a profile function, by the names of functions, old or new; a problem or a text that is met again counts again.
+By a profile function and the names of functions, old or new. What is met again counts again.
 """
 
 import json
@@ -30,11 +30,10 @@ def counted(frame, event, argument):
     if code.co_name in PARSERS:
         texts[frame.f_locals["text"]] += 1
 
-problem = tmsopt.load(f"problems/{sys.argv[1]}.toml")
-calls.clear(), texts.clear(), entered.clear()
+tmsopt.solve, tmsopt.load  # imported by name
 sys.setprofile(counted)
 try:
-    tmsopt.solve(problem, throw=False)
+    tmsopt.solve(tmsopt.load(f"problems/{sys.argv[1]}.toml"), throw=False)
 finally:
     sys.setprofile(None)
 print(json.dumps({
@@ -58,7 +57,7 @@ def report(asked: Asked) -> str:
         now = _counts(_HERE, name)
         then = _counts(Path(before), name) if before else dict.fromkeys(now, "")
         rows += [[name if k == 0 else "", what, then[what], now[what]] for k, what in enumerate(now)]
-    text = "One solve of a problem that was read already, in a process of its own."
+    text = "Reading a problem file and solving it, in a process of its own."
     return page("Counters of one solve", asked, text, table(["problem", "", "before", "now"], rows))
 
 

@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.algebra.elementary import quotient, sqrt, tan
-from tmsopt.models.model import Formula, Quantity, Range
+from tmsopt.algebra.kinds import choose, less, pi, quotient, sqrt, tan
+from tmsopt.models.model import Computed, Quantity, Range
 
 WORDS = "weave", "capsize"
 """What a bicycle does beyond a pair on the imaginary axis, and beyond a root 0."""
@@ -49,7 +49,7 @@ def contact_path(p: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
     return v * cosine / w, c * cosine / w, v, w, -c * cosine
 
 
-def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
+def times(rate: Computed, written: str) -> tuple[Quantity, ...]:
     """Quantities of time, for parameters in SI.
 
     Args:
@@ -71,7 +71,7 @@ def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
             "s",
             "in which the slowest part of a disturbance falls to 1/e",
             r"\tau",
-            lambda v: quotient(1.0, -a * rate(v)) if (a := _of_roots(v, "abscissa")) < 0 else math.nan,
+            lambda v: choose(less(a := _of_roots(v, "abscissa"), 0), quotient(1, -a * rate(v)), math.nan),
             range=Range(lower=0.0),
             aside=True,
             stands_for=f"(1/max({decay}, 0))",
@@ -81,7 +81,7 @@ def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
             "Hz",
             "of the fastest oscillation, 0 where nothing oscillates",
             "f",
-            lambda v: _of_roots(v, "angular_frequency") * rate(v) / (2 * math.pi),
+            lambda v: _of_roots(v, "angular_frequency") * rate(v) / (2 * pi(rate(v))),
             range=Range(lower=0.0),
             aside=True,
             stands_for=f"(angular_frequency*{written}/(2*pi))",

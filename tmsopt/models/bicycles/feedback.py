@@ -4,15 +4,12 @@ M q″ + D q′ + K q = −G (φ, δ, φ′, δ′), q = (lean, steer), so the g
 lag each torque follows as lag T′ + T = −G (…), and its row is multiplied by lag s + 1.
 """
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import flint
-
-from tmsopt.algebra.elementary import is_ball, magnitude, quotient, sqrt
-from tmsopt.models.model import Feedback, Formula, Matrix, Model, Parameter, ParameterSet, Quantity, Range
+from tmsopt.algebra.kinds import absolute, pi, quotient, sqrt
+from tmsopt.models.model import Computed, Feedback, Matrix, Model, Parameter, ParameterSet, Quantity, Range
 from tmsopt.roots.polynomial import determinant
 
 LAG = "lag"
@@ -64,7 +61,7 @@ def native_name(name: str) -> str:
     return "tau" if name == LAG else f"kappa_{name.removeprefix('k_')}"
 
 
-def size(name: str, p: Mapping[str, Any], rate: Formula, torque: Formula) -> Any:
+def size(name: str, p: Mapping[str, Any], rate: Computed, torque: Computed) -> Any:
     """How much of a name of [feedback] in SI a dimensionless one of 1 is."""
     if name == LAG:
         return 1 / rate(p)
@@ -232,13 +229,13 @@ def _parameter(name: str, unit: str, written: str) -> Parameter:
     return Parameter(written, unit, said, latex, default=0.0)
 
 
-def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: Formula) -> Iterator[Quantity]:
+def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: Computed) -> Iterator[Quantity]:
     """What the controller has to give, in SI."""
 
     def per_degree(v: Mapping[str, Any]) -> Any:
         slope = v[f"k_phi{_SLOPE}"] * v["v"] if f"k_phi{_SLOPE}" in names else 0
         gain = v["k_phi"] + slope
-        return gain * (flint.arb.pi() if is_ball(gain) else math.pi) / 180
+        return gain * pi(gain) / 180
 
     def kicked(v: Mapping[str, Any]) -> Any:
         """The torque per impulse: the rates jump by M⁻¹ (0, 1)."""
@@ -253,14 +250,14 @@ def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: 
         yield _sized("push_torque", "N m", meaning, r"T_\delta(0)", kicked)
 
 
-def _sized(name: str, unit: str, meaning: str, latex: str, signed: Formula) -> Quantity:
+def _sized(name: str, unit: str, meaning: str, latex: str, signed: Computed) -> Quantity:
     """The size of a quantity of either sign."""
     return Quantity(
         name,
         unit,
         meaning,
         latex,
-        lambda v: magnitude(signed(v)),
+        lambda v: absolute(signed(v)),
         range=Range(lower=0.0),
         pieces=(signed, lambda v: -signed(v)),
     )

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.elementary import sqrt, tan
+from tmsopt.algebra.kinds import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
 from tmsopt.models.bicycles.feedback import FEEDBACK, UNCONTROLLED, Steered, native_name, size
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS

@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from tmsopt.algebra.elementary import chosen, is_ball, positive_part, quotient, sqrt, tan
+from tmsopt.algebra.kinds import absolute, choose, negligible, positive_part, quotient, sqrt, tan
 from tmsopt.models.bicycles.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.bicycles.tms_equations import matrices
 from tmsopt.models.model import Quantity, Range
@@ -42,13 +40,10 @@ def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
 
 def _Fr_c(v: Mapping[str, Any]) -> Any:
     terms, denominator = _weave_condition(v)
-    numerator = sum(terms)
-    if is_ball(numerator):  # which knows for certain what is 0
-        return sqrt(quotient(numerator, denominator))
-    rounding = 4 * np.finfo(float).eps * sum(abs(t) for t in terms)
-    level = abs(v["chi_B"] - v["chi_H"]) <= 4 * np.finfo(float).eps * (abs(v["chi_B"]) + abs(v["chi_H"]))
-    squared = quotient(chosen(abs(numerator) <= rounding, 0.0, numerator), chosen(level, 0.0, denominator))
-    return abs(sqrt(squared))  # without the sign of −0
+    numerator, size = sum(terms), sum(map(absolute, terms))
+    level = negligible(v["chi_B"] - v["chi_H"], absolute(v["chi_B"]) + absolute(v["chi_H"]))
+    squared = quotient(choose(negligible(numerator, size), 0, numerator), choose(level, 0, denominator))
+    return absolute(sqrt(squared))  # without the sign of −0
 
 
 def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:

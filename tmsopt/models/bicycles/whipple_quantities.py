@@ -1,11 +1,10 @@
 """Quantities derived from the parameters of the Carvallo–Whipple bicycle: speeds, loads, trail, spins."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from tmsopt.algebra.elementary import chosen, is_ball, is_symbolic, positive_part, quotient, sqrt, tan
+from tmsopt.algebra.kinds import both, choose, least, less, positive_part, quotient, ratio, sqrt, tan
 from tmsopt.models.bicycles.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed
 from tmsopt.models.model import Quantity, Range
@@ -15,7 +14,7 @@ Design = Mapping[str, Any]
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
 
-_TINY = 1e-300  # keeps 0/0 away for an optimiser, and changes nothing else
+_ABOVE = 1e300  # any square of a speed that counts is less
 
 _IN_MATRICES = (
     "w",
@@ -53,16 +52,7 @@ def spin(I_yy: Any, r: Any) -> Any:
 
     More: docs/how_to/import.md
     """
-    if is_symbolic(I_yy) or is_symbolic(r):
-        return I_yy * r / (r * r + _TINY) if is_symbolic(r) else I_yy / r if r != 0 else 0 * I_yy
-    if is_ball(I_yy) or is_ball(r):
-        return 0 * r if _vanishes(I_yy) else quotient(I_yy, r)
-    return chosen(np.equal(I_yy, 0), 0.0, quotient(I_yy, r))
-
-
-def _vanishes(x: Any) -> bool:
-    """Whether a ball, or every term of a series, is certainly 0."""
-    return all(x[k] == 0 for k in range(x.prec)) if hasattr(x, "prec") else bool(x == 0)
+    return ratio(I_yy, r)
 
 
 def algebraic(p: Design) -> dict[str, Any]:
@@ -137,22 +127,15 @@ def _v_weave(v: Design) -> Any:
 def _both(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
     """Roots of a y² + b y + c without cancellation, each nan where it does not exist; one of them for a = 0."""
     radical = sqrt(b * b - 4 * a * c)
-    if is_ball(a):
-        far = -(b + radical) / 2 if b > 0 else -(b - radical) / 2
-    else:
-        far = -(b + chosen(b > 0, radical, -radical)) / 2
+    far = -(b + choose(less(0, b), radical, -radical)) / 2
     return quotient(far, a), quotient(c, far)
 
 
 def _least(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
     """The lesser of those y that are positive and have a positive ω²; nan without any."""
-    if is_ball(b[0]):
-        held = [y for y in (one, other) if y > 0 and (b[4] + y * b[5]) * b[1] > 0]
-        return quotient(0 * b[0], 0 * b[0]) if not held else held[0] if len(held) == 1 or held[0] < held[1] else held[1]
-    above = 1e300  # any y that counts is less
-    one, other = (chosen((b[4] + y * b[5]) * b[1] > 0, chosen(y > 0, y, above), above) for y in (one, other))
-    least = chosen(other < one, other, one)
-    return chosen(least < above, least, np.nan)
+    one, other = (choose(both(less(0, y), less(0, (b[4] + y * b[5]) * b[1])), y, _ABOVE) for y in (one, other))
+    found = least(one, other)
+    return choose(less(found, _ABOVE), found, math.nan)
 
 
 def _z_T(v: Design) -> Any:

@@ -1,7 +1,6 @@
 """A stated system with a controller: u = −G y of y = C x, in M q″ + D q′ + K q = B u or x′ = A x + B u."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from tmsopt.models.model import Matrix
 from tmsopt.models.stated.texts import Unfit
@@ -60,17 +59,8 @@ def closed(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
 
 
 def _product(A: Matrix, B: Matrix) -> Matrix:
-    return [[_dot(row, column) for column in zip(*B, strict=True)] for row in A]
-
-
-def _dot(a: Any, b: Any) -> Any:
-    terms = [x * y for x, y in zip(a, b, strict=True) if not (_is_zero(x) or _is_zero(y))]
-    return sum(terms[1:], terms[0]) if terms else 0
-
-
-def _is_zero(x: Any) -> bool:
-    return isinstance(x, int | float) and x == 0
+    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*B, strict=True)] for row in A]
 
 
 def _sum(A: Matrix, B: Matrix) -> Matrix:
-    return [[x if _is_zero(y) else x + y for x, y in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.walk import Instruction, operation_name, steps
+from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, Kind, Step
+from tmsopt.algebra.kinds import FLOATS, as_double
 
 LARGEST_EXPONENT = 1023
 """Of a power: 2**1024 is no double any more."""
@@ -74,17 +74,16 @@ class Degree:
         return Degree(math.ceil(abs(n) * over), math.ceil(abs(n) * under))
 
     def __neg__(self) -> "Degree":
-        return self if self.number is None else constant(-self.number)
+        return self if self.number is None else _constant(-self.number)
 
     __sub__ = __add__
 
 
-def constant(number: Any) -> Degree:
-    """A number."""
+def _constant(number: Any) -> Degree:
     return Degree(0, 0, float(number))
 
 
-def applied(join: Callable[..., Degree], compute: Callable[..., Any]) -> Callable[..., Degree]:
+def _applied(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
     """An operation on degrees that joins them, and computes with what are numbers."""
 
     def operation(*operands: Degree) -> Degree:
@@ -93,65 +92,61 @@ def applied(join: Callable[..., Degree], compute: Callable[..., Any]) -> Callabl
         if len(numbers) < len(operands):
             return joined
         with np.errstate(all="ignore"):
-            return constant(compute(*map(np.float64, numbers)))
+            return _constant(FLOATS.operations[name](*map(np.float64, numbers)))
 
     return operation
 
 
-def same(*operands: Degree) -> Degree:
+def _same(*operands: Degree) -> Degree:
     """Of a root, a magnitude, the lesser of several."""
     return Degree(max(x.over for x in operands), max(x.under for x in operands))
 
 
-def alone(*operands: Degree) -> Degree:
+def _alone(*operands: Degree) -> Degree:
     """Of a function that is not rational: its values are numbers of one size, whatever it is applied to."""
     return Degree()
 
 
-OPERATIONS: Mapping[int, Callable[..., Degree]] = {
-    ca.OP_ADD: operator.add,
-    ca.OP_SUB: operator.add,
-    ca.OP_MUL: operator.mul,
-    ca.OP_DIV: operator.truediv,
-    ca.OP_INV: lambda a: constant(1) / a,
-    ca.OP_SQ: lambda a: a * a,
-    **dict.fromkeys((ca.OP_POW, ca.OP_CONSTPOW), operator.pow),
-    **dict.fromkeys((ca.OP_NEG, ca.OP_TWICE, ca.OP_SQRT, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX), same),
-    **dict.fromkeys((ca.OP_EXP, ca.OP_LOG, ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN), alone),
+_JOINED: Mapping[str, Callable[..., Degree]] = {
+    "add": operator.add,
+    "sub": operator.add,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "square": lambda a: a * a,
+    "pow": operator.pow,
+    **dict.fromkeys(("neg", "sqrt", "abs", "min", "max"), _same),
+    **dict.fromkeys(("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), _alone),
 }
-"""CasADi's, those that balls have."""
+
+DEGREES = Kind({name: _applied(join, name) for name, join in _JOINED.items()}, lambda x: _constant(as_double(x)))
 
 
-def faulty(function: ca.Function) -> tuple[int, str] | None:
-    """The first entry of a function of vectors that is not computed, and why; every step is looked at once.
+def faulty(formula: Formula) -> tuple[int, str] | None:
+    """The first output that is not computed, and why; every step is looked at once.
 
     Degrees are not summed up: in what a program built, such as an inverse of a matrix, most of them cancel. Those of
-    texts are known before there is a function, see `texts`.
+    texts are known before there is a formula, see `tmsopt.models.expression`.
     """
     found: list[Degree | str] = []
-    for step in steps(function):
+    for step in formula.steps:
         operands = [found[k] for k in step.operands]
         wrong = next((o for o in operands if isinstance(o, str)), None)
-        if step.operation == ca.OP_OUTPUT and wrong:
-            return step.place[1], wrong
         now = wrong or _stepped(step, operands)
         found.append(now if isinstance(now, str) or now.number is not None else Degree())
-    return None
+    return next(((k, text) for k, o in enumerate(formula.outputs) if isinstance(text := found[o], str)), None)
 
 
-def _stepped(step: Instruction, operands: Sequence[Any]) -> Degree | str:
+def _stepped(step: Step, operands: Sequence[Any]) -> Degree | str:
     """The degree of a step, or what is wrong with it."""
-    match step.operation:
-        case ca.OP_INPUT | ca.OP_OUTPUT:
-            return Degree()
-        case ca.OP_CONST if not math.isfinite(step.constant):
-            return f"contains {step.constant}, as of a division by 0; accepted: finite numbers, and expressions of them"
-        case ca.OP_CONST:
-            return constant(step.constant)
-        case operation if operation not in OPERATIONS:
-            known = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
-            return f"uses {operation_name(operation)}; accepted: + - * / ** and {known}"
+    if step.op == INPUT:
+        return Degree()
+    if step.op not in (*DEGREES.operations, CONSTANT):
+        known = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
+        return f"uses {step.op}; accepted: + - * / ** and {known}"
+    if step.op == CONSTANT and not math.isfinite(number := as_double(step.value)):
+        return f"contains {number}, as of a division by 0; accepted: finite numbers, and expressions of them"
     try:
-        return OPERATIONS[step.operation](*operands)
+        found: Degree = DEGREES.constant(step.value) if step.op == CONSTANT else DEGREES.operations[step.op](*operands)
+        return found
     except DegreeTooHigh as error:
         return str(error)

@@ -1,11 +1,11 @@
-"""The polynomial and the matrix polynomial of a statement, for entries of any kind of numbers."""
+"""The polynomial and the matrix polynomial of a statement, whose entries are nodes."""
 
 from collections.abc import Iterable
+from fractions import Fraction
 from typing import Any
 
-from tmsopt.algebra.elementary import exact, is_ball
 from tmsopt.models.model import Matrix
-from tmsopt.models.stated.pairs import Pair
+from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
 
 IMAGINARY = "H, imaginary part"
@@ -36,29 +36,22 @@ def polynomial(kind: str, blocks: dict[str, Matrix], carrier: float = 0.0) -> li
 
 def _doubled(R: Matrix, J: Matrix, carrier: float) -> list[Any]:
     """|det(s + i (H + carrier))|² for real s, of which −i (ω + carrier) and the conjugates are the roots."""
-    rows, S = range(len(R)), _carried(R, J, carrier)
-    found = characteristic_polynomial([[Pair(J[i][j], -S[i][j]) for j in rows] for i in rows])
-    re, im = ([x.re if k == 0 else x.im for x in map(_pair, found)] for k in (0, 1))
+    rows, S = range(len(R)), _carried(R, carrier)
+    found = [pair(x) for x in characteristic_polynomial([[Pair(J[i][j], -S[i][j]) for j in rows] for i in rows])]
+    re, im = [x.re for x in found], [x.im for x in found]
     return [a + b for a, b in zip(product(re, re), product(im, im), strict=True)]
 
 
-def _carried(R: Matrix, J: Matrix, carrier: float) -> Matrix:
-    """The real part of H with its carrier, exact where the entries are."""
-    if not carrier:
-        return R
-    added = exact(carrier) if any(is_ball(x) for part in (R, J) for row in part for x in row) else carrier
-    return [[x + added if i == j else x for j, x in enumerate(row)] for i, row in enumerate(R)]
-
-
-def _pair(x: Any) -> Pair:
-    return x if isinstance(x, Pair) else Pair(x)
+def _carried(R: Matrix, carrier: float) -> Matrix:
+    """The real part of H with its carrier."""
+    return [[x + Fraction(carrier) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(R)]
 
 
 def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> tuple[Matrix, ...]:
     """Matrices of the matrix polynomial with these roots, in descending powers; of H those of the real double."""
     if "H" in blocks:
         R, J = blocks["H"], blocks[IMAGINARY]
-        S = _carried(R, J, carrier)
+        S = _carried(R, carrier)
         A = [[*j, *r] for j, r in zip(J, S, strict=True)] + [[*(-x for x in r), *j] for j, r in zip(J, S, strict=True)]
     elif "A" in blocks:
         A = blocks["A"]

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from tmsopt.errors import short
@@ -11,7 +10,7 @@ from tmsopt.models.model import Matrix, Model
 from tmsopt.models.stated.equations import IMAGINARY
 from tmsopt.models.stated.pairs import BESIDE, PAIRS, Pair, as_written, pair, real_text
 from tmsopt.models.stated.texts import Texts, Unfit
-from tmsopt.models.stated.user_defined import made, scalar, square
+from tmsopt.models.stated.user_defined import made, square
 
 _UNIT_NAMES = ("i", "j")
 
@@ -42,11 +41,8 @@ def from_hamiltonian(H: Any, *, name: str = "stated", quantities: Mapping[str, A
     More: docs/explanation/exceptional_points.md
     """
     rows = square("H", H.tolist() if isinstance(H, np.ndarray) and H.ndim == 2 else H)
-    given = [x for row in rows for x in row]
     derived = dict(quantities or {}) if isinstance(quantities or {}, Mapping) else {}
-    parts = [part for x in (*given, *derived.values()) for part in (x if isinstance(x, tuple) else (x,))]
-    symbols = {s.name(): s for x in parts if isinstance(x, ca.SX) for s in ca.symvar(x)}
-    texts = complex_texts(_unfit, symbols, {n: x for n, x in derived.items() if not isinstance(x, str)})
+    texts = complex_texts(_unfit, {n: x for n, x in derived.items() if not isinstance(x, str)})
     texts.read_quantities({n: x for n, x in derived.items() if isinstance(x, str)})
     entries = [
         [_entry(texts, x, f"row {i}, column {j}") for j, x in enumerate(row, start=1)]
@@ -62,18 +58,16 @@ def from_pairs(entries: list[list[Pair]], name: Any, quantities: Any) -> Model:
     return made("hamiltonian", name, {"H": R, IMAGINARY: J}, quantities)
 
 
-def complex_texts(
-    fault: Any, symbols: Mapping[str, Any] | None = None, known: Mapping[str, Any] | None = None
-) -> Texts:
+def complex_texts(fault: Any, known: Mapping[str, Any] | None = None) -> Texts:
     """A reader of texts with complex numbers; see `Texts`."""
-    return Texts(lambda message, *key: fault(as_written(message), *key), symbols, known, PAIRS, BESIDE)
+    return Texts(lambda message, *key: fault(as_written(message), *key), known, PAIRS, BESIDE)
 
 
 def text_entry(texts: Texts, text: str, where: str) -> Pair:
     """One entry as a pair; 0 for one with a fault."""
-    known = set(texts.symbols)
+    known = set(texts.met)
     found = pair(texts.entry(real_text(text), "H", where))
-    for taken in (n for n in _UNIT_NAMES if n in texts.symbols and n not in known):
+    for taken in (n for n in _UNIT_NAMES if n in texts.met and n not in known):
         texts.fault(f"{where}: '{taken}' would be a parameter; write the imaginary unit as 1j", "H")
     return found
 
@@ -84,9 +78,9 @@ def _entry(texts: Texts, x: Any, where: str) -> Pair:
     if isinstance(x, tuple):
         if len(x) != 2:
             raise Unfit("H", f"{where}: found {short(x)}; accepted: two, the real and the imaginary part")
-        return Pair(*(scalar("H", where, part) for part in x))
+        return Pair(*x)
     if isinstance(x, complex | np.complexfloating):
-        return Pair(scalar("H", where, float(x.real)), scalar("H", where, float(x.imag)))
+        return Pair(float(x.real), float(x.imag))
     return Pair(x)
 
 

@@ -1,15 +1,13 @@
-"""Complex numbers as pairs of real ones of any kind: what an entry of a complex matrix is computed in."""
+"""Complex numbers as pairs of nodes: what an entry of a complex matrix is computed in."""
 
+import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import casadi as ca
-
-from tmsopt.models.arithmetics import BINARY, SYMBOLIC, Arithmetic
-from tmsopt.models.constants import number_of, number_symbol, number_texts
+from tmsopt.algebra.formula import Kind, constant, made
+from tmsopt.algebra.kinds import NODES
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, DegreeTooHigh
 
@@ -48,7 +46,7 @@ class Pair:
     def __truediv__(self, other: Any) -> "Pair":
         b = pair(other)
         if is_real(b):
-            return Pair(_quotient(self.re, b.re), self.im if is_real(self) else _quotient(self.im, b.re))
+            return Pair(self.re / b.re, self.im if is_real(self) else self.im / b.re)
         top, square = self * Pair(b.re, -b.im), b.re * b.re + b.im * b.im
         return Pair(top.re / square, top.im / square)
 
@@ -59,10 +57,10 @@ class Pair:
         exponent = _whole(n)
         if exponent is None:
             raise DegreeTooHigh("is a complex number to a power; accepted: whole numbers as exponents, and exp(1j*phi)")
-        found, power = Pair(1.0), self
+        found, power = Pair(constant(1)), self
         for bit in bin(abs(exponent))[:1:-1]:
             found, power = (found * power if bit == "1" else found), power * power
-        return Pair(1.0) / found if exponent < 0 else found
+        return Pair(constant(1)) / found if exponent < 0 else found
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -71,61 +69,50 @@ class Pair:
 def pair(x: Any) -> Pair:
     """A number as a pair."""
     if isinstance(x, complex):
-        return Pair(x.real, x.imag if x.imag else 0)
-    return x if isinstance(x, Pair) else Pair(x)
+        return Pair(constant(x.real), constant(x.imag) if x.imag else 0)
+    return x if isinstance(x, Pair) else Pair(constant(x))
 
 
 def is_real(x: Pair) -> bool:
     """Whether a pair has no imaginary part whatever its parameters are."""
-    return bool(x.im.is_zero()) if isinstance(x.im, ca.SX) else isinstance(x.im, int | float) and x.im == 0
-
-
-def _quotient(x: Any, y: Any) -> Any:
-    """A quotient; one of two numbers is a number too, such as 1/3, which is taken exactly."""
-    a, b = ca.SX(x), ca.SX(y)
-    if a.op() == ca.OP_NEG:
-        return -_quotient(a.dep(), b)
-    texts = [*number_texts(a), *number_texts(b)] if a.is_symbolic() and b.is_symbolic() else []
-    if len(texts) < 2:
-        return x / y
-    return number_symbol("/".join(text if text.replace(".", "").isdigit() else f"({text})" for text in texts))
+    return constant(x.im).fraction == 0
 
 
 def _whole(n: Pair) -> int | None:
     if not is_real(n):
         return None
-    value = number_of(ca.SX(n.re))
-    return int(value) if value is not None and value == int(value) and abs(value) <= LARGEST_EXPONENT else None
+    value = constant(n.re).fraction
+    known = value is not None and value.denominator == 1 and abs(value) <= LARGEST_EXPONENT
+    return int(value) if value is not None and known else None
 
 
-def _real(name: str, function: Callable[..., Any]) -> Callable[..., Pair]:
-    def applied(*operands: Any) -> Pair:
-        if not all(is_real(pair(x)) for x in operands):
+def _real(name: str) -> Callable[..., Pair]:
+    def applied(*operands: Pair) -> Pair:
+        if not all(map(is_real, operands)):
             raise DegreeTooHigh(f"takes {name} of a complex number; accepted: + - * / ** and exp of these")
-        return Pair(function(*(pair(x).re for x in operands)))
+        return Pair(made(name, *(x.re for x in operands)))
 
     return applied
 
 
-def _joined(join: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
-    return join(pair(a), pair(b))
+def _exp(x: Pair) -> Pair:
+    size = made("exp", x.re)
+    return Pair(size) if is_real(x) else Pair(size * made("cos", x.im), size * made("sin", x.im))
 
 
-def _exp(x: Any) -> Pair:
-    z = pair(x)
-    size = ca.exp(ca.SX(z.re))
-    return Pair(size) if is_real(z) else Pair(size * ca.cos(ca.SX(z.im)), size * ca.sin(ca.SX(z.im)))
-
-
-PAIRS = Arithmetic(
-    {**{name: _real(name, SYMBOLIC.functions[name]) for name in FUNCTIONS}, "exp": _exp},
+PAIRS = Kind(
+    {
+        **{name: _real(name) for name in FUNCTIONS},
+        **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg", "pow")},
+        "div": operator.truediv,
+        "square": lambda x: x * x,
+        "exp": _exp,
+    },
+    lambda value: Pair(NODES.constant(value)),
     pair,
-    {sign: partial(_joined, join) for sign, join in BINARY.items()},
-    constant=lambda text: Pair(number_symbol(text)),
 )
-"""Of CasADi's expressions."""
 
-BESIDE: Mapping[str, Any] = {UNIT: Pair(0, 1.0)}
+BESIDE: Mapping[str, Any] = {UNIT: Pair(constant(0), constant(1))}
 
 
 def real_text(text: str) -> str:

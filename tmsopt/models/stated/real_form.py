@@ -6,13 +6,11 @@ from dataclasses import replace
 from itertools import product
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.formulas import Formulas
+from tmsopt.algebra.formula import Formula, Node, NotAccepted, formula
 from tmsopt.algebra.intervals import Interval, ranges
-from tmsopt.algebra.walk import NotAccepted
-from tmsopt.models.constants import formulas
+from tmsopt.algebra.kinds import values
 from tmsopt.models.model import Matrix, Model
 from tmsopt.records import Array
 
@@ -81,7 +79,7 @@ def carrier_for(middle: float, spread: float) -> float:
     return distance - step * round(middle / step)
 
 
-def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tuple[float, float]]:
+def carriers(entries: Sequence[Node]) -> Callable[[Mapping[str, Interval]], tuple[float, float]]:
     """The middle and the spread of Re ω over ranges of parameters, the spread no less than any |Im ω|.
 
     The eigenvalues of H lie in its field of values: Re ω among those of (H + H*)/2, Im ω among those of (H − H*)/2i,
@@ -90,16 +88,13 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
     meet conjugates of others only beyond twice that.
     """
     n = math.isqrt(len(entries) // 2)
-    R, J = (
-        np.array([ca.SX(e) for e in part], dtype=object).reshape(n, n) for part in (entries[: n * n], entries[n * n :])
-    )
+    R, J = (np.array(part, dtype=object).reshape(n, n) for part in (entries[: n * n], entries[n * n :]))
     off = [(i, j) for i in range(n) for j in range(n) if i != j]
     even = [(R[i, j] + R[j, i]) / 2 for i, j in off], [(J[i, j] - J[j, i]) / 2 for i, j in off]
     odd = [(J[i, j] + J[j, i]) / 2 for i, j in off], [(R[i, j] - R[j, i]) / 2 for i, j in off]
     every = [*R.diagonal(), *J.diagonal(), *even[0], *even[1], *odd[0], *odd[1]]
-    names = [x.name() for x in ca.symvar(ca.vertcat(*every))]
-    asked = formulas([ca.simplify(x) for x in every], names)
-    matrix = formulas([*R.ravel(), *J.ravel()], names)
+    matrix = formula(entries)
+    names, asked = matrix.names, formula(every, matrix.names)
 
     def bounds(box: Mapping[str, Interval]) -> tuple[float, float]:
         found = np.array(_ranges(asked, [box[name] for name in names]))
@@ -123,14 +118,14 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
     return bounds
 
 
-def _frequencies(matrix: Formulas, n: int, box: Sequence[Interval]) -> Any:
+def _frequencies(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
     """Eigenvalues of H at designs of the box, corners among them where these are few; none where H does not exist."""
     share = _shares(len(box))
     if len(box) <= _CORNERS:
         share = np.concatenate([share, np.array(list(product((0.0, 1.0), repeat=len(box))))])
     columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in zip(matrix.names, box, share.T, strict=True)}
-    values = np.array([np.broadcast_to(np.asarray(x, dtype=float), len(share)) for x in matrix(columns)])
-    H = (values[: n * n] + 1j * values[n * n :]).T.reshape(-1, n, n)
+    own = np.array([np.broadcast_to(np.asarray(x, dtype=float), len(share)) for x in values(matrix, columns)])
+    H = (own[: n * n] + 1j * own[n * n :]).T.reshape(-1, n, n)
     return np.linalg.eigvals(H) if np.isfinite(H).all() else np.zeros(0)
 
 
@@ -140,17 +135,17 @@ def _shares(size: int) -> Array:
     return np.asarray(share[:, np.arange(size) % share.shape[1]])
 
 
-def _ranges(asked: Formulas, box: Sequence[Interval]) -> list[Interval]:
+def _ranges(asked: Formula, box: Sequence[Interval]) -> list[Interval]:
     try:
-        found = ranges(asked.function, box)[0]
+        found = ranges(asked, box)
         if all(math.isfinite(x) for ends in found for x in ends):
             return found
     except NotAccepted:
         pass
     places = zip(asked.names, box, _shares(len(box)).T, strict=True)
     columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in places}
-    values = np.array([np.broadcast_to(x, _SAMPLE) for x in asked(columns)])
-    values = np.where(np.isfinite(values), values, 0.0)
-    low, high = values.min(axis=1), values.max(axis=1)
+    own = np.array([np.broadcast_to(x, _SAMPLE) for x in values(asked, columns)])
+    own = np.where(np.isfinite(own), own, 0.0)
+    low, high = own.min(axis=1), own.max(axis=1)
     size = (_WIDER - 1) * np.maximum(high - low, 0.0) / 2
     return list(zip((low - size).tolist(), (high + size).tolist(), strict=True))

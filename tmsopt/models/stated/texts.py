@@ -1,24 +1,19 @@
 """A stated system in text: its entries and quantities as expressions of shared symbols."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from types import MappingProxyType
 from typing import Any
 
-import casadi as ca
-
-from tmsopt.models.arithmetics import DEGREES, SYMBOLIC, Arithmetic
-from tmsopt.models.constants import number_symbol
+from tmsopt.algebra.formula import Kind, symbol
+from tmsopt.algebra.kinds import NODES
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
-from tmsopt.models.stated.degree import Degree, DegreeTooHigh
+from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
 
 MOST_QUANTITIES = 500
 """More take seconds to read."""
-
-_SYMBOLIC = replace(SYMBOLIC, constant=number_symbol)
 
 _CIRCLES = 8  # that are listed
 
@@ -49,36 +44,37 @@ class Unfit(ValueError):
 
 
 class Texts:
-    """Turns texts into expressions of shared symbols; discarded after one statement.
+    """Turns texts into nodes; discarded after one statement.
+
+    Attributes:
+        met: names in the texts so far.
 
     Args:
         fault: called with what is wrong with a text, and where: ``M``, or ``quantities`` and a name.
-        symbols: those that there are beside texts.
-        known: quantities that are expressions already.
-        arithmetic: that entries are computed in.
+        known: quantities that are no texts.
+        kind: of numbers that entries are made of.
         beside: names that mean something in it.
     """
 
     def __init__(
         self,
         fault: Callable[..., None],
-        symbols: Mapping[str, Any] | None = None,
         known: Mapping[str, Any] | None = None,
-        arithmetic: Arithmetic = _SYMBOLIC,
+        kind: Kind = NODES,
         beside: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.fault = fault
-        self.arithmetic, self.beside = arithmetic, beside
-        self.symbols = dict(symbols or {})
+        self.kind, self.beside = kind, beside
+        self.met: dict[str, None] = {}
         self.known = dict(known or {})
         self.written: dict[str, Expression | None] = {}
         self._degrees: dict[str, Degree] = {}
         self._order: tuple[str, ...] = ()
 
     def entry(self, text: str, key: str, where: str) -> Any:
-        """One entry as an expression of CasADi; 0 for one with a fault."""
+        """One entry as a node, or what the kind makes of it; 0 for one with a fault."""
         expression = self._parsed(text, (key,), f"{where}: ")
-        return self._symbolic(expression, (key,), f"{where}: ", self.arithmetic)[0] if expression else 0
+        return self._symbolic(expression, (key,), f"{where}: ", self.kind)[0] if expression else 0
 
     def read_quantities(self, texts: Mapping[str, str]) -> None:
         """The formulas of the quantities, which may use one another, each to be had by `quantity`."""
@@ -114,20 +110,21 @@ class Texts:
         return self.known[name]
 
     def _symbolic(
-        self, expression: Expression, key: tuple[str, ...], where: str, arithmetic: Arithmetic = _SYMBOLIC
+        self, expression: Expression, key: tuple[str, ...], where: str, kind: Kind = NODES
     ) -> tuple[Any, Degree]:
         """An expression in symbols, made when first met, and its degree with the quantities in it written out."""
-        values = {} if arithmetic is _SYMBOLIC else dict(self.beside)
+        values = {} if kind is NODES else dict(self.beside)
         for name in (n for n in expression.names if n not in values):
             derived = name in self.written or name in self.known
-            values[name] = self.quantity(name) if derived else self.symbols.setdefault(name, ca.SX.sym(name))
+            self.met[name] = None
+            values[name] = self.quantity(name) if derived else symbol(name)
         try:
-            degree = expression.evaluate({n: self._degrees.get(n, Degree()) for n in values}, DEGREES)
+            degree = expression.of({n: self._degrees.get(n, Degree()) for n in values}, DEGREES)
         except DegreeTooHigh as error:
             self.fault(f"{where}{error}", *key)
             return 0, Degree()
         try:
-            return expression.evaluate(values, arithmetic), degree
+            return expression.of(values, kind), degree
         except DegreeTooHigh as error:
             self.fault(f"{where}'{expression.text}' {error}", *key)
             return 0, Degree()
@@ -149,13 +146,9 @@ class Texts:
 def untexted(
     matrices: Mapping[str, Matrix], derived: Mapping[Any, Any], fault: Callable[..., None]
 ) -> tuple[dict[str, Matrix], dict[Any, Any]]:
-    """Texts in matrices and quantities as expressions of CasADi, one symbol for each name."""
+    """Texts in matrices and quantities as nodes."""
     written = {n: x for n, x in derived.items() if isinstance(x, str)}
-    given = [x for rows in matrices.values() for row in rows for x in row] + list(derived.values())
-    if not any(isinstance(x, str) for x in given):
-        return dict(matrices), dict(derived)
-    symbols = {s.name(): s for x in given if isinstance(x, ca.SX) for s in ca.symvar(x)}
-    texts = Texts(fault, symbols, {n: x for n, x in derived.items() if n not in written})
+    texts = Texts(fault, known={n: x for n, x in derived.items() if n not in written})
     texts.read_quantities(written)
 
     def entry(x: Any, n: str, i: int, j: int) -> Any:

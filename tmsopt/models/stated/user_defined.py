@@ -1,8 +1,8 @@
 """Models of any system that a user states: by its matrices, or by its characteristic polynomial."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from functools import lru_cache
 from numbers import Rational, Real
 from typing import Any, NoReturn
@@ -11,17 +11,14 @@ import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.algebra.elementary import exact, is_ball
-from tmsopt.algebra.formal import Formal
-from tmsopt.algebra.formulas import Formulas
+from tmsopt.algebra.balls import DIGITS
+from tmsopt.algebra.formula import Formula, Node, NotAccepted, constant, fold, formula, nodes_of_casadi, symbol
 from tmsopt.algebra.identity import Field
-from tmsopt.algebra.rounding import Bounded
-from tmsopt.algebra.walk import NotAccepted, steps, walk
+from tmsopt.algebra.kinds import BALLS, NODES, values
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
-from tmsopt.models.constants import formulas, number_symbol, number_texts, rebuilt
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
-from tmsopt.models.names import latex, spelled, unusable
+from tmsopt.models.names import latex, number_text, spelled, unusable
 from tmsopt.models.stated.closed_loop import check_loop, closed
 from tmsopt.models.stated.degree import faulty
 from tmsopt.models.stated.equations import IMAGINARY, in_order, pencil, polynomial, whole
@@ -36,7 +33,6 @@ MOST = {"M": 6, "A": 12, "H": 6, "coefficients": 12}
 """Largest size of M, D, K; of A; of H; largest degree."""
 
 _SAMPLES = 24  # designs at which a leading coefficient must vanish for it to be looked at
-_DIGITS = 60
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -166,22 +162,21 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
         raise Unfit("name", f"'{name.strip()}' is a model of tmsopt's own; give yours another name")
     if not isinstance(quantities or {}, Mapping):
         raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")
-    matrices, derived = untexted(matrices, quantities or {}, _unfit)
+    matrices, derived = untexted(
+        matrices, {n: _node("quantities", n, x) for n, x in (quantities or {}).items()}, _unfit
+    )
     given = {
         (n, f"entry {j}" if kind == "coefficients" else f"row {i}, column {j}"): x
         for n, rows in matrices.items()
         for i, row in enumerate(rows, start=1)
         for j, x in enumerate(row, start=1)
     } | {("quantities", str(n)): x for n, x in derived.items()}
-    entries = {place: scalar(whole(place[0]), place[1], x) for place, x in given.items()}
-    every = ca.vertcat(*entries.values())
-    texts = number_texts(every)
-    numbers = [number_symbol(text) for text in texts]
-    in_numbers = {x.name() for x in numbers}
-    ordered = ca.vertcat(*(entries[place] for place in in_order(kind, entries)))
-    symbols = [x for x in ca.symvar(ordered) if x.name() not in in_numbers]
-    names = tuple(x.name() for x in symbols)
-    twice = {n for n in names if names.count(n) > 1}
+    symbols = [
+        x.name() for x in ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in given.values() if isinstance(x, ca.SX))))
+    ]
+    entries = {place: _node(whole(place[0]), place[1], x) for place, x in given.items()}
+    names = formula(entries[place] for place in in_order(kind, entries)).names
+    twice = {n for n in symbols if symbols.count(n) > 1}
     if twice:
         raise Unfit(key, f"has two symbols named {min(twice)}; make one and use it everywhere")
     if not names:
@@ -193,106 +188,98 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
         if why := "is the name of a parameter" if n in names else unusable(n, kind == "hamiltonian"):
             raise Unfit("quantities", f"{n!r} {why}; give the quantity a name of its own")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
-    exact = ca.Function("stated", [ca.vertcat(*symbols, *numbers)], [ca.densify(every)])
-    if wrong := faulty(rebuilt(names, texts, exact).function):
+    stated = formula(entries.values(), names)
+    if wrong := faulty(stated):
         (key, where), why = list(given)[wrong[0]], wrong[1]
         raise Unfit(whole(key), f"{where}: {why}")
-    return _rebuilt(kind, name.strip(), names, shapes, tuple(derived), exact.serialize(), texts)
+    return _rebuilt(kind, name.strip(), shapes, tuple(derived), stated)
 
 
 @lru_cache(maxsize=64)
 def _rebuilt(
     kind: str,
     name: str,
-    names: tuple[str, ...],
     shapes: tuple[tuple[str, int, int], ...],
     derived: tuple[str, ...],
-    serialized: str,
-    texts: tuple[str, ...],
+    stated: Formula,
     carrier: float = 0.0,
 ) -> Model:
     """A model from plain data; in each process there is one of each."""
-    entry = rebuilt(names, texts, ca.Function.deserialize(serialized))
-    count = sum(rows * columns for _, rows, columns in shapes)
-    symbols = {n: ca.SX.sym(n) for n in names}
-    written = ca.vertsplit(entry.exact(ca.vertcat(*symbols.values(), *map(number_symbol, texts))))
-    zero = [e.is_zero() for e in written]
-
-    def blocks(entries: Sequence[Any]) -> dict[str, Matrix]:
-        found = [0 if zero[k] else x for k, x in enumerate(entries[:count])]
-        taken, at = {}, 0
-        for n, rows, columns in shapes:
-            taken[n] = [found[at + i * columns : at + (i + 1) * columns] for i in range(rows)]
-            at += rows * columns
-        return closed(taken)
-
-    def every(values: Mapping[str, Any]) -> list[Any]:
-        return polynomial(kind, blocks(entry(values)), carrier)
-
-    def vanish(leading: int) -> int:
-        """How many of so many leading coefficients are 0 by their expressions, one after the other."""
-        field = Field(entry.exact, entry.numbers())
-        try:
-            found = blocks(walk(entry.exact, field.inputs, field.arithmetic())[0])
-            for n in ("D", "K")[max(leading - 1, 0) :] if "M" in found else ():  # without part in these coefficients
-                found[n] = [[0] * len(found["M"]) for _ in found["M"]]
-            row = polynomial(kind, found)[:leading]
-            return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
-        except (ZeroDivisionError, NotAccepted):  # or too large to tell
-            return 0
-
-    def alone(written: Any) -> Any:
-        formula = formulas([written], names)
-        return lambda values: formula(values)[0]
-
-    lost = _vanishing(every, names)
-    lost = lost and vanish(lost)
-    if lost == (degree := count - 1 if kind == "coefficients" else shapes[0][1] * (1 if shapes[0][0] == "A" else 2)):
+    names = stated.names
+    entries = fold(stated, {n: symbol(n) for n in names}, NODES)
+    rest = iter(entries)
+    blocks = closed({n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes})
+    every = polynomial(kind, blocks, carrier)
+    degree = len(every) - 1
+    lost = _vanishing(formula(every, names))
+    lost = lost and _vanish(kind, blocks, names, lost)
+    if lost == degree:
         raise Unfit(shapes[0][0], "makes a polynomial without s, which has no root")
-    quick = formulas(every(symbols)[lost:], names)
-
-    def coefficients(**values: Any) -> list[Any]:
-        # The determinant of the entries themselves where numbers are exact: CasADi folds constants as doubles.
-        if not any(map(is_ball, values.values())):
-            return quick(values)
-        number = exact if all(isinstance(x, flint.fmpq | Bounded | Formal) for x in values.values()) else _ball
-        return [number(c) for c in every(values)[lost:]]
+    coefficients, quantities = formula(every[lost:], names), dict(zip(derived, rest, strict=True))
 
     of = ParameterSet("stated", tuple(Parameter(n, "1", "parameter", latex(n)) for n in names), native=dict)
+    plain = (kind, name, shapes, derived, stated)
     made = Model(
         name=name,
         title=name,
         degree=degree - lost,
         sets=(of,),
         algebraic=dict,
-        polynomial=coefficients,
-        quantities=tuple(
-            Quantity(n, "1", "quantity", latex(n), alone(x)) for n, x in zip(derived, written[count:], strict=True)
-        ),
-        pencil=None if kind == "coefficients" else lambda values: pencil(blocks(entry(values)), carrier),
-    )
-    plain = (kind, name, names, shapes, derived, serialized, texts)
-    decimals = dict.fromkeys(step.constant for step in steps(entry.exact) if step.operation == ca.OP_CONST)
-    made = replace(
-        made,
+        polynomial=lambda **given: values(coefficients, given),
+        quantities=tuple(Quantity(n, "1", "quantity", latex(n), _alone(x, names)) for n, x in quantities.items()),
+        pencil=None if kind == "coefficients" else _matrices(pencil(blocks, carrier), names),
         origin=(_rebuilt, (*plain, carrier) if carrier else plain),
-        statement=_statement(entry, shapes, derived),
-        numbers=(*(n for n in texts if not n.lstrip("-").isdigit()), *(repr(x) for x in decimals if x % 1)),
+        statement=_statement(stated, shapes, derived),
+        numbers=_numbers(stated),
     )
     if kind != "hamiltonian":
         return made
     return complex_model(
         made,
         carrier,
-        carriers(entry(symbols)[:count]),
+        carriers(entries[: sum(rows * columns for _, rows, columns in shapes)]),
         lambda c: _rebuilt(*plain, *([c] if c else [])),
-        lambda values: pencil(blocks(entry(values))),
+        _matrices(pencil(blocks), names),
     )
 
 
-def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
+def _alone(x: Any, names: Sequence[str]) -> Callable[[Mapping[str, Any]], Any]:
+    own = formula([x], names)
+    return lambda given: values(own, given)[0]
+
+
+def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[Mapping[str, Any]], tuple[Matrix, ...]]:
+    """Matrices of nodes as a function of named numbers."""
+    n, own = len(rows[0]), formula((x for P in rows for row in P for x in row), names)
+
+    def at(given: Mapping[str, Any]) -> tuple[Matrix, ...]:
+        found = iter(values(own, given))
+        return tuple([[next(found) for _ in range(n)] for _ in range(n)] for _ in rows)
+
+    return at
+
+
+def _vanish(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], leading: int) -> int:
+    """How many of so many leading coefficients are 0 by their expressions, one after the other."""
+    none = [[0] * len(blocks["M"]) for _ in blocks["M"]] if "M" in blocks else []
+    own = {**blocks, **dict.fromkeys(("D", "K")[max(leading - 1, 0) :] if none else (), none)}  # without part in these
+    asked = formula(polynomial(kind, own)[:leading], names)
+    field = Field(asked)
+    try:
+        row = fold(asked, field.inputs, field.kind)
+        return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
+    except (ZeroDivisionError, NotAccepted):  # or too large to tell
+        return 0
+
+
+def _numbers(stated: Formula) -> tuple[str, ...]:
+    """Texts of the constants that are not whole."""
+    return tuple(number_text(x) for x in stated.constants if not (isinstance(x, Fraction) and x.denominator == 1))
+
+
+def _statement(stated: Formula, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
     """What tells a model from others, every number in full."""
-    texts, shared = spelled(entry.function, entry.names)
+    texts, shared = spelled(stated)
     rest = iter(texts)
     matrices = {n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes}
     quantities = dict(zip(derived, rest, strict=True))
@@ -300,33 +287,25 @@ def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived:
         imaginary = matrices.pop(IMAGINARY)
         each = (zip(re, im, strict=True) for re, im in zip(matrices["H"], imaginary, strict=True))
         matrices["H"] = [[complex_text(re, im) for re, im in row] for row in each]
-    return {"parameters": list(entry.names), **matrices, "quantities": quantities, "shared": shared}
+    return {"parameters": list(stated.names), **matrices, "quantities": quantities, "shared": shared}
 
 
-def _ball(x: Any) -> Any:
-    """A coefficient as a ball, or as the series or the formula that it is."""
-    x = exact(x)
-    return flint.arb(x) if isinstance(x, flint.fmpq) else x
-
-
-def _vanishing(polynomial: Any, names: Sequence[str]) -> int:
+def _vanishing(asked: Formula) -> int:
     """Number of leading coefficients that may be 0 for all parameters, as of a singular M: others are not, at a design.
 
-    In balls of 60 digits at designs of many sizes and signs, for numbers as they print: [[0.1, 0.7], [0.3, 2.1]] is
-    meant to be singular, and in binary it is not.
+    In balls of 60 digits at designs of many sizes and signs.
     """
-    lost, known = 0, False
-    with flint.ctx.workdps(_DIGITS):
+    lost, known, names = 0, False, asked.names
+    with flint.ctx.workdps(DIGITS):
         for i in range(_SAMPLES):
             share = [math.modf((i * len(names) + k + 1) * _GOLDEN)[0] for k in range(len(names))]
             # Both signs, sizes near 1 and then from 1e-6 to 1e6; at first positive numbers, where most formulas exist.
             signs = [-1 if i % 3 == 2 and math.modf(8 * x)[0] < 0.5 else 1 for x in share]
             reach = 6 if i < _SAMPLES // 2 else 40
             design = [sign * 2.0 ** (reach * (x - 0.5)) for sign, x in zip(signs, share, strict=True)]
-            row = polynomial({n: exact(x) for n, x in zip(names, design, strict=True)})
-            found = [flint.arb(c) for c in row]
+            found = [flint.arb(c) for c in fold(asked, dict(zip(names, design, strict=True)), BALLS)]
             nonzero = next(
-                (k for k, c in enumerate(found[:-1]) if not c.contains(0) or not c.is_finite()), len(row) - 1
+                (k for k, c in enumerate(found[:-1]) if not c.contains(0) or not c.is_finite()), len(found) - 1
             )
             if all(c.is_finite() for c in found[: nonzero + 1]):
                 lost, known = (min(lost, nonzero) if known else nonzero), True
@@ -339,20 +318,24 @@ def _unfit(message: str, key: str, *name: str) -> NoReturn:
     raise Unfit(key, ": ".join([*name, message]))
 
 
-def scalar(key: str, where: str, value: Any) -> ca.SX:
-    """An entry as an SX of one element.
+def _node(key: str, where: Any, value: Any) -> Any:
+    """An entry as a node; a text as it is.
 
     Raises:
-        Unfit: for what is no finite number or SX.
+        Unfit: for what is no finite number or scalar SX.
     """
+    if isinstance(value, str | Node):
+        return value
     if isinstance(value, ca.MX):
         raise Unfit(key, f"{where}: is MX; make the symbols by ca.SX.sym")
     if isinstance(value, ca.SX | ca.DM):
         if value.numel() != 1:
             raise Unfit(key, f"{where}: is a matrix; accepted: scalar expressions")
-        return ca.densify(ca.SX(value))
+        inputs = ca.symvar(entry := ca.densify(ca.SX(value)))
+        names = [x.name() for x in inputs]
+        return nodes_of_casadi(ca.Function("entry", [ca.vertcat(ca.SX(0, 1), *inputs)], [entry]), names)[0]
     number = _number(key, where, value)
-    return number_symbol(str(value)) if isinstance(value, Rational) else ca.SX(number)
+    return constant(Fraction(value) if isinstance(value, Rational) else number)
 
 
 def _number(key: str, where: str, value: Any) -> float:

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import flint
 
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.balls import rational
 from tmsopt.algebra.identity import Quotient
 from tmsopt.algebra.krawczyk import enclosed, refined
 from tmsopt.roots.exact import isolated_roots

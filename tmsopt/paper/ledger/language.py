@@ -16,7 +16,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.balls import rational
 from tmsopt.paper.ledger.algebra import PRECISION, make_ring, match_factors
 from tmsopt.paper.ledger.vocabulary import VOCABULARY
 

@@ -6,9 +6,8 @@ from functools import cache
 from typing import Any
 
 from tmsopt import laws
-from tmsopt.algebra.elementary import rational
+from tmsopt.algebra.balls import Tilt, rational
 from tmsopt.models import copo
-from tmsopt.models.exact import Tilt
 from tmsopt.paper.ledger.algebra import is_stable
 
 _COUNT = 4000

@@ -6,8 +6,8 @@ from typing import Any
 import flint
 
 from tmsopt import laws
+from tmsopt.algebra.balls import Tilt
 from tmsopt.models import copo, matrices, tms
-from tmsopt.models.exact import Tilt
 from tmsopt.paper.ledger import algebra
 from tmsopt.paper.ledger.entry import judge_decimal
 from tmsopt.paper.ledger.sample import describe_design, draw_sample

@@ -1,10 +1,13 @@
 """Dimensions of numbers, so that the unit of an expression follows from the units of what it names."""
 
+import operator
 import re
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
+
+from tmsopt.algebra.formula import Kind
+from tmsopt.algebra.kinds import as_double
 
 _DERIVED = {"N": "kg m/s^2", "Hz": "1/s", "1": "", "√(g/w)": "√g/√w"}
 _NAMED = {"kg m/s^2": "N", "kg m^2/s^2": "N m", "√g/√w": "√(g/w)"}
@@ -93,13 +96,20 @@ def _none(_: Any) -> Dimension:
     return Dimension()
 
 
-FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    **dict.fromkeys(("sin", "cos", "tan", "exp", "log"), _none),
-    **dict.fromkeys(("asin", "acos", "atan"), _angle),
-    **dict.fromkeys(("abs", "min", "max"), _same),
-    "sqrt": lambda x: power(x if isinstance(x, Dimension) else 1.0, 0.5),
-}
-"""What the functions of an expression make of dimensions."""
+UNITS = Kind(
+    {
+        **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg")},
+        "div": operator.truediv,
+        "square": lambda x: x * x,
+        "pow": power,
+        "sqrt": lambda x: power(x, 0.5),
+        **dict.fromkeys(("sin", "cos", "tan", "exp", "log"), _none),
+        **dict.fromkeys(("asin", "acos", "atan"), _angle),
+        **dict.fromkeys(("abs", "min", "max"), _same),
+    },
+    lambda x: float(as_double(x)),
+)
+"""What operations make of dimensions; constants are numbers."""
 
 
 def _power(name: str, p: Fraction) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.elementary import as_ball, rational
+from tmsopt.algebra.balls import as_ball, rational
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.naming import shown
 from tmsopt.roots.patterns.shape import Shape

@@ -132,11 +132,12 @@ def damping_ratio(p: Real, q: Real) -> Real:
     return where(0.25 * p * p < q, 0.5 * p / np.sqrt(np.abs(q)), real)
 
 
-def root_pair(p: Real, q: Real) -> tuple[Real, Real]:
-    """Both roots of s² + p s + q as complex numbers, conjugates exact."""
+def root_pair(p: Real, q: Real) -> Four:
+    """Real and imaginary parts of both roots of s² + p s + q, conjugates exact."""
     half = -0.5 * p
     square = half * half - q
     width = np.sqrt(np.abs(square))
     far = half + where(half < 0.0, -1.0, 1.0) * where(q == 0.0, np.abs(half), width)
     near = where(far == 0.0, 0.0, q / far)
-    return where(square < 0.0, half + 1j * width, far), where(square < 0.0, half - 1j * width, near)
+    paired = square < 0.0
+    return where(paired, half, far), where(paired, width, 0.0), where(paired, half, near), where(paired, -width, 0.0)

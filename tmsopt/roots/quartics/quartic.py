@@ -53,7 +53,8 @@ class Factors:
     def roots(self) -> NDArray[np.complex128]:
         """All roots, shape (…, 4), those of a factor side by side; conjugates are exact."""
         with np.errstate(all="ignore"):
-            pair = np.stack(factors.root_pair(self.p, self.q), axis=-1)
+            re, im, other_re, other_im = factors.root_pair(self.p, self.q)
+            pair = np.stack([re + 1j * im, other_re + 1j * other_im], axis=-1)
         return np.asarray(pair.reshape(*self.p.shape[:-1], 4))
 
 

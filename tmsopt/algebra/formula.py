@@ -1,0 +1,420 @@
+"""Formulas as graphs with exact constants, stated once as plain arithmetic, and one fold of them into any numbers.
+
+A formula is made of a Python function on nodes (`trace`), of a text (`tmsopt.models.expression`), or of a function of
+CasADi (`from_casadi`). What its operations mean is said by a kind of numbers; see `kinds`.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, NamedTuple, Union
+
+import casadi as ca
+
+INPUT, CONSTANT = "input", "constant"
+
+Constant = Union[Fraction, float, "Formula"]
+"""A fraction; a formula without names where the number is none, as √2 or π; nan and infinities alone as a float."""
+
+_WHOLE = 64  # exponent up to which a power of fractions is multiplied out
+_BITS = 2**12  # of such a power
+
+
+class NotAccepted(ValueError):
+    """An operation that a kind of numbers lacks; the message is its name."""
+
+
+class Step(NamedTuple):
+    """One operation of a formula.
+
+    Attributes:
+        op: ``input``, ``constant``, or the name of an operation such as ``add``.
+        operands: numbers of the steps whose results it takes.
+        value: name of an input, or the constant.
+    """
+
+    op: str
+    operands: tuple[int, ...] = ()
+    value: Any = None
+
+
+@dataclass(frozen=True)
+class Formula:
+    """Numbers that depend on others, for numbers of any kind.
+
+    Attributes:
+        names: of the inputs, those that no step takes among them.
+        steps: in an order in which they can be computed, each once.
+        outputs: numbers of steps.
+    """
+
+    names: tuple[str, ...]
+    steps: tuple[Step, ...]
+    outputs: tuple[int, ...]
+
+    @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that it depends on."""
+        return tuple(step.value for step in self.steps if step.op == INPUT)
+
+    @property
+    def constants(self) -> list[Constant]:
+        """Its constants, each once."""
+        return [step.value for step in self.steps if step.op == CONSTANT]
+
+    @cached_property
+    def dead(self) -> tuple[tuple[int, ...], ...]:
+        """For each step the operands that nothing needs after it."""
+        last = {o: k for k, step in enumerate(self.steps) for o in step.operands}
+        found: list[list[int]] = [[] for _ in self.steps]
+        for o, k in last.items():
+            if o not in self.outputs:
+                found[k].append(o)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def uses(self) -> tuple[int, ...]:
+        """How often the result of each step is taken by others."""
+        found = [0] * len(self.steps)
+        for step in self.steps:
+            for o in step.operands:
+                found[o] += 1
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Numbers of one kind.
+
+    Attributes:
+        operations: name → what it makes of its operands.
+        constant: what a constant is.
+        number: what an input is taken for.
+    """
+
+    operations: Mapping[str, Callable[..., Any]]
+    constant: Callable[[Constant], Any]
+    number: Callable[[Any], Any] = lambda x: x
+
+
+def fold(
+    formula: Formula, values: Mapping[str, Any], kind: Kind, shared: Callable[[Any], Any] | None = None
+) -> list[Any]:
+    """The outputs of a formula for numbers of a kind.
+
+    Args:
+        values: name of an input → number.
+        shared: applied to every result that is used more than once.
+
+    Raises:
+        NotAccepted: for an operation that the kind does not have.
+    """
+    operations, found = kind.operations, list[Any]()
+    for step, dead, uses in zip(formula.steps, formula.dead, formula.uses, strict=True):
+        op = step.op
+        if op == INPUT:
+            value = kind.number(values[step.value])
+        elif op == CONSTANT:
+            value = kind.constant(step.value)
+        elif op in operations:
+            value = operations[op](*[found[o] for o in step.operands])
+            if shared and uses > 1:
+                value = shared(value)
+        else:
+            raise NotAccepted(op)
+        found.append(value)
+        for o in dead:
+            found[o] = None  # so that few arrays are alive, and these in the cache
+    return [found[o] for o in formula.outputs]
+
+
+class Node:
+    """A number that is not known yet: an input, a constant, or an operation on others; made by arithmetic.
+
+    What is certain for every number is left out: 0 + x is x, 0 x is 0, and fractions are computed. A 0.0 stays, which
+    makes of infinity what is no number.
+    """
+
+    __slots__ = ("fixed", "op", "operands", "value")
+
+    def __init__(self, op: str, operands: tuple["Node", ...] = (), value: Any = None) -> None:
+        self.op, self.operands, self.value = op, operands, value
+        self.fixed: bool = op != INPUT and all(o.fixed for o in operands)
+
+    def __bool__(self) -> bool:
+        raise TypeError("a formula does not ask what its numbers are; write choose(condition, a, b)")
+
+    def __add__(self, other: Any) -> "Node":
+        return made("add", self, other)
+
+    def __radd__(self, other: Any) -> "Node":
+        return made("add", other, self)
+
+    def __sub__(self, other: Any) -> "Node":
+        return made("sub", self, other)
+
+    def __rsub__(self, other: Any) -> "Node":
+        return made("sub", other, self)
+
+    def __mul__(self, other: Any) -> "Node":
+        return made("mul", self, other)
+
+    def __rmul__(self, other: Any) -> "Node":
+        return made("mul", other, self)
+
+    def __truediv__(self, other: Any) -> "Node":
+        return made("div", self, other)
+
+    def __rtruediv__(self, other: Any) -> "Node":
+        return made("div", other, self)
+
+    def __pow__(self, other: Any) -> "Node":
+        return made("pow", self, other)
+
+    def __rpow__(self, other: Any) -> "Node":
+        return made("pow", other, self)
+
+    def __neg__(self) -> "Node":
+        return made("neg", self)
+
+    def __abs__(self) -> "Node":
+        return made("abs", self)
+
+    def __lt__(self, other: Any) -> "Node":
+        return made("less", self, other)
+
+    def __le__(self, other: Any) -> "Node":
+        return made("at_most", self, other)
+
+    def __gt__(self, other: Any) -> "Node":
+        return made("less", other, self)
+
+    def __ge__(self, other: Any) -> "Node":
+        return made("at_most", other, self)
+
+    def __and__(self, other: Any) -> "Node":
+        return made("both", self, other)
+
+    def __or__(self, other: Any) -> "Node":
+        return made("either", self, other)
+
+    def __invert__(self) -> "Node":
+        return made("not", self)
+
+    def __eq__(self, other: object) -> "Node":  # type: ignore[override]
+        return made("equal", self, other)
+
+    def __ne__(self, other: object) -> "Node":  # type: ignore[override]
+        return ~made("equal", self, other)
+
+    __hash__ = object.__hash__
+
+    def __array_ufunc__(self, function: Any, method: str, *given: Any) -> "Node":
+        name = function.__name__
+        return made(_NUMPY.get(name, name), *given)
+
+    @property
+    def fraction(self) -> Fraction | None:
+        """The number that it is, where that is a fraction."""
+        return self.value if self.op == CONSTANT and isinstance(self.value, Fraction) else None
+
+
+_NUMPY = {
+    "subtract": "sub",
+    "multiply": "mul",
+    "divide": "div",
+    "power": "pow",
+    "absolute": "abs",
+    "maximum": "max",
+    "minimum": "min",
+}
+"""Functions of NumPy whose names are not those of operations."""
+
+
+def symbol(name: str) -> Node:
+    """An input."""
+    return Node(INPUT, (), name)
+
+
+PI = Node("pi")
+
+
+def constant(x: Any) -> Node:
+    """A number as it is written: a float stands for the decimal that prints it."""
+    if isinstance(x, Node):
+        return x
+    if isinstance(x, float):
+        x = float(x)  # NumPy's among them
+        return Node(CONSTANT, (), Fraction(repr(x)) if math.isfinite(x) else x)
+    return Node(CONSTANT, (), Fraction(x) if isinstance(x, int | Fraction) else Fraction(int(x.p), int(x.q)))
+
+
+def made(op: str, *given: Any) -> Node:
+    """An operation on nodes and numbers, in its simplest form."""
+    operands = tuple(constant(x) for x in given)
+    fractions = [None if isinstance(x, float) and x == 0 else o.fraction for x, o in zip(given, operands, strict=True)]
+    if op in _EXACT and None not in fractions and (number := _EXACT[op](*fractions)) is not None:
+        return Node(CONSTANT, (), number)
+    simplest = _simplest(op, operands, fractions) if op in _SIMPLEST else None
+    return Node(op, operands) if simplest is None else simplest
+
+
+def _power(a: Fraction, b: Fraction) -> Fraction | None:
+    whole = b.denominator == 1 and abs(b) <= _WHOLE and (a != 0 or b > 0)
+    size = max(a.numerator.bit_length(), a.denominator.bit_length())
+    return a ** int(b) if whole and size * abs(b) <= _BITS else None
+
+
+_EXACT: Mapping[str, Callable[..., Fraction | None]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b if b else None,
+    "neg": lambda a: -a,
+    "square": lambda a: a * a,
+    "abs": abs,
+    "pow": _power,
+}
+"""What fractions make a fraction of; None where they do not."""
+
+_SIMPLEST = {"add", "sub", "mul", "div", "pow", "neg", "tan"}
+
+
+def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911
+    """What an operation comes to, whatever the number is; None where that is no simpler."""
+    first, last = operands[0], operands[-1]
+    match op, *fractions:
+        case ("add", 0, _) | ("mul", 1, _):
+            return last
+        case ("add" | "sub", _, 0) | ("mul" | "div" | "pow", _, 1):
+            return first
+        case ("mul", 0, _) | ("mul", _, 0):
+            return constant(0)
+        case ("sub", 0, _) | ("mul", -1, _):
+            return -last
+        case ("mul", _, -1):
+            return -first
+        case ("mul", _, _) if first is last:
+            return Node("square", (first,))
+        case ("pow", _, 2):
+            return made("square", first)
+        case ("pow", _, Fraction(numerator=1, denominator=2)):
+            return Node("sqrt", (first,))
+        case ("neg", _) if first.op == "neg":
+            return first.operands[0]
+        case ("tan", _) if first.op == "atan":
+            return first.operands[0]
+    return None
+
+
+def formula(outputs: Iterable[Any], names: Iterable[str] = ()) -> Formula:
+    """The formula of nodes and numbers, in inputs of these names and those that appear."""
+    steps: list[Step] = []
+    places: dict[Step, int] = {}
+    known: dict[int, int] = {}  # id of a node, which is kept alive by the outputs
+
+    def place(step: Step) -> int:
+        if step not in places:
+            places[step] = len(steps)
+            steps.append(step)
+        return places[step]
+
+    nodes = [constant(x) for x in outputs]
+    waiting = nodes[::-1]
+    while waiting:
+        node = waiting.pop()
+        if id(node) in known:
+            continue
+        if not node.operands or node.fixed:
+            alone = node.op in (INPUT, CONSTANT)
+            known[id(node)] = place(Step(node.op, (), node.value) if alone else Step(CONSTANT, (), _alone(node)))
+        elif left := [o for o in node.operands if id(o) not in known]:
+            waiting += [node, *left[::-1]]
+        else:
+            known[id(node)] = place(Step(node.op, tuple(known[id(o)] for o in node.operands)))
+    met = [step.value for step in steps if step.op == INPUT]
+    return Formula(tuple(dict.fromkeys((*names, *met))), tuple(steps), tuple(known[id(n)] for n in nodes))
+
+
+def _alone(node: Node) -> Formula:
+    """A constant that is no fraction, as a formula without names."""
+    steps: list[Step] = []
+
+    def place(n: Node) -> int:
+        operands = tuple(place(o) for o in n.operands)
+        steps.append(Step(n.op, operands, n.value))
+        return len(steps) - 1
+
+    output = place(node)
+    return Formula((), tuple(steps), (output,))
+
+
+def trace(function: Callable[[Mapping[str, Node]], Iterable[Any]], names: Sequence[str]) -> Formula:
+    """What a function of named numbers computes."""
+    return formula(function({name: symbol(name) for name in names}), names)
+
+
+def from_casadi(function: ca.Function, names: Sequence[str] = ()) -> Formula:
+    """The formula of a function of CasADi, the entries of all its inputs in a row, and of its outputs.
+
+    Args:
+        names: of the inputs; by default their numbers.
+    """
+    names = names or tuple(map(str, range(sum(function.nnz_in(n) for n in range(function.n_in())))))
+    return formula(nodes_of_casadi(function, names), names)
+
+
+def nodes_of_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
+    """The entries of its outputs as nodes."""
+    firsts = [sum(function.nnz_in(k) for k in range(n)) for n in range(function.n_in() + 1)]
+    ends = [sum(function.nnz_out(k) for k in range(n)) for n in range(function.n_out() + 1)]
+    inputs, held, outputs = [symbol(n) for n in names], dict[int, Node](), [constant(0)] * ends[-1]
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        given, into = function.instruction_input(k), function.instruction_output(k)
+        match operation:
+            case ca.OP_INPUT:
+                held[into[0]] = inputs[firsts[given[0]] + given[1]]
+            case ca.OP_OUTPUT:
+                outputs[ends[into[0]] + into[1]] = held[given[0]]
+            case ca.OP_CONST:
+                held[into[0]] = constant(function.instruction_constant(k))
+            case _:
+                held[into[0]] = _translated(operation, [held[r] for r in given])
+    return outputs
+
+
+def _translated(operation: int, operands: Sequence[Node]) -> Node:
+    """An operation of CasADi; what there is not here keeps its name, and no kind of numbers takes it."""
+    first, last = operands[0], operands[-1]
+    match operation:
+        case ca.OP_ASSIGN:
+            return first
+        case ca.OP_TWICE:
+            return 2 * first
+        case ca.OP_INV:
+            return 1 / first
+        case ca.OP_NE:
+            return first != last
+        case ca.OP_IF_ELSE_ZERO:
+            return made("choose", first, last, 0)
+    name = _NAMES.get(operation, f"operation {operation}")
+    return made(_RENAMED.get(name, name), *operands)
+
+
+_NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
+
+_RENAMED = {
+    "constpow": "pow",
+    "sq": "square",
+    "fabs": "abs",
+    "fmin": "min",
+    "fmax": "max",
+    "lt": "less",
+    "le": "at_most",
+    "eq": "equal",
+    "and": "both",
+    "or": "either",
+}

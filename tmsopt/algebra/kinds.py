@@ -1,0 +1,401 @@
+"""Kinds of numbers: what the operations of a formula are for floats and arrays, CasADi, balls, intervals and nodes.
+
+A condition on balls is True, False, or None where that is not certain. The operations beside those of arithmetic:
+
+    quotient      a / b, nan where b is 0: a quantity that does not exist, not an infinite one
+    ratio         the same, and 0 where a is 0, whatever b is
+    choose        b where the condition a holds, else c
+    positive_part a where it is positive, else 0
+    negligible    whether a is 0, or nothing but the rounding of a sum whose terms have the size b
+"""
+
+import math
+import operator
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from functools import lru_cache, partial
+from typing import Any
+
+import casadi as ca
+import flint
+import numpy as np
+
+from tmsopt.algebra import rounding
+from tmsopt.algebra.balls import DIGITS, as_ball, exact, is_ball, rational
+from tmsopt.algebra.formula import PI, Constant, Formula, Kind, Node, constant, fold, formula, made
+from tmsopt.algebra.rounding import Bounded
+
+_WHOLE = 1023  # exponent up to which a power is a product
+_BITS = 2**22  # of a fraction that is a power
+_TINY = 1e-300  # keeps 0/0 away for an optimiser, and changes nothing else
+ROUNDING = 4 * float(np.finfo(float).eps)
+"""Of a sum of a few terms, relative to their size."""
+
+Operations = Mapping[str, Callable[..., Any]]
+
+_ARITHMETIC: Operations = {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "neg": operator.neg,
+    "square": lambda x: x * x,
+}
+
+
+# Floats and arrays.
+
+
+def as_double(value: Constant) -> Any:
+    """The double nearest to a constant, as NumPy has it: it gives nan and inf where Python raises."""
+    return np.float64(value) if isinstance(value, float) else _double(value)
+
+
+@lru_cache(maxsize=4096)
+def _double(value: Fraction | Formula) -> Any:
+    if isinstance(value, Fraction):
+        try:
+            return np.float64(float(value))
+        except OverflowError:
+            return np.float64(math.copysign(math.inf, value))
+    with flint.ctx.workdps(DIGITS):
+        ball = flint.arb(as_exact(value))
+    if not ball.is_finite():
+        return np.float64(math.nan)
+    return np.float64(0.0) if ball.contains(0) else _double(Fraction(str(rational(ball))))
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    """A small power as products and roots, exactly rounded each."""
+    small = _POWERS.get(float(exponent)) if np.ndim(exponent) == 0 else None
+    return np.power(base, exponent) if small is None else small(base)
+
+
+_POWERS: Mapping[float, Callable[[Any], Any]] = {
+    -1.0: lambda x: np.divide(1.0, x),
+    0.5: np.sqrt,
+    1.0: lambda x: x,
+    2.0: lambda x: x * x,
+    3.0: lambda x: x * x * x,
+    4.0: lambda x: (square := x * x) * square,
+}
+
+
+def _choose(condition: Any, a: Any, b: Any) -> Any:
+    return np.where(condition, a, b)[()]
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    return np.where(np.equal(b, 0), np.nan, np.divide(a, b))[()]
+
+
+FLOATS = Kind(
+    {
+        **_ARITHMETIC,
+        "div": np.divide,
+        "pow": _power,
+        **{name: getattr(np, name) for name in ("sqrt", "abs", "exp", "log", "sin", "cos", "tan", "sign")},
+        **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan")},
+        "min": np.minimum,  # nan where either is
+        "max": np.maximum,
+        "less": np.less,
+        "at_most": np.less_equal,
+        "equal": np.equal,
+        "both": np.logical_and,
+        "either": np.logical_or,
+        "not": np.logical_not,
+        "choose": _choose,
+        "quotient": _quotient,
+        "ratio": lambda a, b: _choose(np.equal(a, 0), 0.0, _quotient(a, b)),
+        "positive_part": lambda x: (x + np.abs(x)) / 2,
+        "negligible": lambda x, size: np.abs(x) <= ROUNDING * size,
+    },
+    as_double,
+    lambda x: np.asarray(x, dtype=float)[()],
+)
+"""Scalars and arrays that broadcast; to be folded without NumPy's warnings."""
+
+
+# Expressions of CasADi.
+
+
+def _tangent(x: Any) -> Any:
+    """Of an arctangent, its argument, so that formulas in tan stay polynomial."""
+    return x.dep(0) if hasattr(x, "is_op") and x.is_op(ca.OP_ATAN) else ca.tan(x)
+
+
+def _symbolic_ratio(a: Any, b: Any) -> Any:
+    """Smooth where b may be 0."""
+    if isinstance(b, ca.DM):
+        return a / b if b != 0 else 0 * a
+    return a * b / (b * b + _TINY)
+
+
+CASADI = Kind(
+    {
+        **_ARITHMETIC,
+        "pow": operator.pow,
+        **{name: getattr(ca, name) for name in ("sqrt", "exp", "log", "sin", "cos", "asin", "acos", "atan", "sign")},
+        "abs": ca.fabs,
+        "tan": _tangent,
+        "min": ca.fmin,
+        "max": ca.fmax,
+        "less": lambda a, b: a < b,
+        "at_most": lambda a, b: a <= b,
+        "equal": lambda a, b: a == b,
+        "both": ca.logic_and,
+        "either": ca.logic_or,
+        "not": ca.logic_not,
+        "choose": ca.if_else,
+        "quotient": lambda a, b: ca.if_else(b == 0, np.nan, a / b),
+        "ratio": _symbolic_ratio,
+        "positive_part": lambda x: (x + ca.fabs(x)) / 2,
+        "negligible": lambda x, size: ca.fabs(x) <= ROUNDING * size,
+    },
+    lambda value: float(as_double(value)),
+    lambda x: x if isinstance(x, ca.SX | ca.MX) else ca.DM(float(x)),
+)
+
+
+# Balls.
+
+
+def as_exact(value: Constant) -> Any:
+    """A constant as a fraction, or as a ball of the working precision."""
+    if isinstance(value, Fraction):
+        return flint.fmpq(value.numerator, value.denominator)
+    return flint.arb(value) if isinstance(value, float) else fold(value, {}, BALLS)[0]
+
+
+def _ball_number(x: Any) -> Any:
+    if x is None or isinstance(x, bool | np.bool | np.ndarray):  # a condition
+        return x
+    return flint.arb(x) if isinstance(x, float) and not math.isfinite(x) else exact(x)
+
+
+def _ball_root(x: Any) -> Any:
+    if isinstance(x, flint.fmpq):
+        is_square = x >= 0 and x.p.is_square() and x.q.is_square()
+        return flint.fmpq(x.p.isqrt(), x.q.isqrt()) if is_square else flint.arb(x).sqrt()
+    return x.sqrt()
+
+
+def _ball_quotient(a: Any, b: Any) -> Any:
+    try:
+        return a / b
+    except (ZeroDivisionError, ValueError):  # of fractions, of series
+        return flint.arb("nan")
+
+
+def _ball_power(a: Any, b: Any) -> Any:
+    """nan for a negative a and a b that is not whole. A fraction of many bits is a ball."""
+    whole = isinstance(b, flint.fmpq) and b.q == 1 and abs(b.p) <= _WHOLE
+    if whole and not (isinstance(a, flint.fmpq) and a.height_bits() * abs(int(b.p)) > _BITS):
+        try:
+            return a ** int(b.p)
+        except (ZeroDivisionError, ValueError):
+            return flint.arb("nan")
+    return as_ball(a) ** as_ball(b)
+
+
+def magnitude(x: Any) -> Any:
+    """|x| of a ball; where the sign of a series is not certain, its slopes may have either."""
+    if not isinstance(x, flint.arb_series):
+        return abs(x)
+    first = x[0]
+    if first > 0:
+        return x
+    if first < 0:
+        return -x
+    either = x * flint.arb(0, 1)
+    return flint.arb_series([abs(first), *(either[k] for k in range(1, x.prec))], prec=x.prec)
+
+
+def greater(a: Any, b: Any) -> Any:
+    """The greater of two balls."""
+    return _extreme(a, b, 1)
+
+
+def lesser(a: Any, b: Any) -> Any:
+    """The lesser of two balls."""
+    return _extreme(a, b, -1)
+
+
+def _extreme(a: Any, b: Any, sign: int) -> Any:
+    """(a + b + sign |a − b|)/2, and exactly one of the two where it is certain which."""
+    if isinstance(a, Bounded) or isinstance(b, Bounded):
+        return sign * rounding.greater(sign * a, sign * b)
+    difference = a - b
+    first = difference[0] if isinstance(difference, flint.arb_series) else difference
+    if sign * first >= 0:
+        return a
+    if sign * first <= 0:
+        return b
+    if isinstance(difference, flint.arb):
+        return as_ball(a).max(as_ball(b)) if sign > 0 else as_ball(a).min(as_ball(b))
+    return (a + b + sign * magnitude(difference)) / 2
+
+
+def _sign_of(difference: Any, holds: Callable[[Any], Any], fails: Callable[[Any], Any]) -> Any:
+    """What a comparison says of a difference with 0: an array of conditions as floats, nan where not certain."""
+    if isinstance(difference, Bounded):
+        low, high = difference.value - difference.error, difference.value + difference.error
+        return np.where(holds(high) & holds(low), 1.0, np.where(fails(high) & fails(low), 0.0, np.nan))
+    first = difference[0] if isinstance(difference, flint.arb_series) else difference
+    return True if holds(first) else False if fails(first) else None
+
+
+def _ball_choice(condition: Any, a: Any, b: Any) -> Any:
+    """One of two; where it is not certain which, a ball around both."""
+    if isinstance(condition, np.ndarray | float):
+        one, other = rounding.as_bounded(a), rounding.as_bounded(b)
+        return one.where(condition == 1, other).where(~np.isnan(condition), Bounded(np.nan, np.inf))
+    if condition is None:
+        one, other = as_ball(a), as_ball(b)
+        known = all(isinstance(x, flint.arb) and x.is_finite() for x in (one, other))
+        return one.union(other) if known else flint.arb("nan")
+    return a if condition else b
+
+
+def _ball_ratio(a: Any, b: Any) -> Any:
+    if isinstance(a, Bounded):
+        nothing = (a.value == 0) & (a.error == 0)
+        return Bounded(np.zeros_like(a.value)).where(nothing, a / rounding.as_bounded(b))
+    vanishes = all(a[k] == 0 for k in range(a.prec)) if hasattr(a, "prec") else bool(a == 0)
+    return 0 * b if vanishes else _ball_quotient(a, b)
+
+
+def _both(a: Any, b: Any) -> Any:
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return np.minimum(a, b)
+    return False if a is False or b is False else None if a is None or b is None else True
+
+
+def _not(a: Any) -> Any:
+    return 1.0 - a if isinstance(a, np.ndarray) else None if a is None else not a
+
+
+def _equals(a: Any, b: Any) -> Any:
+    return _sign_of(a - b, lambda x: x == 0, lambda x: x != 0)
+
+
+def _function(name: str) -> Callable[[Any], Any]:
+    return lambda x: getattr(as_ball(x), name)()
+
+
+BALLS = Kind(
+    {
+        **_ARITHMETIC,
+        "div": _ball_quotient,
+        "quotient": _ball_quotient,
+        "ratio": _ball_ratio,
+        "pow": _ball_power,
+        "pi": flint.arb.pi,
+        "sqrt": _ball_root,
+        "abs": magnitude,
+        "min": lesser,
+        "max": greater,
+        **{name: _function(name) for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")},
+        "less": lambda a, b: _sign_of(a - b, lambda x: x < 0, lambda x: x >= 0),
+        "at_most": lambda a, b: _sign_of(a - b, lambda x: x <= 0, lambda x: x > 0),
+        "equal": _equals,
+        "both": _both,
+        "either": lambda a, b: _not(_both(_not(a), _not(b))),
+        "not": _not,
+        "choose": _ball_choice,
+        "positive_part": lambda x: (x + magnitude(x)) / 2,
+        "negligible": lambda x, size: _equals(x, 0),
+    },
+    as_exact,
+    _ball_number,
+)
+"""Constants are exact; fractions stay fractions as long as they can."""
+
+
+def square(x: Any) -> Any:
+    """x² of an interval, not negative."""
+    # abs(x) of a ball around 0 reaches below 0, by as much as the ball has on its lesser side
+    return (x.abs_lower() ** 2).union(x.abs_upper() ** 2) if x.is_finite() else flint.arb(0, math.inf)
+
+
+def _interval_power(x: Any, y: Any) -> Any:
+    """x to the power y; whole powers of any x."""
+    if y.is_integer():
+        exponent = int(float(y))
+        if exponent < 0:
+            return 1 / _interval_power(x, flint.arb(-exponent))
+        if exponent % 2 == 0:
+            return square(x ** (exponent // 2))
+        return x**exponent
+    return x**y
+
+
+_ON_INTERVALS = ("add", "sub", "mul", "neg", "div", "sqrt", "abs", "min", "max", "quotient")
+
+INTERVALS = Kind(
+    {
+        **{name: BALLS.operations[name] for name in (*_ON_INTERVALS, "positive_part")},
+        **{name: BALLS.operations[name] for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")},
+        "square": square,
+        "pow": _interval_power,
+    },
+    lambda value: flint.arb(as_exact(value)),
+)
+"""Balls as wide as a box, where an even power must not reach below 0."""
+
+
+# Nodes: a formula of formulas.
+
+
+def _as_node(value: Constant) -> Node:
+    found: Node = fold(value, {}, NODES)[0] if isinstance(value, Formula) else constant(value)
+    return found
+
+
+NODES = Kind({name: partial(made, name) for name in (*FLOATS.operations, "pi")}, _as_node, constant)
+
+
+def kind_of(*numbers: Any) -> Kind:
+    """The kind that numbers are of; floats among others are taken for those."""
+    found = FLOATS
+    for x in numbers:
+        if isinstance(x, Node):
+            return NODES
+        if isinstance(x, ca.SX | ca.MX):
+            found = CASADI
+        elif found is FLOATS and is_ball(x):
+            found = BALLS
+    return found
+
+
+def values(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
+    """The outputs of a formula for numbers of whatever kind; nan and inf of floats come without a warning."""
+    with np.errstate(all="ignore"):
+        return fold(formula, given, kind_of(*(given[name] for name in formula.names if name in given)))
+
+
+# Operations of formulas, on numbers of any kind.
+
+
+def _applied(op: str) -> Callable[..., Any]:
+    def operation(*operands: Any) -> Any:
+        kind = kind_of(*operands)
+        with np.errstate(all="ignore"):
+            return kind.operations[op](*map(kind.number, operands))
+
+    return operation
+
+
+sqrt, tan, absolute, least, less, both = map(_applied, ("sqrt", "tan", "abs", "min", "less", "both"))
+choose, quotient, ratio, positive_part, negligible = map(
+    _applied, ("choose", "quotient", "ratio", "positive_part", "negligible")
+)
+
+
+def pi(like: Any) -> Any:
+    """π, as a number of the kind of another."""
+    kind = kind_of(like)
+    return PI if kind is NODES else kind.constant(_PI)
+
+
+_PI = formula([PI])
