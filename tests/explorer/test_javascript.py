@@ -13,7 +13,7 @@ from helpers.curves import sturm
 from helpers.javascript import page_script, run
 from helpers.oracles import routh_exact
 
-from tmsopt.algebra import exact
+from tmsopt.algebra import BALLS, exact
 from tmsopt.explorer import kernel_script, model_script
 from tmsopt.models import Values, from_coefficients, from_matrices
 from tmsopt.problem import Problem, load
@@ -173,7 +173,7 @@ def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
             for root, value in of_roots.items():
                 numbers.define(root, value)
             for k, n in enumerate(script.quantities):
-                expected = problem.read(n).enclosure(values)
+                expected = problem.read(n).of(values, BALLS)
                 known += bool(flint.arb(expected).is_finite())
                 assert agree(y[k], expected), n
                 plain = problem.read(n)(numbers)
@@ -182,7 +182,7 @@ def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
             for k, n in enumerate(script.constraints, start=len(script.quantities)):
                 condition = problem.conditions[n]
                 sign = -1 if condition.comparison == "<=" else 1  # the margin is what is left of a limit
-                assert agree(sign * y[k], condition.enclosure(values)), n
+                assert agree(sign * y[k], condition.of(values, BALLS)), n
     assert known >= 0.5 * FEW * len(script.quantities)
     assert np.all(np.isnan(found[:, len(script.quantities) + len(script.constraints) :]))
 

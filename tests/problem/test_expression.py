@@ -53,7 +53,7 @@ def test_random_expressions_mean_what_they_mean_in_python(text, numbers):
     assume(isinstance(rough, float) and abs(rough - value) < 1e-11 * min(abs(value), 1e100))
     expression = parse_value(text, NAMES)
     symbols = {n: ca.SX.sym(n) for n in NAMES}
-    function = ca.Function("f", list(symbols.values()), [ca.SX(expression.symbolic(symbols))])
+    function = ca.Function("f", list(symbols.values()), [ca.SX(expression(symbols))])
     several = expression({n: np.array([v, v]) for n, v in at.items()})
     for found in (expression(at), float(function(*numbers)), *np.broadcast_to(several, 2)):
         assert found == pytest.approx(float(value), rel=1e-8)
@@ -83,7 +83,7 @@ def test_random_expressions_mean_what_they_mean_in_python(text, numbers):
 def test_the_rules_of_school(text, value):
     expression = parse_value(text, ())
     assert float(expression({})) == value
-    assert float(ca.evalf(ca.SX(expression.symbolic({})))) == value
+    assert float(ca.evalf(ca.SX(expression({})))) == value
 
 
 @pytest.mark.parametrize("text", ["sqrt(Fr)", "log(Fr)", "asin(2 - Fr)", "Fr ** 0.5", "sqrt(Fr) + 1", "0/(Fr + 1)"])
@@ -92,7 +92,7 @@ def test_what_does_not_exist_is_nan_without_a_warning(text):
     expression = parse_value(text, NAMES)
     assert math.isnan(expression({"Fr": -1.0}))
     symbol = ca.SX.sym("Fr")
-    value = float(ca.Function("f", [symbol], [expression.symbolic({"Fr": symbol})])(-1.0))
+    value = float(ca.Function("f", [symbol], [expression({"Fr": symbol})])(-1.0))
     assert math.isnan(value) or text.startswith("0/")
 
 
@@ -130,7 +130,7 @@ def test_comparisons(text, comparison, difference, violation):
     assert float(expression(at)) == difference
     assert expression.violation(at) == violation
     symbols = {n: ca.SX.sym(n) for n in at}
-    assert float(ca.Function("f", [*symbols.values()], [expression.symbolic(symbols)])(1.5, 1.0)) == difference
+    assert float(ca.Function("f", [*symbols.values()], [expression(symbols)])(1.5, 1.0)) == difference
 
 
 def test_a_comparison_of_what_does_not_exist_is_violated_by_nan():
@@ -369,7 +369,7 @@ def test_random_tokens_are_refused_or_can_be_evaluated(parts, space, parse):
         return
     assert set(text.strip()) <= ALLOWED, text
     assert isinstance(float(expression(dict.fromkeys(NAMES, 0.7))), float)
-    expression.symbolic({n: ca.SX.sym(n) for n in NAMES})
+    expression({n: ca.SX.sym(n) for n in NAMES})
 
 
 @settings(max_examples=300, deadline=None, derandomize=True)

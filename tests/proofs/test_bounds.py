@@ -140,7 +140,7 @@ EXPRESSIONS = (
 def function(text, names=("x", "y", "z")):
     """x → the value of an expression."""
     x = {name: ca.SX.sym(name) for name in names}
-    return ca.Function("f", [ca.vertcat(*x.values())], [ca.SX(parse_value(text, names).symbolic(x))])
+    return ca.Function("f", [ca.vertcat(*x.values())], [ca.SX(parse_value(text, names)(x))])
 
 
 @pytest.mark.parametrize("text", EXPRESSIONS)
@@ -240,7 +240,7 @@ ONE_OF_EACH = {
 def least(text, ends, sign=1.0):
     """minimise ± an expression of one x."""
     x = ca.SX.sym("x")
-    f = ca.Function("f", [x], [sign * ca.SX(parse_value(text, ("x",)).symbolic({"x": x})), ca.SX(0, 1)])
+    f = ca.Function("f", [x], [sign * ca.SX(parse_value(text, ("x",))({"x": x})), ca.SX(0, 1)])
     return NLP("test", ("x",), f, (float(ends[0]),), (float(ends[1]),), (), (), ())
 
 
@@ -274,7 +274,7 @@ def test_no_value_is_below_the_bound(text):
 def constrained(texts, ends, most=0.0):
     """Whether there are x, y with every expression ≤ most."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    rows = [ca.SX(parse_value(text, ("x", "y")).symbolic({"x": x, "y": y})) for text in texts]
+    rows = [ca.SX(parse_value(text, ("x", "y"))({"x": x, "y": y})) for text in texts]
     f = ca.Function("f", [ca.vertcat(x, y)], [ca.SX(0), ca.vertcat(*rows)])
     lower, upper = zip(*ends, strict=True)
     count = len(texts)

@@ -130,18 +130,26 @@ def fold(
     return [found[o] for o in formula.outputs]
 
 
+_TOTAL = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "square", "abs", "min", "max", "sin", "cos", "atan", "exp"}
+
+
 class Node:
     """A number that is not known yet: an input, a constant, or an operation on others; made by arithmetic.
 
-    What is certain for every number is left out: 0 + x is x, 0 x is 0, and fractions are computed. A 0.0 stays, which
-    makes of infinity what is no number.
+    What is certain for every number is left out: 0 + x is x, fractions are computed, and 0 x is 0 where x always has a
+    value. A 0.0 stays, which makes of infinity what is no number.
+
+    Attributes:
+        fixed: whether no input is in it.
+        total: whether it has a value wherever its inputs have.
     """
 
-    __slots__ = ("fixed", "op", "operands", "value")
+    __slots__ = ("fixed", "op", "operands", "total", "value")
 
     def __init__(self, op: str, operands: tuple["Node", ...] = (), value: Any = None) -> None:
         self.op, self.operands, self.value = op, operands, value
         self.fixed: bool = op != INPUT and all(o.fixed for o in operands)
+        self.total: bool = op in _TOTAL and all(o.total for o in operands)
 
     def __bool__(self) -> bool:
         raise TypeError("a formula does not ask what its numbers are; write choose(condition, a, b)")
@@ -290,7 +298,9 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
             return last
         case ("add" | "sub", _, 0) | ("mul" | "div" | "pow", _, 1):
             return first
-        case ("mul", 0, _) | ("mul", _, 0):
+        case ("mul", 0, _) | ("mul", _, 0) if first.total and last.total:
+            return constant(0)
+        case ("sub", _, _) if first is last and first.total:
             return constant(0)
         case ("sub", 0, _) | ("mul", -1, _):
             return -last

@@ -1,6 +1,6 @@
 """Kinds of numbers: what the operations of a formula are for floats and arrays, CasADi, balls, intervals and nodes.
 
-A condition on balls is True, False, or None where that is not certain. The operations beside those of arithmetic:
+A condition on balls is True, False, or None where that is not certain, of series nan. The operations beside those of arithmetic:
 
     quotient      a / b, nan where b is 0: a quantity that does not exist, not an infinite one
     ratio         the same, and 0 where a is 0, whatever b is
@@ -121,7 +121,7 @@ FLOATS = Kind(
 
 def _tangent(x: Any) -> Any:
     """Of an arctangent, its argument, so that formulas in tan stay polynomial."""
-    return x.dep(0) if hasattr(x, "is_op") and x.is_op(ca.OP_ATAN) else ca.tan(x)
+    return x.dep(0) if not isinstance(x, ca.DM) and x.is_op(ca.OP_ATAN) else ca.tan(x)
 
 
 def _symbolic_ratio(a: Any, b: Any) -> Any:
@@ -237,17 +237,20 @@ def _extreme(a: Any, b: Any, sign: int) -> Any:
 
 
 def _sign_of(difference: Any, holds: Callable[[Any], Any], fails: Callable[[Any], Any]) -> Any:
-    """What a comparison says of a difference with 0: an array of conditions as floats, nan where not certain."""
+    """What a comparison says of a difference with 0: of arrays as floats, nan where that is not certain."""
     if isinstance(difference, Bounded):
         low, high = difference.value - difference.error, difference.value + difference.error
         return np.where(holds(high) & holds(low), 1.0, np.where(fails(high) & fails(low), 0.0, np.nan))
-    first = difference[0] if isinstance(difference, flint.arb_series) else difference
-    return True if holds(first) else False if fails(first) else None
+    series = isinstance(difference, flint.arb_series)
+    first = difference[0] if series else difference
+    return True if holds(first) else False if fails(first) else math.nan if series else None
 
 
 def _ball_choice(condition: Any, a: Any, b: Any) -> Any:
     """One of two; where it is not certain which, a ball around both."""
-    if isinstance(condition, np.ndarray | float):
+    if isinstance(condition, float | flint.arb):  # nan, of series: a jump has no slope
+        return flint.arb("nan")
+    if isinstance(condition, np.ndarray):
         one, other = rounding.as_bounded(a), rounding.as_bounded(b)
         return one.where(condition == 1, other).where(~np.isnan(condition), Bounded(np.nan, np.inf))
     if condition is None:
@@ -268,11 +271,11 @@ def _ball_ratio(a: Any, b: Any) -> Any:
 def _both(a: Any, b: Any) -> Any:
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return np.minimum(a, b)
-    return False if a is False or b is False else None if a is None or b is None else True
+    return False if a is False or b is False else b if a is True else a
 
 
 def _not(a: Any) -> Any:
-    return 1.0 - a if isinstance(a, np.ndarray) else None if a is None else not a
+    return 1.0 - a if isinstance(a, np.ndarray | float) else None if a is None else not a
 
 
 def _equals(a: Any, b: Any) -> Any:

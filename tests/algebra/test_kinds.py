@@ -1,0 +1,166 @@
+"""What the operations of formulas are for each kind of numbers, against Python's own functions; each one is met."""
+
+import math
+from fractions import Fraction
+
+import casadi as ca
+import flint
+import numpy as np
+import pytest
+
+from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, NotAccepted, fold, from_casadi, trace
+from tmsopt.algebra.formula import formula, made, symbol
+from tmsopt.algebra.kinds import as_double, values
+from tmsopt.models.expression import parse_value
+
+POINTS = [(0.7, 1.3), (2.6, 1.3), (1.3, 1.3), (3.1, 0.4), (0.25, -0.5)]
+
+ALIKE = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "pow": lambda a, b: a**b,
+    "min": min,
+    "max": max,
+    "quotient": lambda a, b: a / b,
+    "ratio": lambda a, b: a / b,
+}
+TRUTHS = {"less": lambda a, b: a < b, "at_most": lambda a, b: a <= b, "equal": lambda a, b: a == b}
+ALONE = {
+    "neg": lambda a: -a,
+    "square": lambda a: a * a,
+    "sqrt": math.sqrt,
+    "abs": abs,
+    "sign": lambda a: math.copysign(a != 0, a),
+    **{name: getattr(math, name) for name in ("exp", "log", "sin", "cos", "tan", "atan")},
+    "asin": lambda a: math.asin(a / 8),
+    "acos": lambda a: math.acos(a / 8),
+    "positive_part": lambda a: max(a, 0),
+}
+"""An operation on x, or on x/8, and on y."""
+
+BOTH = {
+    "both": lambda p, q: p and q,
+    "either": lambda p, q: p or q,
+}
+
+
+def asked():
+    """Every operation as a formula in x and y, and what it is."""
+    x, y = symbol("x"), symbol("y")
+    found = {op: (made(op, x, y), f) for op, f in ALIKE.items()}
+    chosen = {op: made("choose", made(op, x, y), x, 3) for op in TRUTHS}
+    found |= {op: (chosen[op], lambda a, b, f=f: a if f(a, b) else 3) for op, f in TRUTHS.items()}
+    found |= {op: (made(op, x / 8 if op in ("asin", "acos") else x), lambda a, b, f=f: f(a)) for op, f in ALONE.items()}
+    for op, f in BOTH.items():
+        condition = made(op, x < 2, y < 1)
+        found[op] = made("choose", condition, x, y), lambda a, b, f=f: a if f(a < 2, b < 1) else b
+    found["not"] = made("choose", ~(x < y), x, 3), lambda a, b: 3 if a < b else a
+    found["choose"] = made("choose", x < y, x * x, y), lambda a, b: a * a if a < b else b
+    found["negligible"] = made("choose", made("negligible", (x + 0.1) - 0.1 - x, x), y, 3), lambda a, b: b
+    return found
+
+
+@pytest.mark.parametrize("op", asked())
+def test_operations_are_those_of_python(op):
+    """Each function of the libraries is right to a few units of its last digit; balls hold the value."""
+    node, truth = asked()[op]
+    own = formula([node], ("x", "y"))
+    points = [p for p in POINTS if op != "pow" or p[1] > -1]
+    expected = [float(truth(*p)) for p in points]
+    columns = dict(zip("xy", np.array(points).T, strict=True))
+    assert values(own, columns)[0] == pytest.approx(expected, rel=1e-14, abs=1e-15)
+    x = ca.SX.sym("x", 2)
+    written = ca.Function("f", [x], [ca.SX(values(own, {"x": x[0], "y": x[1]})[0])])
+    again = formula(values(own, {"x": symbol("x"), "y": symbol("y")}))  # nodes of nodes
+    for point, value in zip(points, expected, strict=True):
+        at = dict(zip("xy", point, strict=True))
+        assert float(values(own, at)[0]) == float(values(again, at)[0]) == pytest.approx(value, rel=1e-14, abs=1e-15)
+        assert float(written(point)) == pytest.approx(value, rel=1e-13, abs=1e-15)
+        if op in BALLS.operations:
+            exact = values(own, {n: flint.fmpq(*v.as_integer_ratio()) for n, v in at.items()})[0]
+            ball = flint.arb(values(own, {n: flint.arb(v) for n, v in at.items()})[0])
+            assert ball.overlaps(flint.arb(exact))
+            assert op == "negligible" or float(ball.mid()) == pytest.approx(value, rel=1e-14, abs=1e-15)
+        if op in INTERVALS.operations:
+            over = fold(own, {n: flint.arb(v, 1e-3) for n, v in at.items()}, INTERVALS)[0]
+            assert over.contains(flint.arb(value)) or not over.is_finite()
+
+
+def test_no_operation_is_left_out():
+    assert {*asked()} == {*FLOATS.operations} == {*CASADI.operations} == {*NODES.operations} - {"pi"}
+    assert {*BALLS.operations} == {*FLOATS.operations} - {"sign"} | {"pi"}
+
+
+def test_what_does_not_exist_is_nan_of_every_kind():
+    x, y = symbol("x"), symbol("y")
+    own = formula([made("quotient", x, y), made("ratio", x, y), made("sqrt", -x)], ("x", "y"))
+    at = {"x": 1.0, "y": 0.0}
+    s = ca.SX.sym("x", 2)
+    written = ca.Function("f", [s], [ca.vertcat(*values(own, {"x": s[0], "y": s[1]}))])
+    assert np.isnan(np.array(values(own, at), dtype=float)).all()
+    assert np.isnan(np.array(written([1.0, 0.0])).ravel()[[0, 2]]).all()
+    assert not any(flint.arb(x).is_finite() for x in values(own, {n: flint.arb(v) for n, v in at.items()}))
+    nothing = formula([made("ratio", x, y)], ("x", "y"))
+    for zero in (0.0, np.zeros(3), flint.arb(0), flint.fmpq(0)):
+        assert np.all(np.array([values(nothing, {"x": zero, "y": zero})[0] == 0]))
+
+
+def test_where_a_ball_cannot_tell_both_choices_are_held():
+    own = formula([made("choose", symbol("x") < 0, 1, 2)])
+    found = values(own, {"x": flint.arb(0, 1)})[0]
+    assert found.contains(1)
+    assert found.contains(2)
+    assert values(own, {"x": flint.arb(1)})[0] == 2
+    assert not flint.arb(values(own, {"x": flint.arb_series([flint.arb(0, 1), 1], prec=2)})[0]).is_finite()
+
+
+# Formulas
+
+
+def test_constants_are_exact():
+    """A number is what its digits say; doubles are the nearest to it, whatever it is made of."""
+    own = parse_value("0.1*x + 2*pi/3 - sqrt(1/3)", ["x"]).formula
+    (found,) = fold(own, {"x": flint.fmpq(1)}, BALLS)
+    with flint.ctx.workdps(60):
+        assert (flint.arb(1) / 10 + 2 * flint.arb.pi() / 3 - (flint.arb(1) / 3).sqrt()).overlaps(found)
+    assert parse_value("1/3 + 0.1", []).formula.constants == [Fraction(13, 30)]
+    for text, value in {
+        "1/3": 1 / 3,
+        "1e-400*1e400" if False else "1e-300/1e300": 0.0,
+        "2*pi/3": 2 * math.pi / 3,
+    }.items():
+        assert as_double(parse_value(text, []).formula.constants[0]) == pytest.approx(value, rel=2e-16)
+
+
+def test_what_is_certain_is_left_out():
+    x, zero = symbol("x"), 0 * symbol("y")
+    for same in (x + 0, 0 + x, 1 * x, x * 1, x / 1, x - 0, (-x).__neg__(), x**1, made("tan", made("atan", x))):
+        assert same is x
+    assert zero.fraction == 0
+    assert (x - x).fraction == 0
+    assert formula([x * 0.0]).inputs == ("x",)  # which makes of infinity what is no number
+    assert [step.op for step in formula([x * x, x**2, x**0.5]).steps] == ["input", "square", "sqrt"]
+
+
+def test_equal_parts_are_computed_once():
+    own = trace(lambda v: [(v["x"] + v["y"]) ** 2, 3 / (v["x"] + v["y"])], ["x", "y"])
+    assert [step.op for step in own.steps].count("add") == 1
+
+
+def test_a_formula_does_not_ask_for_its_numbers():
+    with pytest.raises(TypeError, match="choose"):
+        bool(symbol("x") > 0)
+
+
+def test_functions_of_casadi_are_formulas():
+    x, y = ca.SX.sym("x"), ca.SX.sym("y", 2)
+    asked = [ca.sqrt(x) + y[0], ca.vertcat(x * x, 2 * y[1], 1 / x, ca.fabs(x - y[0]), ca.if_else(x < y[1], x, y[0]))]
+    function = ca.Function("f", [x, y], [ca.densify(e) for e in asked])
+    own = from_casadi(function)
+    given = [0.7, 1.3, -0.4]
+    expected = [float(v) for part in function(given[0], given[1:]) for v in part.full().ravel()]
+    assert fold(own, dict(zip(own.names, given, strict=True)), FLOATS) == pytest.approx(expected, rel=1e-15)
+    with pytest.raises(NotAccepted, match="erf"):
+        values(from_casadi(ca.Function("f", [x], [ca.erf(x)]), ["x"]), {"x": 1.0})
