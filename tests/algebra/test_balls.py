@@ -3,6 +3,7 @@
 import math
 import re
 from fractions import Fraction
+from importlib import import_module
 
 import flint
 import numpy as np
@@ -11,9 +12,14 @@ from helpers.designs import designs
 from mpmath import mp
 
 from tmsopt.algebra import BALLS, exact
-from tmsopt.algebra.kinds import absolute, greater, lesser, magnitude, positive_part, quotient, sqrt, tan
 from tmsopt.models import FUNCTIONS, Values, tms, to_si
 from tmsopt.problem import parse_comparison, parse_value
+
+kinds = import_module("tmsopt.algebra.kinds")
+absolute, greater, lesser, magnitude, positive_part, quotient, sqrt, tan = (
+    getattr(kinds, name)
+    for name in ["absolute", "greater", "lesser", "magnitude", "positive_part", "quotient", "sqrt", "tan"]
+)
 
 HALF = flint.fmpq(1, 2)
 

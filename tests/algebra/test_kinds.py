@@ -2,16 +2,18 @@
 
 import math
 from fractions import Fraction
+from importlib import import_module
 
 import casadi as ca
 import flint
 import numpy as np
 import pytest
 
-from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, NotAccepted, fold, from_casadi, trace
-from tmsopt.algebra.formula import formula, made, symbol
-from tmsopt.algebra.kinds import as_double, values
-from tmsopt.models.expression import parse_value
+from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, NotAccepted, fold, from_casadi, trace, values
+from tmsopt.problem import parse_value
+
+as_double = import_module("tmsopt.algebra.kinds").as_double
+formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))
 
 POINTS = [(0.7, 1.3), (2.6, 1.3), (1.3, 1.3), (3.1, 0.4), (0.25, -0.5)]
 

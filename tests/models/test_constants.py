@@ -98,8 +98,8 @@ def test_a_proof_lists_the_numbers_that_it_takes_exactly():
     ("entry", "im", "listed"),
     [
         ("1j/3", Fraction(1, 3), "1/3"),
-        ("-1j/3", Fraction(-1, 3), "1/3"),
-        ("2.5j/3", Fraction(5, 6), "2.5/3"),
+        ("-1j/3", Fraction(-1, 3), "-1/3"),
+        ("2.5j/3", Fraction(5, 6), "5/6"),
         ("k + 1j/7", Fraction(1, 7), "1/7"),
     ],
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from tmsopt import Problem, certify, solve
-from tmsopt.algebra import NotAccepted, ball, interval, square
+from tmsopt.algebra import INTERVALS, NotAccepted, ball, interval
 from tmsopt.global_search import INFEASIBLE, SCIP, Decision, Question, SolverPool, interlace, squares_of, task
 from tmsopt.models import tms
 
@@ -29,7 +29,7 @@ def verdicts(asked):
 
 @pytest.mark.parametrize(("lower", "upper"), [(-1.5, 0.2), (-0.2, 1.5), (-1.0, 1.0), (0.0, 2.0), (-3.0, -1.0)])
 def test_a_square_over_a_range_around_0_reaches_down_to_0(lower, upper):
-    least, most = interval(square(ball((lower, upper))))
+    least, most = interval(INTERVALS.operations["square"](ball((lower, upper))))
     assert least <= (0.0 if lower <= 0 <= upper else min(lower**2, upper**2))
     assert most >= max(lower**2, upper**2)
 

@@ -1,6 +1,7 @@
 """Kinds of numbers: what the operations of a formula are for floats and arrays, CasADi, balls, intervals and nodes.
 
-A condition on balls is True, False, or None where that is not certain, of series nan. The operations beside those of arithmetic:
+A condition on balls is True, False, or None where that is not certain, of series nan. The operations beside those of
+arithmetic:
 
     quotient      a / b, nan where b is 0: a quantity that does not exist, not an infinite one
     ratio         the same, and 0 where a is 0, whatever b is

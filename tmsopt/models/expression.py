@@ -71,10 +71,9 @@ class Expression:
         left, *right = self.sides(values)
         return left - right[0] if right else left
 
-    def sides(self, values: Mapping[str, Any]) -> list[Any]:
+    def sides(self, values: Mapping[str, Any]) -> tuple[Any, ...]:
         """Both sides of a comparison; of a value, itself."""
-        with np.errstate(all="ignore"):  # what has no value, or no double, is nan or inf
-            return kinds.values(self.formula, values)
+        return tuple(float(x) if isinstance(x, np.float64) else x for x in kinds.values(self.formula, values))
 
     def difference(self, values: Mapping[str, Any], limit: Any) -> Any:
         """Left minus right, with `limit` in place of the number on one side."""
@@ -89,7 +88,7 @@ class Expression:
 
     def violation(self, values: Mapping[str, Any]) -> float:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
-        left, right = map(float, self.sides(values))
+        left, right = self.sides(values)
         difference = left - right
         excess = float(self.excess(difference))
         return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
@@ -227,10 +226,10 @@ def _joined(op: str, *parts: _Part) -> _Part:
 
 def _read(body: ast.expr, text: str, accepted: list[str] | None) -> tuple[tuple[str, ...], Node]:
     """Names that a value uses, and its formula; raises where it is no accepted arithmetic, or too large to compute."""
-    reader = _Reader(text, accepted)
+    parser = _Parser(text, accepted)
     try:
-        node = reader.read(body).node
-        return tuple(reader.names), node
+        node = parser.read(body).node
+        return tuple(parser.names), node
     except DegreeTooHigh as error:
         part = _source(error.part, text)
         whole = "" if part == text.strip() else f"{_quoted(text)}: "
@@ -241,7 +240,7 @@ def _quoted(text: str) -> str:
     return f"'{text}'" if len(text) <= _LEGIBLE else f"'{text[: _LEGIBLE - 1]}…'"
 
 
-class _Reader:
+class _Parser:
     """Turns a parsed text into nodes, each name an input; discarded after one text."""
 
     def __init__(self, text: str, accepted: list[str] | None) -> None:
