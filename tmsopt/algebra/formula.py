@@ -112,19 +112,21 @@ def fold(
         NotAccepted: for an operation that the kind does not have.
     """
     operations, found = kind.operations, list[Any]()
-    for step, dead, uses in zip(formula.steps, formula.dead, formula.uses, strict=True):
-        op = step.op
+    for (op, operands, value), dead, uses in zip(formula.steps, formula.dead, formula.uses, strict=True):
         if op == INPUT:
-            value = kind.number(values[step.value])
+            result = kind.number(values[value])
         elif op == CONSTANT:
-            value = kind.constant(step.value)
-        elif op in operations:
-            value = operations[op](*[found[o] for o in step.operands])
-            if shared and uses > 1:
-                value = shared(value)
-        else:
+            result = kind.constant(value)
+        elif (operation := operations.get(op)) is None:
             raise NotAccepted(op)
-        found.append(value)
+        else:
+            if len(operands) == 2:  # by far the most
+                result = operation(found[operands[0]], found[operands[1]])
+            else:
+                result = operation(*[found[o] for o in operands])
+            if shared and uses > 1:
+                result = shared(result)
+        found.append(result)
         for o in dead:
             found[o] = None  # so that few arrays are alive, and these in the cache
     return [found[o] for o in formula.outputs]

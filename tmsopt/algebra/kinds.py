@@ -62,7 +62,8 @@ def _double(value: Fraction | Formula) -> Any:
     with flint.ctx.workdps(DIGITS):
         ball = flint.arb(as_exact(value))
     if not ball.is_finite():
-        return np.float64(math.nan)
+        with np.errstate(all="ignore"):
+            return fold(value, {}, FLOATS)[0]  # nan or inf
     return np.float64(0.0) if ball.contains(0) else _double(Fraction(str(rational(ball))))
 
 
@@ -112,7 +113,7 @@ FLOATS = Kind(
         "negligible": lambda x, size: np.abs(x) <= ROUNDING * size,
     },
     as_double,
-    lambda x: np.asarray(x, dtype=float)[()],
+    lambda x: np.float64(x) if type(x) is float else np.asarray(x, dtype=float)[()],
 )
 """Scalars and arrays that broadcast; to be folded without NumPy's warnings."""
 

@@ -81,6 +81,8 @@ def _suspect(nlp: NLP) -> bool:
     Not of those with settings, whose functions have two vectors.
     """
 
+    if not {nlp.functions.instruction_id(k) for k in range(nlp.functions.n_instructions())} & _KINKED:
+        return False
     known = INTERVALS.operations
 
     def divided(op: str, *operands: Any) -> Any:
@@ -159,6 +161,7 @@ _POLES: Mapping[str, Callable[..., tuple[Any, Any]]] = {
     "div": lambda a, b: (a, b),
     "tan": lambda e: (ca.sin(e), ca.cos(e)),
 }
+_KINKED = {ca.OP_DIV, ca.OP_INV, ca.OP_TAN, ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN}
 _PIECES: Mapping[str, Callable[..., Sequence[Any]]] = {
     "abs": lambda e: (e, -e),
     "max": lambda a, b: (a, b),

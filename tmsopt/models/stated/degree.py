@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, Kind, Step
+from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, Kind, Step
 from tmsopt.algebra.kinds import FLOATS, as_double
 
 LARGEST_EXPONENT = 1023
@@ -118,7 +118,16 @@ _JOINED: Mapping[str, Callable[..., Degree]] = {
     **dict.fromkeys(("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), _alone),
 }
 
-DEGREES = Kind({name: _applied(join, name) for name, join in _JOINED.items()}, lambda x: _constant(as_double(x)))
+
+def _stated(x: Constant) -> Degree:
+    number = as_double(x)
+    if not math.isfinite(number):
+        message = f"contains {number}, as of a division by 0; accepted: finite numbers, and expressions of them"
+        raise DegreeTooHigh(message)
+    return _constant(number)
+
+
+DEGREES = Kind({name: _applied(join, name) for name, join in _JOINED.items()}, _stated)
 
 
 def faulty(formula: Formula) -> tuple[int, str] | None:
@@ -143,8 +152,6 @@ def _stepped(step: Step, operands: Sequence[Any]) -> Degree | str:
     if step.op not in (*DEGREES.operations, CONSTANT):
         known = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
         return f"uses {step.op}; accepted: + - * / ** and {known}"
-    if step.op == CONSTANT and not math.isfinite(number := as_double(step.value)):
-        return f"contains {number}, as of a division by 0; accepted: finite numbers, and expressions of them"
     try:
         found: Degree = DEGREES.constant(step.value) if step.op == CONSTANT else DEGREES.operations[step.op](*operands)
         return found
