@@ -289,7 +289,7 @@ _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
 }
 """What fractions make a fraction of; None where they do not."""
 
-_SIMPLEST = {"add", "sub", "mul", "div", "pow", "neg", "tan"}
+_SIMPLEST = {"add", "sub", "mul", "div", "pow", "neg", "sin", "cos", "tan"}
 
 
 def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911
@@ -318,6 +318,9 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
             return first.operands[0]
         case ("tan", _) if first.op == "atan":
             return first.operands[0]
+        case ("sin" | "cos", _) if first.op == "atan":
+            t = first.operands[0]
+            return (t if op == "sin" else 1) / made("sqrt", 1 + t * t)
     return None
 
 

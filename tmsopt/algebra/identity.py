@@ -5,7 +5,7 @@ tan = sin/cos, √x² = x and |x|² = x². What vanishes for another reason is n
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -13,7 +13,20 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, Kind, NotAccepted, fold
+from tmsopt.algebra.formula import (
+    CONSTANT,
+    INPUT,
+    Constant,
+    Formula,
+    Kind,
+    Node,
+    NotAccepted,
+    constant,
+    fold,
+    formula as formula_of,
+    made as made_of,
+    symbol,
+)
 from tmsopt.algebra.kinds import FLOATS
 
 _WHOLE = 64  # exponent up to which a power is a product
@@ -103,6 +116,7 @@ class Field:
         self._context, self._one = context, context.constant(1)
         self.inputs = {name: self._free(k) for k, name in enumerate(formula.names)}
         self._used = count
+        self._nodes = [symbol(name) for name in formula.names]  # what each unknown is
         self._known: list[tuple[str, tuple[Quotient, ...], Quotient]] = []
         self._squares: list[tuple[int, Quotient]] = []
         self.kind = Kind(
@@ -147,6 +161,22 @@ class Field:
             x = rest
         return not x.over
 
+    def node(self, x: Quotient) -> Node:
+        """An element in inputs, multiplied out, each unknown taken out of as many terms as hold it (Horner's rule)."""
+        lead = x.under.leading_coefficient()
+        return self._taken_out((x.over / lead).to_dict()) / self._taken_out((x.under / lead).to_dict())
+
+    def _taken_out(self, terms: Mapping[tuple[int, ...], Any]) -> Node:
+        count = [sum(exponent > 0 for exponent in each) for each in zip(*terms, strict=True)]
+        if not any(count):
+            return constant(terms[next(iter(terms))] if terms else 0)
+        k = max(range(len(count)), key=lambda j: (count[j], str(self._nodes[j].value if j < len(self._nodes) else "")))
+        power = min(monomial[k] for monomial in terms if monomial[k])
+        inner = {(*m[:k], m[k] - power, *m[k + 1 :]): c for m, c in terms.items() if m[k]}
+        rest = {m: c for m, c in terms.items() if not m[k]}
+        product = self._taken_out(inner) * self._nodes[k] ** int(power)
+        return product + self._taken_out(rest) if rest else product
+
     def _applied(self, operation: str, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
         """An unknown for what a function makes of its operands, the same for the same."""
         for known, given, made in self._known:
@@ -154,6 +184,7 @@ class Field:
                 return made
         at, self._used = self._used, self._used + 1
         made = self._free(at)
+        self._nodes.append(made_of(operation, *map(self.node, operands)))
         self._known.append((operation, operands, made))
         if square is not None:
             self._squares.append((at, square()))
@@ -173,3 +204,13 @@ class Field:
 
     def _free(self, at: int) -> Quotient:
         return Quotient(self._context.gens()[at], self._one)
+
+
+def multiplied_out(asked: Formula) -> Formula:
+    """A formula of quotients of polynomials, in which sums cancel, in inputs and what is not rational in them.
+
+    Raises:
+        NotAccepted: where there would be too many terms.
+    """
+    field = Field(asked)
+    return formula_of(map(field.node, fold(asked, field.inputs, field.kind)), asked.names)

@@ -391,7 +391,7 @@ def _applied(op: str) -> Callable[..., Any]:
     return operation
 
 
-sqrt, tan, absolute, least, less, both = map(_applied, ("sqrt", "tan", "abs", "min", "less", "both"))
+sqrt, tan, atan, absolute, least, less, both = map(_applied, ("sqrt", "tan", "atan", "abs", "min", "less", "both"))
 choose, quotient, ratio, positive_part, negligible = map(
     _applied, ("choose", "quotient", "ratio", "positive_part", "negligible")
 )

@@ -12,4 +12,4 @@ from .tasks import (
 from .complete import (
     Completeness as Completeness, Undecided as Undecided, available as available, completeness as completeness,
 )
-from .pruning import Puzzle as Puzzle, prune as prune, tree as tree
+from .pruning import Puzzle as Puzzle, prune as prune

@@ -5,18 +5,19 @@ import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import flint
 
 from tmsopt.algebra.balls import Number, number
-from tmsopt.algebra.formal import variable
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import NotAccepted, fold, formula, symbol
+from tmsopt.algebra.identity import multiplied_out
 from tmsopt.algebra.intervals import interval
-from tmsopt.algebra.kinds import BALLS
+from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
-from tmsopt.global_search.conditions import Ends, Sheet, sheets
-from tmsopt.global_search.pruning import Box, Pruned, Puzzle, ends, halves, partial, prune, tree
+from tmsopt.global_search.conditions import Ends, Sheet, sheet, sheets
+from tmsopt.global_search.pruning import Box, Pruned, Puzzle, check, ends, halves, prune
 from tmsopt.killable import Killable
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Problem
@@ -226,34 +227,30 @@ def _sheets(problem: Problem) -> Iterator[Sheet]:
     lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
     scale = scale_of(problem)
     scale = Scale(_UNITS * scale.unit, scale.lead)
-    held = problem.exactly(problem.fixed)
     for pieces in sheets(problem.pattern.form):
-        yield Sheet(problem, pieces, scale, equalities, lifted, held)
+        yield sheet(problem, pieces, scale, lifted)
 
 
 def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     """Equations and limits as plain data, and the box of all unknowns.
 
     Raises:
-        NotAccepted: for equations that have no such form.
+        NotAccepted: for equations that branch and prune cannot take.
     """
-    names = sheet.names
-    at = {n: variable(n) for n in names}
-    equations = tuple(tree(e, names) for e in sheet(at))
-    limits = [*sheet.nonnegative(at), *sheet.ascending(at)]
-    values = sheet.values(at)
-    for condition in sheet.problem.conditions.values():
-        if not condition.equality:
-            try:
-                limits.append(-condition.sign * condition.of(values, BALLS))
-            except (NotAccepted, TypeError, KeyError, ZeroDivisionError):
-                continue  # it takes no part, and is asked of every design that is found
     box = tuple(_range(ends) for ends in _ends(sheet))
-    guarded = set().union(*(partial(e) for e in equations))
-    trees = tuple(tree(limit, names) for limit in limits)
-    more = tuple(tree(e, names) for e in sheet.shared(at))
-    widths = tuple(_width(*limits) for limits in box)
-    return Puzzle(equations, trees, tuple(sorted(guarded)), widths, more), box
+    names = {n: symbol(n) for n in sheet.names}
+    limits = [*fold(sheet.nonnegative, names, NODES), *fold(sheet.ascending, names, NODES)]
+    for name, limit in sheet.limits.items():
+        try:
+            check(limit)
+        except NotAccepted:
+            continue  # it takes no part, and is asked of every design that is found
+        limits.append(-sheet.problem.conditions[name].sign * fold(limit, names, NODES)[0])
+    equations, more = multiplied_out(sheet.equations), multiplied_out(sheet.shared)
+    for asked in (equations, more):
+        check(asked)
+    widths = tuple(_width(*ends) for ends in box)
+    return Puzzle(equations, multiplied_out(formula(limits, sheet.names)), widths, more), box
 
 
 def _width(lo: float, hi: float) -> float:
@@ -284,8 +281,9 @@ def _zero(sheet: Sheet, box: Box) -> _Zero | None:
     start = {n: flint.arb(lo + (hi - lo) / 2) for n, (lo, hi) in zip(sheet.names, box, strict=True)}
     units = reaches_of(sheet.problem)
     try:
-        middle = refined(sheet, start, sheet.names, _DIGITS, units)
-        found = enclosed(sheet, middle, sheet.names, _DIGITS, units)
+        system = partial(fold, sheet.equations, kind=BALLS)
+        middle = refined(system, start, sheet.names, _DIGITS, units)
+        found = enclosed(system, middle, sheet.names, _DIGITS, units)
     except (Refused, ZeroDivisionError, ValueError):
         return None
     around = {n: found.uniqueness * units.get(n, 1.0) for n in sheet.names}
@@ -300,23 +298,23 @@ def _within(balls: Mapping[str, Any], names: Sequence[str], box: Box) -> bool:
 def _standing(zero: _Zero) -> str | None:
     """The limit on which a design lies as far as can be told, or empty; None for one beyond a limit."""
     sheet, at = zero.sheet, zero.enclosure.balls
-    values = sheet.values(at)
     room: list[tuple[str, Any]] = []
     for name, (lo, hi) in zip(sheet.names, _ends(sheet), strict=True):
         said = "" if name.startswith(":") else name
         room += [(said and f"the least {said}", at[name] - lo), (said and f"the greatest {said}", hi - at[name])]
-    room += [("the edge of the pattern", x) for x in sheet.nonnegative(at)]
-    room += [("", x) for x in sheet.ascending(at)]
+    room += [("the edge of the pattern", x) for x in fold(sheet.nonnegative, at, BALLS)]
+    room += [("", x) for x in fold(sheet.ascending, at, BALLS)]
     for name, condition in sheet.problem.conditions.items():
         if not condition.equality:
-            excess = condition.sign * flint.arb(condition.of(values, BALLS))
+            told = fold(sheet.limits[name], at, BALLS)[0] if name in sheet.limits else "nan"
+            excess = condition.sign * flint.arb(told)
             if not excess.is_finite() and not _met(sheet.problem, condition, at):
                 return None
             room.append((f"constraint {name}", -excess))
     if any(x < 0 for _, x in room):
         return None
     on = [said for said, x in room if said and not x > 0]
-    return ", ".join(on + ["a0 = 0"] * flint.arb(values.coefficients[0]).contains(0))
+    return ", ".join(on + ["a0 = 0"] * flint.arb(fold(sheet.leading, at, BALLS)[0]).contains(0))
 
 
 def _met(problem: Problem, condition: Expression, at: Mapping[str, Any]) -> bool:

@@ -7,13 +7,12 @@ range, whatever the leading coefficient does, and no equation has a quotient.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from fractions import Fraction
+from itertools import pairwise, product
 from typing import Any
 
-import flint
-
-from tmsopt.algebra.balls import exact
-from tmsopt.algebra.kinds import BALLS, quotient
+from tmsopt.algebra.formula import Formula, formula, symbol
+from tmsopt.algebra.kinds import atan, quotient
 from tmsopt.models import Quantity, Values
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Problem
@@ -23,7 +22,7 @@ from tmsopt.roots.patterns.parts import Part, parts_of
 
 Ends = tuple[float, float]
 
-_AWAY = flint.fmpq(3, 4)  # factors of one kind are told apart by b + 3c/4, which is rarely the same of two
+_AWAY = Fraction(3, 4)  # factors of one kind are told apart by b + 3c/4, which is rarely the same of two
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
 def values_at(problem: Problem, lifted: Sequence[Quantity], at: Mapping[str, Any], held: Mapping[str, Any]) -> Values:
     """Everything that follows from numbers by name, angles by their tangents; `held` are parameters themselves."""
     of, known = problem.parameter_set, {q.name for q in lifted}
-    own = {n: held[n] if n in held else at[n].atan() if of[n].tangent else at[n] for n in of.names}
+    own = {n: held[n] if n in held else atan(at[n]) if of[n].tangent else at[n] for n in of.names}
     return Values(problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
 
 
@@ -121,83 +120,82 @@ def others(
 ) -> list[Any]:
     """Left sides of the equations beside those of a pattern: of quantities that are unknowns, and == constraints."""
     left = [values.fold(q.left_side, {q.name: at[q.name]})[0] for q in lifted if q.equation]
-    return left + [e.of(values, BALLS) for e in equalities]
+    return left + [e(values) for e in equalities]
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """The equations of a pattern where some of its roots are small and the others large; names go to any numbers.
+    """The equations of a pattern where some of its roots are small and the others large.
 
     A parameter goes by its name, an angle by its tangent; a quantity with an equation of its own by its name; the
     unknowns of the pattern by ``:0``, ``:1`` and so on.
 
     Attributes:
-        scale: of the roots and the coefficients.
-        equalities: the == constraints.
-        lifted: quantities in them that are unknowns with an equation.
-        held: the fixed parameters, as they are taken exactly.
+        names: all that is unknown.
+        lifted: quantities among them.
+        equations: left sides, as many as unknowns.
+        shared: what must be 0 beside them where roots of size 1 count as small and as large.
+        nonnegative: what must be ≥ 0 for the unknowns to be those of the pattern.
+        ascending: what is ≥ 0 for one of the ways to call the factors of a design by number.
+        leading: the leading coefficient.
+        limits: of each constraint that is no equality, left minus right.
     """
 
     problem: Problem
     pieces: tuple[Piece, ...]
-    scale: Scale
-    equalities: tuple[Expression, ...]
+    names: tuple[str, ...]
     lifted: tuple[Quantity, ...]
-    held: Mapping[str, Any]
+    equations: Formula
+    shared: Formula
+    nonnegative: Formula
+    ascending: Formula
+    leading: Formula
+    limits: Mapping[str, Formula]
 
-    @property
-    def unknowns(self) -> tuple[str, ...]:
-        """Those of the pattern."""
-        return tuple(f":{k}" for k in range(sum(len(p.ranges) for p in self.pieces)))
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All that is unknown."""
-        return (*self.problem.free, *(q.name for q in self.lifted), *self.unknowns)
+def sheet(problem: Problem, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple[Quantity, ...]) -> Sheet:
+    """The sheet of some factors.
 
-    def values(self, at: Mapping[str, Any]) -> Values:
-        """Everything that follows from numbers by name."""
-        values = values_at(self.problem, self.lifted, at, self.held)
-        if (abscissa := self._abscissa([at[n] for n in self.unknowns])) is not None:
-            values.define("abscissa", abscissa)
-        return values
+    Args:
+        scale: of the roots and the coefficients.
+        lifted: quantities in == constraints that are unknowns with an equation.
+    """
+    unknowns = tuple(f":{k}" for k in range(sum(len(p.ranges) for p in pieces)))
+    names = (*problem.free, *(q.name for q in lifted), *unknowns)
+    at = {n: symbol(n) for n in names}
+    u = [at[n] for n in unknowns]
+    values = values_at(problem, lifted, at, problem.as_nodes(problem.fixed))
+    if (abscissa := _abscissa(problem, pieces, scale, u)) is not None:
+        values.define("abscissa", abscissa)
+    lead, unit = Fraction(scale.lead), Fraction(scale.unit)
+    a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
+    equalities = [c for c in problem.conditions.values() if c.equality]
+    own = [x for piece in pieces for x in piece.nonnegative(u)]
+    alike = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
+    told = {n: c for n, c in problem.conditions.items() if not c.equality and all(name in values for name in c.names)}
+    return Sheet(
+        problem,
+        pieces,
+        names,
+        lifted,
+        equations=formula([*conditions(a, pieces, u), *others(values, lifted, equalities, at)], names),
+        shared=formula(shared(a, pieces, u), names),
+        nonnegative=formula(own, names),
+        ascending=formula((q.place(u) - p.place(u) for p, q in alike), names),
+        leading=formula([values.coefficients[0]], names),
+        limits={n: formula([c(values)], names) for n, c in told.items()},
+    )
 
-    def __call__(self, at: Mapping[str, Any]) -> list[Any]:
-        """Left sides of the equations: as many as unknowns."""
-        values = self.values(at)
-        left = conditions(self._scaled(values), self.pieces, [at[n] for n in self.unknowns])
-        return left + others(values, self.lifted, self.equalities, at)
 
-    def shared(self, at: Mapping[str, Any]) -> list[Any]:
-        """What must be 0 beside the equations where roots of size 1 count as small and as large."""
-        return shared(self._scaled(self.values(at)), self.pieces, [at[n] for n in self.unknowns])
-
-    def _scaled(self, values: Values) -> list[Any]:
-        lead, unit = exact(self.scale.lead), exact(self.scale.unit)
-        return [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
-
-    def nonnegative(self, at: Mapping[str, Any]) -> list[Any]:
-        """What must be ≥ 0 for the unknowns to be those of the pattern."""
-        u = [at[n] for n in self.unknowns]
-        return [x for piece in self.pieces for x in piece.nonnegative(u)]
-
-    def ascending(self, at: Mapping[str, Any]) -> list[Any]:
-        """What is ≥ 0 for one of the ways to call the factors of a design by number."""
-        u = [at[n] for n in self.unknowns]
-        pairs = zip(self.pieces, self.pieces[1:], strict=False)
-        alike = [(p, q) for p, q in pairs if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
-        return [q.place(u) - p.place(u) for p, q in alike]
-
-    def _abscissa(self, u: Sequence[Any]) -> Any:
-        """Largest real part where the pattern makes up all roots; None elsewhere."""
-        pattern = self.problem.pattern
-        if pattern is None or pattern.abscissa is None:
-            return None
-        (piece,) = self.pieces
-        unit, own = exact(self.scale.unit), piece.own(u)
-        if piece.kind == "root":
-            return quotient(unit, own[0]) if piece.outer else unit * own[0]
-        return quotient(-unit * own[0], 2 * own[1]) if piece.outer else -unit * own[0] / 2
+def _abscissa(problem: Problem, pieces: Sequence[Piece], scale: Scale, u: Sequence[Any]) -> Any:
+    """Largest real part where the pattern makes up all roots; None elsewhere."""
+    if problem.pattern is None or problem.pattern.abscissa is None:
+        return None
+    (piece,) = pieces
+    unit, own = Fraction(scale.unit), piece.own(u)
+    if piece.kind == "root":
+        return quotient(unit, own[0]) if piece.outer else unit * own[0]
+    return quotient(-unit * own[0], 2 * own[1]) if piece.outer else -unit * own[0] / 2
 
 
 def conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:

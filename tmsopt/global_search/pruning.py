@@ -5,30 +5,28 @@ and whoever reads their answers must allow for nothing.
 """
 
 import math
+import operator
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
 import flint
 import numpy as np
 
-from tmsopt.algebra.formal import Formal, Symbol, by_symbol
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, Kind, NotAccepted, fold
 from tmsopt.algebra.intervals import interval
-
-Tree = tuple[Any, ...]
-"""``("x", number of a variable)``, ``("c", least, greatest)``, ``("+", tree, tree)``, ``("*", tree, tree)``,
-``("^", tree, power)``, or ``(function, tree)``."""
+from tmsopt.algebra.kinds import as_exact
 
 Box = tuple[tuple[float, float], ...]
 """Least and greatest value of each variable."""
 
-PARTIAL = ("inv", "sqrt", "asin", "acos")
-"""Functions that do not exist, or have no slope, somewhere; not log, at which codac 2.1.2 ends its process."""
+PARTIAL = {"div": 1, "quotient": 1, "sqrt": 0, "asin": 0, "acos": 0}
+"""Operations that do not exist, or have no slope, somewhere, and which operand decides on that."""
 
-_FUNCTIONS = (*PARTIAL, "abs", "exp", "sin", "cos", "atan")
+FUNCTIONS = ("sqrt", "abs", "exp", "sin", "cos", "asin", "acos", "atan")
 
 _GAIN = 0.9  # of a width: contracting goes on where one shrinks below
 _ROUNDS = 8
@@ -40,18 +38,23 @@ class Puzzle:
     """What is to hold in a box; plain data.
 
     Attributes:
-        equations: trees that must be 0, as many as variables.
-        limits: trees that must be ≥ 0.
-        more: trees that must be 0 too.
-        guarded: functions with their arguments that must exist for the equations to have slopes.
+        equations: what must be 0, as many as variables.
+        limits: what must be ≥ 0.
         widths: of the first box, 1 where it has no end.
+        more: what must be 0 too.
     """
 
-    equations: tuple[Tree, ...]
-    limits: tuple[Tree, ...]
-    guarded: tuple[tuple[str, Tree], ...]
+    equations: Formula
+    limits: Formula
     widths: tuple[float, ...]
-    more: tuple[Tree, ...] = ()
+    more: Formula
+
+    @property
+    def guarded(self) -> list[tuple[str, Formula]]:
+        """Operations with their arguments that must exist for the equations to have slopes."""
+        steps, names = self.equations.steps, self.equations.names
+        taken = dict.fromkeys((s.op, s.operands[PARTIAL[s.op]]) for s in steps if s.op in PARTIAL)
+        return [(op, Formula(names, steps, (k,))) for op, k in taken if steps[k].op != CONSTANT]
 
 
 @dataclass(frozen=True)
@@ -131,16 +134,19 @@ class _Contractors:
     def __init__(self, puzzle: Puzzle) -> None:
         import codac
 
-        self.codac, self.widths, self.guarded = codac, puzzle.widths, [name for name, _ in puzzle.guarded]
-        n = len(puzzle.equations)
+        guarded = puzzle.guarded
+        self.codac, self.widths, self.guarded = codac, puzzle.widths, [op for op, _ in guarded]
+        n = len(puzzle.equations.outputs)
         x = codac.VectorVar(n)
-        self.system = codac.AnalyticFunction([x], [_expression(codac, e, x) for e in puzzle.equations])
+        self.system = codac.AnalyticFunction([x], _expressions(codac, puzzle.equations, x))
         zero = codac.IntervalVector([[0.0, 0.0]] * n)
-        self.rows = [codac.CtcInverse(self.system, zero, not puzzle.guarded)]
+        self.rows = [codac.CtcInverse(self.system, zero, not guarded)]
         allowed = [(codac.Interval(0.0, math.inf), puzzle.limits), (codac.Interval(0.0), puzzle.more)]
-        for over, trees in allowed:
-            self.rows += [codac.CtcInverse(_scalar(codac, x, found), over, False) for found in trees]
-        self.arguments = [_scalar(codac, x, argument) for _, argument in puzzle.guarded]
+        for over, asked in allowed:
+            self.rows += [
+                codac.CtcInverse(codac.AnalyticFunction([x], e), over, False) for e in _expressions(codac, asked, x)
+            ]
+        self.arguments = [codac.AnalyticFunction([x], *_expressions(codac, argument, x)) for _, argument in guarded]
 
     def contract(self, x: Any) -> bool:
         """Shrink a box around its zeros; whether Newton's operator shows one in it, or just beside."""
@@ -201,7 +207,7 @@ class _Contractors:
         """Whether every function that the equations use has a slope all over a box."""
         for name, argument in zip(self.guarded, self.arguments, strict=True):
             over = argument.eval(self.codac.EvalMode.NATURAL, x)
-            if name == "inv":
+            if name in ("div", "quotient"):
                 if over.contains(0.0):
                     return False
             elif name in ("asin", "acos"):
@@ -236,21 +242,27 @@ def _contractors(puzzle: Puzzle) -> _Contractors:
     return _Contractors(puzzle)
 
 
-def _scalar(codac: Any, x: Any, found: Tree) -> Any:
-    return codac.AnalyticFunction([x], _expression(codac, found, x))
+def _expressions(codac: Any, asked: Formula, x: Any) -> list[Any]:
+    """The outputs of a formula as expressions of codac.
+
+    Raises:
+        NotAccepted: for an operation that it lacks, or at which it ends its process, as log of codac 2.1.2.
+    """
+    inputs = {name: codac.ScalarExpr(x[k]) for k, name in enumerate(asked.names)}
+    return [codac.ScalarExpr(x) if isinstance(x, codac.Interval) else x for x in fold(asked, inputs, _kind(codac))]
 
 
-def _expression(codac: Any, found: Tree, x: Any) -> Any:
-    operation, *rest = found
-    parts = [_expression(codac, part, x) for part in rest if isinstance(part, tuple)]
-    return {
-        "x": lambda: codac.ScalarExpr(x[rest[0]]),
-        "c": lambda: codac.ScalarExpr(codac.Interval(*rest)),
-        "+": lambda: parts[0] + parts[1],
-        "*": lambda: parts[0] * parts[1],
-        "^": lambda: codac.pow(parts[0], codac.ScalarExpr(codac.Interval(rest[1]))),
-        "inv": lambda: codac.ScalarExpr(codac.Interval(1.0)) / parts[0],
-    }.get(operation, lambda: getattr(codac, operation)(*parts))()
+def _kind(codac: Any) -> Kind:
+    return Kind(
+        {
+            **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg")},
+            **dict.fromkeys(("div", "quotient"), operator.truediv),
+            "square": codac.sqr,
+            "pow": lambda a, b: codac.pow(a, codac.ScalarExpr(b)),
+            **{name: getattr(codac, name) for name in FUNCTIONS},
+        },
+        lambda value: codac.Interval(*ends(as_exact(value))),  # an expression of its own wherever it is used
+    )
 
 
 def _vector(codac: Any, box: Box) -> Any:
@@ -261,34 +273,17 @@ def _box(x: Any) -> Box:
     return tuple((x[k].lb(), x[k].ub()) for k in range(x.size()))
 
 
-def tree(formula: Any, names: Sequence[str]) -> Tree:
-    """A formula in variables of these names, each taken out of as many terms as hold it (Horner's rule).
+def check(asked: Formula) -> None:
+    """Refuse a formula that codac cannot take.
 
     Raises:
-        NotAccepted: for another function than these.
+        NotAccepted: with the name of an operation.
     """
-    return _of_terms(formula.terms if isinstance(formula, Formal) else {(): formula}, names)
-
-
-def _of_terms(terms: Any, names: Sequence[str]) -> Tree:
-    if (parts := by_symbol(terms)) is None:
-        return ("c", *ends(terms.get((), flint.fmpq(0))))
-    symbol, power, inner, rest = parts
-    taken = _of_symbol(symbol, names)
-    if power > 1:
-        taken = ("^", taken, power)
-    factor = _of_terms(inner, names)
-    if factor != ("c", 1.0, 1.0):
-        taken = ("*", factor, taken)
-    return ("+", taken, _of_terms(rest, names)) if rest else taken
-
-
-def _of_symbol(symbol: Symbol, names: Sequence[str]) -> Tree:
-    if symbol.argument is None:
-        return ("x", names.index(symbol.name))
-    if symbol.name not in _FUNCTIONS:
-        raise NotAccepted(symbol.name)
-    return (symbol.name, tree(symbol.argument, names))
+    known = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "div", "quotient", "square", "pow", *FUNCTIONS}
+    for step in asked.steps:
+        exponent = asked.steps[step.operands[1]].value if step.op == "pow" else 1
+        if step.op not in known or not isinstance(exponent, int | Fraction) or exponent % 1:
+            raise NotAccepted(step.op)
 
 
 def ends(number: Any) -> tuple[float, float]:
@@ -297,9 +292,3 @@ def ends(number: Any) -> tuple[float, float]:
     if ball.is_finite() and ball.is_exact() and flint.arb(float(ball)) == ball:
         return float(ball), float(ball)
     return interval(ball)
-
-
-def partial(found: Tree) -> set[tuple[str, Tree]]:
-    """Functions in a tree that must be looked at before slopes are taken, with their arguments."""
-    own = {(found[0], found[1])} if found[0] in PARTIAL else set()
-    return own.union(*(partial(part) for part in found[1:] if isinstance(part, tuple)))

@@ -11,8 +11,8 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.balls import DIGITS, Tilt, rational
-from tmsopt.algebra.formula import fold
-from tmsopt.algebra.kinds import BALLS
+from tmsopt.algebra.formula import PI, Node, constant as node_of, fold, formula
+from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.expression import Expression, parse_value
 from tmsopt.models.model import Model, ParameterSet
@@ -44,11 +44,16 @@ class Exact:
         """The number as a fraction; None for degrees, and where it is irrational."""
         return self.value if isinstance(self.value, Fraction) and not self.degrees else None
 
+    @property
+    def node(self) -> Node:
+        """The number, an angle in radians, in a formula."""
+        value = self.value
+        node: Node = node_of(value) if isinstance(value, Fraction) else fold(value.formula, {}, NODES)[0]
+        return node * PI / 180 if self.degrees else node
+
     def ball(self) -> Any:
         """The number, an angle in radians, as a ball at the working precision."""
-        value: Any = self.value
-        ball = flint.arb(rational(value) if isinstance(value, Fraction) else fold(value.formula, {}, BALLS)[0])
-        return ball * flint.arb.pi() / 180 if self.degrees else ball
+        return flint.arb(fold(formula([self.node]), {}, BALLS)[0])
 
     def times(self, factor: Fraction) -> "Exact":
         """The product with a fraction."""
@@ -98,11 +103,10 @@ def constant(text: str) -> Exact:
     return found
 
 
-def number(x: float, text: str = "") -> Any:
-    """A double as the number that was typed for it, a fraction or a ball; the decimal that prints it without a text."""
+def number(x: float, text: str = "") -> Node:
+    """A double as the number that was typed for it, in a formula; the decimal that prints it without a text."""
     typed = _parsed(text, angle=True) if text else None
-    fraction = typed.fraction if typed else decimal(float(x))
-    return typed.ball() if typed and fraction is None else rational(fraction)
+    return typed.node if typed else node_of(float(x))
 
 
 def decimal(x: Any) -> Fraction:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
+from tmsopt.algebra.formula import Node, fold, formula
+from tmsopt.algebra.kinds import BALLS
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values, controlled
 from tmsopt.models.exact import number
@@ -232,10 +234,14 @@ class Problem:
         exact = {n: self.written.get(n, {}).get(x) for n, x in parameters.items()}
         return {n: text for n, text in exact.items() if text}
 
-    def exactly(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """Numbers of the file as they were typed, as fractions or as balls of the working precision."""
+    def as_nodes(self, parameters: Mapping[str, float]) -> dict[str, Node]:
+        """Numbers of the file as they were typed, in formulas."""
         typed = self.typed(parameters)
         return {n: number(x, typed.get(n, "")) for n, x in parameters.items()}
+
+    def exactly(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """Numbers of the file as they were typed, as fractions or as balls of the working precision."""
+        return {n: fold(formula([x]), {}, BALLS)[0] for n, x in self.as_nodes(parameters).items()}
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
