@@ -1,6 +1,5 @@
 from .arrays import on_arrays as on_arrays
 from .balls import Number as Number, exact as exact, number as number, rational as rational
-from .formal import variable as variable
 from .formula import (
     Formula as Formula, Kind as Kind, NotAccepted as NotAccepted, fold as fold, from_casadi as from_casadi,
     trace as trace,

@@ -1,7 +1,7 @@
 """Fractions and balls, what they are made of, and as data that lasts: decimals with a radius, and roots of them.
 
 A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), a power series of
-these (`flint.arb_series`), a formula multiplied out, or an array of numbers with bounds of their errors
+these (`flint.arb_series`), a polynomial, or an array of numbers with bounds of their errors
 (`rounding.Bounded`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
 """
 
@@ -12,7 +12,6 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.formal import Formal
 from tmsopt.algebra.rounding import Bounded
 
 DIGITS = 60
@@ -137,8 +136,8 @@ class Tilt:
 
 
 def is_ball(x: Any) -> bool:
-    """Whether x is a number of ball arithmetic, exact fractions and formulas of these among them."""
-    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal | Bounded | Tilt)
+    """Whether x is a number of ball arithmetic, exact fractions and polynomials among them."""
+    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | flint.fmpq_poly | flint.arb_poly | Bounded | Tilt)
 
 
 def exact(x: Any) -> Any:

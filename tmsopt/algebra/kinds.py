@@ -184,7 +184,7 @@ def _ball_root(x: Any) -> Any:
 
 def _ball_quotient(a: Any, b: Any) -> Any:
     try:
-        return a / b
+        return a * (1 / b) if isinstance(a, flint.arb_poly) else a / b
     except (ZeroDivisionError, ValueError):  # of fractions, of series
         return flint.arb("nan")
 

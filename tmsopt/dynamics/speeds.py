@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import flint
+from flint.utils.flint_exceptions import DomainError
 
 from tmsopt.algebra.balls import exact, rational
-from tmsopt.algebra.formal import Formal, variable
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import fold, formula, symbol
+from tmsopt.algebra.kinds import BALLS
 from tmsopt.boundaries.surroundings import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, told
 from tmsopt.errors import Fault, InputError, short, suggest
@@ -181,12 +182,14 @@ def coefficients_over(problem: Problem, of: ParameterSet, own: Mapping[str, floa
     Raises:
         InputError: where they are none.
     """
+    nodes = {**problem.as_nodes(own), name: symbol(name)}
+    at = problem.model.algebraic(of.native({n: nodes[n] for n in of.names}))
     try:
         with flint.ctx.workdps(DIGITS):
-            native = of.native({**problem.exactly(own), name: variable(name)})
-            at = {n: _with_fractions(x) for n, x in problem.model.algebraic(native).items()}
-            a = [_powers(c) for c in problem.model.polynomial(**at)]
-    except (NotAccepted, TypeError, ZeroDivisionError):
+            over = fold(formula(at.values()), {name: flint.arb_poly([0, 1])}, BALLS)
+            exact_ones = {n: _with_fractions(x) for n, x in zip(at, over, strict=True)}
+            a = [list(flint.fmpq_poly([0]) + c) or [flint.fmpq(0)] for c in problem.model.polynomial(**exact_ones)]
+    except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # no polynomial on the way
         a = []
     if not any(x != 0 for c in a for x in c):
         raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
@@ -194,22 +197,8 @@ def coefficients_over(problem: Problem, of: ParameterSet, own: Mapping[str, floa
 
 
 def _with_fractions(x: Any) -> Any:
-    """A formula whose coefficients are fractions, right to the digits carried."""
-    return Formal({m: rational(c) for m, c in x.terms.items()}) if isinstance(x, Formal) else rational(x)
-
-
-def _powers(x: Any) -> Polynomial:
-    """The coefficients of a formula in one variable, ascending.
-
-    Raises:
-        NotAccepted: where it is no polynomial with exact coefficients.
-    """
-    found: dict[int, Any] = {}
-    for monomial, c in (x.terms if isinstance(x, Formal) else {(): exact(x)}).items():
-        if not isinstance(c, flint.fmpq) or any(symbol.argument is not None for symbol, _ in monomial):
-            raise NotAccepted("a formula that is no polynomial")
-        found[sum(power for _, power in monomial)] = c
-    return [found.get(k, flint.fmpq(0)) for k in range(max(found, default=0) + 1)]
+    """A polynomial, or a number, with fractions that are right to the digits carried."""
+    return flint.fmpq_poly([rational(c) for c in x]) if isinstance(x, flint.arb_poly) else rational(x)
 
 
 def parameters_of(design: Any, whole: Problem, name: str, progress: Listener | None) -> dict[str, float]:
