@@ -5,12 +5,12 @@ in shape (1, n) or (m, 1); what depends on no axis is one number.
 """
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import INPUT, Formula, Step, fold
+from tmsopt.algebra.formula import INPUT, Formula, fold
 from tmsopt.algebra.kinds import FLOATS
 
 BLOCK = 2**14
@@ -24,43 +24,28 @@ def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
     with np.errstate(all="ignore"):
         if math.prod(shape) <= BLOCK:
             return fold(formula, columns, FLOATS)
-        large, sources = _divided(formula, {n: _axes(np.shape(x)) for n, x in columns.items()}, _axes(shape))
-        ends = dict.fromkeys((*sources, *(o for o in formula.outputs if o not in large)))
-        known = dict(zip(map(str, ends), fold(_part(formula, list(ends)), columns, FLOATS), strict=True))
-        found = {str(o): np.empty(shape) for o in formula.outputs if o in large}
-        rest = _part(formula, [int(o) for o in found], sources)
-        for rows, along in _blocks(shape) if found else ():
-            near = {name: _cut({**columns, **known}[name], rows, along) for name in rest.inputs}
-            for into, value in zip(found.values(), fold(rest, near, FLOATS), strict=True):
-                _cut(into, rows, along)[...] = value
-    return [{**known, **found}[str(o)] for o in formula.outputs]
+        large = _whole(formula, {n: _axes(np.shape(x)) for n, x in columns.items()}, _axes(shape))
+        names, small, rest = formula.split(large)
+        known = columns | dict(zip(names, fold(small, columns, FLOATS), strict=True))
+        found = [known[str(o)] if str(o) in known else np.empty(shape) for o in formula.outputs]
+        filled = [k for k, o in enumerate(formula.outputs) if o in large]
+        rest = rest.part([rest.outputs[k] for k in filled])
+        for rows, along in _blocks(shape) if filled else ():
+            near = {name: _cut(known[name], rows, along) for name in rest.inputs}
+            for k, value in zip(filled, fold(rest, near, FLOATS), strict=True):
+                _cut(found[k], rows, along)[...] = value
+    return found
 
 
-def _divided(formula: Formula, given: Mapping[str, int], axes: int) -> tuple[set[int], set[int]]:
-    """The steps that have all the axes of a grid, and those of others that they take."""
+def _whole(formula: Formula, given: Mapping[str, int], axes: int) -> set[int]:
+    """The steps that have all the axes of a grid."""
     own: list[int] = []
     for step in formula.steps:
         along = given[step.value] if step.op == INPUT else 0
         for o in step.operands:
             along |= own[o]
         own.append(along)
-    large = {k for k, along in enumerate(own) if along == axes}
-    return large, {o for k in large for o in formula.steps[k].operands} - large
-
-
-def _part(formula: Formula, outputs: Sequence[int], known: Collection[int] = ()) -> Formula:
-    """The formula of some steps, in what is known of others, as inputs that have their numbers for names."""
-    needed = set(outputs)
-    for k in range(len(formula.steps) - 1, -1, -1):
-        if k in needed and k not in known:
-            needed.update(formula.steps[k].operands)
-    place = {k: number for number, k in enumerate(sorted(needed))}
-    steps = [
-        Step(INPUT, (), str(k)) if k in known else step._replace(operands=tuple(place[o] for o in step.operands))
-        for k, step in enumerate(formula.steps)
-        if k in needed
-    ]
-    return Formula(formula.names, tuple(steps), tuple(place[o] for o in outputs))
+    return {k for k, along in enumerate(own) if along == axes}
 
 
 def _axes(shape: tuple[int, ...]) -> int:

@@ -5,7 +5,7 @@ CasADi (`from_casadi`). What its operations mean is said by a kind of numbers; s
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -40,7 +40,7 @@ class Step(NamedTuple):
     value: Any = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=True)
 class Formula:
     """Numbers that depend on others, for numbers of any kind.
 
@@ -53,6 +53,42 @@ class Formula:
     names: tuple[str, ...]
     steps: tuple[Step, ...]
     outputs: tuple[int, ...]
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.names, self.steps, self.outputs))
+
+    def part(self, outputs: Sequence[int], known: Collection[int] = ()) -> "Formula":
+        """The formula of some steps, in what is known of others, as inputs that have their numbers for names."""
+        needed = set(outputs)
+        for k in range(len(self.steps) - 1, -1, -1):
+            if k in needed and k not in known:
+                needed.update(self.steps[k].operands)
+        place = {k: number for number, k in enumerate(sorted(needed))}
+        steps = (
+            Step(INPUT, (), str(k))
+            if k in known
+            else self.steps[k]._replace(operands=tuple(place[o] for o in self.steps[k].operands))
+            for k in place
+        )
+        return Formula(self.names, tuple(steps), tuple(place[o] for o in outputs))
+
+    def split(self, late: Collection[int]) -> tuple[tuple[str, ...], "Formula", "Formula"]:
+        """The formula in two: what late steps and outputs take of the others, by name; these; and the rest in them."""
+        taken = {o for k in late for o in self.steps[k].operands} | set(self.outputs)
+        sources = sorted(k for k in taken if k not in late)
+        return tuple(map(str, sources)), self.part(sources), self.part(self.outputs, sources)
+
+    def depending(self, names: Collection[str]) -> set[int]:
+        """The steps that depend on some of the inputs."""
+        found: set[int] = set()
+        for k, step in enumerate(self.steps):
+            if step.value in names if step.op == INPUT else any(o in found for o in step.operands):
+                found.add(k)
+        return found
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -241,6 +277,11 @@ _NUMPY = {
     "minimum": "min",
 }
 """Functions of NumPy whose names are not those of operations."""
+
+
+def depends_on(x: Any, names: Collection[str]) -> bool:
+    """Whether a node has some of the inputs in it."""
+    return bool(formula([x]).depending(names))
 
 
 def symbol(name: str) -> Node:

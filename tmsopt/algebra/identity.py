@@ -214,3 +214,11 @@ def multiplied_out(asked: Formula) -> Formula:
     """
     field = Field(asked)
     return formula_of(map(field.node, fold(asked, field.inputs, field.kind)), asked.names)
+
+
+def is_linear(asked: Formula) -> bool:
+    """Whether a formula of one output is linear in its inputs, as far as that is known."""
+    field = Field(asked)
+    (found,) = fold(asked, field.inputs, field.kind)
+    plain = (sum(exponents) == sum(exponents[: len(asked.names)]) <= 1 for exponents in found.over.to_dict())
+    return bool(found.under.is_constant()) and all(plain)

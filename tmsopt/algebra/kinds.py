@@ -12,7 +12,7 @@ arithmetic:
 
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, partial
 from typing import Any
@@ -23,7 +23,7 @@ import numpy as np
 
 from tmsopt.algebra import rounding
 from tmsopt.algebra.balls import DIGITS, as_ball, exact, is_ball, rational
-from tmsopt.algebra.formula import PI, Constant, Formula, Kind, Node, constant, fold, formula, made
+from tmsopt.algebra.formula import PI, Constant, Formula, Kind, Node, constant, fold, formula, made, nodes_of_casadi
 from tmsopt.algebra.rounding import Bounded
 
 _WHOLE = 1023  # exponent up to which a power is a product
@@ -404,3 +404,14 @@ def pi(like: Any) -> Any:
 
 
 _PI = formula([PI])
+
+
+def gradients(outputs: Sequence[Any], inputs: Sequence[Node]) -> list[list[Node]]:
+    """The slopes of each output with respect to some inputs, as nodes; CasADi takes them."""
+    asked = formula(outputs)
+    symbols = {name: ca.SX.sym(name) for name in dict.fromkeys((*asked.inputs, *(x.value for x in inputs)))}
+    own = ca.vertcat(*(symbols[x.value] for x in inputs))
+    slopes = ca.jacobian(ca.vertcat(*fold(asked, symbols, CASADI)), own)
+    function = ca.Function("slopes", [ca.vertcat(*symbols.values())], [ca.densify(slopes.T)])
+    found = iter(nodes_of_casadi(function, list(symbols)))
+    return [[next(found) for _ in inputs] for _ in outputs]

@@ -200,7 +200,7 @@ def _judged(solution: Solution) -> Problem:
     x = initial_point(nlp, problem, solution.parameters)
     if "abscissa" in nlp.variables:
         x[nlp.variables.index("abscissa")] = solution.abscissa / nlp.unit
-    rows = np.array(nlp.at(nlp.filled(x))[1]).ravel()
+    rows = nlp.at(nlp.filled(x))[1]
     if any(np.sort(rows[list(kink.rows)])[1] <= _MET for kink in nlp.kinks if not kink.quotient):
         raise NotCovered("two sides of an abs, min or max meet there")
     return problem

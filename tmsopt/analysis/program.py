@@ -98,7 +98,7 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
     """
     nlp = abscissa(problem)
     symbols = ca.SX.sym("x", len(nlp.variables))
-    f, g = nlp.at(symbols)
+    f, g = nlp.symbolic(symbols)
     values = problem.values(solution.parameters)
     point = dict(zip(problem.free, variables_of(problem, solution.parameters), strict=True))
     names = [*problem.free, *nlp.variables[len(problem.free) :]]

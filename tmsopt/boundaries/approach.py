@@ -1,21 +1,18 @@
 """From starts to the nearest point of one edge: IPOPT, with solvers that serve every design of a model."""
 
 import math
-import threading
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from tmsopt.algebra.formula import formula, symbol
 from tmsopt.boundaries.boundaries import Edge
 from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.models import Model
-from tmsopt.program.ipopt import Point, Run, ipopt, polisher
-from tmsopt.program.nlp import NLP
+from tmsopt.program.ipopt import ipopt, polisher
+from tmsopt.program.nlp import NLP, name_of
 from tmsopt.records import Array
 
 ALIKE = 1e-9
@@ -25,8 +22,9 @@ _ITERATIONS, _UNFINISHED = 200, "Maximum_Iterations_Exceeded"
 _FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
 _STATIONARY = 1e-8
 _SHIFTED = 1e-8  # share by which what is left of a violation shifts the square of the distance, times its multiplier
-_LARGE = 50_000  # operations times displacements: the expression of a Hessian would take too many
-_KEPT = 64  # solvers, of so many edges and models
+_KEPT = 64  # programs, of so many edges and models
+_WEIGHT, _SCALE, _SIZE, _SIGN = "weight of ", "scale ", "size ", "sign of a0"
+"""What numbers of a program are called beside the parameters, of which none has a blank in its name."""
 
 
 @dataclass(frozen=True)
@@ -52,25 +50,29 @@ def approach(place: WeightedDesign, edge: Edge, sign: float, size: float) -> Cal
         sign: sign of a0 on the side of the edge that is stable or heavily damped.
         size: distance to expect, the unit in which the NLP measures.
     """
-    solver, n = _solver(place, edge), len(place.weights)
-    numbers = (place.parameters[name] for name in place.problem.parameter_set.names)
+    n, own = len(place.weights), {name: place.parameters[name] for name in place.problem.parameter_set.names}
+    own |= {_WEIGHT + name: weight for name, weight in place.weights.items()}
+    own |= {f"{_SCALE}{k}": x for k, x in enumerate(place.scale.tolist())}
+    own |= {f"{_SIZE}{k}": x for k, x in enumerate(place.sizes.tolist())} | {_SIGN: sign, _SIZE: size}
+    plain = _nlp(place.problem.model, place.problem.parameter_set.name, tuple(place.weights), edge)
     nlp = replace(
-        solver.nlp,
-        lower=(*(place.space.lower / size).tolist(), *solver.nlp.lower[n:]),
-        upper=(*(place.space.upper / size).tolist(), *solver.nlp.upper[n:]),
-        settings=(*numbers, *place.weights.values(), *place.scale.tolist(), *place.sizes.tolist(), sign, size),
+        plain,
+        lower=(*(place.space.lower / size).tolist(), *plain.lower[n:]),
+        upper=(*(place.space.upper / size).tolist(), *plain.upper[n:]),
+        numbers=own,
     )
+    run, polish = ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp)
 
     def from_start(u: Array, below: float) -> Approach | None:
         c = sign * place.space.coefficients(u)
         if not (np.all(np.isfinite(c)) and c.any()):
             return None
-        raw = solver.run(np.concatenate([u / size, edge.guess(c)]), nlp)
+        raw = run(np.concatenate([u / size, edge.guess(c)]))
         if below == math.inf and raw.status == _UNFINISHED:  # nothing is known yet: it may go on
-            raw = solver.run(raw.x, nlp)
+            raw = run(raw.x)
         if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - ALIKE):
             return None
-        point = solver.polish(raw, nlp)
+        point = polish(raw, nlp)
         if not point.violation <= _FEASIBLE:
             return None
         u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
@@ -80,68 +82,32 @@ def approach(place: WeightedDesign, edge: Edge, sign: float, size: float) -> Cal
     return from_start
 
 
-@dataclass(frozen=True)
-class _Solver:
-    """What finds nearest points of one edge, for every design of a model."""
+@lru_cache(maxsize=_KEPT)
+def _nlp(model: Model, set_name: str, weighted: tuple[str, ...], edge: Edge) -> NLP:
+    """Minimise y·y, y = u/size, over displacements and the unknowns of the edge; the same for every design.
 
-    nlp: NLP
-    run: Callable[[Array, NLP], Run]
-    polish: Callable[[Run, NLP], Point]
-
-
-_BUILT = threading.local()  # a solver belongs to one thread
-
-
-def _solver(place: WeightedDesign, edge: Edge) -> _Solver:
-    """The solver for an edge, kept: what differs between designs are parameters of the NLP."""
-    known: OrderedDict[Hashable, _Solver] = vars(_BUILT).setdefault("solvers", OrderedDict())
-    key = (place.problem.model, place.problem.parameter_set.name, tuple(place.weights), edge.name)
-    if key not in known:
-        nlp = _nlp(place, edge)
-        known[key] = _Solver(nlp, ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp))
-        if len(known) > _KEPT:
-            known.popitem(last=False)
-    known.move_to_end(key)
-    return known[key]
-
-
-def _nlp(place: WeightedDesign, edge: Edge) -> NLP:
-    """Minimise y·y, y = u/size, over displacements and the unknowns of the edge.
-
-    Its settings are the parameters, the weights, scales and sizes of the coefficients, the sign of a0, and the size.
+    Its numbers are the parameters, the weights, scales and sizes of the coefficients, the sign of a0, and the size.
     """
-    model, of = place.problem.model, place.problem.parameter_set
-    n, extra = len(place.weights), len(edge.unknowns)
-    around = _around(model, of.name, tuple(place.weights))
-    kind: Any = ca.MX if around.n_instructions() * n >= _LARGE else ca.SX
-    x, p = kind.sym("x", n + extra), kind.sym("p", around.size1_in(1))
-    y, unknowns = x[:n], [x[n + k] for k in range(extra)]
-    c, sizes = (ca.vertsplit(column) for column in around(y, p))
-    equations = [e / sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
-    others = edge.nonnegative(c, unknowns)
+    of, n, extra = model.parameter_set(set_name), len(weighted), len(edge.unknowns)
+    x = [symbol(name_of(k)) for k in range(n + extra)]
+    numbers = [*of.names, *(_WEIGHT + name for name in weighted)]
+    numbers += [f"{kind}{k}" for kind in (_SCALE, _SIZE) for k in range(model.degree + 1)] + [_SIGN, _SIZE]
+    given = {name: symbol(name) for name in numbers}
+    moved = {name: given[name] + given[_WEIGHT + name] * given[_SIZE] * y for name, y in zip(weighted, x, strict=False)}
+    a = model.coefficients({name: moved.get(name, given[name]) for name in of.names}, of)
+    c = [given[_SIGN] * coefficient / given[f"{_SCALE}{k}"] for k, coefficient in enumerate(a)]
+    found = zip(edge.equations(c, x[n:]), edge.powers, strict=True)
+    equations = [e / given[f"{_SIZE}{k}"] for e, k in found]
+    others = edge.nonnegative(c, x[n:])
+    rows = [*equations, *others]
     return NLP(
         formulation="nearest",
-        variables=(*place.weights, *edge.unknowns),
-        functions=ca.Function("nlp", [x, p], [ca.sumsqr(y), ca.vertcat(*equations, *others)]),
+        variables=(*weighted, *edge.unknowns),
+        formula=formula([sum(y * y for y in x[:n]), *rows], (*(y.value for y in x), *numbers)),
+        numbers={},
         lower=(-np.inf,) * n + (0.0,) * extra,
         upper=(np.inf,) * n + edge.upper,
         rows=(*[edge.name] * len(equations), *["others"] * len(others)),
-        row_lower=(0.0,) * (len(equations) + len(others)),
+        row_lower=(0.0,) * len(rows),
         row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
-        settings=(np.nan,) * p.numel(),
     )
-
-
-@lru_cache(maxsize=_KEPT)
-def _around(model: Model, set_name: str, weighted: tuple[str, ...]) -> ca.Function:
-    """Coefficients at a displacement, and their sizes, as functions of that and of an NLP's settings."""
-    of, n = model.parameter_set(set_name), len(weighted)
-    parts = (len(of.names), n, model.degree + 1, model.degree + 1, 2)
-    y, p = ca.SX.sym("y", n), ca.SX.sym("p", sum(parts))
-    columns = iter(ca.vertsplit(p))
-    numbers, weights, scale, sizes, (sign, size) = ([next(columns) for _ in range(count)] for count in parts)
-    parameters = dict(zip(of.names, numbers, strict=True))
-    moved = {name: parameters[name] + weights[k] * size * y[k] for k, name in enumerate(weighted)}
-    a = model.coefficients({**parameters, **moved}, of)
-    c = [sign * coefficient / unit for coefficient, unit in zip(a, scale, strict=True)]
-    return ca.Function("around", [y, p], [ca.vertcat(*c), ca.vertcat(*sizes)], {"max_num_dir": 1})

@@ -3,10 +3,7 @@
 import math
 from dataclasses import replace
 
-import casadi as ca
-
 from tmsopt.algebra.formula import NotAccepted
-from tmsopt.algebra.intervals import ranges
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.problem.limit import limit_of, limit_side
@@ -51,9 +48,8 @@ def _excluded(problem: Problem) -> bool:
     build.constraints(without=problem.asked_of_roots)
     if not build.rows:
         return False
-    rows = ca.Function("rows", [ca.vertcat(*build.x)], [ca.densify(ca.vertcat(*(row[1] for row in build.rows)))])
     try:
-        found = ranges(rows, build.bounds)
+        found = build.over([row[1] for row in build.rows])
     except NotAccepted:
         return False
     return any(

@@ -1,7 +1,7 @@
 """Sub-problems of a Pareto front: one objective minimised, the others held below a value (eps-constraints)."""
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -10,31 +10,14 @@ from tmsopt.fronts.front import FrontPoint
 from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
-from tmsopt.program.formulate import LIMIT
 from tmsopt.program.options import STARTS, Options
 from tmsopt.search.solve import solve_any_status
-from tmsopt.search.workspace import Family
 
 _RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
 _SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
 _AT_END = 1e-6  # of a parameter's range: IPOPT stays inside it, and where limits are degenerate polishing keeps that
 _BEYOND = 1e-6  # relative: a part of the box whose best is worse by less than this is searched all the same
 _WORTH = 1e-4  # gain at an end that its slack does not explain: at a smooth optimum it buys sqrt(1e-9) = 3e-5
-
-
-class Workshop:
-    """What one process has built for sub-problems; never sent to another."""
-
-    def __init__(self) -> None:
-        self._families = dict[Hashable, Family]()
-
-    def __reduce__(self) -> tuple[type["Workshop"], tuple[()]]:
-        return Workshop, ()
-
-    def family(self, problem: Problem, limits: Sequence[str]) -> Family:
-        """Of the sub-problems that differ in these limits alone."""
-        name = problem.minimize, *limits, *problem.fixed.items()
-        return self._families.setdefault(name, Family([n + LIMIT for n in limits]))
 
 
 @dataclass(frozen=True)
@@ -47,7 +30,6 @@ class FrontSolver:
         ranges: of the objectives over the front, once its ends are known.
         ends: the same.
         easier: the least of each objective alone, as far as known: no sub-problem has a better one.
-        shop: where they are solved; not sent to other processes.
     """
 
     problem: Problem
@@ -55,17 +37,14 @@ class FrontSolver:
     ranges: tuple[float, ...] = ()
     ends: tuple[FrontPoint, ...] = ()
     easier: Mapping[int, Solution] = field(default_factory=dict)
-    shop: Workshop = field(default_factory=Workshop, compare=False)
 
     def solve(
         self, problem: Problem, starts: int, near: Sequence[Solution] = (), without_sample: bool = False
     ) -> Solution:
         """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
-        limits = [n for n in eps_names(self) if n in problem.constraints]
-        family = self.shop.family(problem, limits)
         beside = [_inside(problem, n) for n in near]
         options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
-        return solve_any_status(problem, options, family, beside, without_sample, self._hopeless(problem, near))
+        return solve_any_status(problem, options, beside, without_sample, self._hopeless(problem, near))
 
     def _hopeless(self, problem: Problem, near: Sequence[Solution]) -> frozenset[str]:
         """Parts of the box whose best in an objective, without any limit, is worse than what is asked or had of it."""

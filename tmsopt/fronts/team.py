@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from tmsopt.executor import Crash, EngineError, Executor, here, processes
-from tmsopt.fronts.subproblems import FrontSolver, Workshop
+from tmsopt.fronts.subproblems import FrontSolver
 
 AT_ONCE = 4
 """Sub-problems set at a time, at most, however many processes there are: what is asked next depends on them all."""
@@ -23,7 +22,6 @@ class Team:
 
     def __init__(self, workers: int) -> None:
         self._executor: Executor = processes(workers) if workers > 1 else here()
-        self._solve = _Worker()
 
     def __enter__(self) -> "Team":
         return self
@@ -39,22 +37,16 @@ class Team:
         Raises:
             EngineError: an item ends every process that tries it.
         """
-        with closing(self._executor.map(self._solve, [(function, ask, item) for item in items])) as answers:
+        with closing(self._executor.map(_solve, [(function, ask, item) for item in items])) as answers:
             for place, answer in answers:
                 if isinstance(answer, Crash):
                     raise EngineError(f"a sub-problem of the front ends its process ({answer.cause})")
                 yield place, answer
 
 
-@dataclass(frozen=True)
-class _Worker:
-    """Solves sub-problems by what its process has built for those before."""
-
-    shop: Workshop = field(default_factory=Workshop)
-
-    def __call__(self, task: tuple[Callable[[FrontSolver, T], R], FrontSolver, T]) -> R:
-        function, ask, item = task
-        return function(replace(ask, shop=self.shop), item)
+def _solve(task: tuple[Callable[[FrontSolver, T], R], FrontSolver, T]) -> R:
+    function, ask, item = task
+    return function(ask, item)
 
 
 def can_send(thing: Any) -> bool:

@@ -8,10 +8,10 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.intervals import Interval, ranges, root_bound
+from tmsopt.algebra.formula import constant, formula
+from tmsopt.algebra.intervals import Interval, root_bound
 from tmsopt.global_search.interlacing import interlace, squares_of, unknowns
 from tmsopt.models import Model, Values
 from tmsopt.program.formulate import Builder
@@ -71,12 +71,6 @@ def compact(model: Model, values: Values) -> list[Any]:
     return list(values.coefficients)
 
 
-def over(build: Builder, expressions: Sequence[Any]) -> list[Interval]:
-    """Ranges of expressions over the variables so far, by interval arithmetic."""
-    function = ca.Function("over", [ca.vertcat(*build.x)], [ca.densify(ca.vertcat(*map(ca.SX, expressions)))])
-    return ranges(function, build.bounds)
-
-
 def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lifted:
     """Every root of every case at or left of a line: a known one, or a variable."""
     covered, values = build.covered, build.values
@@ -84,17 +78,19 @@ def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lift
     at = build.variable("abscissa", *_reach(frame, build, looked)) if line is None else line
     for case in looked:
         c = frame.about(values, case, at)
-        edges = interlace(build, case, c, frame.largest(over(build, c), case == covered[0]), frame.compact)
+        edges = interlace(build, case, c, frame.largest(build.over(c), case == covered[0]), frame.compact)
         if line is None and frame.touching and len(covered) == 1:
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
     size = (line is None) + len(looked) * unknowns(frame.model.degree)
-    return Lifted(ca.SX(at), AddedVariable("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ())
+    return Lifted(
+        constant(at), AddedVariable("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ()
+    )
 
 
 def _reach(frame: Frame, build: Builder, looked: Sequence[int]) -> tuple[float, float]:
     """Range of the abscissa: it is no larger than the largest root, unless that is one of a case not looked at."""
     most = max(
-        frame.unit * frame.largest(over(build, frame.coefficients(build.values, case)), case == looked[0])
+        frame.unit * frame.largest(build.over(frame.coefficients(build.values, case)), case == looked[0])
         for case in looked
     )
     return -most, most if len(build.values) == 1 or not frame.touching else math.inf
@@ -113,7 +109,7 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
     size = int(ratio is None)
     for case in looked:
         a = frame.coefficients(values, case)
-        largest = frame.largest(over(build, a), case == covered[0])
+        largest = frame.largest(build.over(a), case == covered[0])
         pairs, monic = [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
@@ -139,18 +135,18 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
     build.row("damping_ratio", 1 - zeta, 0.0, np.inf)  # real roots would satisfy any larger one, too
     guess = partial(_sector_guess, frame, looked, ratio, build.unit)
-    return Lifted(ca.SX(zeta), AddedVariable("damping_ratio", size, guess), (), ())
+    return Lifted(constant(zeta), AddedVariable("damping_ratio", size, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
     """Ranges for the unknown factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
     count = len(pattern.unknowns)
-    largest = root_bound(over(build, compact(frame.model, build.values[0]))) / build.unit
+    largest = root_bound(build.over(compact(frame.model, build.values[0]))) / build.unit
     symbols = build.x[-count:]
     for factor in pattern.factors(symbols):
         for k, c in enumerate(factor[1:], start=1):
             for j, symbol in enumerate(symbols):
-                if any(ca.is_equal(ca.SX(c), e, 2) for e in (symbol, -symbol)):
+                if any(formula([c]) == formula([e]) for e in (symbol, -symbol)):
                     most = math.comb(len(factor) - 1, k) * largest**k
                     lower, upper = build.bounds[j - count]
                     build.bounds[j - count] = (max(lower, -most), min(upper, most))

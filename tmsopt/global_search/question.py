@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.formula import NotAccepted
-from tmsopt.global_search.half_planes import Frame, bound_unknowns, compact, half_planes, over, sectors
+from tmsopt.algebra.formula import NotAccepted, formula, symbol
+from tmsopt.algebra.identity import is_linear
+from tmsopt.global_search.half_planes import Frame, bound_unknowns, compact, half_planes, sectors
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import rewards_change_of
 from tmsopt.problem.expression import Expression
@@ -24,7 +24,6 @@ from tmsopt.program.nlp import NLP
 from tmsopt.roots import Root
 
 _SMALL = 1e-6  # of roots at 0 or at infinity, which say nothing of the others
-_DEEP = 99  # levels to which expressions are compared
 
 _WORSE = {"abscissa": 1.0, "damping_ratio": -1.0}
 """Direction in which a root quantity gets worse."""
@@ -50,11 +49,11 @@ class Question:
     def signs(self) -> dict[int, dict[int, int]]:
         """Each sign that a0 can have in the box, with that of every case where it is known then."""
         build = Builder(self.problem, self.cases)
-        leading = [ca.SX(compact(self.problem.model, values)[0]) for values in build.values]
-        can = [(upper > 0, lower < 0) for lower, upper in over(build, leading)]
+        leading = [compact(self.problem.model, values)[0] for values in build.values]
+        can = [(upper > 0, lower < 0) for lower, upper in build.over(leading)]
         first = build.covered[0]
         known = {k: 1 if positive else -1 for k, (positive, negative) in enumerate(can) if positive != negative}
-        alike = [k for k, a in enumerate(leading) if ca.is_equal(a, leading[first], _DEEP)]
+        alike = [k for k, a in enumerate(leading) if formula([a]) == formula([leading[first]])]
         possible = [sign for sign, some in zip((1, -1), can[first], strict=True) if some]
         return {sign: known | dict.fromkeys(alike, sign) for sign in possible}
 
@@ -62,8 +61,8 @@ class Question:
         """The least leading coefficient under the constraints; None where the box alone keeps it away from 0."""
         build = Builder(self.problem, self.cases)
         first = build.covered[0]
-        build.objective = sign * ca.SX(compact(self.problem.model, build.values[first])[0])
-        if over(build, [build.objective])[0][0] > 0:
+        build.objective = sign * compact(self.problem.model, build.values[first])[0]
+        if build.over([build.objective])[0][0] > 0:
             return None
         build.constraints(without=self.problem.asked_of_roots)
         return build.finish("leading")
@@ -92,7 +91,7 @@ class Question:
             build.optimise()
             sense = problem.sign
             build.row("limit", build.objective, -np.inf, sense * self.limit)
-        build.objective = ca.SX(0)
+        build.objective = 0
         return build.finish("bound")
 
     def _known(self, name: str) -> float | None:
@@ -113,9 +112,7 @@ def _threshold(condition: Expression, name: str, worse: float) -> float | None:
     """The value that a comparison allows a quantity at worst, where it is linear in that and nothing else."""
     if condition.names != (name,) or condition.equality:
         return None
-    symbol = ca.SX.sym(name)
-    difference = ca.SX(condition({name: symbol}))
-    if not ca.is_linear(difference, symbol):  # |ζ| ≥ 1/2 looks linear from 0 to 1
+    if not is_linear(formula([condition({name: symbol(name)})], [name])):  # |ζ| ≥ 1/2 looks linear from 0 to 1
         return None
     at = [float(condition({name: value})) for value in (0.0, 1.0)]
     slope = at[1] - at[0]

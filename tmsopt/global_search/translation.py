@@ -12,7 +12,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.formula import Kind, NotAccepted, fold, from_casadi
+from tmsopt.algebra.formula import Kind, NotAccepted
 from tmsopt.algebra.intervals import Interval, ball, interval
 from tmsopt.algebra.kinds import INTERVALS, as_double
 from tmsopt.program.nlp import NLP
@@ -56,8 +56,7 @@ def translate(nlp: NLP) -> Translated:
     """
     built = _Translation()
     x = [built.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
-    formula = from_casadi(nlp.functions)
-    objective, *rows = fold(formula, dict(zip(formula.names, x, strict=True)), built.kind(), built.variable)
+    objective, *rows = nlp.fold(x, built.kind(), built.variable)
     for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
         built.between(row, lower, upper)
     least = built.variable(objective).expression

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from tmsopt.algebra.formula import Formula, fold, formula
+from tmsopt.algebra.kinds import FLOATS, gradients
 from tmsopt.models import Values
 from tmsopt.problem.cases import weight_of
 from tmsopt.program.lifts import Rows
@@ -21,12 +22,17 @@ from tmsopt.roots.patterns.pattern import Roots
 
 @dataclass(frozen=True)
 class _Foot:
-    """One case, and a function from what is given, u and w to slopes."""
+    """One case, and slopes of its equations in the unknowns u and w."""
 
     case: int
     names: tuple[str, ...]
-    weave: bool
-    slopes: ca.Function
+    unknowns: list[str]
+    equations: int
+    slopes: Formula
+
+    @property
+    def weave(self) -> bool:
+        return len(self.unknowns) > len(self.names)
 
 
 Feet = Mapping[int, Mapping[str, Any]]
@@ -52,29 +58,31 @@ def lift_feet(
     radius: Any,
     feet: Feet,
     edges: Mapping[int, str],
-    given: Any,
-    known: Callable[[Values], list[float]],
+    known: Callable[[Values], Mapping[str, float]],
     weights: Mapping[str, float],
 ) -> AddedVariable:
     """The conditions of a foot in some cases, and radius² ≤ u·u.
 
     Args:
         edges: the boundaries that they stand on.
-        given: what else decides on a polynomial; `known`: the numbers for it, of numeric designs.
+        known: the numbers of a numeric design that decide on a polynomial, by name.
     """
     made, first = [], build.size[0]
     for k, foot in feet.items():
-        edge, u = edges[k], ca.vertcat(*foot.values())
+        edge, u = edges[k], [*foot.values()]
         w = [build.variable(f"w.{k}", 0.0)] if edge == "weave" else []
-        equations = ca.vertcat(*_on_edge(edge, build.polynomial(k), *w))
-        slopes = ca.densify(ca.jacobian(equations, ca.vertcat(u, *w)))
-        multipliers = ca.vertcat(*(build.variable(f"l{j}.{k}") for j in range(equations.numel())))
-        pull = ca.vertcat(u, *[0] * len(w)) + slopes.T @ multipliers
-        for row in (*ca.vertsplit(equations), *ca.vertsplit(pull)):
+        equations = _on_edge(edge, build.polynomial(k), *w)
+        slopes = gradients(equations, [*u, *w])
+        multipliers = [build.variable(f"l{j}.{k}") for j in range(len(equations))]
+        pull = [
+            sum((m * row[j] for m, row in zip(multipliers, slopes, strict=True)), x)
+            for j, x in enumerate([*u, *[0] * len(w)])
+        ]
+        for row in (*equations, *pull):
             build.row("radius", row, 0.0, 0.0)
-        build.row("radius", ca.sumsqr(u) - radius * radius, 0.0, np.inf)
-        function = ca.Function("slopes", [given, u, ca.vertcat(*w)], [slopes])
-        made.append(_Foot(k, tuple(foot), bool(w), function))
+        build.row("radius", sum(x * x for x in u) - radius * radius, 0.0, np.inf)
+        asked = formula(x for row in slopes for x in row)
+        made.append(_Foot(k, tuple(foot), [x.value for x in (*u, *w)], len(equations), asked))
     return AddedVariable("feet", build.size[0] - first, partial(_guess, made, known, weights))
 
 
@@ -87,7 +95,7 @@ def _on_edge(edge: str, a: Sequence[Any], w: Any = None) -> list[Any]:
 
 def _guess(
     feet: Sequence[_Foot],
-    known: Callable[[Values], list[float]],
+    known: Callable[[Values], Mapping[str, float]],
     weights: Mapping[str, float],
     values: Sequence[Values],
     z: Sequence[Roots],
@@ -97,7 +105,8 @@ def _guess(
     for foot in feet:
         w = [_pair(z[foot.case])] if foot.weave else []
         u = _displacement(weights, foot.names, values[0], values[foot.case])
-        slopes = foot.slopes(known(values[0]), u, w).full()
+        at = {**known(values[0]), **dict(zip(foot.unknowns, [*u, *w], strict=True))}
+        slopes = np.array(fold(foot.slopes, at, FLOATS), dtype=float).reshape(foot.equations, -1)
         multipliers = np.linalg.lstsq(slopes.T, -np.array([*u, *[0.0] * len(w)]), rcond=None)[0]
         found += [*w, *multipliers.tolist()]
     return [found]

@@ -10,13 +10,16 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from tmsopt.models import Quantity, Values
+from tmsopt.algebra.formula import constant, depends_on, fold, formula, made, symbol
+from tmsopt.algebra.intervals import Interval, ball, interval
+from tmsopt.algebra.kinds import INTERVALS
+from tmsopt.models import Quantity, Values, decimal
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import demands_heavy_damping, depends_on_case, needs_two_sided_bounds, rewards_change_of
 from tmsopt.problem.expression import Expression
+from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Problem, degrees_of_freedom
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
 from tmsopt.program.boundary_points import lift_displacements, lift_feet
@@ -32,8 +35,19 @@ from tmsopt.program.lifts import (
     lift_real_roots,
     worst_guess,
 )
-from tmsopt.program.nlp import NLP, AddedVariable, Contact, Factor, objective_size, objective_unit, scale_of, units_of
+from tmsopt.program.nlp import (
+    NLP,
+    AddedVariable,
+    Contact,
+    Factor,
+    name_of,
+    objective_size,
+    objective_unit,
+    scale_of,
+    units_of,
+)
 from tmsopt.program.strips import lift_angular_frequency
+from tmsopt.records import Table
 from tmsopt.roots import Pattern
 
 Lifting = Callable[["Builder"], Lifted]
@@ -50,7 +64,6 @@ def formulate(
     cases: Sequence[Case] = (),
     elastic: bool = False,
     damping_ratio: float | None = None,
-    settings: Mapping[str, Any] | None = None,
     lead: int = 0,
 ) -> NLP:
     """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``; its kinks as variables.
@@ -59,13 +72,10 @@ def formulate(
         cases: what the design must stand up to; the nominal design alone, without any.
         elastic: leave every constraint a row that can be relaxed.
         damping_ratio: take this for it: 1, by real roots, or −1, and leave it to the recheck whether it is.
-        settings: symbols for numbers of the problem that are to be parameters of the NLP; see `Family`.
         lead: sign of a0, where the NLP is to go as far as a0 = 0.
     """
-    if problem.pattern:
-        nlp = matching(problem, cases=cases, settings=settings)
-    else:
-        nlp = abscissa(problem, cases, elastic, damping_ratio, settings, lead)
+    located = matching(problem, cases=cases) if problem.pattern else None
+    nlp = located or abscissa(problem, cases, elastic, damping_ratio, lead)
     return epigraph_form(
         nlp if elastic else remove_even_powers(nlp, problem.constraints), needs_two_sided_bounds(problem)
     )
@@ -76,11 +86,10 @@ def abscissa(
     cases: Sequence[Case] = (),
     elastic: bool = False,
     damping_ratio: float | None = None,
-    settings: Mapping[str, Any] | None = None,
     lead: int = 0,
 ) -> NLP:
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
-    build = Builder(problem, cases, settings=settings, lead=lead)
+    build = Builder(problem, cases, lead=lead)
     if damping_ratio == 1 or (damping_ratio is None and not elastic and demands_heavy_damping(problem)):
         build.real_roots()
     elif damping_ratio is not None:
@@ -92,12 +101,7 @@ def abscissa(
     return build.finish("abscissa")
 
 
-def matching(
-    problem: Problem,
-    pattern: Pattern | None = None,
-    cases: Sequence[Case] = (),
-    settings: Mapping[str, Any] | None = None,
-) -> NLP:
+def matching(problem: Problem, pattern: Pattern | None = None, cases: Sequence[Case] = ()) -> NLP:
     """Match coefficients with a pattern: a_k = a0 · c_k(unknowns).
 
     Square: the equations alone. Under-determined: the objective, or the distance to the start relative to the box.
@@ -106,7 +110,7 @@ def matching(
     pattern = pattern or problem.pattern
     if pattern is None:
         raise ValueError("matching needs a pattern; give the problem locate = 'EP4' or another")
-    build = Builder(problem, cases, settings=settings)
+    build = Builder(problem, cases)
     build.pattern(pattern)
     build.constraints()
     left = degrees_of_freedom(problem).count
@@ -140,7 +144,6 @@ class Builder:
 
     Args:
         lifts: root quantity → how it is carried by variables; by default by factors.
-        settings: symbols that stand for numbers of the problem.
         lead: sign of a0 in an NLP that goes as far as a0 = 0.
     """
 
@@ -149,11 +152,10 @@ class Builder:
         problem: Problem,
         cases: Sequence[Case],
         lifts: Mapping[str, Lifting] | None = None,
-        settings: Mapping[str, Any] | None = None,
         lead: int = 0,
     ) -> None:
         self.problem, self.lead = problem, lead
-        self.settings = dict(settings or {})
+        self.numbers = numbers_of(problem)
         self.lifting = _LIFTED if lifts is None else lifts
         self.cases = tuple(cases)
         self.names: list[str] = []
@@ -165,14 +167,11 @@ class Builder:
         self.products: list[tuple[Factor, ...]] = []
         self.shared: dict[str, Any] = {}
         self.taken: set[str] = set()
-        self.objective: Any = ca.SX(0)
+        self.objective: Any = 0
         self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
-        # A weight is 1 where its parameter is 0, and else its size: a number that is 0 stays one.
-        kept = {n for n, x in problem.fixed.items() if x or not problem.asks_radius}
-        given = {n: s for n, s in self.settings.items() if n in kept}
-        nominal = problem.ordered({**self.design, **given})
+        nominal = problem.ordered({**self.design, **{n: symbol(n) for n in problem.fixed if n in self.numbers}})
         directed = [k for k, case in enumerate(self.cases, start=1) if case.direction]
-        radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)
+        radius = self.variable(RADIUS, 0.0) if directed else constant(0)
         edges = {k: case.edge for k, case in enumerate(self.cases, start=1) if case.edge}
         feet = {k: {n: self.variable(f"{n}.{k}") for n in self.cases[k - 1].direction} for k in edges}
         moved = [replace(case, direction=feet.get(k, case.direction)) for k, case in enumerate(self.cases, start=1)]
@@ -186,9 +185,8 @@ class Builder:
             self.lifts.append(lift_radius(self, [k for k in directed if k not in feet]))
             self.shared[RADIUS] = radius
         if feet:
-            given = ca.vertcat(*self.x[: len(problem.free)], *self.settings.values())
-            known = partial(_known, problem, tuple(self.settings))
-            self.lifts.append(lift_feet(self, radius, feet, edges, given, known, problem.weights))
+            known = partial(_known, problem)
+            self.lifts.append(lift_feet(self, radius, feet, edges, known, problem.weights))
 
     @property
     def unit(self) -> float:
@@ -213,21 +211,19 @@ class Builder:
         return Values(self.problem.model, of, parameters, extra=(*ROOT_QUANTITIES, NO_RADIUS), lift=lift)
 
     def variable(self, name: str, lower: float = -np.inf, upper: float = np.inf) -> Any:
-        symbol = ca.SX.sym(name)
         self.names.append(name)
-        self.x.append(symbol)
+        self.x.append(symbol(name_of(len(self.x))))
         self.bounds.append((lower, upper))
-        return symbol
+        return self.x[-1]
 
     def parameter(self, name: str, lower: float, upper: float) -> Any:
         """A free parameter, as a variable or as the arctangent of one."""
         if self.problem.parameter_set[name].tangent:
-            return ca.atan(self.variable(f"tan({name})", np.tan(lower), np.tan(upper)))
+            return made("atan", self.variable(f"tan({name})", np.tan(lower), np.tan(upper)))
         return self.variable(name, lower, upper)
 
     def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
-        symbol = isinstance(expression, ca.SX)  # a copy of one takes as long as ten operations
-        self.rows.append((name, expression if symbol else ca.SX(expression), lower, upper))
+        self.rows.append((name, constant(expression), lower, upper))
 
     def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
         """Equations between coefficient lists; the leading ones agree by construction."""
@@ -248,7 +244,7 @@ class Builder:
 
     def take(self, name: str, value: float) -> None:
         """A number for a root quantity; limits on it alone hold by the form of the factors, or the recheck tells."""
-        self.shared[name] = ca.SX(value)
+        self.shared[name] = constant(value)
         self.taken.add(name)
 
     def constraints(self, without: Collection[str] = ()) -> None:
@@ -258,7 +254,8 @@ class Builder:
                 continue
             if len(condition.names) == 1 and condition.names[0] in self.taken:
                 continue
-            for value in self.in_each_case(condition, self.settings.get(name + LIMIT)):
+            limit = symbol(name + LIMIT) if name + LIMIT in self.numbers else None
+            for value in self.in_each_case(condition, limit):
                 self.row(name, value, *condition.allowed)
 
     def optimise(self) -> None:
@@ -296,21 +293,17 @@ class Builder:
             self.row(pattern.name, expression, 0.0, np.inf)
 
     def nearest_to(self, design: Mapping[str, float]) -> None:
-        for name, symbol in self.design.items():
+        for name, variable in self.design.items():
             lower, upper = self.problem.free[name]
-            self.objective += ((symbol - design[name]) / (upper - lower)) ** 2
+            self.objective += ((variable - design[name]) / (upper - lower)) ** 2
 
     def finish(self, formulation: str) -> NLP:
-        g = ca.vertcat(*[r[1] for r in self.rows]) if self.rows else ca.SX(0, 1)
-        inputs = {"x": ca.vertcat(*self.x)}
-        if self.settings:
-            inputs["p"] = ca.vertcat(*self.settings.values())
-        outputs = {"f": ca.densify(self.objective), "g": ca.densify(g)}
-        functions = ca.Function("nlp", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+        names = (*(name_of(k) for k in range(len(self.x))), *self.numbers)
         return NLP(
             formulation=formulation,
             variables=tuple(self.names),
-            functions=functions,
+            formula=formula([self.objective, *(r[1] for r in self.rows)], names),
+            numbers=self.numbers,
             lower=tuple(lo for lo, _ in self.bounds),
             upper=tuple(hi for _, hi in self.bounds),
             rows=tuple(r[0] for r in self.rows),
@@ -321,12 +314,21 @@ class Builder:
             touches=self.touches,
             products=tuple(self.products),
             exact=bool(self.products) and formulation == "abscissa",
-            settings=(np.nan,) * len(self.settings),
             unit=self.unit,
             size=objective_size(self.problem),
             units=units_of(self.problem),
             objective_unit=objective_unit(self.problem),
         )
+
+    def over(self, expressions: Sequence[Any]) -> list[Interval]:
+        """Ranges of expressions over the variables so far, by interval arithmetic.
+
+        Raises:
+            NotAccepted: for an operation that has none.
+        """
+        over = {name_of(k): ball(ends) for k, ends in enumerate(self.bounds)}
+        numbers = {n: INTERVALS.constant(decimal(x)) for n, x in self.numbers.items()}
+        return [interval(x) for x in fold(formula(expressions), over | numbers, INTERVALS)]
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:
         """A quantity as a variable, bound by factors or by its division-free equation."""
@@ -343,16 +345,15 @@ class Builder:
         if quantity.equation is None and (not quantity.pieces or rewards_change_of(self.problem, name)):
             return None
         ends = (-np.inf, np.inf) if quantity.pieces else (quantity.range.lower, quantity.range.upper)
-        symbol, lift = lift_quantity(self, name, case, ends)
+        variable, lift = lift_quantity(self, name, case, ends)
         self.lifts.append(lift)
         if quantity.equation is not None:
-            self.row(name, values.fold(quantity.left_side, {name: symbol})[0], 0.0, 0.0)
+            self.row(name, values.fold(quantity.left_side, {name: variable})[0], 0.0, 0.0)
         for piece in values.fold(quantity.each_piece):
-            above = ca.SX(symbol - piece)
             # A limit that equals a constant piece would share its multiplier with it.
-            varies_with_design = any(ca.depends_on(above, x) for x in self.x if x is not symbol)
-            self.row(name, above, 0.0 if varies_with_design else -_LEEWAY, np.inf)
-        return symbol
+            varies_with_design = depends_on(piece, {x.value for x in self.x})
+            self.row(name, variable - piece, 0.0 if varies_with_design else -_LEEWAY, np.inf)
+        return variable
 
 
 _LIFTED: Mapping[str, Lifting] = {
@@ -362,6 +363,14 @@ _LIFTED: Mapping[str, Lifting] = {
 }
 
 
-def _known(problem: Problem, settings: Sequence[str], values: Values) -> list[float]:
-    """The first variables and the settings of a numeric design; no polynomial depends on a limit."""
-    return [*variables_of(problem, values), *(0.0 if n.endswith(LIMIT) else float(values[n]) for n in settings)]
+def _known(problem: Problem, values: Values) -> dict[str, float]:
+    """The first variables of a numeric design and the numbers, by their names in formulas."""
+    own = {name_of(k): x for k, x in enumerate(variables_of(problem, values))}
+    return {**own, **{n: float(values[n]) for n in problem.fixed}}
+
+
+def numbers_of(problem: Problem) -> Mapping[str, float]:
+    """Numbers that a program takes as parameters: fixed values and limits; one that is 0 shapes it instead."""
+    limits = {name + LIMIT: limit_of(text) for name, text in problem.constraints.items()}
+    every = {**problem.fixed, **limits}
+    return Table({name: float(x) for name, x in every.items() if x})

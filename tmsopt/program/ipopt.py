@@ -8,13 +8,14 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.program.nlp import NLP
+from tmsopt.program.nlp import NLP, Compiled
 from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
 
@@ -27,9 +28,15 @@ _NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6, **_QUICK}
 # A start that satisfies the equations of many cases is worth keeping to: with the barrier of far starts IPOPT
 # throws that away, and half as many starts of band designs end at the best optimum.
 _EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_QUICK}
-_SETTINGS: dict[str, dict[str, Any]] = {"far": _FAR, "exact": _EXACT, "near": _NEAR}
+_SETTINGS = {
+    name: {f"ipopt.{option}": value for option, value in own.items()}
+    for name, own in {"far": _FAR, "exact": _EXACT, "near": _NEAR}.items()
+}
 
 _SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM") if hasattr(signal, n)]
+_KEPT = 32
+"""Programs of which solvers are kept."""
+
 _STEPS = 12
 _STALLED = 1e-14  # relative step of Newton's method, below which it ends once the steps no longer shrink
 _STATIONARY = 1e-9
@@ -81,6 +88,33 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
 
     Not to be shared between threads.
     """
+    unit = (*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units)))
+    asked = (("ipopt.linear_solver", options.linear_solver), ("ipopt.max_iter", max_iterations))
+    solver = _MADE.solver(nlp.compiled, unit, 1 / nlp.objective_unit, (*asked, *_SETTINGS[start].items()))
+
+    def run(x0: Array, limits: NLP = nlp) -> Run:
+        lower, upper = np.array(limits.lower), np.array(limits.upper)
+        first, *ends = (
+            (column / np.array(unit)).tolist() for column in (x0, lower, upper)
+        )  # quicker in CasADi than arrays
+        rows = {"lbg": limits.row_lower, "ubg": limits.row_upper}
+        with _interruptible():
+            answer = solver(x0=first, p=limits.constants, lbx=ends[0], ubx=ends[1], **rows)
+        stats = solver.stats()
+        return Run(
+            x=np.clip(answer["x"].full().ravel() * np.array(unit), lower, upper),
+            row_multipliers=answer["lam_g"].full().ravel(),
+            bound_multipliers=answer["lam_x"].full().ravel() / np.array(unit),
+            status=str(stats["return_status"]),
+        )
+
+    return run
+
+
+def _solver(
+    compiled: Compiled, unit: tuple[float, ...], objective: float, asked: tuple[tuple[str, Any], ...]
+) -> ca.Function:
+    """IPOPT on compiled functions, whose variables it moves in units."""
     settings: dict[str, Any] = {
         "print_time": False,
         "show_eval_warnings": False,
@@ -88,49 +122,45 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
         "calc_lam_p": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
-        "ipopt.linear_solver": options.linear_solver,
         "ipopt.tol": 1e-12,
         "ipopt.bound_relax_factor": 0.0,
-        "ipopt.max_iter": max_iterations,
-        "ipopt.obj_scaling_factor": 1 / nlp.objective_unit,
-        **{f"ipopt.{name}": value for name, value in _SETTINGS[start].items()},
+        "ipopt.obj_scaling_factor": objective,
+        **dict(asked),
     }
-    unit = np.array([*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units))])
-    stated, derivatives = nlp.derived
-    if not np.all(unit == 1):
-        x, p = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("p", len(nlp.settings))
-        stated, derivatives = ca.Function("nlp", [x, p], nlp.at(x * unit, p), ["x", "p"], ["f", "g"]), {}
-    solver = ca.nlpsol("solver", "ipopt", stated, {**settings, **derivatives})
+    if set(unit) <= {1.0}:
+        return ca.nlpsol("solver", "ipopt", compiled.function, {**settings, **compiled.derivatives})
+    x, p, _ = compiled.symbols
+    stated = ca.Function("nlp", [x, p], list(compiled.function(x * ca.DM(unit), p)), ["x", "p"], ["f", "g"])
+    return ca.nlpsol("solver", "ipopt", stated, settings)
 
-    def run(x0: Array, limits: NLP = nlp) -> Run:
-        lower, upper = np.array(limits.lower), np.array(limits.upper)
-        first, *ends = ((column / unit).tolist() for column in (x0, lower, upper))  # quicker in CasADi than arrays
-        rows = {"lbg": limits.row_lower, "ubg": limits.row_upper}
-        with _interruptible():
-            answer = solver(x0=first, p=limits.settings, lbx=ends[0], ubx=ends[1], **rows)
-        stats = solver.stats()
-        return Run(
-            x=np.clip(answer["x"].full().ravel() * unit, lower, upper),
-            row_multipliers=answer["lam_g"].full().ravel(),
-            bound_multipliers=answer["lam_x"].full().ravel() / unit,
-            status=str(stats["return_status"]),
-        )
 
-    return run
+def _conditions(compiled: Compiled) -> ca.Function:
+    """Objective, its gradient, rows, their Jacobian, and the Hessian of the Lagrangian."""
+    x, p, rows = compiled.symbols
+    first = [e for name in ("grad_f", "jac_g") for e in compiled.derivatives[name](x, p)]
+    hessian = ca.triu2symm(compiled.derivatives["hess_lag"](x, p, 1, rows))
+    return ca.Function("kkt", [x, rows, p], [*first, hessian])
+
+
+class _Made(threading.local):
+    """Solvers and conditions of what was compiled; a solver must not be used from two threads."""
+
+    def __init__(self) -> None:
+        self.solver = lru_cache(maxsize=3 * _KEPT)(_solver)
+        self.conditions = lru_cache(maxsize=_KEPT)(_conditions)
+
+
+_MADE = _Made()
 
 
 def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
     """A function that refines runs of one NLP under given limits; the better of refined and raw point is returned."""
-    _, derivatives = nlp.derived
-    sizes = {"x": len(nlp.variables), "m": len(nlp.rows), "p": len(nlp.settings)}
-    x, rows, p = (nlp.symbol(name, size) for name, size in sizes.items())
-    first = [e for name in ("grad_f", "jac_g") for e in derivatives[name](x, p)]
-    expand = ca.Function("kkt", [x, rows, p], [*first, ca.triu2symm(derivatives["hess_lag"](x, p, 1, rows))])
+    expand = _MADE.conditions(nlp.compiled)
 
     def polish(run: Run, limits: NLP) -> Point:
         ends = (np.array(e) for e in (limits.lower, limits.upper, limits.row_lower, limits.row_upper))
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not better
-            return _polished(_Conditions(expand, limits.settings, *ends), run)
+            return _polished(_Conditions(expand, limits.constants, *ends), run)
 
     return polish
 
@@ -147,7 +177,7 @@ def gains(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
     own = np.concatenate([point.row_multipliers, point.bound_multipliers])
     held = np.abs(own) > _STATIONARY * (1 + np.abs(own).max(initial=0.0))
     _, slope, rows, jacobian = (
-        part.full() for name in ("grad_f", "jac_g") for part in nlp.derived[1][name](point.x, nlp.settings)
+        part.full() for name in ("grad_f", "jac_g") for part in nlp.compiled.derivatives[name](point.x, nlp.constants)
     )
     columns = np.hstack([jacobian.T, np.eye(len(point.x))])[:, held]
     lengths = np.linalg.norm(columns, axis=0)
@@ -209,7 +239,7 @@ class _Conditions:
     """The optimality conditions of one NLP: its functions with derivatives, and its limits."""
 
     expand: ca.Function
-    settings: tuple[float, ...]
+    constants: Sequence[float]
     lower: Array
     upper: Array
     row_lower: Array
@@ -217,7 +247,7 @@ class _Conditions:
 
     def at(self, x: Array, rows: Array) -> tuple[float, Array, Array, Array, Array]:
         """Objective, its gradient, rows, their Jacobian, and the Hessian of the Lagrangian."""
-        every = self.expand(x.tolist(), rows.tolist(), self.settings)
+        every = self.expand(x.tolist(), rows.tolist(), self.constants)
         f, gradient, g, jacobian, hessian = (part.full() for part in every)
         return float(f.item()), gradient.ravel(), g.ravel(), jacobian, hessian
 

@@ -16,12 +16,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.formula import Kind, NotAccepted, fold, from_casadi
-from tmsopt.algebra.intervals import ball, interval, ranges
-from tmsopt.algebra.kinds import CASADI, INTERVALS
+from tmsopt.algebra.formula import Kind, NotAccepted, depends_on, fold, formula, made, symbol
+from tmsopt.algebra.intervals import ball, interval
+from tmsopt.algebra.kinds import INTERVALS, NODES
 from tmsopt.models import Values
 from tmsopt.problem.dependence import WORSE_DIRECTION
-from tmsopt.program.nlp import NLP, AddedVariable, Contact, MaximumVariable
+from tmsopt.program.nlp import NLP, AddedVariable, Contact, MaximumVariable, name_of
 from tmsopt.roots.patterns.pattern import Roots
 
 KINK = ".kink"
@@ -35,20 +35,19 @@ def epigraph_form(nlp: NLP, overclaims: bool) -> NLP:
         overclaims: whether bounds on root quantities would, kinks aside.
     """
     plain = nlp if overclaims else replace(nlp, touches={})
-    if not (nlp.settings or _suspect(nlp)):
+    if not _suspect(nlp):
         return plain
     build = _Unfolding(nlp)
-    x, p, f, g = build.expressions()
+    f, g = build.expressions()
     if not build.kinks:
         return plain
-    inputs = {"x": x, "p": p} if nlp.settings else {"x": x}
-    functions = ca.Function("nlp", [*inputs.values()], [f, g], [*inputs], ["f", "g"])
+    names = (*map(name_of, range(len(nlp.variables) + len(build.kinks))), *nlp.numbers)
     count, first = len(build.kinks), len(nlp.rows)
     rows = sum(len(kink.rows) for kink in build.kinks)
     plain = replace(
         nlp,
         variables=(*nlp.variables, *[KINK] * count),
-        functions=functions,
+        formula=formula([f, *g], names),
         lower=(*nlp.lower, *[-np.inf] * count),
         upper=(*nlp.upper, *[np.inf] * count),
         rows=(*nlp.rows, *[KINK] * rows),
@@ -57,7 +56,8 @@ def epigraph_form(nlp: NLP, overclaims: bool) -> NLP:
         lifts=(*nlp.lifts, *[AddedVariable(KINK, 1, _filled_later)] * count),
         kinks=tuple(build.kinks),
     )
-    slopes = partial(_slopes, ca.jacobian(ca.vertcat(f, g), x))
+    x = ca.SX.sym("x", len(plain.variables))
+    slopes = partial(_slopes, ca.jacobian(ca.vertcat(*plain.symbolic(x)), x))
     held: dict[str, tuple[Contact, ...]] = {}
     equal = set[int]()
     for kink in reversed(build.kinks):  # what is made of others comes before them
@@ -76,12 +76,8 @@ def epigraph_form(nlp: NLP, overclaims: bool) -> NLP:
 
 
 def _suspect(nlp: NLP) -> bool:
-    """Whether there may be a kink, or a pole in the box: of most NLPs one look by interval arithmetic denies it.
-
-    Not of those with settings, whose functions have two vectors.
-    """
-
-    if not {nlp.functions.instruction_id(k) for k in range(nlp.functions.n_instructions())} & _KINKED:
+    """Whether there may be a kink, or a pole in the box: of most NLPs one look by interval arithmetic denies it."""
+    if not {step.op for step in nlp.formula.steps} & {*_PIECES, *_POLES}:
         return False
     known = INTERVALS.operations
 
@@ -92,10 +88,9 @@ def _suspect(nlp: NLP) -> bool:
         return known[op](*operands)
 
     smooth = {op: f for op, f in known.items() if op not in _PIECES} | {op: partial(divided, op) for op in _POLES}
-    formula = from_casadi(nlp.functions)
-    box = {name: ball(ends) for name, ends in zip(formula.names, zip(nlp.lower, nlp.upper, strict=True), strict=True)}
+    box = [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
     try:
-        fold(formula, box, Kind(smooth, INTERVALS.constant))
+        nlp.fold(box, Kind(smooth, INTERVALS.constant))
     except NotAccepted:
         return True
     return False
@@ -105,63 +100,58 @@ class _Unfolding:
     """Collects the kinks of one NLP; discarded once they are known."""
 
     def __init__(self, nlp: NLP) -> None:
-        self.nlp = nlp
-        self.x = list(ca.vertsplit(ca.SX.sym("x", len(nlp.variables))))
-        self.p = list(ca.vertsplit(ca.SX.sym("p", len(nlp.settings)))) if nlp.settings else []
+        self.nlp, self.count = nlp, len(nlp.variables)
         self.rows: list[Any] = []
         self.kinks: list[MaximumVariable] = []
 
-    def expressions(self) -> tuple[Any, Any, Any, Any]:
-        """Variables, settings, objective and rows, without a kink."""
-        x, p = ca.SX.sym("x", len(self.x)), ca.SX.sym("p", len(self.p))
-        formula = from_casadi(ca.Function("stacked", [ca.vertcat(x, p)], self.nlp.at(x, p)))
-        kind = Kind({op: partial(self.applied, op) for op in CASADI.operations}, CASADI.constant, CASADI.number)
-        f, *g = fold(formula, dict(zip(formula.names, [*self.x, *self.p], strict=True)), kind)
-        rows = ca.densify(ca.vertcat(*g, *self.rows))
-        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(ca.SX(f)), rows
+    def expressions(self) -> tuple[Any, list[Any]]:
+        """Objective and rows, without a kink."""
+        own = {op: partial(self.applied, op) for op in _PIECES} | {op: partial(self.divided, op) for op in _POLES}
+        kind = Kind({**NODES.operations, **own}, NODES.constant, NODES.number)
+        f, *g = fold(self.nlp.formula, {n: symbol(n) for n in self.nlp.formula.names}, kind)
+        return f, [*g, *self.rows]
 
     def applied(self, op: str, *operands: Any) -> Any:
-        """The result of an operation; of a kink that depends on variables, a new one."""
-        if op in _POLES:
-            return self._divided(op, *operands)
-        pieces = _PIECES.get(op)
-        if pieces is None or not any(ca.depends_on(ca.SX(e), ca.vertcat(*self.x)) for e in operands):
-            return CASADI.operations[op](*operands)
-        first, t = len(self.nlp.rows) + len(self.rows), ca.SX.sym(KINK)
-        every = pieces(*operands)
-        self.kinks.append(MaximumVariable(len(self.x), tuple(range(first, first + len(every)))))
-        self.x.append(t)
-        self.rows += [t - piece for piece in every]
+        """A kink that depends on variables, as a new one."""
+        every = set(map(name_of, range(self.count)))
+        if not any(depends_on(e, every) for e in operands):
+            return made(op, *operands)
+        t = self.variable(pieces := _PIECES[op](*operands), quotient=False)
+        self.rows += [t - piece for piece in pieces]
         return -t if op == "min" else t
 
-    def _divided(self, op: str, *operands: Any) -> Any:
+    def variable(self, rows: Sequence[Any], quotient: bool) -> Any:
+        """A new variable, and the rows that are to come."""
+        first = len(self.nlp.rows) + len(self.rows)
+        self.kinks.append(MaximumVariable(self.count, tuple(range(first, first + len(rows))), quotient=quotient))
+        self.count += 1
+        return symbol(name_of(self.count - 1))
+
+    def divided(self, op: str, *operands: Any) -> Any:
         """A quotient or tangent; as a new variable where the denominator may be 0 in the box."""
-        numerator, denominator = map(ca.SX, _POLES[op](*operands))
-        plain = CASADI.operations[op](*operands)
-        known = self.x[: len(self.nlp.variables)]
-        if not ca.depends_on(denominator, ca.vertcat(*known)) or ca.depends_on(
-            denominator, ca.vertcat(*self.x[len(known) :], *self.p)
+        numerator, denominator = _POLES[op](*operands)
+        own, plain = formula([denominator]), made(op, *operands)
+        if not own.depending(self.nlp.inputs) or own.depending(
+            set(map(name_of, range(len(self.nlp.inputs), self.count)))
         ):
             return plain
-        ends = list(zip(self.nlp.lower, self.nlp.upper, strict=True))
+        box = [ball(ends) for ends in zip(self.nlp.lower, self.nlp.upper, strict=True)]
         try:
-            ((lower, upper),) = ranges(ca.Function("d", [ca.vertcat(*known)], [denominator]), ends)
+            (over,) = replace(self.nlp, formula=own).fold(box, INTERVALS)
         except NotAccepted:
             return plain
+        lower, upper = interval(over)
         if lower > 0 or upper < 0:
             return plain
-        t = ca.SX.sym(KINK)
-        self.kinks.append(MaximumVariable(len(self.x), (len(self.nlp.rows) + len(self.rows),), quotient=True))
-        self.x.append(t)
+        t = self.variable([None], quotient=True)
         self.rows.append(t * denominator - numerator)
         return t
 
 
 _POLES: Mapping[str, Callable[..., tuple[Any, Any]]] = {
     "div": lambda a, b: (a, b),
-    "tan": lambda e: (ca.sin(e), ca.cos(e)),
+    "tan": lambda e: (made("sin", e), made("cos", e)),
 }
-_KINKED = {ca.OP_DIV, ca.OP_INV, ca.OP_TAN, ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN}
 _PIECES: Mapping[str, Callable[..., Sequence[Any]]] = {
     "abs": lambda e: (e, -e),
     "max": lambda a, b: (a, b),

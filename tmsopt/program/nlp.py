@@ -1,14 +1,17 @@
 """An NLP as plain data, the units it is written in, and what its solver needs to start."""
 
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from tmsopt.algebra.formula import Formula, Kind, constant, fold, formula, symbol
+from tmsopt.algebra.kinds import CASADI, FLOATS, NODES
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.problem.cases import Case
@@ -22,6 +25,12 @@ _TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where
 
 _TIE = 1e-3
 """Difference of distances that are the same."""
+
+_LARGE = 50_000
+"""Operations times variables: derivatives as expressions would be too many, so that functions are differentiated."""
+
+_KEPT = 64
+"""Compiled formulas kept: where cases are added row by row, most are not met again."""
 
 _FIRST = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
 _DESIGNS = 33
@@ -104,7 +113,8 @@ class NLP:
     Attributes:
         formulation: ``abscissa`` or ``matching``.
         variables: names; the free parameters come first, each as itself or as its tangent.
-        functions: CasADi function x → (f, g); with settings, (x, p) → (f, g).
+        formula: f, then each row of g, in the variables, named by `name_of`, and in numbers of the problem.
+        numbers: name → value: of fixed parameters that are not 0, and of limits such as ``trail.limit``.
         rows: name of each row of g: a constraint's name, or the equation it belongs to.
         lifts: the variables after the free parameters, in order.
         cases: the variations of the design that its rows cover.
@@ -113,7 +123,6 @@ class NLP:
         kinks: those that others are made of come first.
         products: the factors of each polynomial.
         exact: whether starts satisfy the equations of all cases.
-        settings: values of the numbers p that differ between the problems of a family.
         unit: of the roots in its variables.
         size: of the objective, as far as it is known beforehand.
         units: of the first variables, the free parameters, in which a solver of absolute tolerances moves them.
@@ -122,7 +131,8 @@ class NLP:
 
     formulation: str
     variables: tuple[str, ...]
-    functions: ca.Function = field(repr=False)
+    formula: Formula = field(repr=False)
+    numbers: Mapping[str, float] = field(repr=False)
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     rows: tuple[str, ...]
@@ -134,39 +144,52 @@ class NLP:
     kinks: tuple[MaximumVariable, ...] = field(repr=False, default=())
     products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
     exact: bool = False
-    settings: tuple[float, ...] = ()
     unit: float = 1.0
     size: float = 1.0
     units: tuple[float, ...] = ()
     objective_unit: float = 1.0
 
-    def at(self, x: Any, settings: Any = None) -> Any:
-        """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
-        x = x.tolist() if isinstance(x, np.ndarray) else x
-        if not self.settings:
-            return self.functions(x)
-        return self.functions(x, self.settings if settings is None else settings)
-
     @property
-    def symbol(self) -> Any:
-        """What makes a symbol for the functions: a matrix where they call others, an array of expressions elsewhere."""
-        return (ca.MX if self.functions.is_a("MXFunction") else ca.SX).sym
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the variables in the formula."""
+        return tuple(map(name_of, range(len(self.variables))))
+
+    def at(self, x: Array) -> tuple[float, Array]:
+        """f and g."""
+        f, g = self.compiled.function(x.tolist(), self.constants)
+        return float(f), g.full().ravel()
 
     @cached_property
-    def derived(self) -> tuple[ca.Function, dict[str, ca.Function]]:
-        """(x, p) → (f, g), and what CasADi else derives of it anew for every solver."""
-        x, p = self.symbol("x", len(self.variables)), self.symbol("p", len(self.settings))
-        function = ca.Function("nlp", [x, p], self.at(x, p), ["x", "p"], ["f", "g"])
-        first = {of: function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
-        second = function.factory("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
-        return function, {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
+    def baked(self) -> Formula:
+        """The formula with its numbers as constants."""
+        numbers = {n: constant(v) for n, v in self.numbers.items()}
+        return formula(fold(self.formula, {n: symbol(n) for n in self.inputs} | numbers, NODES), self.inputs)
+
+    def fold(self, x: Sequence[Any], kind: Kind, shared: Callable[[Any], Any] | None = None) -> list[Any]:
+        """f and the rows of g for variables of a kind; numbers are constants."""
+        return fold(self.baked, dict(zip(self.inputs, x, strict=True)), kind, shared)
+
+    def symbolic(self, x: Any) -> tuple[Any, Any]:
+        """f and g for a vector of CasADi."""
+        f, *g = self.fold(ca.vertsplit(x), CASADI)
+        return ca.densify(ca.SX(f)), ca.densify(ca.vertcat(ca.SX(0, 1), *g))
+
+    @cached_property
+    def compiled(self) -> "Compiled":
+        """Functions of CasADi for f and g; of each formula one in each thread."""
+        return _MADE.of(self.formula, len(self.variables))
+
+    @property
+    def constants(self) -> list[float]:
+        """What the functions take beside the variables: all that depends on numbers alone."""
+        return _MADE.constants(self.formula, len(self.variables), tuple(self.numbers.items()))
 
     def touchings(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
         """The same with everything in `touches` met exactly: in the ways that a point is closest to, then in others.
 
         In each of the others one way is exchanged for one that is as close, but for a `tie`.
         """
-        rows = np.array(self.at(x)[1]).ravel() if self.kinks else x
+        rows = self.at(x)[1] if self.kinks else x
         ranked: list[list[Contact]] = []
         for ways in self.touches.values():
             distances = [float(rows[way.row]) if way.distance is None else way.distance(x) for way in ways]
@@ -192,10 +215,10 @@ class NLP:
         x = x.copy()
         for kink in self.kinks:
             x[kink.variable] = 0.0
-            value = -float(np.array(self.at(x)[1]).ravel()[list(kink.rows)].min())
+            value = -float(self.at(x)[1][list(kink.rows)].min())
             if kink.quotient:
                 x[kink.variable] = 1.0
-                denominator = float(np.array(self.at(x)[1]).ravel()[kink.rows[0]]) + value
+                denominator = float(self.at(x)[1][kink.rows[0]]) + value
                 value = value / denominator if denominator else 0.0
             x[kink.variable] = value if np.isfinite(value) else 0.0
         return x
@@ -215,6 +238,69 @@ class NLP:
                 if shared and not double:
                     return True
         return False
+
+
+def name_of(variable: int) -> str:
+    """The name of a variable in a formula, which no parameter has."""
+    return f":{variable}"
+
+
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """The functions of an NLP as CasADi compiles them, for whatever numbers: the one place where they are made.
+
+    Attributes:
+        early: what the functions take beside the variables, in numbers.
+        function: (x, p) → (f, g).
+    """
+
+    early: Formula
+    function: ca.Function
+
+    @property
+    def symbols(self) -> list[Any]:
+        """Symbols for x, p and multipliers of the rows, of the kind that the functions are made of."""
+        kind: Any = ca.MX if self.function.is_a("MXFunction") else ca.SX
+        sizes = {"x": self.function.size1_in(0), "p": self.function.size1_in(1), "m": self.function.size1_out(1)}
+        return [kind.sym(name, size) for name, size in sizes.items()]
+
+    @cached_property
+    def derivatives(self) -> dict[str, ca.Function]:
+        """What CasADi else derives anew for every solver."""
+        make = self.function.factory
+        first = {of: make("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
+        second = make("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
+        return {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
+
+
+def compile_formula(formula: Formula, count: int) -> Compiled:
+    """A formula of an NLP as functions of CasADi of so many variables."""
+    variables = tuple(map(name_of, range(count)))
+    names, early, late = formula.split(formula.depending(variables))
+    x, p = ca.SX.sym("x", count), ca.SX.sym("p", len(names))
+    given = dict(zip((*variables, *names), [*ca.vertsplit(x), *ca.vertsplit(p)], strict=True))
+    f, *g = fold(late, given, CASADI)
+    outputs = [ca.densify(ca.SX(f)), ca.densify(ca.vertcat(ca.SX(0, 1), *g))]
+    function = ca.Function("nlp", [x, p], outputs, ["x", "p"], ["f", "g"])
+    if len(late.steps) * count >= _LARGE:
+        inputs: list[Any] = [ca.MX.sym("x", count), ca.MX.sym("p", len(names))]
+        function = ca.Function("nlp", inputs, list(function(*inputs)), ["x", "p"], ["f", "g"])
+    return Compiled(early, function)
+
+
+class _Made(threading.local):
+    """Compiled formulas; those of another thread are not to be used."""
+
+    def __init__(self) -> None:
+        self.of = lru_cache(maxsize=_KEPT)(compile_formula)
+        self.constants = lru_cache(maxsize=_KEPT)(self._constants)
+
+    def _constants(self, formula: Formula, count: int, numbers: tuple[tuple[str, float], ...]) -> list[float]:
+        with np.errstate(all="ignore"):
+            return [float(c) for c in fold(self.of(formula, count).early, dict(numbers), FLOATS)]
+
+
+_MADE = _Made()
 
 
 @dataclass(frozen=True)

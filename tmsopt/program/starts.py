@@ -162,5 +162,5 @@ def _mismatch(nlp: NLP, x: list[float], guess: list[float]) -> float:
     """Size of the rows when the lifts that follow are still unknown (at 0)."""
     trial = np.zeros(len(nlp.variables))
     trial[: len(x) + len(guess)] = x + guess
-    g = np.array(nlp.at(trial)[1]).ravel()
+    g = nlp.at(trial)[1]
     return float(np.abs(g[np.isfinite(g)]).sum())

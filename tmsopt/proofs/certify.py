@@ -9,7 +9,6 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.global_search.answer import Clock, answer, contradicted, doubt
-from tmsopt.global_search.half_planes import over
 from tmsopt.global_search.question import Question, unit_of
 from tmsopt.global_search.race import SolverPool
 from tmsopt.global_search.stability import SOLVER
@@ -189,7 +188,7 @@ def _over_the_box(design: Solution) -> Bound:
         return Bound()
     build = Builder(problem, _cases(design))
     build.optimise()
-    lower, upper = over(build, [build.objective])[0]  # of the negative, where it is maximised
+    lower, upper = build.over([build.objective])[0]  # of the negative, where it is maximised
     sense = problem.sign
     gap = max(sense * design.value - lower, 0.0)
     return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()

@@ -183,7 +183,9 @@ class Runner:
         return best
 
     def _from(self, x: Array, limits: NLP, start: str) -> LocalEnd:
-        return self.work.chained(candidate_of(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits)))
+        return self.work.chained(
+            candidate_of(self.work.part, limits, ipopt(self.nlp, self.work.options, start)(x, limits))
+        )
 
 
 def _limits(nlp: NLP) -> tuple[tuple[float, ...], ...]:
@@ -211,15 +213,14 @@ def distinct(candidates: Sequence[LocalEnd], known: Sequence[LocalEnd] = ()) -> 
 
 def candidate_of(problem: Problem, nlp: NLP, run: Run) -> LocalEnd:
     """What a run of IPOPT came to."""
-    f, g = nlp.at(run.x)
-    rows = np.array(g).ravel()
-    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(float(f))):
+    f, rows = nlp.at(run.x)
+    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(f)):
         return LocalEnd(nlp, run, math.inf, False)
     outside = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)).clip(0)
     feasible = outside.max(initial=0.0) <= _FEASIBLE and run.status != "Infeasible_Problem_Detected"
     # What rows, met to 1e-12, may give where they are singular: a double root off by 1e-6, as its square is by that.
     claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if nlp.touches else 0.0
-    return LocalEnd(nlp, run, float(f) + claim, bool(feasible) and not _spurious(problem, nlp, run))
+    return LocalEnd(nlp, run, f + claim, bool(feasible) and not _spurious(problem, nlp, run))
 
 
 def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:

@@ -35,7 +35,7 @@ def solutions(nlp: NLP, starts: Iterable[Array], mirrored: int) -> Iterator[Arra
 def square_system(nlp: NLP) -> ca.Function | None:
     """x → the equations of an NLP, and their Jacobian; None unless there are as many as variables."""
     x = ca.SX.sym("x", len(nlp.variables))
-    g = nlp.at(x)[1]
+    g = nlp.symbolic(x)[1]
     equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
     if len(equalities) != len(nlp.variables):
         return None

@@ -16,7 +16,7 @@ from tmsopt.problem.problem import Problem
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import OtherBranch
 from tmsopt.program.formulate import abscissa, design_of, matching
-from tmsopt.program.ipopt import Point, gains
+from tmsopt.program.ipopt import Point, gains, polisher
 from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import designs, initial_point
 from tmsopt.records import Array, Table
@@ -154,7 +154,7 @@ def counted(candidates: Sequence[LocalEnd], at_best: float) -> Starts:
 
 def best_checked(work: Workspace, nlp: NLP, candidates: Sequence[LocalEnd]) -> CheckedEnd | None:
     """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
-    polish, problem = work.family.polisher(nlp), work.problem
+    polish, problem = polisher(nlp), work.problem
     kept: CheckedEnd | None = None
     tried: list[float] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
@@ -296,7 +296,7 @@ def _other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> t
 
 def _excluded(problem: Problem, nlp: NLP, x: Array) -> tuple[str, ...]:
     """Names of the bounds and inequality rows that a solution violates."""
-    values = (*x, *np.array(nlp.at(x)[1]).ravel())
+    values = (*x, *nlp.at(x)[1])
     lower, upper = (*nlp.lower, *nlp.row_lower), (*nlp.upper, *nlp.row_upper)
     names: dict[str, None] = {}
     for k, name in enumerate((*problem.free, *nlp.variables[len(problem.free) :], *nlp.rows)):

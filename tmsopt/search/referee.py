@@ -302,7 +302,7 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: CheckedEnd | Non
         if reached is None or not reached.objective < least:
             continue
         rows = [k for k, name in enumerate(opened.rows) if name == "a0"]
-        singular = bool(np.array(opened.at(reached.run.x)[1]).ravel()[rows].min() < _SINGULAR)
+        singular = bool(opened.at(reached.run.x)[1][rows].min() < _SINGULAR)
         if singular:
             inside = [_INSIDE if k in rows else lower for k, lower in enumerate(opened.row_lower)]
             opened = replace(opened, row_lower=tuple(inside))

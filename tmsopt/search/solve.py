@@ -42,7 +42,7 @@ from tmsopt.search.outcome import (
 )
 from tmsopt.search.remedies.needs import add_required_speed
 from tmsopt.search.search import Explored, answered, explore, without_any
-from tmsopt.search.workspace import Family, Workspace, check_near, workspace
+from tmsopt.search.workspace import Workspace, check_near, workspace
 
 UNSTABLE = "no stable design was found that meets the other limits"
 """Of a design that is not stable though a limit asks for it."""
@@ -55,9 +55,7 @@ _NEAR = 4  # starts where branch and bound found a stable design, that design th
 
 
 @documents_options(AskedOfSolve, _ASKING)
-def solve(
-    problem: Given, *, throw: bool = True, family: Family | None = None, **options: Unpack[AskedOfSolve]
-) -> Solution:
+def solve(problem: Given, *, throw: bool = True, **options: Unpack[AskedOfSolve]) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
     Ctrl-C ends the search with the best design so far, ``not_converged`` and `interrupted`; a second one ends that too.
@@ -65,7 +63,6 @@ def solve(
     Args:
         problem: or the path of its file.
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
-        family: what was built for other problems that differ in numbers alone, to be used again.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
             ``stability`` and ``interruptible``; see `tmsopt.Options`.
 
@@ -82,7 +79,7 @@ def solve(
     More: docs/tutorials/first_bicycle.md
     """
     problem = as_solvable(problem)
-    solution = solve_any_status(problem, options_of(options, AskedOfSolve, _ASKING), family)
+    solution = solve_any_status(problem, options_of(options, AskedOfSolve, _ASKING))
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
@@ -91,7 +88,6 @@ def solve(
 def solve_any_status(
     design: Given,
     options: Options = DEFAULTS,
-    family: Family | None = None,
     extra_starts: Sequence[Mapping[str, float]] = (),
     without_sample: bool = False,
     without: Collection[str] = (),
@@ -117,7 +113,7 @@ def solve_any_status(
             check_near(problem, options.near)
             near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
-        work = workspace(problem, options, family, extra_starts, without_sample)
+        work = workspace(problem, options, extra_starts, without_sample)
         parts = [part for part in work.parts(options.near) if part.name not in without]
         explored: list[Explored] = []
         try:
@@ -143,10 +139,10 @@ def solve_any_status(
     if interrupted or not options.stability or options.near:  # which keeps to its side of the box
         return solution
     try:
-        judged = _with_stability(solution, options, family, began)
+        judged = _with_stability(solution, options, began)
         needy, missed = add_required_speed(judged, options, partial(answered, asked=problem, thorough=True))
         words = "a search for the least speed found the stable design from which this one was reached"
-        return _led(needy, missed, words, options, family) if missed else needy
+        return _led(needy, missed, words, options) if missed else needy
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
@@ -210,7 +206,7 @@ def _order(problem: Problem, finding: Outcome) -> tuple[float, float]:
     return sum(finding.checked.violations.values()), worth
 
 
-def _with_stability(solution: Solution, options: Options, family: Family | None, began: float) -> Solution:
+def _with_stability(solution: Solution, options: Options, began: float) -> Solution:
     """Of a search for stability that found none: whether there is any, and the design that one leads to."""
     problem = solution.problem
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
@@ -221,7 +217,7 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
     asked = any_stable(problem, options.stability, solution.parameters, options.progress)
     if asked.design is not None:
         words = "branch and bound found the stable design from which this one was reached"
-        solution = _led(solution, asked.design, words, options, family)
+        solution = _led(solution, asked.design, words, options)
     elif asked.any is False:
         solution = replace(solution, notes=(*solution.notes, f"that none is stable is proved {asked.proof}"))
     if asked.failed:
@@ -230,13 +226,11 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
     return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
 
 
-def _led(
-    solution: Solution, design: Mapping[str, float], words: str, options: Options, family: Family | None
-) -> Solution:
+def _led(solution: Solution, design: Mapping[str, float], words: str, options: Options) -> Solution:
     """Where a design leads that the search has missed, if that is better."""
     problem = solution.problem
     few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
-    found = solve_any_status(problem, replace(few, near=design), family)
+    found = solve_any_status(problem, replace(few, near=design))
     gain = problem.sign * (solution.value - found.value)
     better = found.status == "optimal" and (solution.status != "optimal" or gain > 0)
     return replace(found, notes=(*found.notes, words)) if better else solution

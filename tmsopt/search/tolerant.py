@@ -64,7 +64,7 @@ def _climb(
     """Where the feet of one design, and those met on the way, lead."""
     problem = work.problem
     listed = tuple(case for case in problem.cases if not case.direction)
-    around = work.family.around(problem, problem.ordered(design))
+    around = work.around(problem.ordered(design))
     feet: list[Case] = []
     for _ in range(_ROUNDS):
         if around is None or not around.stable:

@@ -1,89 +1,27 @@
 """What solving needs of a problem again and again, made once: for one problem, or for many that differ in numbers."""
 
-from collections import OrderedDict
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar
 
-import casadi as ca
 import numpy as np
 
 from tmsopt.boundaries.nearest import Robustness, robustness_at
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.evaluation.recheck import Evaluation, recheck
 from tmsopt.global_search.signs import none_stable
-from tmsopt.models import Quantity, Values
 from tmsopt.problem.cases import Case
-from tmsopt.problem.dependence import demands_heavy_damping, needs_two_sided_bounds, rewards_change_of
-from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Freedom, Problem, degrees_of_freedom
 from tmsopt.problem.verdict.meetings import is_crossing
-from tmsopt.program.formulate import LIMIT, design_of, formulate, middle
-from tmsopt.program.ipopt import Point, Run, ipopt, polisher
-from tmsopt.program.nlp import NLP, objective_unit, scale_of, units_of
+from tmsopt.program.formulate import design_of, formulate
+from tmsopt.program.ipopt import Run
+from tmsopt.program.nlp import NLP
 from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
 from tmsopt.search.sample import Sample, Sampler
 
-_KEPT = 32
-"""NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
-
 _THIN = 1e-9
 """Width of a part of the box below which it is not worth a search of its own."""
-
-T = TypeVar("T")
-
-
-class Family:
-    """NLPs, solvers and polishers that have been built, of problems that differ in some numbers.
-
-    Not to be shared between threads, as no solver is. A lone problem is a family in which nothing varies.
-
-    Args:
-        varied: names of the numbers that differ: fixed parameters, and ``trail.limit`` for the number that the
-            constraint ``trail`` compares with. They are parameters of the NLPs; the box may differ too.
-    """
-
-    def __init__(self, varied: Collection[str] = ()) -> None:
-        self.varied = tuple(varied)
-        self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
-        self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
-        self._around: OrderedDict[Hashable, Robustness] = OrderedDict()
-
-    def formulate(
-        self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None, lead: int = 0
-    ) -> NLP:
-        """What `formulate` gives, with the problem's numbers in place of another's of the family."""
-        if not self.varied:
-            return formulate(problem, cases, damping_ratio=damping_ratio, lead=lead)
-        symbols = {name: ca.SX.sym(name) for name in self.varied}
-        nlp = _kept(
-            self._nlps,
-            (tuple(cases), damping_ratio, lead, *_decisions(problem, self.varied)),
-            lambda: formulate(problem, cases, damping_ratio=damping_ratio, settings=symbols, lead=lead),
-        )
-        return narrowed(replace(nlp, settings=tuple(_value(problem, name) for name in self.varied)), problem)
-
-    def ipopt(self, nlp: NLP, options: Options, start: str) -> Callable[..., Run]:
-        """A solver of an NLP of the family; see `ipopt`."""
-        return self._of(nlp, (options.of_ipopt, start), lambda: ipopt(nlp, options, start))
-
-    def polisher(self, nlp: NLP) -> Callable[[Run, NLP], Point]:
-        """A polisher of an NLP of the family; see `polisher`."""
-        return self._of(nlp, (), lambda: polisher(nlp))
-
-    def around(self, problem: Problem, parameters: Mapping[str, float]) -> Robustness | None:
-        """The boundaries nearest to a design, where the problem asks for the radius; met again as cases are added."""
-        if not problem.asks_radius:
-            return None
-        key = (tuple(parameters.items()), tuple(problem.weights.items()))
-        return _kept(self._around, key, lambda: robustness_at(problem, parameters))
-
-    def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
-        """Something made of an NLP's functions, which are kept with it lest another gets their address."""
-        made: T = _kept(self._made, (id(nlp.functions), options), lambda: (nlp.functions, make()), 3 * _KEPT)[1]
-        return made
 
 
 @dataclass(frozen=True)
@@ -111,20 +49,20 @@ class Workspace:
     Attributes:
         part: the problem on the part of the box that designs are drawn from, e.g. one sign of one parameter.
         name: of the part, e.g. ``normal rake``; empty for the whole box.
-        family: that the problem is one of.
         extra_starts: designs that may be close to the optimum, to be started from.
         without_sample: whether to do without a sample.
         met: where starts ended in any part of the box, each with the NLP that it was started in.
+        nearest: boundaries nearest to designs that were met.
     """
 
     problem: Problem
     part: Problem
     options: Options
-    family: Family
     name: str = ""
     extra_starts: tuple[Mapping[str, float], ...] = ()
     without_sample: bool = False
     met: list[tuple[NLP, LocalEnd]] = field(default_factory=list, compare=False)
+    nearest: dict[Hashable, Robustness] = field(default_factory=dict, compare=False, repr=False)
 
     def chained(self, candidate: LocalEnd) -> LocalEnd:
         """The same, not feasible where roots that a pattern makes meet have no Jordan chain."""
@@ -175,12 +113,17 @@ class Workspace:
 
     def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None, lead: int = 0) -> NLP:
         """The NLP of the problem on this part of the box."""
-        nlp = self.family.formulate(self.problem, cases, damping_ratio, lead)
+        nlp = formulate(self.problem, cases, damping_ratio=damping_ratio, lead=lead)
         return narrowed(nlp, self.part) if self.part is not self.problem else nlp
 
-    def ipopt(self, nlp: NLP, start: str) -> Callable[..., Run]:
-        """A solver of an NLP; see `formulation.ipopt`."""
-        return self.family.ipopt(nlp, self.options, start)
+    def around(self, parameters: Mapping[str, float]) -> Robustness | None:
+        """The boundaries nearest to a design, where the problem asks for the radius; met again as cases are added."""
+        if not self.problem.asks_radius:
+            return None
+        key = tuple(parameters.items())
+        if key not in self.nearest:
+            self.nearest[key] = robustness_at(self.problem, parameters)
+        return self.nearest[key]
 
     def design_at(self, x: Array) -> dict[str, float]:
         """The free parameters at a point of an NLP, inside the part of the box."""
@@ -188,7 +131,7 @@ class Workspace:
 
     def recheck(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> Evaluation:
         """What a design is in the given cases; see `checks.recheck`."""
-        return recheck(self.problem, parameters, cases, self.family.around(self.problem, parameters))
+        return recheck(self.problem, parameters, cases, self.around(parameters))
 
     def parts(self, near: Mapping[str, float] | None = None) -> "tuple[Workspace, ...]":
         """The parts into which a parameter with two sides divides the box, positive values first.
@@ -214,14 +157,11 @@ class Workspace:
 def workspace(
     problem: Problem,
     options: Options = DEFAULTS,
-    family: Family | None = None,
     extra_starts: Sequence[Mapping[str, float]] = (),
     without_sample: bool = False,
 ) -> Workspace:
     """The workspace of a problem in its whole box."""
-    return Workspace(
-        problem, problem, options, family or Family(), extra_starts=tuple(extra_starts), without_sample=without_sample
-    )
+    return Workspace(problem, problem, options, extra_starts=tuple(extra_starts), without_sample=without_sample)
 
 
 def _on(problem: Problem, name: str, ends: tuple[float, float]) -> Problem:
@@ -237,58 +177,6 @@ def narrowed(nlp: NLP, problem: Problem) -> NLP:
     for k, (name, ends) in enumerate(problem.free.items()):
         lower[k], upper[k] = (float(np.tan(e)) if of[name].tangent else e for e in ends)
     return replace(nlp, lower=tuple(lower), upper=tuple(upper))
-
-
-def _kept(known: OrderedDict[Hashable, T], key: Hashable, make: Callable[[], T], most: int = _KEPT) -> T:
-    """What is known, or is made now; of too many, the one that was not used for longest goes."""
-    if key not in known:
-        known[key] = make()
-        if len(known) > most:
-            known.popitem(last=False)
-    known.move_to_end(key)
-    return known[key]
-
-
-def _value(problem: Problem, name: str) -> float:
-    if name.endswith(LIMIT):
-        limit = limit_of(problem.constraints[name.removesuffix(LIMIT)])
-        assert limit is not None  # a study checks what it varies
-        return limit
-    return problem.fixed[name]
-
-
-def _decisions(problem: Problem, varied: Sequence[str]) -> tuple[Hashable, ...]:
-    """What decides on variables and rows beside the numbers that are parameters of the NLP."""
-    heavy = problem.pattern is None and demands_heavy_damping(problem)
-    texts = tuple(problem.constraints.items()) if heavy else ()
-    nearest = problem.pattern is not None and problem.objective is None and degrees_of_freedom(problem).count > 0
-    # The box decides which quotients may have a pole in it.
-    box = (tuple(problem.free.items()), tuple(middle(problem).items()) if nearest else ())
-    zero = tuple(problem.fixed.get(name) == 0 for name in varied) if problem.asks_radius else ()
-    units = (scale_of(problem), units_of(problem), objective_unit(problem))
-    roots = (needs_two_sided_bounds(problem), *(rewards_change_of(problem, name) for name in _pieced(problem)))
-    return units, heavy, texts, box, zero, roots
-
-
-def _pieced(problem: Problem) -> list[str]:
-    """Quantities in pieces that are asked for: whether they become variables depends on what more of them does."""
-    found: dict[str, None] = {}
-
-    def seen(quantity: Quantity, values: Values) -> Any:
-        if quantity.pieces:
-            found[quantity.name] = None
-        return ca.SX.sym(quantity.name) if quantity.pieces or quantity.equation is not None else None
-
-    names = {n for e in (problem.objective, *problem.conditions.values()) if e for n in e.names}
-    quantities = {q.name: q for q in (*problem.model.quantities, *problem.parameter_set.quantities)}
-    asked = names & quantities.keys()
-    if any(q.pieces for q in quantities.values()) and asked:
-        values = Values(
-            problem.model, problem.parameter_set, {n: ca.SX.sym(n) for n in problem.parameter_set.names}, lift=seen
-        )
-        for name in sorted(asked):
-            values[name]
-    return sorted(found)
 
 
 def check_near(problem: Problem, near: Mapping[str, float]) -> None:

@@ -7,7 +7,7 @@ import platform
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,6 @@ from tmsopt.problem.unit_system import amounts_text
 from tmsopt.records import Array, Table
 from tmsopt.search.multistart import same_objective
 from tmsopt.search.solve import solve
-from tmsopt.search.workspace import Family
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.rows import PREFIXES, Part, Row, blank, column_of, header
 from tmsopt.studies.study import Study
@@ -79,11 +78,6 @@ class Solver:
     def __getstate__(self) -> dict[str, Any]:
         return {"study": self.study}
 
-    @cached_property
-    def _family(self) -> Family:
-        free = {f"{name}.{end}" for name in self.study.problem.free for end in ("min", "max")}
-        return Family([name for name in self.study.columns if name not in free])
-
     def _block(self, numbers: Sequence[int]) -> list[SolvedRow]:
         """Both ends from many starts, the others from their neighbours and from afar; back again where that is better.
 
@@ -116,7 +110,7 @@ class Solver:
         began, solution = time.perf_counter(), None
         try:
             problem = self.study.row_problem(number)
-            options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False, "family": self._family}
+            options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False}
             # What takes longer than the rest of a row without a design is left out, and Ctrl-C is for the whole study.
             options |= {"alone": False, "stability": 0.0, "interruptible": False}
             if neighbour is not None and neighbour.status == "optimal":

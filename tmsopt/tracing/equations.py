@@ -76,7 +76,7 @@ def prepare(problem: Problem) -> Traced:
     unit = np.ones(len(nlp.variables))
     unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])  # of the NLP; x has natural units
     x = ca.SX.sym("x", len(nlp.variables))
-    g = nlp.at(x / ca.DM(unit))[1]
+    g = nlp.symbolic(x / ca.DM(unit))[1]
     rows = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
     if len(rows) != len(nlp.variables) - 1:
         names = ", ".join(equalities)

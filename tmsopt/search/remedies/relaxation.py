@@ -6,9 +6,10 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from tmsopt.algebra.formula import fold, formula, symbol
+from tmsopt.algebra.kinds import NODES, atan
 from tmsopt.evaluation.recheck import FEASIBLE, excesses
 from tmsopt.evaluation.worst_case import worst_cases
 from tmsopt.models import Values
@@ -16,7 +17,7 @@ from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Problem
 from tmsopt.program.formulate import design_of, formulate
-from tmsopt.program.nlp import NLP, AddedVariable
+from tmsopt.program.nlp import NLP, AddedVariable, name_of
 from tmsopt.records import Table
 from tmsopt.search.basins.leaders import starting
 from tmsopt.search.multistart import Runner, same_objective
@@ -288,8 +289,9 @@ def _elastic(wide: Problem, cases: Sequence[Case], limits: Sequence[Limit]) -> N
     """minimise Σ slack / scale, with each limit moved by its slack; everything else holds."""
     nlp = formulate(wide, cases, elastic=True)
     names = [limit.name for limit in limits]
-    x, slack = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("s", len(limits))
-    g = nlp.at(x)[1]
+    inputs = [symbol(name_of(k)) for k in range(len(nlp.variables) + len(limits))]
+    x, slack = inputs[: len(nlp.variables)], inputs[len(nlp.variables) :]
+    _, *g = fold(nlp.formula, {n: symbol(n) for n in nlp.formula.names}, NODES)
     rows: list[tuple[str, Any, float, float]] = []
     second: list[tuple[str, Any, float, float]] = []  # after all others, whose numbers touches and kinks know
     for k, name in enumerate(nlp.rows):
@@ -306,18 +308,16 @@ def _elastic(wide: Problem, cases: Sequence[Case], limits: Sequence[Limit]) -> N
     for number, limit in enumerate(limits):
         if limit.parameter:
             at = list(wide.free).index(limit.parameter)
-            value = ca.atan(x[at]) if wide.parameter_set[limit.parameter].tangent else x[at]
+            value = atan(x[at]) if wide.parameter_set[limit.parameter].tangent else x[at]
             most = limit.name.endswith(".max")
             ends = (-np.inf, limit.end) if most else (limit.end, np.inf)
             rows.append((limit.name, value - slack[number] if most else value + slack[number], *ends))
-    objective = sum((slack[k] / limit.scale for k, limit in enumerate(limits)), ca.SX(0))
-    variables = ca.vertcat(x, slack)
-    body = ca.densify(ca.vertcat(*(r[1] for r in rows)))
+    objective = sum(slack[k] / limit.scale for k, limit in enumerate(limits))
     return replace(
         nlp,
         formulation="elastic",
         variables=(*nlp.variables, *(f"slack of {n}" for n in names)),
-        functions=ca.Function("elastic", [variables], [ca.densify(objective), body], ["x"], ["f", "g"]),
+        formula=formula([objective, *(r[1] for r in rows)], (*(x.value for x in inputs), *nlp.numbers)),
         lower=(*nlp.lower, *(0.0 for _ in names)),
         upper=(*nlp.upper, *(np.inf for _ in names)),
         rows=tuple(r[0] for r in rows),
