@@ -8,7 +8,7 @@ import pytest
 import tmsopt
 from tmsopt.models import from_matrices
 
-approach = import_module("tmsopt.boundaries.approach")
+nlp = import_module("tmsopt.program.nlp")
 
 STATE = (np.diag([-3.0] * 5) + np.random.default_rng(1).normal(size=(5, 5)).round(2)).tolist()
 STATE[0][1], STATE[2][2], STATE[4][0] = "x*y", "x*z - 3", "3*x*y"
@@ -23,8 +23,8 @@ PENCIL = (
 def test_a_nearest_point_is_the_same_by_either_second_derivative(model, edge, monkeypatch):
     found = []
     for large in (0, np.inf):  # operations from which expressions are not expanded
-        monkeypatch.setattr(approach, "_LARGE", large)
-        vars(approach._BUILT).clear()
+        monkeypatch.setattr(nlp, "_LARGE", large)
+        nlp._MADE.of.cache_clear()
         problem = tmsopt.Problem(model, fixed={"x": 0.3, "y": 0.4, "z": 0.2})
         found.append(tmsopt.nearest(problem, edge, weights={"x": 1.0, "y": 0.5}))
     assert found[0].refined

@@ -11,7 +11,7 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients, tms
-from tmsopt.search import Family, solve
+from tmsopt.search import solve
 
 pytestmark = pytest.mark.slow
 
@@ -168,7 +168,6 @@ def test_members_of_a_family_with_kinks():
     """s² + 2 z s + k: abscissa −z up to z = √k; |abscissa + 0.3| + |z − 0.25|/2 is 0.025 at z = 0.3."""
     k = ca.SX.sym("k")
     model = from_coefficients([1, 2 * z, k])
-    family = Family(["k"])
     for stiffness in (1.0, 4.0, 9.0):
         member = tmsopt.Problem(
             model=model,
@@ -176,7 +175,7 @@ def test_members_of_a_family_with_kinks():
             free={"z": (0.05, 3.0)},
             minimize="abs(abscissa + 0.3) + abs(z - 0.25) / 2",
         )
-        assert solve(member, family=family).value == pytest.approx(0.025, abs=TOLERANCE)
+        assert solve(member).value == pytest.approx(0.025, abs=TOLERANCE)
 
 
 def test_an_explanation_stops_at_a_kink():
