@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.executor import here, processes
+from tmsopt.program import forget
 
 
 def best(works: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
@@ -67,8 +68,9 @@ class IpoptRun:
 
 @contextmanager
 def ipopt_runs() -> Iterator[list[IpoptRun]]:
-    """Note every run of IPOPT by a solver that is built meanwhile."""
+    """Note every run of IPOPT in this thread; solvers are built anew."""
     runs: list[IpoptRun] = []
+    forget()
     made_by: Any = ca.nlpsol
 
     class Noted:
@@ -88,3 +90,4 @@ def ipopt_runs() -> Iterator[list[IpoptRun]]:
 
     with patch.object(ca, "nlpsol", Noted):
         yield runs
+    forget()

@@ -9,11 +9,18 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.algebra import EVERYTHING, NotAccepted, ball, interval, ranges, root_bound
+from tmsopt.algebra import EVERYTHING, NotAccepted, ball, from_casadi, interval, ranges, root_bound
 from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
 from tmsopt.problem import parse_value
 from tmsopt.program import NLP
 from tmsopt.roots import product
+
+
+def nlp_of(variables, function, *limits):
+    """An NLP of a function of CasADi."""
+    names = [f":{k}" for k in range(len(variables))]
+    return NLP("test", variables, from_casadi(function, names), {}, *limits)
+
 
 scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
@@ -241,7 +248,7 @@ def least(text, ends, sign=1.0):
     """minimise ± an expression of one x."""
     x = ca.SX.sym("x")
     f = ca.Function("f", [x], [sign * ca.SX(parse_value(text, ("x",))({"x": x})), ca.SX(0, 1)])
-    return NLP("test", ("x",), f, (float(ends[0]),), (float(ends[1]),), (), (), ())
+    return nlp_of(("x",), f, (float(ends[0]),), (float(ends[1]),), (), (), ())
 
 
 @scip
@@ -278,7 +285,7 @@ def constrained(texts, ends, most=0.0):
     f = ca.Function("f", [ca.vertcat(x, y)], [ca.SX(0), ca.vertcat(*rows)])
     lower, upper = zip(*ends, strict=True)
     count = len(texts)
-    return NLP("test", ("x", "y"), f, lower, upper, tuple(texts), (-math.inf,) * count, (most,) * count)
+    return nlp_of(("x", "y"), f, lower, upper, tuple(texts), (-math.inf,) * count, (most,) * count)
 
 
 @scip
@@ -357,7 +364,7 @@ def test_a_row_without_variables():
     for value, verdict in ((1.0, INFEASIBLE), (-1.0, FOUND)):
         x = ca.SX.sym("x", 2)
         f = ca.Function("f", [x], [ca.SX(0), ca.vertcat(ca.SX(value))])
-        nlp = NLP("test", ("x", "y"), f, (0.0, 0.0), (1.0, 1.0), ("row",), (-math.inf,), (0.0,))
+        nlp = nlp_of(("x", "y"), f, (0.0, 0.0), (1.0, 1.0), ("row",), (-math.inf,), (0.0,))
         assert SCIP.decide(task(nlp, 5.0)).verdict == verdict
 
 
@@ -366,4 +373,4 @@ def test_an_operation_that_scip_lacks_is_named():
     x = ca.SX.sym("x")
     f = ca.Function("f", [x], [ca.floor(x), ca.SX(0, 1)])
     with pytest.raises(NotAccepted, match="floor"):
-        SCIP.decide(task(NLP("test", ("x",), f, (0.0,), (1.0,), (), (), ()), 1.0))
+        SCIP.decide(task(nlp_of(("x",), f, (0.0,), (1.0,), (), (), ()), 1.0))

@@ -12,10 +12,10 @@ from tmsopt import laws
 from tmsopt.algebra import FLOATS
 from tmsopt.models import from_coefficients, tms
 from tmsopt.problem import Problem, load, with_limit
-from tmsopt.program import formulate
+from tmsopt.program import forget, formulate
 from tmsopt.search import solve
 
-nlp, ipopt = (import_module(f"tmsopt.program.{name}") for name in ("nlp", "ipopt"))
+nlp = import_module("tmsopt.program.nlp")
 
 EP4 = Problem(
     model=tms,
@@ -23,12 +23,6 @@ EP4 = Problem(
     free={"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.02, 1.4)},
     minimize="abscissa",
 )
-
-
-def forget():
-    """Compile everything anew."""
-    for made in (nlp._MADE.of, nlp._MADE.constants, ipopt._MADE.solver, ipopt._MADE.conditions):
-        made.cache_clear()
 
 
 def with_fixed(problem, **values):

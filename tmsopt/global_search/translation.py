@@ -225,7 +225,7 @@ class _Translation:
             return self.root(a)
         if abs(exponent) > _WHOLE:
             raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
-        if a.degree > 0 and a.ball.is_finite():
+        if exponent != int(exponent) and a.degree > 0 and a.ball.is_finite():
             _refuse_huge(_OVER["pow"](a.ball, b.ball), "a power")
         if exponent < 0:
             return self.quotient(_constant(1.0), self.power(a, _constant(-exponent)))

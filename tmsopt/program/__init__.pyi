@@ -1,3 +1,4 @@
+from .ipopt import forget as forget
 from .formulate import abscissa as abscissa, formulate as formulate, matching as matching
 from .nlp import NLP as NLP, Factor as Factor, Scale as Scale, objective_size as objective_size, scale_of as scale_of
 from .options import (

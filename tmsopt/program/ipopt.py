@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.program.nlp import NLP, Compiled
+from tmsopt.program.nlp import NLP, Compiled, forget_formulas
 from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
 
@@ -142,7 +142,7 @@ def _conditions(compiled: Compiled) -> ca.Function:
     return ca.Function("kkt", [x, rows, p], [*first, hessian])
 
 
-class _Made(threading.local):
+class _Solvers(threading.local):
     """Solvers and conditions of what was compiled; a solver must not be used from two threads."""
 
     def __init__(self) -> None:
@@ -150,7 +150,14 @@ class _Made(threading.local):
         self.conditions = lru_cache(maxsize=_KEPT)(_conditions)
 
 
-_MADE = _Made()
+_MADE = _Solvers()
+
+
+def forget() -> None:
+    """Compile everything anew from now on, in this thread."""
+    for made in (_MADE.solver, _MADE.conditions):
+        made.cache_clear()
+    forget_formulas()
 
 
 def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:

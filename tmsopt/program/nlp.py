@@ -288,7 +288,7 @@ def compile_formula(formula: Formula, count: int) -> Compiled:
     return Compiled(early, function)
 
 
-class _Made(threading.local):
+class _Formulas(threading.local):
     """Compiled formulas; those of another thread are not to be used."""
 
     def __init__(self) -> None:
@@ -300,7 +300,13 @@ class _Made(threading.local):
             return [float(c) for c in fold(self.of(formula, count).early, dict(numbers), FLOATS)]
 
 
-_MADE = _Made()
+_MADE = _Formulas()
+
+
+def forget_formulas() -> None:
+    """Compile formulas anew, in this thread."""
+    for made in (_MADE.of, _MADE.constants):
+        made.cache_clear()
 
 
 @dataclass(frozen=True)
