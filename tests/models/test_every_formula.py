@@ -1,0 +1,203 @@
+"""Every formula of every model in every kind of numbers: what each kind says lies in the ball of the others.
+
+The ball of a value is that of 106 bits; what doubles may be off is bounded by arithmetic that carries the error along.
+"""
+
+import math
+from importlib import import_module
+
+import casadi as ca
+import flint
+import numpy as np
+import pytest
+from helpers.javascript import run
+
+from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, Bounded, NotAccepted, fold
+from tmsopt.global_search import available
+from tmsopt.killable import Killable
+from tmsopt.models import Values, controlled, from_coefficients, from_hamiltonian, from_matrices, tms, whipple
+
+formula, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "symbol"))
+multiplied_out = import_module("tmsopt.algebra.identity").multiplied_out
+function = import_module("tmsopt.explorer.javascript").function
+translation = import_module("tmsopt.global_search.translation")
+
+POINTS, FEW = 1000, 20
+SHORT = 60  # steps of what is multiplied out
+
+GAINS = ("k_phi", "k_phidot_v", "k_deltadot", "lag")
+MODELS = {
+    "tms": tms,
+    "tms with a controller": controlled(tms, ("k_phi", "k_phidot", "lean_phidot")),
+    "whipple": whipple,
+    "whipple with a controller": controlled(whipple, GAINS),
+    "matrices": from_matrices(
+        M=[["m*(1 + x**2)", "x"], ["x", 2]],
+        D=[["0.1*x", 0], [0, "c"]],
+        K=[["k + sqrt(c)", "-k/3"], ["-k/3", "exp(-x)"]],
+        quantities={"size": "abs(x - k) + max(c, 0.3)", "angle": "atan(x/k)**2"},
+    ),
+    "coefficients": from_coefficients(["1", "sqrt(2)*c", "k**-2", "c*k/7", "min(c, k)"]),
+    "complex H": from_hamiltonian([["w - 1j*g/3", "k*exp(1j*w)"], ["k", "2 - 0.1j"]]),
+}
+SETS = [(name, of) for name, model in MODELS.items() for of in range(len(model.sets))]
+OF_ROOTS = ("abscissa", "damping_ratio", "angular_frequency")
+
+
+def asked(name, of):
+    """Native parameters, coefficients, quantities and matrices of a model in one formula, and its inputs."""
+    model = MODELS[name]
+    own = model.sets[of]
+    given = {n: symbol(n) for n in own.names}
+    values = Values(model, own, given)
+    for root in OF_ROOTS:
+        values.define(root, symbol(root))
+    listed = [values[n] for n in model.quantity_names(own)]
+    matrices = [] if model.pencil is None else model.pencil(own.native(given))
+    every = [*listed, *(x for P in matrices for row in P for x in row)]
+    return formula(every, (*own.names, *OF_ROOTS))
+
+
+def drawn(name, of, count):
+    """Designs within their physical ranges, near 1, both signs where these are allowed; and root quantities."""
+    rng = np.random.default_rng([count, of, len(name)])
+    columns = {}
+    for p in MODELS[name].sets[of].parameters:
+        size = rng.uniform(0.2, 1.4, count) * rng.choice([-1.0, 1.0], count)
+        least, most = max(p.range.lower, -2.0), min(p.range.upper, 2.0)
+        columns[p.name] = np.where((size >= least) & (size <= most), size, -size)
+    return columns | {n: rng.uniform(-1.0, 1.0, count) for n in OF_ROOTS}
+
+
+def balls(own, columns, count):
+    """Exact values of some designs, shape (outputs, count)."""
+    with flint.ctx.workprec(106):
+        rows = [{n: flint.fmpq(*float(x[k]).as_integer_ratio()) for n, x in columns.items()} for k in range(count)]
+        return [[flint.arb(x) for x in fold(own, row, BALLS)] for row in rows]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "of"), SETS)
+def test_floats_casadi_javascript_and_nodes_lie_in_the_ball(name, of):
+    own, columns = asked(name, of), drawn(name, of, POINTS)
+    exact = balls(own, columns, POINTS)
+    known = np.array([[x.is_finite() for x in row] for row in exact]).T
+    middle = np.array([[float(x.mid()) if x.is_finite() else 0.0 for x in row] for row in exact]).T
+    with np.errstate(all="ignore"):
+        bounded = [Bounded(*np.broadcast_arrays(*_parts(x), columns["abscissa"])[:2]) for x in _bounded(own, columns)]
+        error = np.array([x.error for x in bounded])
+        inside = np.abs(np.array([x.value for x in bounded]) - middle) <= error
+        assert np.all(inside | ~np.isfinite(error) | ~known)
+        room = 2 * error + 1e-300
+        at_once = np.array([np.broadcast_to(x, POINTS) for x in fold(own, columns, FLOATS)], dtype=float)
+        again = fold(own, {n: symbol(n) for n in own.names}, NODES)
+        once_more = np.array([np.broadcast_to(x, POINTS) for x in fold(formula(again), columns, FLOATS)], dtype=float)
+    assert np.array_equal(at_once, once_more, equal_nan=True)
+    x = ca.SX.sym("x", len(own.names))
+    written = ca.Function("f", [x], [ca.vertcat(*(ca.SX(e) for e in _symbolic(own, x)))]).map(POINTS)
+    by_casadi = written(np.array([columns[n] for n in own.names])).full()
+    script = function("const at = function", ("x", "y"), own, {n: f"x[{k}]" for k, n in enumerate(own.names)})
+    rows = np.array([columns[n] for n in own.names]).T.tolist()
+    answer = f"(rows) => rows.map((x) => {{const y = Array({len(exact[0])}); at(x, y); return y;}})"
+    by_script = np.array(run([script], answer, rows), dtype=float).T
+    for found in (at_once, by_casadi, by_script):
+        off = np.abs(found - middle)
+        assert np.all((off <= room) | ~known | ~np.isfinite(error))
+        assert not np.any(np.isfinite(found) & ~known & np.isfinite(error))
+    assert known.mean() > 0.6
+
+
+def _parts(x):
+    return (x.value, x.error) if isinstance(x, Bounded) else (float(flint.arb(x)), abs(float(flint.arb(x))) * 1e-16)
+
+
+def _bounded(own, columns):
+    return fold(own, {n: Bounded(x, np.zeros_like(x)) for n, x in columns.items()}, BALLS)
+
+
+def _symbolic(own, x):
+    return fold(own, {n: x[k] for k, n in enumerate(own.names)}, CASADI)
+
+
+@pytest.mark.parametrize(("name", "of"), SETS)
+def test_intervals_scip_and_fractions_hold_the_ball(name, of):
+    """Of what each of them takes, output by output."""
+    own, columns = asked(name, of), drawn(name, of, FEW)
+    exact, met = balls(own, columns, FEW), dict.fromkeys(("intervals", "scip", "fractions"), 0)
+    pytest.importorskip("pyscipopt")
+    built = translation._Translation()
+    for k in range(len(own.outputs)):
+        part = own.part([own.outputs[k]])
+        for j in range(FEW):
+            point = {n: float(x[j]) for n, x in columns.items()}
+            for kind in met if exact[j][k].is_finite() else ():
+                try:
+                    over = HOLDS[kind](built, part, point)
+                except (NotAccepted, ZeroDivisionError):
+                    continue
+                met[kind] += 1
+                assert not over.is_finite() or over.overlaps(exact[j][k]), (kind, k)
+    assert all(met.values())
+
+
+def _by_intervals(built, part, point):
+    return fold(part, {n: flint.arb(x, 1e-9) for n, x in point.items()}, INTERVALS)[0]
+
+
+def _by_scip(built, part, point):
+    terms = {n: built.free(x - 1e-9, x + 1e-9) for n, x in point.items()}
+    ball = fold(part, terms, built.kind(), built.variable)[0].ball
+    return flint.arb(ball) * flint.arb(1, 2**-52)  # SCIP's constants are doubles
+
+
+def _by_fractions(built, part, point):
+    if len(part.steps) > SHORT or any(math.isnan(x) for x in part.constants if isinstance(x, float)):
+        raise NotAccepted("what takes long to multiply out, and what is no number")
+    with flint.ctx.workprec(212):
+        exact = {n: flint.fmpq(*x.as_integer_ratio()) for n, x in point.items()}
+        return flint.arb(fold(multiplied_out(part), exact, BALLS)[0])
+
+
+HOLDS = {"intervals": _by_intervals, "scip": _by_scip, "fractions": _by_fractions}
+
+
+@pytest.mark.skipif(not available(), reason="codac is not installed")
+@pytest.mark.parametrize(("name", "of"), SETS)
+def test_codac_holds_the_ball(name, of):
+    """In a process of its own, for codac changes how doubles are rounded."""
+    own, columns = asked(name, of), drawn(name, of, FEW)
+    exact, worker = balls(own, columns, FEW), Killable()
+    parts = [own.part([o]) for o in own.outputs]
+    points = [{n: float(x[j]) for n, x in columns.items()} for j in range(FEW)]
+    try:
+        found = worker.call(ranges_by_codac, parts, points).result(timeout=100)
+    finally:
+        worker.end()
+    assert any(over is not None for row in found for over in row)
+    for k, row in enumerate(found):
+        for j, over in enumerate(row):
+            if over is not None and exact[j][k].is_finite():
+                assert flint.arb(over[0]).union(flint.arb(over[1])).overlaps(exact[j][k]), k
+
+
+def ranges_by_codac(parts, points):
+    """The range of each formula about each point; None of what codac does not take, or where it knows no end."""
+    import codac
+
+    pruning = import_module("tmsopt.global_search.pruning")
+    found = []
+    for part in parts:
+        try:
+            pruning.check(part)
+        except NotAccepted:
+            found.append([None] * len(points))
+            continue
+        x = codac.VectorVar(len(part.names))
+        own, row = codac.AnalyticFunction([x], *pruning._expressions(codac, part, x)), []
+        for point in points:
+            box = codac.IntervalVector([[point[n] - 1e-12, point[n] + 1e-12] for n in part.names])
+            over = own.eval(codac.EvalMode.NATURAL, box)
+            known = not over.is_empty() and not over.is_unbounded()
+            row.append((over.lb(), over.ub()) if known else None)
+        found.append(row)
+    return found
