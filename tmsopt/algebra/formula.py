@@ -367,44 +367,32 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
 
 def formula(outputs: Iterable[Any], names: Iterable[str] = ()) -> Formula:
     """The formula of nodes and numbers, in inputs of these names and those that appear."""
-    steps: list[Step] = []
+    return _listed([constant(x) for x in outputs], names, lambda node: node.fixed and node.op != CONSTANT)
+
+
+def _listed(outputs: Sequence[Node], names: Iterable[str], alone: Callable[[Node], bool]) -> Formula:
+    """The steps of nodes, equal ones once.
+
+    Args:
+        alone: whether a node is a constant that is a formula of its own.
+    """
     places: dict[Step, int] = {}
     known: dict[int, int] = {}  # id of a node, which is kept alive by the outputs
-
-    def place(step: Step) -> int:
-        if step not in places:
-            places[step] = len(steps)
-            steps.append(step)
-        return places[step]
-
-    nodes = [constant(x) for x in outputs]
-    waiting = nodes[::-1]
+    waiting = list(outputs[::-1])
     while waiting:
         node = waiting.pop()
         if id(node) in known:
             continue
-        if not node.operands or node.fixed:
-            alone = node.op in (INPUT, CONSTANT)
-            known[id(node)] = place(Step(node.op, (), node.value) if alone else Step(CONSTANT, (), _alone(node)))
+        if alone(node):
+            step = Step(CONSTANT, (), _listed([node], (), lambda node: False))
         elif left := [o for o in node.operands if id(o) not in known]:
             waiting += [node, *left[::-1]]
+            continue
         else:
-            known[id(node)] = place(Step(node.op, tuple(known[id(o)] for o in node.operands)))
-    met = [step.value for step in steps if step.op == INPUT]
-    return Formula(tuple(dict.fromkeys((*names, *met))), tuple(steps), tuple(known[id(n)] for n in nodes))
-
-
-def _alone(node: Node) -> Formula:
-    """A constant that is no fraction, as a formula without names."""
-    steps: list[Step] = []
-
-    def place(n: Node) -> int:
-        operands = tuple(place(o) for o in n.operands)
-        steps.append(Step(n.op, operands, n.value))
-        return len(steps) - 1
-
-    output = place(node)
-    return Formula((), tuple(steps), (output,))
+            step = Step(node.op, tuple(known[id(o)] for o in node.operands), node.value)
+        known[id(node)] = places.setdefault(step, len(places))
+    met = [step.value for step in places if step.op == INPUT]
+    return Formula(tuple(dict.fromkeys((*names, *met))), tuple(places), tuple(known[id(n)] for n in outputs))
 
 
 def trace(function: Callable[[Mapping[str, Node]], Iterable[Any]], names: Sequence[str]) -> Formula:

@@ -4,10 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import casadi as ca
 import flint
 
-from tmsopt.algebra.formula import Formula, fold, from_casadi
+from tmsopt.algebra.formula import Formula, fold
 from tmsopt.algebra.kinds import INTERVALS
 
 Interval = tuple[float, float]
@@ -35,13 +34,12 @@ def outwards(lower: float, upper: float) -> Interval:
     return (lower, upper) if lower == upper else (math.nextafter(lower, -math.inf), math.nextafter(upper, math.inf))
 
 
-def ranges(asked: ca.Function | Formula, box: Sequence[Interval]) -> list[Interval]:
-    """Ranges of the outputs of a function over a box; without bounds where it may not exist.
+def ranges(formula: Formula, box: Sequence[Interval]) -> list[Interval]:
+    """Ranges of the outputs of a formula over a box; without bounds where it may not exist.
 
     Raises:
         NotAccepted: for an operation that has no interval arithmetic here.
     """
-    formula = asked if isinstance(asked, Formula) else from_casadi(asked)
     over = {name: ball(ends) for name, ends in zip(formula.names, box, strict=True)}
     return [interval(x) for x in fold(formula, over, INTERVALS)]
 

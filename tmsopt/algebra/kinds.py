@@ -170,7 +170,7 @@ def as_exact(value: Constant) -> Any:
 
 
 def _ball_number(x: Any) -> Any:
-    if x is None or isinstance(x, bool | np.bool | np.ndarray):  # a condition
+    if x is None or isinstance(x, bool | np.bool_ | np.ndarray):  # a condition
         return x
     return flint.arb(x) if isinstance(x, float) and not math.isfinite(x) else exact(x)
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.algebra.formula import Formula, NotAccepted, from_casadi
+from tmsopt.algebra.formula import Formula, NotAccepted, formula, symbol
 from tmsopt.algebra.intervals import ranges
+from tmsopt.algebra.kinds import gradients
 from tmsopt.boundaries.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
 from tmsopt.models.user_spectrum import public_names
@@ -187,13 +187,12 @@ def _beyond(problem: Problem, condition: Expression, values: Values) -> bool:
 @lru_cache(maxsize=256)
 def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
     """A condition and its slopes, as a function of parameters and root quantities."""
-    symbols = {name: ca.SX.sym(name) for name in names}
-    of = model.parameter_set(set_name)
+    symbols, of = {name: symbol(name) for name in names}, model.parameter_set(set_name)
     values = Values(model, of, {n: symbols[n] for n in of.names})
     for name in names[len(of.names) :]:
         values.define(name, symbols[name])
-    difference, x = ca.SX(condition(values)), ca.vertcat(*symbols.values())
-    return from_casadi(ca.Function("sloped", [x], [difference, ca.densify(ca.gradient(difference, x))]))
+    difference = condition(values)
+    return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
 def excesses(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:

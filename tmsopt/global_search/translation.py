@@ -68,7 +68,7 @@ class Term:
     """A result on the way: an expression of SCIP with its degree and range.
 
     Attributes:
-        expression: a number where it is _constant.
+        expression: a number where it is constant.
         degree: 0, 1 or 2.
         ball: its range.
         size: bound on its summands, which may cancel.
