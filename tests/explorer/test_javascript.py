@@ -3,6 +3,7 @@
 import math
 import re
 from fractions import Fraction
+from itertools import count, islice
 from pathlib import Path
 
 import flint
@@ -494,7 +495,15 @@ def test_random_expressions_have_the_values_that_python_computes():
         binary = ["({0}) + ({1})", "({0}) - ({1})", "({0}) * ({1})", "({0}) / ({1})", "min({0}, {1})", "max({0}, {1})"]
         return str(rng.choice(binary + unary if rng.random() < 0.6 else binary)).format(*sides)
 
-    texts = {f"q{k}": f"{written(5)} + 0*u" for k in range(FEW)}
+    def exists(text):
+        try:
+            return from_coefficients(["1", "u + v", "w"], quantities={"q": text})
+        except ValueError as error:
+            assert "divides by 0" in str(error)  # as by atan(w - w)
+            return False
+
+    drawn = filter(exists, (f"{written(5)} + 0*u" for _ in count()))
+    texts = {f"q{k}": text for k, text in enumerate(islice(drawn, FEW))}
     model = from_coefficients(["1", "u + v", "w"], quantities=texts)
     problem = Problem(model, free=dict.fromkeys("uvw", (-2.0, 2.0)))
     x = designs(problem, 20)

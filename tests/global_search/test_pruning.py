@@ -56,6 +56,20 @@ def test_no_box_loses_a_zero():
         worker.end()
 
 
+@pytest.mark.skipif(not available(), reason="codac is not installed")
+@pytest.mark.parametrize("power", [-1, -3])
+def test_a_pole_has_no_slope(power):
+    """x⁻¹ + 1 falls on both sides of 0, but not from one to the other: by slopes alone the zero at −1 would be lost."""
+    worker = Killable()
+    asked, box = formula([symbol("x") ** power + 1], ("x",)), ((-2.0, 2.1),)
+    none = formula([], ("x",))
+    try:
+        pruned = worker.call(prune, Puzzle(asked, none, (4.1,), none), [box], [], 1.0, 50, 1e-7).result(timeout=60)
+    finally:
+        worker.end()
+    assert any(lo <= -1 <= hi for ((lo, hi),) in (*pruned.left, *pruned.met, *pruned.small))
+
+
 def test_identities_of_angles():
     t = symbol("x")
     angle = made("atan", t)

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple, Union
 
 import casadi as ca
@@ -77,8 +77,11 @@ class Formula:
         return Formula(self.names, tuple(steps), tuple(place[o] for o in outputs))
 
     def split(self, late: Collection[int]) -> tuple[tuple[str, ...], "Formula", "Formula"]:
-        """The formula in two: what late steps and outputs take of the others, by name; these; and the rest in them."""
-        taken = {o for k in late for o in self.steps[k].operands} | set(self.outputs)
+        """The formula in two: what late steps and outputs take of the others, by name; these; and the rest in them.
+
+        Constants that late steps take stay with them: an exponent is to be a number, which has no slope.
+        """
+        taken = {o for k in late for o in self.steps[k].operands if self.steps[o].op != CONSTANT} | set(self.outputs)
         sources = sorted(k for k in taken if k not in late)
         return tuple(map(str, sources)), self.part(sources), self.part(self.outputs, sources)
 
@@ -318,6 +321,10 @@ def _power(a: Fraction, b: Fraction) -> Fraction | None:
     return a ** int(b) if whole and size * abs(b) <= _BITS else None
 
 
+def _at_zero(value: int, a: Fraction) -> Fraction | None:
+    return None if a else Fraction(value)
+
+
 _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -327,13 +334,15 @@ _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
     "square": lambda a: a * a,
     "abs": abs,
     "pow": _power,
+    **{op: partial(_at_zero, 1) for op in ("exp", "cos")},
+    **{op: partial(_at_zero, 0) for op in ("sin", "tan", "asin", "atan")},
 }
 """What fractions make a fraction of; None where they do not."""
 
 _SIMPLEST = {"add", "sub", "mul", "div", "pow", "neg", "sin", "cos", "tan"}
 
 
-def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911
+def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911, PLR0912
     """What an operation comes to, whatever the number is; None where that is no simpler."""
     first, last = operands[0], operands[-1]
     match op, *fractions:
@@ -343,6 +352,8 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
             return first
         case ("mul", 0, _) | ("mul", _, 0) if first.total and last.total:
             return constant(0)
+        case ("pow", _, 0) if first.total:
+            return constant(1)
         case ("sub", _, _) if first is last and first.total:
             return constant(0)
         case ("sub", 0, _) | ("mul", -1, _):

@@ -335,15 +335,8 @@ def _interval_power(x: Any, y: Any) -> Any:
     return x**y
 
 
-_ON_INTERVALS = ("add", "sub", "mul", "neg", "div", "sqrt", "abs", "min", "max", "quotient")
-
 INTERVALS = Kind(
-    {
-        **{name: BALLS.operations[name] for name in (*_ON_INTERVALS, "positive_part")},
-        **{name: BALLS.operations[name] for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")},
-        "square": square,
-        "pow": _interval_power,
-    },
+    {**BALLS.operations, "square": square, "pow": _interval_power},
     lambda value: flint.arb(as_exact(value)),
 )
 """Balls as wide as a box, where an even power must not reach below 0."""

@@ -44,7 +44,7 @@ _MORE = 8  # designs at which a relation is tried beyond those that determine it
 _DEPENDENT = 1e-9  # singular value of the coefficients at random designs, relative, above which there is no relation
 _FINENESS = 2**40  # steps of a range, one of which an exact design takes at random
 
-_RATIONAL = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div"}
+_RATIONAL = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div", "quotient", "ratio"}
 """Operations that make rational functions, beside whole powers."""
 
 Box = Mapping[str, tuple[float, float]]

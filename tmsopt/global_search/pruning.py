@@ -23,11 +23,14 @@ from tmsopt.algebra.kinds import as_exact
 Box = tuple[tuple[float, float], ...]
 """Least and greatest value of each variable."""
 
-PARTIAL = {"div": 1, "quotient": 1, "sqrt": 0, "asin": 0, "acos": 0}
+PARTIAL = {"div": 1, "quotient": 1, "ratio": 1, "pow": 0, "sqrt": 0, "asin": 0, "acos": 0}
 """Operations that do not exist, or have no slope, somewhere, and which operand decides on that."""
+
+_POLES = {"div", "quotient", "ratio", "pow"}  # where it is 0; of powers with a negative exponent
 
 FUNCTIONS = ("sqrt", "abs", "exp", "sin", "cos", "asin", "acos", "atan")
 
+_TINY = 1e-300
 _GAIN = 0.9  # of a width: contracting goes on where one shrinks below
 _ROUNDS = 8
 _WIDER = 0.1  # of a width: the box in which a zero is looked for is so much wider at each end
@@ -53,7 +56,10 @@ class Puzzle:
     def guarded(self) -> list[tuple[str, Formula]]:
         """Operations with their arguments that must exist for the equations to have slopes."""
         steps, names = self.equations.steps, self.equations.names
-        taken = dict.fromkeys((s.op, s.operands[PARTIAL[s.op]]) for s in steps if s.op in PARTIAL)
+        smooth = {k for k, s in enumerate(steps) if s.op == "pow" and steps[s.operands[1]].value >= 0}
+        taken = dict.fromkeys(
+            (s.op, s.operands[PARTIAL[s.op]]) for k, s in enumerate(steps) if s.op in PARTIAL and k not in smooth
+        )
         return [(op, Formula(names, steps, (k,))) for op, k in taken if steps[k].op != CONSTANT]
 
 
@@ -207,7 +213,7 @@ class _Contractors:
         """Whether every function that the equations use has a slope all over a box."""
         for name, argument in zip(self.guarded, self.arguments, strict=True):
             over = argument.eval(self.codac.EvalMode.NATURAL, x)
-            if name in ("div", "quotient"):
+            if name in _POLES:
                 if over.contains(0.0):
                     return False
             elif name in ("asin", "acos"):
@@ -257,12 +263,18 @@ def _kind(codac: Any) -> Kind:
         {
             **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg")},
             **dict.fromkeys(("div", "quotient"), operator.truediv),
+            "ratio": lambda a, b: a * b / (codac.sqr(b) + codac.Interval(0.0, _TINY)),  # anything where b is 0
             "square": codac.sqr,
-            "pow": lambda a, b: codac.pow(a, codac.ScalarExpr(b)),
+            "pow": lambda a, b: _power(codac, a, b) if b.lb() >= 0 else codac.Interval(1.0) / _power(codac, a, -b),
             **{name: getattr(codac, name) for name in FUNCTIONS},
         },
         lambda value: codac.Interval(*ends(as_exact(value))),  # an expression of its own wherever it is used
     )
+
+
+def _power(codac: Any, base: Any, exponent: Any) -> Any:
+    """Not for negative exponents: of these codac 2.1.2 loses zeros, as x⁻³ = −1."""
+    return codac.pow(base, codac.ScalarExpr(exponent))
 
 
 def _vector(codac: Any, box: Box) -> Any:
@@ -279,7 +291,7 @@ def check(asked: Formula) -> None:
     Raises:
         NotAccepted: with the name of an operation.
     """
-    known = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "div", "quotient", "square", "pow", *FUNCTIONS}
+    known = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "div", "quotient", "ratio", "square", "pow", *FUNCTIONS}
     for step in asked.steps:
         exponent = asked.steps[step.operands[1]].value if step.op == "pow" else 1
         if step.op not in known or not isinstance(exponent, int | Fraction) or exponent % 1:

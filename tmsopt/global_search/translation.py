@@ -165,6 +165,8 @@ class _Translation:
                 "mul": self.product,
                 "square": self.square,
                 "div": self.quotient,
+                "quotient": self.quotient,
+                "ratio": self.ratio,
                 "sqrt": self.root,
                 "pow": self.power,
                 "tan": self.tangent,
@@ -206,6 +208,12 @@ class _Translation:
         q = self.defined(a.ball / b.ball)
         self.between(Term(q.expression * b.expression - a.expression, 2, a.ball, a.size), 0.0, 0.0)
         return q
+
+    def ratio(self, a: Term, b: Term) -> Term:
+        """The same, which leaves 0/0 open; where b is 0 throughout, a/b is 0 or does not exist."""
+        if b.degree == 0 and not b.expression:
+            raise NotAccepted("a ratio to 0")
+        return self.quotient(a, b)
 
     def root(self, a: Term) -> Term:
         """r ≥ 0 with r² = a."""

@@ -33,7 +33,8 @@ class Pair:
         return Pair(-self.re, -self.im)
 
     def __sub__(self, other: Any) -> "Pair":
-        return self + -pair(other)
+        b = pair(other)
+        return Pair(self.re - b.re, self.im - b.im)
 
     def __mul__(self, other: Any) -> "Pair":
         b = pair(other)
