@@ -166,3 +166,13 @@ def test_functions_of_casadi_are_formulas():
     assert fold(own, dict(zip(own.names, given, strict=True)), FLOATS) == pytest.approx(expected, rel=1e-15)
     with pytest.raises(NotAccepted, match="erf"):
         values(from_casadi(ca.Function("f", [x], [ca.erf(x)]), ["x"]), {"x": 1.0})
+
+
+def test_an_exponent_stays_a_number_where_a_formula_is_split():
+    """As a parameter of a solver it would have a slope, the logarithm of a negative base among it."""
+    whole = trace(lambda v: [v["x"] ** 3 + 5 * v["c"]], ["x", "c"])
+    names, early, late = whole.split(whole.depending(["x"]))
+    assert fold(early, {"c": 2.0}, FLOATS) == [10.0]
+    x, p = ca.SX.sym("x"), ca.SX.sym("p")
+    slopes = ca.Function("f", [x, p], fold(late, {"x": x, **dict.fromkeys(names, p)}, CASADI)).jacobian()
+    assert [float(d) for d in slopes(-2.0, 10.0, 0.0)] == [12.0, 1.0]
