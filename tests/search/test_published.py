@@ -307,7 +307,7 @@ def test_all_ep3_of_three_masses_are_found():
     found = tmsopt.solve_all(both, starts=24, seconds=0).solutions
     height = float(three_masses().parameters["mu_i"])
     assert all(d.status == "optimal" and d.structure == "CEP3" for d in found)
-    ends = sorted([d.parameters[n] for n in asked.free] for d in found)
+    ends = [[d.parameters[n] for n in asked.free] for d in sorted(found, key=lambda d: d.parameters["mu_i"])]
     assert ends == [pytest.approx([1.5, sign * height, 0.5, sign * height], abs=MET) for sign in (-1, 1)]
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 
 import tmsopt
 from tmsopt import laws
+from tmsopt.algebra import trace
 from tmsopt.program import NLP, Factor
 
 pytestmark = pytest.mark.slow
@@ -214,7 +215,8 @@ def test_heavy_damping_however_it_is_written():
 def shared_out(pairs):
     """An NLP that keeps (t − r)(t − s) for each pair, and its point."""
     x = np.array([c for r, s in pairs for c in (-(r + s), r * s)])
-    empty = NLP("", (), None, (), (), (), (), (), products=(tuple(Factor(2 * k, False) for k in range(len(pairs))),))
+    products = (tuple(Factor(2 * k, False) for k in range(len(pairs))),)
+    empty = NLP("", (), trace(lambda v: [0], ()), {}, (), (), (), (), (), products=products)
     return empty, x
 
 

@@ -65,7 +65,8 @@ def gauss_newton(form: Form, guess: Array, monic: Array, size: Array, patience: 
         residual = (np.array(form.monic(list(u)), dtype=float) - monic) / size
         if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(residual))):
             break
-        distance = float(np.linalg.norm(residual))
+        with np.errstate(over="ignore"):  # where it diverges
+            distance = float(np.linalg.norm(residual))
         left = patience if distance < 0.9 * least else left - 1
         if distance < least:
             best, least = u, distance
