@@ -86,11 +86,11 @@ class Designs:
         self.problem = problem
         self.names = list(problem.free)
         self.lower, self.upper = np.array([*problem.free.values()]).reshape(-1, 2).T
-        assert problem.objective is not None
-        self.objective = compile(problem.objective.text, "objective", "eval")
-        self.about_roots = _about(problem.objective.names)
-        self.rows = [_row(c.text, c.names) for c in problem.conditions.values()]
-        self.sign = problem.sign
+        assert problem.posed.objective is not None
+        self.objective = compile(problem.posed.objective.text, "objective", "eval")
+        self.about_roots = _about(problem.posed.objective.names)
+        self.rows = [_row(c.text, c.names) for c in problem.posed.conditions.values()]
+        self.sign = problem.posed.sign
         self._quick = None if problem.model.statement is None else self._function()
 
     @property
@@ -101,7 +101,7 @@ class Designs:
     def _function(self) -> Any:
         """The coefficients of a stated model, for arrays: at once, where formulas are walked step by step."""
         symbols = {n: ca.SX.sym(n) for n in self.names}
-        found = self.problem.model.coefficients({**self.problem.fixed, **symbols}, self.problem.parameter_set)
+        found = self.problem.model.coefficients({**self.problem.fixed, **symbols}, self.problem.posed.parameter_set)
         return ca.Function("coefficients", [ca.vertcat(*symbols.values())], [ca.densify(ca.vertcat(*found))])
 
     def values(self, x: Array) -> Values | _Stated:
@@ -109,7 +109,7 @@ class Designs:
         at: dict[str, Any] = {**self.problem.fixed, **dict(zip(self.names, x, strict=True))}
         if self._quick is not None:
             return _Stated(at, self.problem.model.coefficient_names(), self._quick, x)
-        return Values(self.problem.model, self.problem.parameter_set, at)
+        return Values(self.problem.model, self.problem.posed.parameter_set, at)
 
     def coefficients(self, values: Values | _Stated, count: int) -> Array:
         """Shape (designs, n + 1)."""

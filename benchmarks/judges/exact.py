@@ -51,8 +51,8 @@ def confirmed(problem: Problem, design: Mapping[str, float], claimed: float) -> 
 
 def stored_values(problem: Problem, design: Mapping[str, float]) -> Values:
     """Everything but the roots, of the parameters as stored, in balls of the digits that hold at the time."""
-    stored = problem.ordered({n: design[n] for n in problem.free})
-    return Values(problem.model, problem.parameter_set, {n: flint.arb(v) for n, v in stored.items()})
+    stored = problem.posed.ordered({n: design[n] for n in problem.free})
+    return Values(problem.model, problem.posed.parameter_set, {n: flint.arb(v) for n, v in stored.items()})
 
 
 def near_roots(problem: Problem, design: Mapping[str, float]) -> Iterator[Roots]:

@@ -58,12 +58,12 @@ class Judged:
 
 def cases_of(problem: Problem, points: int, inside: int = 0) -> Cases:
     """A grid of `points` per band with the corners of the tolerance box, and points inside both."""
-    scenarios = {n: _points(s, points) for n, s in problem.variations.items()}
+    scenarios = {n: _points(s, points) for n, s in problem.posed.scenarios.items()}
     signs = [np.array([-1.0, 1.0])] * len(problem.tolerances)
     grid = np.array(list(itertools.product(*scenarios.values(), *signs)))
     if inside and (problem.tolerances or len(scenarios) > 1):
         rng = np.random.default_rng(0)
-        drawn = [_drawn(rng, s, inside) for s in problem.variations.values()]
+        drawn = [_drawn(rng, s, inside) for s in problem.posed.scenarios.values()]
         drawn += [rng.uniform(-1, 1, inside) for _ in problem.tolerances]
         grid = np.concatenate([grid, np.array(drawn).T])
     columns = list(grid.T)
@@ -94,14 +94,18 @@ class Judge:
         self.names = list(problem.free)
         self.lower, self.upper = np.array([problem.free[n] for n in self.names]).reshape(-1, 2).T
         self.cases = cases_of(problem, points, inside)
-        self._rows = [_compiled(c.text) for c in problem.conditions.values()]
-        self._objective = compile(problem.objective.text, "objective", "eval") if problem.objective else None
-        self._sign = -1.0 if problem.sense == "maximize" else 1.0
+        self._rows = [_compiled(c.text) for c in problem.posed.conditions.values()]
+        self._objective = (
+            compile(problem.posed.objective.text, "objective", "eval") if problem.posed.objective else None
+        )
+        self._sign = -1.0 if problem.posed.sense == "maximize" else 1.0
 
     def worth(self, x: Array) -> Array:
         """The objective alone, worst over the cases, without roots if it is not about them."""
-        assert self.problem.objective is not None
-        return self(x).value if {"abscissa", "damping_ratio"} & set(self.problem.objective.names) else self._plain(x)
+        assert self.problem.posed.objective is not None
+        return (
+            self(x).value if {"abscissa", "damping_ratio"} & set(self.problem.posed.objective.names) else self._plain(x)
+        )
 
     def __call__(self, x: Array, shift: float = 0.0) -> Judged:
         """Designs of shape (free, designs); root quantities better by `shift` times what rounding does to them."""
@@ -137,7 +141,7 @@ class Judge:
 
     def _values(self, x: Array) -> tuple[Values, Values]:
         """The nominal designs, shape (designs, 1), and all cases of them, shape (designs, cases)."""
-        of, model = self.problem.parameter_set, self.problem.model
+        of, model = self.problem.posed.parameter_set, self.problem.model
         nominal = {**self.problem.fixed, **{n: x[k][:, None] for k, n in enumerate(self.names)}}
         varied = {**nominal, **{n: v[None, :] for n, v in self.cases.at.items()}}
         varied |= {n: varied[n] + o[None, :] for n, o in self.cases.offset.items()}
@@ -165,7 +169,7 @@ class Verdict:
 
 def verdict(problem: Problem, parameters: Mapping[str, float], points: int = 1025) -> Verdict:
     """Judge a claimed design on a dense grid."""
-    if len(problem.variations) > 1 or problem.tolerances:
+    if len(problem.posed.scenarios) > 1 or problem.tolerances:
         points = min(points, 257)
     judge = Judge(problem, points, inside=_WITHIN)
     plain, granted = judge.of(parameters), judge.of(parameters, _GRANTED)

@@ -70,7 +70,7 @@ def _timed(
     digits: int,
     exact: Mapping[str, Fraction] | None = None,
 ) -> Row:
-    work = partial(prove_design, solution.problem, parameters, solution.structure, digits, exact)
+    work = partial(prove_design, solution.problem.posed, parameters, solution.structure, digits, exact)
     return Row(place, work(), best({place: work}, _REPEATS)[place])
 
 

@@ -245,5 +245,5 @@ def _judged(search: _Search, ends: list[tuple[str, Array]], began: float) -> Bes
 
 
 def _ahead(problem: Problem, one: Best, other: Best) -> bool:
-    keys = [(not b.feasible, problem.sign * b.value if b.feasible else b.violation) for b in (one, other)]
+    keys = [(not b.feasible, problem.posed.sign * b.value if b.feasible else b.violation) for b in (one, other)]
     return keys[0] < keys[1]

@@ -61,8 +61,8 @@ class Followed:
 def evolve(problem: Problem, seed: int = 0) -> Evolved:
     """The worst over scenarios and tolerances; a coarse grid in the whole box, then the full one."""
     lower, upper = np.array([*problem.free.values()]).reshape(-1, 2).T
-    loose = _BAND if any(c.comparison == "==" for c in problem.conditions.values()) else 0.0
-    sign = -1.0 if problem.sense == "maximize" else 1.0
+    loose = _BAND if any(c.comparison == "==" for c in problem.posed.conditions.values()) else 0.0
+    sign = -1.0 if problem.posed.sense == "maximize" else 1.0
 
     def run(points: int, bounds: Bounds, generations: int, x0: Array | None = None) -> Array:
         judge = Judge(problem, points)
@@ -74,13 +74,13 @@ def evolve(problem: Problem, seed: int = 0) -> Evolved:
         return _minimised(merit, bounds, seed, generations, popsize=12, tol=1e-10, x0=x0)
 
     x = run(_COARSE, Bounds(lower, upper), 400)
-    if problem.variations:
+    if problem.posed.scenarios:
         reach = _AROUND * (upper - lower)
         near = Bounds(np.maximum(lower, x - reach), np.minimum(upper, x + reach))
         x = run(POINTS, near, 120, np.clip(x, near.lb, near.ub))
     found = Judge(problem, POINTS)(x[:, None])
     value = float(found.value[0]) if found.violation[0] <= loose else float("nan")
-    parameters = problem.ordered(dict(zip(problem.free, x.tolist(), strict=True)))
+    parameters = problem.posed.ordered(dict(zip(problem.free, x.tolist(), strict=True)))
     return Evolved(parameters, value, float(found.violation[0]))
 
 

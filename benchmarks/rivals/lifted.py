@@ -91,8 +91,8 @@ class Lifted:
 
     @property
     def _objective(self) -> str:
-        assert self.at.problem.objective is not None
-        return self.at.problem.objective.text
+        assert self.at.problem.posed.objective is not None
+        return self.at.problem.posed.objective.text
 
     def _monic(self, u: Array) -> Array:
         with np.errstate(all="ignore"):

@@ -61,8 +61,8 @@ def poles(problem: Problem) -> Poles:
     """Of a problem whose coefficients are linear in its free parameters."""
 
     def coefficients(x: Array) -> Array:
-        values = problem.ordered(dict(zip(problem.free, x.tolist(), strict=True)))
-        return np.array([float(a) for a in problem.values(values).coefficients])
+        values = problem.posed.ordered(dict(zip(problem.free, x.tolist(), strict=True)))
+        return np.array([float(a) for a in problem.posed.values(values).coefficients])
 
     constant = coefficients(np.zeros(len(problem.free)))
     return Poles(constant, np.column_stack([coefficients(unit) - constant for unit in np.eye(len(problem.free))]))

@@ -50,7 +50,7 @@ class Reduced:
     def __init__(self, problem: Problem, watch: Watch | None = None) -> None:
         self.problem = problem
         self._watch = watch
-        conditions = list(problem.conditions.values())
+        conditions = list(problem.posed.conditions.values())
         equalities = [c.text for c in conditions if c.comparison == "=="]
         self._solved = _solvable(problem, equalities[0]) if equalities else ""
         self._equation = compile(difference(equalities[0]), "equality", "eval") if equalities else None
@@ -135,8 +135,8 @@ def _coefficients(p: Mapping[str, Any]) -> list[Any]:
 
 def _violation(problem: Problem, parameters: Mapping[str, float]) -> float:
     """Largest violation, by the package's own evaluation and not by what the rival was told."""
-    values = problem.values(parameters)
-    worst = [c.violation(values) for c in problem.conditions.values()]
+    values = problem.posed.values(parameters)
+    worst = [c.violation(values) for c in problem.posed.conditions.values()]
     worst += [max(lo - parameters[n], parameters[n] - hi, 0.0) for n, (lo, hi) in problem.free.items()]
     largest = float(np.max(worst, initial=0.0))
     return largest if np.isfinite(largest) else np.inf
@@ -144,12 +144,12 @@ def _violation(problem: Problem, parameters: Mapping[str, float]) -> float:
 
 def _solvable(problem: Problem, equality: str) -> str:
     """A free parameter in which the equality is linear, so that it can be solved for it."""
-    expression = parse_value(difference(equality), problem.vocabulary)
+    expression = parse_value(difference(equality), problem.posed.vocabulary)
     rng = np.random.default_rng(0)
     designs = [{n: rng.uniform(*ends) for n, ends in problem.free.items()} for _ in range(3)]
 
     def at(design: Mapping[str, float], name: str, value: float) -> float:
-        return float(expression(problem.values(problem.ordered({**design, name: value}))))
+        return float(expression(problem.posed.values(problem.posed.ordered({**design, name: value}))))
 
     def second_differences(name: str) -> Iterable[tuple[float, float]]:
         for design in designs:

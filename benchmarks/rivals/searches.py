@@ -69,7 +69,7 @@ def local(method: str, problem: Problem, starts: int = STARTS, watch: Watch | No
     began = time.perf_counter()
     ends: list[Found] = []
     with quiet():
-        for design in designs(problem, 0, starts):
+        for design in designs(problem.posed, 0, starts):
             start = np.array([design[name] for name in reduced.names])
             answer: Any = minimize(function, start, bounds=bounds, **search)
             ends.append(reduced.found(method, np.asarray(answer.x), 0.0))

@@ -135,5 +135,5 @@ def slopes(reduced: Reduced, x: Array) -> tuple[Array, Array]:
 
 
 def _starts(reduced: Reduced) -> Iterator[Array]:
-    for design in designs(reduced.problem, 0, _MANY):
+    for design in designs(reduced.problem.posed, 0, _MANY):
         yield np.array([design[n] for n in reduced.names])

@@ -56,7 +56,7 @@ def moved(problem: Problem, amounts: Mapping[str, float], share: float = 1.0) ->
     constraints: dict[str, str] = {}
     for name, text in problem.constraints.items():
         amount = share * amounts.get(name, 0.0)
-        comparison = problem.conditions[name].comparison
+        comparison = problem.posed.conditions[name].comparison
         left, right = text.split(comparison)
         constraints[name] = f"{left} {comparison} ({right}) {'-' if comparison == '>=' else '+'} {amount!r}"
     free = {

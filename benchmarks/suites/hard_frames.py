@@ -50,7 +50,7 @@ class Frame:
         at: dict[str, Any] = {**self.fixed, **dict(zip(self.free, self.designs, strict=True))}
         problem = Problem(model=self.model, fixed=self.fixed, free=self.free, minimize="abscissa")
         with np.errstate(all="ignore"):
-            values = Values(self.model, problem.parameter_set, {**problem.fixed, **at})
+            values = Values(self.model, problem.posed.parameter_set, {**problem.fixed, **at})
             a = np.stack(np.broadcast_arrays(*values.coefficients, self.designs[0]), axis=-1)[:, :-1]
             abscissa, ratio = root_values(eigenvalues(np.asarray(a, float)))
         values.define("abscissa", abscissa)

@@ -102,7 +102,9 @@ class _Draw:
     def values(self, expression: str) -> np.ndarray | None:
         """Finite values over the designs; None where the expression is constant or rarely exists."""
         problem = self.problem
-        values = parse_value(expression, problem.vocabulary)(problem.values(problem.ordered(self.designs)))
+        values = parse_value(expression, problem.posed.vocabulary)(
+            problem.posed.values(problem.posed.ordered(self.designs))
+        )
         found = np.broadcast_to(np.asarray(values, dtype=float), _SPREAD)
         found = found[np.isfinite(found)]
         constant = len(found) < 3 or float(np.ptp(found)) <= 1e-9 * float(np.abs(found).max())

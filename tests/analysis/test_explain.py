@@ -192,13 +192,13 @@ def test_moved_constraints_keep_their_sense():
     problem = tmsopt.Problem(
         tms, fixed=CHI_H_1, free=BOX, minimize="abscissa", constraints={"a": "Fr <= 2", "b": "1 - nu_H>=chi_B - 1"}
     )
-    values = problem.values({**CHI_H_1, "Fr": 2.0, "chi_B": 1.4, "lambda_s": 0.4})
+    values = problem.posed.values({**CHI_H_1, "Fr": 2.0, "chi_B": 1.4, "lambda_s": 0.4})
     for name, step in (("a", 0.5), ("b", -1e-5), ("a", -0.25)):
-        after = moved(problem, name, step)
-        assert after.conditions[name].comparison == problem.conditions[name].comparison
-        change = after.conditions[name](values) - problem.conditions[name](values)  # of left minus right
+        after = moved(problem.posed, name, step)
+        assert after.conditions[name].comparison == problem.posed.conditions[name].comparison
+        change = after.conditions[name](values) - problem.posed.conditions[name](values)  # of left minus right
         assert change == pytest.approx(-step, rel=1e-9)
-    assert moved(problem, "Fr.max", 1.0).free["Fr"] == (0.01, 11.0)
+    assert moved(problem.posed, "Fr.max", 1.0).free["Fr"] == (0.01, 11.0)
 
 
 # Rounding

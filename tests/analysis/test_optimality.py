@@ -195,10 +195,14 @@ def least_sampled(solution, sizes, count):
             for name, d in zip(problem.free, step / np.linalg.norm(step), strict=True):
                 lower, upper = problem.free[name]
                 moved[name] = min(max(moved[name] + size * d, lower), upper)
-            if any(c.violation(problem.values(moved)) > 0 for c in problem.conditions.values() if "==" not in c.text):
+            if any(
+                c.violation(problem.posed.values(moved)) > 0
+                for c in problem.posed.conditions.values()
+                if "==" not in c.text
+            ):
                 continue
             taken += 1
-            native = problem.parameter_set.native(moved)
+            native = problem.posed.parameter_set.native(moved)
             a = polynomial_60(**{n: native[n] for n in NATIVE})
             rises.append(float(abscissa_60(a)) - solution.abscissa)
     return min(rises)
@@ -292,7 +296,7 @@ def test_curvature_decides_where_the_slope_does_not(bend, verdict):
     if verdict == NOT_MINIMAL:
         moved = {n: found.better[n] for n in at}
         assert float(growth(**moved)) < float(growth())
-        assert asked.conditions["curve"].violation(asked.values(asked.ordered(moved))) < 1e-9
+        assert asked.posed.conditions["curve"].violation(asked.posed.values(asked.posed.ordered(moved))) < 1e-9
 
 
 # Invariance

@@ -129,7 +129,7 @@ def test_a_limit_is_violated_by_as_much_as_in_the_recheck():
     solution = replace(tmsopt.solve("problems/ep4.toml"), problem=problem)
     solution = replace(solution, parameters={**solution.parameters, "Fr": 2.2004})
     for row in rounded(solution, [(["Fr"], digits) for digits in (2, 3, 5)]):
-        checked = recheck(problem, {**solution.parameters, "Fr": float(row.written["Fr"])})
+        checked = recheck(problem.posed, {**solution.parameters, "Fr": float(row.written["Fr"])})
         assert dict(row.violations) == dict(checked.amounts)
         assert dict(row.violations) == ({"speed": pytest.approx(4e-4**4, rel=1e-9)} if row.digits < 4 else {})
 

@@ -91,8 +91,8 @@ def test_limits_are_moved_outwards():
         minimize="Fr",
     )
     wider = moved(problem, {"a": 1.0, "b": 0.5, "c": -1.0, "Fr.max": 0.25, "chi_B.min": 0.5})
-    values = wider.values(wider.ordered({"Fr": 2.0, "chi_B": 2.0, "lambda_s": 0.5}))
-    assert [c.violation(values) for c in wider.conditions.values()] == [0, 0, 0]
+    values = wider.posed.values(wider.posed.ordered({"Fr": 2.0, "chi_B": 2.0, "lambda_s": 0.5}))
+    assert [c.violation(values) for c in wider.posed.conditions.values()] == [0, 0, 0]
     assert wider.free["Fr"] == (1, 2.25)
     assert wider.free["chi_B"] == (0.5, 2)
 

@@ -201,8 +201,8 @@ def test_a_band_of_a_chain_is_proved_stable():
     problem = Problem(model=of, fixed=fixed, tolerances={"k1": 0.05})
     k = np.linspace(0.95, 1.05, 2001)
     least = float(roots(stacked(of, fixed | {"k1": k})).real.max())
-    assert cover(problem, fixed, least).proven
-    assert not cover(problem, fixed, least - 1e-3, boxes=50).proven
+    assert cover(problem.posed, fixed, least).proven
+    assert not cover(problem.posed, fixed, least - 1e-3, boxes=50).proven
 
 
 def scatter(z, multiple, others):
@@ -281,7 +281,9 @@ def test_the_instant_bound_of_a_high_power_of_one_parameter():
 
     of = model(("x",), 2, lambda x: [1, 2, 2 + chebyshev(x)])
     problem = Problem(model=of, free={"x": (-0.95, 0.95)}, minimize="abscissa")
-    assert omega0_bound(problem, -1.0).value <= -np.sqrt(3) * (1 - 1e-12)
+    assert omega0_bound(problem.posed, -1.0).value <= -np.sqrt(3) * (1 - 1e-12)
     steep = model(("x",), 2, lambda x: [1, 2, 2 + chebyshev(x) * chebyshev(x)])
     problem = Problem(model=steep, free={"x": (-0.95, 0.95)}, minimize="abscissa")
-    assert omega0_bound(problem, -1.0).value <= -np.sqrt(3) * (1 - 1e-12)  # too high a degree to fit: never above it
+    assert omega0_bound(problem.posed, -1.0).value <= -np.sqrt(3) * (
+        1 - 1e-12
+    )  # too high a degree to fit: never above it

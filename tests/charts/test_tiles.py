@@ -43,7 +43,7 @@ def test_quantities_are_those_of_every_design(whole):
     assert np.array_equal(whole.layers["settled"], whole.layers["abscissa"] * Fr, equal_nan=True)
     assert np.all(whole.layers["one"] == 1)
     for i, j in ((0, 0), (22, 36), (11, 5)):
-        one = PLANE.values(PLANE.ordered({"Fr": float(Fr[i, j]), "lambda_s": float(tilt[i, j])}))
+        one = PLANE.posed.values(PLANE.posed.ordered({"Fr": float(Fr[i, j]), "lambda_s": float(tilt[i, j])}))
         wanted = float(Fr[i, j]) - float(one["Fr_c"])
         assert whole.layers["second"][i, j] == one["a2"]
         assert whole.layers["excess"][i, j] == wanted or (np.isnan(wanted) and np.isnan(whole.layers["excess"][i, j]))
@@ -63,9 +63,9 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
         flat = chart(plane, axes[:2], points=points[:2], boundaries=False)
         for name in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied"):
             assert found.layers[name][k].tobytes() == getattr(flat, name).tobytes()
-        function = array_function(plane, {"x": "Fr_c"})
+        function = array_function(plane.posed, {"x": "Fr_c"})
         x, y = np.meshgrid(*flat.grid)
-        critical = function(plane.ordered({"chi_B": x, "lambda_s": y}))["x"]
+        critical = function(plane.posed.ordered({"chi_B": x, "lambda_s": y}))["x"]
         assert np.array_equal(found.layers["x"][k], critical, equal_nan=True)
     best = found.to_json()["least_abscissa"]
     assert best["value"] == found.layers["abscissa"].min()

@@ -243,8 +243,8 @@ def test_a_design_has_its_status_and_its_parameters(name):
     assert data["structure"] in read.badges
     head, *rows = read.tables["Parameters of the design"]
     listed = {row[0]: dict(zip(head, row, strict=True)) for row in rows}
-    for of in solution.problem.parameter_set.parameters:
-        unit, row = unit_of(solution.problem, of.name), listed[of.name]
+    for of in solution.problem.posed.parameter_set.parameters:
+        unit, row = unit_of(solution.problem.posed, of.name), listed[of.name]
         assert shown(row["value"], solution.parameters[of.name], unit.one), of.name
         assert row.get("unit", "") == unit.text
         assert row["meaning"] == of.meaning

@@ -103,7 +103,7 @@ def test_bands_of_speed_are_the_same_without_what_happens_at_their_ends(file):
     """The box of the speed plays no part in them."""
     design = tmsopt.solve(f"problems/{file}.toml")
     name = tmsopt.speeds(design).parameter
-    allowed = design.problem.parameter_set[name].range
+    allowed = design.problem.posed.parameter_set[name].range
     assert stable_speeds(design) == tmsopt.speeds(design, between=(allowed.lower, allowed.upper)).stable != ()
 
 

@@ -191,7 +191,7 @@ def test_four_modes_merge_in_one_at_an_ep4(file):
     """At the real root: (M s² + D s + K) (1, κ) = 0, κ = −L₁₁/L₁₂ from the first row alone."""
     motion = tmsopt.simulate(PROBLEMS / file)
     (mode,) = motion.modes
-    model, of = motion.problem.model, motion.problem.parameter_set
+    model, of = motion.problem.model, motion.problem.posed.parameter_set
     assert model.pencil is not None
     assert of.rate is None or of.rate(motion.parameters) == 1
     M, D, K = (np.array(m, dtype=float) for m in model.pencil(of.native(motion.parameters)))

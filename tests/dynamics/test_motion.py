@@ -276,7 +276,7 @@ def test_a_stated_system_starts_by_the_names_of_its_states():
     assert list(tmsopt.simulate(spring).columns) == ["t", "q1", "q1dot"]
     flow = from_matrices(A=[["a", 1], [0, -2]])
     assert list(tmsopt.simulate(tmsopt.Problem(flow, fixed={"a": -1.0})).columns) == ["t", "x1", "x2"]
-    assert system_of(spring, {"c": 0.2}).A.tolist() == [[0, 1], [-1, -0.2]]
+    assert system_of(spring.posed, {"c": 0.2}).A.tolist() == [[0, 1], [-1, -0.2]]
 
 
 def test_growth_beyond_all_numbers_is_refused():

@@ -306,7 +306,7 @@ def test_the_omega0_bound_is_never_above_the_true_one():
             }
             free = {"v": (1.0, 5.0), "x_B": (0.4, 1.4)}
         problem = tmsopt.Problem(model=tms, fixed=fixed, free=free, minimize="abscissa")
-        bound = omega0_bound(problem, 0.0)
+        bound = omega0_bound(problem.posed, 0.0)
         with mp.workdps(DIGITS):
             anywhere = native_60({**fixed, **{name: lower for name, (lower, _) in free.items()}})
             a0, *_, a4 = polynomial_60(**anywhere)

@@ -97,7 +97,7 @@ def test_roots_near_a_4_fold_one_are_those_of_the_doubles():
     """Roots −1 ± 0.005 i and −1.003 ± 0.01 i are no multiple ones to 1e-11; numeric ones are off by 1e-9."""
     a = np.polymul([1, 2, 1 + 2.5e-5], [1, 2.006, 1.003**2 + 1e-4])
     fixed = dict(zip("abcd", a[1:].tolist(), strict=True))
-    found = recheck(tmsopt.Problem(from_coefficients([1, *"abcd"]), fixed=fixed), fixed)
+    found = recheck(tmsopt.Problem(from_coefficients([1, *"abcd"]), fixed=fixed).posed, fixed)
     exact = float(max(z.real for z in roots_60([mp.mpf(1), *map(mp.mpf, fixed.values())])))
     assert found.structure.abscissa == pytest.approx(exact, abs=1e-14)
     assert found.realised == pytest.approx(exact, abs=1e-14)
@@ -130,5 +130,5 @@ def test_a_triple_root_that_is_there_for_rounding_alone_does_not_exist(off, ther
     model = from_coefficients([1, "2*z + c", "1 + 2*z*c", "c"])
     problem = tmsopt.Problem(model, free={"z": (0.05, 3.0), "c": (0.1, 3.0)}, minimize="abscissa")
     design = {"z": 1 - off**2 / 6 if off < 0.1 else 1.0, "c": 1 + off}
-    assert max(r.multiplicity for r in problem.values(design)["structure"].roots) == (2 if off == 1.0 else 3)
-    assert multiple_roots_exist(problem, design) is there
+    assert max(r.multiplicity for r in problem.posed.values(design)["structure"].roots) == (2 if off == 1.0 else 3)
+    assert multiple_roots_exist(problem.posed, design) is there

@@ -251,7 +251,7 @@ def sides(forward, backward):
 )
 def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
     end = front_data.FrontPoint(end, None, ())
-    ask = subproblems.FrontSolver(problem(free=TILTED), options.Options(), ends=(end,), easier={0: halves})
+    ask = subproblems.FrontSolver(problem(free=TILTED).posed, options.Options(), ends=(end,), easier={0: halves})
     assert ask._hopeless(subproblems.subproblem(ask, k, limits), ()) == out
 
 
@@ -369,7 +369,7 @@ def test_faults_are_named(changes, words):
 
 
 def test_each_verb_refuses_the_other_kind_of_problem():
-    assert problem().sense == "pareto"
+    assert problem().posed.sense == "pareto"
     with pytest.raises(InputError, match=r"tmsopt\.pareto"):
         tmsopt.solve(problem())
     with pytest.raises(InputError, match="no front is asked for"):

@@ -62,7 +62,7 @@ def test_never_where_a_grid_has_a_stable_design(degree):
     ],
 )
 def test_clearly_unstable(coefficients, ends, sign):
-    assert none_stable(stated([sign * c for c in coefficients], {"x": ends}))
+    assert none_stable(stated([sign * c for c in coefficients], {"x": ends}).posed)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -78,10 +78,10 @@ def test_clearly_unstable(coefficients, ends, sign):
 )
 def test_one_stable_design_in_a_corner_is_enough(coefficients, ends, sign):
     """The same up to a hair beyond their edge."""
-    assert not none_stable(stated([sign * c for c in coefficients], {"x": ends}))
+    assert not none_stable(stated([sign * c for c in coefficients], {"x": ends}).posed)
 
 
 def test_of_several_cases_and_of_no_box_nothing_is_said():
-    assert not none_stable(stated([1, x - 2, 1 + y], {"x": (0, 1)}, scenarios={"y": [0.0, 1.0]}))
+    assert not none_stable(stated([1, x - 2, 1 + y], {"x": (0, 1)}, scenarios={"y": [0.0, 1.0]}).posed)
     fixed = tmsopt.Problem(from_coefficients([1, x - 2, 1]), fixed={"x": 1.0}, minimize="abscissa")
-    assert not none_stable(fixed)
+    assert not none_stable(fixed.posed)

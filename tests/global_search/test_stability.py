@@ -49,7 +49,7 @@ def test_boxes_without_a_stable_design(coefficients, free, asked):
 @pytest.mark.parametrize("most", [3.0, 2.001])
 def test_a_stable_design_is_found(most):
     """Be it one in a thousand."""
-    found = any_stable(problem(DAMPED, {"x": (0, most)}), SECONDS)
+    found = any_stable(problem(DAMPED, {"x": (0, most)}).posed, SECONDS)
     assert found.any is True
     assert found.design is not None
     assert 2 < found.design["x"] <= most
@@ -58,7 +58,7 @@ def test_a_stable_design_is_found(most):
 @scip
 def test_limits_hold_for_what_is_found():
     found = any_stable(
-        problem(DAMPED, {"x": (0, 9)}, constraints={"most": "x**2 <= 5", "rest": "abscissa >= 1"}), SECONDS
+        problem(DAMPED, {"x": (0, 9)}, constraints={"most": "x**2 <= 5", "rest": "abscissa >= 1"}).posed, SECONDS
     )
     assert found.any is True
     assert found.design is not None
@@ -77,7 +77,7 @@ def test_limits_hold_for_what_is_found():
 def test_of_designs_on_the_axis_nothing_is_said(coefficients, most):
     """What is refuted is that roots may lie left of the axis or on it, and here they may."""
     began = time.perf_counter()
-    assert any_stable(problem(coefficients, {"x": (0, most)}), 60.0).any is None
+    assert any_stable(problem(coefficients, {"x": (0, most)}).posed, 60.0).any is None
     assert time.perf_counter() - began < 10  # and no time is spent on it
 
 
@@ -86,7 +86,7 @@ def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch):
     monkeypatch.setattr(
         SolverPool, "race", lambda self, tasks, tick=None: [Decision(INFEASIBLE, bound=1.0) for _ in tasks]
     )
-    assert any_stable(problem(DAMPED, {"x": (0, 3)}), SECONDS, known={"x": 1.0}) == Stability()
+    assert any_stable(problem(DAMPED, {"x": (0, 3)}).posed, SECONDS, known={"x": 1.0}) == Stability()
 
 
 @scip
@@ -102,12 +102,15 @@ def test_an_interrupt_goes_on(when, monkeypatch):
     monkeypatch.setattr(asking, "none_stable", lambda problem: False)
     monkeypatch.setattr(SolverPool, "race", stop)
     with pytest.raises(KeyboardInterrupt):
-        any_stable(problem(DAMPED, {"x": (0, 1)}), SECONDS, known={"x": 1.0})
+        any_stable(problem(DAMPED, {"x": (0, 1)}).posed, SECONDS, known={"x": 1.0})
 
 
 @scip
 def test_what_scip_cannot_take_is_left_undecided():
-    assert any_stable(problem(DAMPED, {"x": (0, 3)}, constraints={"huge": "exp(60*x) >= 1e10"}), SECONDS) == Stability()
+    assert (
+        any_stable(problem(DAMPED, {"x": (0, 3)}, constraints={"huge": "exp(60*x) >= 1e10"}).posed, SECONDS)
+        == Stability()
+    )
 
 
 def test_without_a_global_solver_nothing_is_asked(monkeypatch):

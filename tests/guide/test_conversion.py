@@ -81,7 +81,7 @@ def test_each_file_in_si_has_the_same_designs(name, tmp_path):
     new = tmsopt.load(file)
     assert (new.free, new.tolerances, new.scenarios, new.title) == (old.free, old.tolerances, old.scenarios, old.title)
     assert new.units == {n: u for n, u in old.units.items() if n in new.units}
-    middle = old.ordered({n: (0.4 * low + 0.6 * high) for n, (low, high) in old.free.items()})
+    middle = old.posed.ordered({n: (0.4 * low + 0.6 * high) for n, (low, high) in old.free.items()})
     one, other = old.values(middle), new.values({**new.fixed, **middle})
     rate = math.sqrt(middle["g"] / middle["w"])
     for limit in old.constraints:
@@ -122,7 +122,7 @@ def test_all_that_a_file_says_is_kept(tmp_path):
     new = tmsopt.load(file)
     assert new.model.name == "whipple"
     assert new.fixed["k_phi"] == -2
-    assert new.typed(new.fixed)["x_H"] == "10/9"
+    assert new.posed.typed(new.fixed)["x_H"] == "10/9"
     assert "[feedback]" in text
     assert (new.free, new.start, new.tolerances) == (old.free, old.start, old.tolerances)
     assert new.minimize == "abscissa"

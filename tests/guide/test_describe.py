@@ -42,7 +42,7 @@ def test_a_file_is_described_by_every_name_that_it_may_use(path):
     if "study" not in path.stem:
         problem = tmsopt.load(path)
         hidden = () if problem.model.carrier is None else problem.model.coefficient_names()
-        assert names(found) == set(problem.vocabulary) - set(hidden)
+        assert names(found) == set(problem.posed.vocabulary) - set(hidden)
         assert (found.title, found.model) == (problem.title, problem.model.name)
         assert dict(found.asked.get("constraints", {})) == problem.constraints
     assert max(map(len, str(found).splitlines())) <= 100

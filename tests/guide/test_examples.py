@@ -34,7 +34,7 @@ def test_a_new_problem_solves_with_every_hint_taken(kind, tmp_path):
     assert len(offered) >= 2
     for line in offered:
         file.write_text(text.replace('minimize = "abscissa"\n', f"{line}\n"), encoding="utf-8")
-        assert tmsopt.load(file).sense == line.split(" = ")[0]
+        assert tmsopt.load(file).posed.sense == line.split(" = ")[0]
 
 
 def test_the_tables_that_the_new_robot_offers_are_read(tmp_path):

@@ -21,7 +21,7 @@ def row(number, study=STUDY, **given):
     told = {"status": "optimal", "abscissa": -1 / (1 + number)} | given
     if told["status"] not in ("failed", "quarantined"):
         given = {**study.problem.fixed, **varied}
-        told = {"parameters": Table({n: given.get(n, 1.0) for n in study.problem.parameter_set.names})} | told
+        told = {"parameters": Table({n: given.get(n, 1.0) for n in study.problem.posed.parameter_set.names})} | told
     return Row(number, study.seed_of(number), varied, **told)
 
 

@@ -119,7 +119,7 @@ def test_quantities_in_layers_are_walked_once_each():
     """a ← (a + b)/2, b ← (a − b)/2 multiplies (a, b) by a matrix whose square is 1/2."""
     began = time.process_time()
     model = models.from_coefficients([1, "a0 + b0"], quantities=layers(40, "({a} + {b})/2", "({a} - {b})/2"))
-    values = tmsopt.Problem(model=model, fixed={"k": 3.0}).values({"k": 3.0})
+    values = tmsopt.Problem(model=model, fixed={"k": 3.0}).posed.values({"k": 3.0})
     assert (float(values["a0"]), float(values["b0"])) == pytest.approx((3 * 2.0**-20, 4 * 2.0**-20), rel=1e-12)
     assert time.process_time() - began < 2
     with pytest.raises(models.Unfit, match="has the degree"):
@@ -187,7 +187,7 @@ def test_sizes_of_parameters_whose_products_are_no_doubles_are_refused(value):
 @pytest.mark.parametrize("mass", [5e-324, 1e-310, 1e-200])
 def test_a_mass_next_to_nought_is_a_singular_mass_matrix(mass):
     """Without a warning, of which pytest would make an error."""
-    assert _light(mass).values({"c": 0.1, "d": 1.0})["structure"].name == "undecided"
+    assert _light(mass).posed.values({"c": 0.1, "d": 1.0})["structure"].name == "undecided"
 
 
 def _light(mass):

@@ -210,7 +210,7 @@ c = 3
 k = 4
 """,
     )
-    values = problem.values({"c": 3.0, "k": 4.0})
+    values = problem.posed.values({"c": 3.0, "k": 4.0})
     assert problem.model.sets[0].names == ("c", "k")
     assert [float(values[n]) for n in ("w", "z", "half", "a1", "a2")] == [2, 0.75, 0.375, 3, 4]
 
@@ -403,7 +403,7 @@ a3 = 0.5
     chart = tmsopt.chart(problem, points=(3, 3))
     expected = [[np.roots([1, x + 1, y, 0.5]).real.max() for x in (1, 2, 3)] for y in (2, 3, 4)]
     assert np.allclose(chart.abscissa, expected, rtol=1e-12)
-    values = problem.values({"a1": 1.0, "a2": 2.0, "a3": 0.5})
+    values = problem.posed.values({"a1": 1.0, "a2": 2.0, "a3": 0.5})
     assert [float(values[n]) for n in ("a0", "a1", "coefficient0", "coefficient1")] == [2, 1, 1, 2]
 
 
@@ -467,7 +467,7 @@ def test_small_roots_of_a_stiff_system_are_not_called_double():
     problem = tmsopt.Problem(model=model, fixed={"c": 1, "d": 6})
     for off in (1e-4, 1e-8):
         slow = np.sqrt(8) * (1 + off)
-        found = problem.values({"c": slow, "d": 6.0})["structure"]
+        found = problem.posed.values({"c": slow, "d": 6.0})["structure"]
         assert found.name == "real"
         assert found.abscissa == pytest.approx(-slow / 2 + np.sqrt(slow**2 / 4 - 2), abs=1e-7)
 
@@ -516,13 +516,13 @@ def test_matrices_take_the_texts_that_a_file_takes():
     by_symbols = from_matrices([[1, 0], [0, mu]], [[c, -c], [-c, c]], [[1 + k, -k], [-k, k]])
     design = {"mu": 0.1, "c": 0.05, "w": 0.9}
     assert stated.coefficients(design) == pytest.approx(by_symbols.coefficients(design), rel=1e-15)
-    values = tmsopt.Problem(stated, fixed=design).values(design)
+    values = tmsopt.Problem(stated, fixed=design).posed.values(design)
     assert values["half"] == pytest.approx(0.05 / (4 * 0.1 * 0.9), rel=1e-15)
     mixed = from_matrices(
         M=np.array([[1, 0], [0, mu]]), D=drag, K=texts["K"], quantities={"zeta": c / (2 * mu * w), "half": "zeta/2"}
     )
     assert set(mixed.sets[0].names) == set(design)
-    assert tmsopt.Problem(mixed, fixed=design).values(design)["half"] == values["half"]
+    assert tmsopt.Problem(mixed, fixed=design).posed.values(design)["half"] == values["half"]
     assert pickle.loads(pickle.dumps(stated)) is stated
     row = from_coefficients(["1", "c", "k1 + 2"])
     assert [float(x) for x in row.coefficients({"c": 3.0, "k1": 1.0})] == [1, 3, 3]

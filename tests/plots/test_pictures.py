@@ -107,7 +107,7 @@ def test_a_name_stands_at_its_own_curve(whipple, part):
     data = tmsopt.growth(whipple)
     ax = (plots.draw_growth if part == "growth" else plots.draw_frequencies)(data, ax_of())
     names = import_module("tmsopt.plots.growth")._names
-    ruler = import_module("tmsopt.plots.labels").scale_over(data.problem, data.over)
+    ruler = import_module("tmsopt.plots.labels").scale_over(data.problem.posed, data.over)
     kind = "real" if part == "growth" else "imag"
     found = names(ax, data, ruler, kind, ["weave", "capsize", "castering"])
     assert sorted(words(ax)) == sorted(n.text for n in found)

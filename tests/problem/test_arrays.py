@@ -33,7 +33,9 @@ SI = Problem(
 def grid(problem, rows=7, columns=11):
     """Every parameter: the first free one along the columns, the second along the rows."""
     (first, ends), (second, others) = problem.free.items()
-    return problem.ordered({first: np.linspace(*ends, columns)[None, :], second: np.linspace(*others, rows)[:, None]})
+    return problem.posed.ordered(
+        {first: np.linspace(*ends, columns)[None, :], second: np.linspace(*others, rows)[:, None]}
+    )
 
 
 def single(problem, columns, i, j, shape=(7, 11)):
@@ -77,7 +79,7 @@ EXACT_VALUES = {
 
 def test_every_operation_of_the_language_is_right():
     """A correctly rounded operation is within 1/2 ulp, NumPy's functions within 2, as its own tests demand."""
-    found = array_function(NATIVE, dict(zip(EXACT_VALUES, EXACT_VALUES, strict=True)))
+    found = array_function(NATIVE.posed, dict(zip(EXACT_VALUES, EXACT_VALUES, strict=True)))
     columns = grid(NATIVE)
     values = found(columns)
     with mpmath.workdps(50):
@@ -92,12 +94,12 @@ def test_every_operation_of_the_language_is_right():
 @pytest.mark.parametrize("problem", [NATIVE, SI], ids=["native", "SI"])
 def test_every_quantity_is_that_of_one_design_at_a_time(problem):
     of_roots = ("abscissa", "damping_ratio", "angular_frequency", "decay_rate", "decay_time", "frequency")
-    names = [n for n in problem.vocabulary if n not in of_roots]
-    written = array_function(problem, dict(zip(names, names, strict=True)))
+    names = [n for n in problem.posed.vocabulary if n not in of_roots]
+    written = array_function(problem.posed, dict(zip(names, names, strict=True)))
     columns = grid(problem)
     values = written(columns)
     for i, j in np.ndindex(7, 11):
-        one = Values(tms, problem.parameter_set, single(problem, columns, i, j), extra=(NO_RADIUS,))
+        one = Values(tms, problem.posed.parameter_set, single(problem, columns, i, j), extra=(NO_RADIUS,))
         for name in names:
             found = float(np.broadcast_to(values[name], (7, 11))[i, j])
             assert found == pytest.approx(float(one[name]), rel=1e-12, nan_ok=True), name
@@ -106,11 +108,11 @@ def test_every_quantity_is_that_of_one_design_at_a_time(problem):
 def test_constraints_are_those_of_one_design_at_a_time():
     """Forms of every kind, left minus right; the powers in them cost up to 2 ulp of a side."""
     texts = {f"{text} {sign} 0.7": sign for text, sign in TEMPLATES}
-    conditions = {t: parse_comparison(t, NATIVE.vocabulary) for t in texts}
+    conditions = {t: parse_comparison(t, NATIVE.posed.vocabulary) for t in texts}
     columns = grid(NATIVE)
-    values = array_function(NATIVE, conditions)(columns)
+    values = array_function(NATIVE.posed, conditions)(columns)
     for i, j in np.ndindex(7, 11):
-        one = NATIVE.values(single(NATIVE, columns, i, j))
+        one = NATIVE.posed.values(single(NATIVE, columns, i, j))
         for text, condition in conditions.items():
             left, right = condition.sides(one)
             found = float(np.broadcast_to(values[text], (7, 11))[i, j])
@@ -132,13 +134,13 @@ def test_constraints_are_those_of_one_design_at_a_time():
 def test_nan_where_a_value_does_not_exist(text, exists):
     tilts = np.array([-1.1, -0.5, -0.25, 0.25, 0.5, 1.2])[:, None]
     columns = grid(NATIVE) | {"lambda_s": tilts}
-    found = np.broadcast_to(array_function(NATIVE, {"x": text})(columns)["x"], (6, 11))
+    found = np.broadcast_to(array_function(NATIVE.posed, {"x": text})(columns)["x"], (6, 11))
     assert np.array_equal(np.isfinite(found[:, 0]), [exists(s) for s in tilts.ravel()])
 
 
 def test_a_difference_keeps_its_roundings():
     """(x + y) − y is not x."""
-    found = array_function(NATIVE, {"x": "(lambda_s + 1e16) - 1e16"})(grid(NATIVE) | {"lambda_s": 1.5})
+    found = array_function(NATIVE.posed, {"x": "(lambda_s + 1e16) - 1e16"})(grid(NATIVE) | {"lambda_s": 1.5})
     assert found["x"] == 2.0
 
 
@@ -146,12 +148,12 @@ def test_a_difference_keeps_its_roundings():
 
 
 def test_what_depends_on_one_axis_stays_on_it():
-    found = array_function(NATIVE, {"a3": "a3", "a4": "a4", "a2": "a2", "mass": "mu * zeta_H"})(grid(NATIVE))
+    found = array_function(NATIVE.posed, {"a3": "a3", "a4": "a4", "a2": "a2", "mass": "mu * zeta_H"})(grid(NATIVE))
     assert {n: np.shape(v) for n, v in found.items()} == {"a3": (1, 11), "a4": (7, 1), "a2": (7, 11), "mass": ()}
 
 
 def test_root_quantities_are_given_or_computed():
-    found, columns = array_function(NATIVE, {"x": "2 * abscissa", "y": "Fr"}), grid(NATIVE)
+    found, columns = array_function(NATIVE.posed, {"x": "2 * abscissa", "y": "Fr"}), grid(NATIVE)
     alpha = np.random.default_rng(0).normal(size=(7, 11))
     assert np.array_equal(found(columns | {"abscissa": alpha})["x"], 2 * alpha)
     z = roots(np.stack(np.broadcast_arrays(*tms.coefficients(columns)), axis=-1))
@@ -162,7 +164,7 @@ def test_a_formula_that_asks_for_its_numbers_is_refused_in_words():
     odd = Quantity("steps", "1", "Fr where it is positive", "", lambda v: v["Fr"] if v["Fr"] > 0 else 0)
     model = dataclasses.replace(tms, quantities=(*tms.quantities, odd))
     with pytest.raises(TypeError, match=r"write choose\(condition, a, b\)"):
-        array_function(dataclasses.replace(NATIVE, model=model), {"x": "steps * lambda_s"})
+        array_function(dataclasses.replace(NATIVE, model=model).posed, {"x": "steps * lambda_s"})
 
 
 # Programs
@@ -172,7 +174,7 @@ def test_a_formula_that_asks_for_its_numbers_is_refused_in_words():
 def test_blocks_change_nothing(size, monkeypatch):
     """Blocks are parts of a row, or some rows."""
     written, columns = (
-        array_function(NATIVE, {n: n for n in ("a2", "a4", "Fr_c", "ballast_rear")}),
+        array_function(NATIVE.posed, {n: n for n in ("a2", "a4", "Fr_c", "ballast_rear")}),
         grid(NATIVE, 40, 30),
     )
     whole = written(columns)
@@ -186,7 +188,7 @@ def test_inputs_are_left_as_they_are_and_may_be_read_only():
     for array in (columns["Fr"], columns["lambda_s"]):
         array.flags.writeable = False
     alpha = np.broadcast_to(np.linspace(-1, 1, 11), (7, 11))
-    found = array_function(problem, {"x": "abscissa * Fr - lambda_s", "y": "abscissa"})
+    found = array_function(problem.posed, {"x": "abscissa * Fr - lambda_s", "y": "abscissa"})
     values = found(columns | {"abscissa": alpha})
     assert np.array_equal(values["x"], alpha * columns["Fr"] - columns["lambda_s"])
     assert np.array_equal(values["y"], alpha)
@@ -206,4 +208,4 @@ def test_an_empty_output_is_zero():
 
 def test_unknown_names_are_refused():
     with pytest.raises(InputError, match=r"quantities\.x: .*unknown name 'Froude'"):
-        array_function(NATIVE, {"x": "Froude"})
+        array_function(NATIVE.posed, {"x": "Froude"})

@@ -64,8 +64,8 @@ def test_file_and_python_are_one_problem(written):
     assert loaded.scenarios == stated.scenarios == {"Fr": Band(1.2, 2.4, 3)}
     assert replace(loaded, title="") == stated
     assert stated.fixed["Fr"] == pytest.approx(1.8)  # the middle, where nothing else is written
-    assert sorted({c.at["Fr"] for c in stated.cases}) == pytest.approx([1.2, 1.8, 2.4])
-    assert {tuple(c.offset.values()) for c in stated.cases} == set(product((-0.005, 0.005), (-0.01, 0.01)))
+    assert sorted({c.at["Fr"] for c in stated.posed.cases}) == pytest.approx([1.2, 1.8, 2.4])
+    assert {tuple(c.offset.values()) for c in stated.posed.cases} == set(product((-0.005, 0.005), (-0.01, 0.01)))
     assert problem({**FIXED, "Fr": 2.2}, scenarios={"Fr": [1.2, 2.4]}).fixed["Fr"] == 2.2
 
 
@@ -97,7 +97,7 @@ z_H = "5 mm"
     built = written(si, "")
     assert built.scenarios == {"v": Band(2.5, 5.0, 2), "m_H": (0.5, 2)}
     assert built.tolerances == pytest.approx({"z_H": 0.005})
-    assert len(built.cases) == 2 * 2 * 2
+    assert len(built.posed.cases) == 2 * 2 * 2
 
 
 FAULTS = [

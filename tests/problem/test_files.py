@@ -75,7 +75,7 @@ maximize = "v - v_c"
     assert problem.fixed["w"] == pytest.approx(1.1, rel=1e-15)
     assert problem.fixed["m_H"] == pytest.approx(0.5, rel=1e-15)
     assert problem.free["v"] == pytest.approx((5 / 3.6, 15 / 3.6), rel=1e-15)
-    assert problem.parameter_set.name == "SI"
+    assert problem.posed.parameter_set.name == "SI"
 
 
 def replaced(old, new):

@@ -133,8 +133,8 @@ def test_the_longest_chain_in_fractions(sizes):
 
 def judged(model, pattern, at):
     problem = tmsopt.Problem(model, free=dict.fromkeys(at, (-1.0, 1.0)), locate=pattern)
-    assert problem.pattern is not None
-    met = located_meetings(problem, problem.pattern, problem.ordered(at))[0]
+    assert problem.posed.pattern is not None
+    met = located_meetings(problem.posed, problem.posed.pattern, problem.posed.ordered(at))[0]
     return met.geometric, met.longest
 
 

@@ -38,7 +38,7 @@ def problem(**asked):
         "lambda_s": (-1.4, 1.4),
     }
     drop = asked.pop("drop", ())
-    return tmsopt.Problem(TMS, free={n: e for n, e in free.items() if n not in drop}, constraints=LIMITS, **asked)
+    return tmsopt.Problem(TMS, free={n: e for n, e in free.items() if n not in drop}, constraints=LIMITS, **asked).posed
 
 
 def judged(stated, drawn):
@@ -83,7 +83,7 @@ def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_
         tolerances={"x": 1.0},
         minimize="abscissa + x",
         constraints={"decay": "abscissa <= -0.5", "own": "x == 4", "all": "x - y >= 2"},
-    )
+    ).posed
     found = judgement.evaluate(stated, {"x": np.array([3.0, 4.0, 6.0])})
     # The objective: x is 1 more at worst, beside the worst abscissa.
     assert found.worth == pytest.approx([4.0, 4.0, 4.0], abs=1e-12)
@@ -96,7 +96,7 @@ def test_a_design_without_motion_is_none():
     model = from_coefficients([x, 1 + ca.log(y), 1])
     stated = tmsopt.Problem(
         model, free={"x": (-1.0, 1.0), "y": (0.0, 1.0)}, minimize="x", constraints={"own": "y <= 2"}
-    )
+    ).posed
     found = judgement.evaluate(stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])})
     assert np.isfinite(found.worth).tolist() == [False, False, True, False]
     assert found.excess.tolist() == [[np.inf, np.inf, 0.0, np.inf]]

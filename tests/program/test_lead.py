@@ -24,11 +24,11 @@ def asked(degree, objective):
 def test_any_design_has_such_factors(degree, objective, sign):
     """With a0 of either sign, small or not: a start meets all rows, and says of the roots what NumPy does."""
     problem, rng = asked(degree, objective), np.random.default_rng(degree)
-    nlp = formulate(problem, lead=sign)
+    nlp = formulate(problem.posed, lead=sign)
     names = nlp.variables[degree + 1 :]
     for a0 in (1.0, 0.3, 1e-2, 1e-3):
         a = sign * np.array([a0, *rng.uniform(0.5, 2, degree)])
-        x = initial_point(nlp, problem, dict(zip(NAMES, a.tolist(), strict=False)), False)
+        x = initial_point(nlp, problem.posed, dict(zip(NAMES, a.tolist(), strict=False)), False)
         rows = np.array(nlp.at(x)[1]).ravel()
         size = np.abs(x).max()
         assert np.all(rows >= np.array(nlp.row_lower) - 1e-9 * size)

@@ -82,7 +82,7 @@ def unsolved(asked, of):
 
 def is_closed(design):
     """Whether a bound is as it should be: proved by SCIP, on the right side, and not further than it says."""
-    bound, sense = design.bound, -1 if design.problem.sense == "maximize" else 1
+    bound, sense = design.bound, -1 if design.problem.posed.sense == "maximize" else 1
     gap = sense * (design.value - bound.value)
     assert bound.proven
     assert bound.method == "scip"

@@ -86,16 +86,16 @@ def test_constant_product_and_constant_mean(degree):
     """With aₙ = c the bound is ω0 = −c^(1/n), with a1 = c the mean of the roots, −c/n."""
     last = boxed(free_polynomial(degree, **{f"a{degree}": lambda a: 3 + 0 * a[1]}), minimize="abscissa")
     mean = boxed(free_polynomial(degree, a1=lambda a: 3 + 0 * a[2]), minimize="abscissa")
-    assert relation_bound(last) == pytest.approx(-(3 ** (1 / degree)), rel=1e-15)
-    assert omega0_bound(last, math.inf).value == pytest.approx(-(3 ** (1 / degree)), rel=1e-14)
-    assert relation_bound(mean) == pytest.approx(-3 / degree, rel=1e-15)
+    assert relation_bound(last.posed) == pytest.approx(-(3 ** (1 / degree)), rel=1e-15)
+    assert omega0_bound(last.posed, math.inf).value == pytest.approx(-(3 ** (1 / degree)), rel=1e-14)
+    assert relation_bound(mean.posed) == pytest.approx(-3 / degree, rel=1e-15)
 
 
 def test_of_two_relations_the_one_without_the_leading_coefficient_counts_too():
     """a₃ = 100 and a₄ = 1: 100 = −Σ Re 1/sₖ ≤ 4/d where all Re sₖ ≤ −d < 0; either relation alone says far less."""
     a, b = symbols("a b")
     both = boxed(from_coefficients([1, a, b, 100, 1]), 0.0, 200.0, minimize="abscissa")
-    assert relation_bound(both) == pytest.approx(-0.04, rel=1e-15)
+    assert relation_bound(both.posed) == pytest.approx(-0.04, rel=1e-15)
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 6, 9])
@@ -110,7 +110,7 @@ def test_no_polynomial_of_a_family_with_one_relation_is_below_its_bound(degree):
         def rest(a, b=b):
             return -(b[0] + sum(b[k] * a[k] for k in range(2, degree + 1))) / b[1]
 
-        bound = relation_bound(boxed(free_polynomial(degree, a1=rest), minimize="abscissa"))
+        bound = relation_bound(boxed(free_polynomial(degree, a1=rest), minimize="abscissa").posed)
         drawn = rng.normal(size=(200, degree + 1)) * 3.0 ** rng.integers(-2, 3, (200, 1))
         binomial = np.array([math.comb(degree, k) * (-bound) ** k for k in range(degree + 1)])
         drawn[:100] = binomial * (1 + 0.1 * drawn[:100])
@@ -127,9 +127,9 @@ def test_what_is_no_relation():
     a, b = symbols("a b")
     for coefficients in ([1, a, b], [1, ca.fabs(a), b, a * b], [1, ca.sin(b) * 0 + ca.sqrt(2 + b), a]):
         model = from_coefficients(coefficients)
-        assert relation_bound(boxed(model, 0.5, 2.0, minimize="abscissa")) == -math.inf
+        assert relation_bound(boxed(model, 0.5, 2.0, minimize="abscissa").posed) == -math.inf
     piecewise = from_coefficients([1, ca.fabs(a - 1.999), b, 1.999 - a])  # a1 = a3 nearly everywhere in the box
-    assert relation_bound(boxed(piecewise, 0.5, 2.0, minimize="abscissa")) == -math.inf
+    assert relation_bound(boxed(piecewise, 0.5, 2.0, minimize="abscissa").posed) == -math.inf
 
 
 # The product of the roots of models that users state
@@ -151,7 +151,7 @@ def test_the_bound_by_the_product_of_the_roots_holds_for_any_formula(last):
     problem = boxed(model, 0.0, 1.5, minimize="abscissa")
     grid = np.meshgrid(np.linspace(0, 1.5, 301), np.linspace(0, 1.5, 301))
     largest = np.abs(model.coefficients(dict(zip("xy", grid, strict=True)))[-1]).max()
-    bound = omega0_bound(problem, math.inf).value
+    bound = omega0_bound(problem.posed, math.inf).value
     assert -math.inf < bound <= -(largest ** (1 / 3)) * (1 - 1e-15)
 
 
@@ -161,15 +161,15 @@ def test_more_parameters_than_have_corners():
     more = {f"b{k}": (0.0, 1.0) for k in range(3)}
     extra = sum(ca.SX.sym(n) for n in more)
     wide = boxed(free_polynomial(12, a1=lambda a: a[2] * extra), 0.0, 1.0, minimize="abscissa")
-    assert omega0_bound(problem, math.inf).value == pytest.approx(-1.0, rel=1e-14)
-    assert -1 - 1e-8 <= omega0_bound(wide, math.inf).value <= -1  # balls have radii of 30 bits
+    assert omega0_bound(problem.posed, math.inf).value == pytest.approx(-1.0, rel=1e-14)
+    assert -1 - 1e-8 <= omega0_bound(wide.posed, math.inf).value <= -1  # balls have radii of 30 bits
 
 
 # Branch and bound
 
 
 def verdict(problem, limit):
-    question = Question(problem, limit=limit)
+    question = Question(problem.posed, limit=limit)
     return {SCIP.decide(task(question.program(sign), 20.0)).verdict for sign in question.signs()}
 
 
@@ -235,7 +235,7 @@ def test_patterns_are_excluded_or_found_in_any_unit(most, told):
     problem = tmsopt.Problem(
         model, free={"a": (1.0, most), "b": (0.0, 20.0), "c": (0.0, 20.0), "d": (0.0, 20.0)}, locate="EP5"
     )
-    assert {SCIP.decide(task(Question(problem, unit=128.0).program(1), 20.0)).verdict} == {told}
+    assert {SCIP.decide(task(Question(problem.posed, unit=128.0).program(1), 20.0)).verdict} == {told}
 
 
 @pytest.mark.slow
@@ -279,7 +279,7 @@ def test_parameters_may_have_the_names_of_unknowns(names):
     model = from_coefficients([1, *symbols(names)])
     stored = {n: float(c) for n, c in zip(names.split(), exact[1:], strict=True)}
     problem = boxed(model, -5.0, 5.0, locate="EP2+CEP2")
-    proof = prove_design(problem, stored, "pair", 20)
+    proof = prove_design(problem.posed, stored, "pair", 20)
     assert (proof.proved, proof.pattern, len(proof.moved)) == (True, "EP2+CEP2", 3)
     found = {u.rpartition(".")[2]: x for u, x in proof.unknowns.items()}
     with mp.workdps(20):  # three coefficients are moved; the others are held at their decimals, 1e-16 off
@@ -292,7 +292,7 @@ def test_twelve_equal_roots():
     model = free_polynomial(12, a1=lambda a: 4 + 0 * a[2])
     stored = {f"a{k}_": math.comb(12, k) / 3.0**k for k in range(2, 13)}
     problem = tmsopt.Problem(model, free={n: (x / 2, 2 * x) for n, x in stored.items()}, locate="EP12")
-    proof = prove_design(problem, stored, "EP12", 30)
+    proof = prove_design(problem.posed, stored, "EP12", 30)
     assert (proof.proved, proof.pattern, len(proof.moved)) == (True, "EP12", 11)
     with mp.workdps(40):
         assert holds(proof.unknowns["r"], -mp.mpf(1) / 3)
@@ -304,7 +304,7 @@ def test_what_is_no_multiple_root_is_refused():
     c = product([1, 1], [1, 1.001], [1, 1, 1], [1, 1, 2])
     names = [f"a{k}_" for k in range(1, 7)]
     problem = boxed(free_polynomial(6), -50.0, 50.0, locate="EP2")
-    proof = prove_design(problem, dict(zip(names, map(float, c[1:]), strict=True)), "EP2", 20)
+    proof = prove_design(problem.posed, dict(zip(names, map(float, c[1:]), strict=True)), "EP2", 20)
     assert not proof.proved
     assert "not the design's" in proof.reason
     assert proof.stable.holds is True

@@ -20,7 +20,7 @@ WEAVE = {**FIXED, "zeta_B": -0.1, "zeta_H": -0.1, "chi_B": 0.5}  # reversed rake
 def question(free, *constraints, base=None, **asked):
     fixed = {name: value for name, value in (base or FIXED).items() if name not in free}
     named = {f"c{k}": text for k, text in enumerate(constraints)}
-    return Question(Problem(tms, fixed, free, named, **(asked or {"minimize": next(iter(free))})))
+    return Question(Problem(tms, fixed, free, named, **(asked or {"minimize": next(iter(free))})).posed)
 
 
 def verdicts(asked):
@@ -75,7 +75,7 @@ def test_the_least_leading_coefficient_of_one_case_bounds_no_roots_of_another():
     free = {"zeta_H": (-1.0, -0.1), "chi_H": (0.9, 1.1)}
     scenarios = {"lambda_s": (0.1, 1.0), "zeta_B": (-1.0, -0.1)}
     problem = Problem(tms, fixed, free, scenarios=scenarios, minimize="abscissa")
-    asked = Question(problem, problem.cases, 50.0)
+    asked = Question(problem.posed, problem.posed.cases, 50.0)
     loose, tight = (asked.program(1, least) for least in (0.0, 0.1))
     ends = {name: (a, b) for name, a, b in zip(loose.variables, loose.upper, tight.upper, strict=True)}
     assert ends["x1.1"][0] == float("inf")

@@ -66,7 +66,11 @@ def on_ep_set(lambda_s, kind):
     free = {"Fr": (0.1, 6.0), "chi_B": (1.01, 3.0)}
     with mp.workdps(30):
         Fr = float(mp.sqrt(ep_set(mp.tan(mp.mpf(repr(lambda_s))))))
-    return tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, locate=kind), {**fixed, "Fr": Fr, "chi_B": SQRT2}
+    return tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, locate=kind).posed, {
+        **fixed,
+        "Fr": Fr,
+        "chi_B": SQRT2,
+    }
 
 
 # Closed forms in the balls
@@ -104,7 +108,7 @@ def test_the_optimised_benchmark_on_all_its_branches():
     assert len({round(p["Fr"], 6) for p in points}) == 4
     with mp.workdps(70):
         for parameters in points:
-            proof = prove_design(design.problem, parameters, "EP4", 40)
+            proof = prove_design(design.problem.posed, parameters, "EP4", 40)
             assert proof.proved
             assert proof.inside.holds is (parameters is design.parameters)
             root = -1 if parameters["Fr"] > 0 else 1
@@ -163,7 +167,7 @@ def test_uniqueness_ends_before_the_other_solution():
     proofs = []
     for T, kind in zip(sorted(tilts), ("2EP2", "CEP2"), strict=True):
         design = {**fixed, "chi_B": r, "lambda_s": math.atan(T)}
-        proof = prove_design(replace(problem, locate=kind), polished(design), kind)
+        proof = prove_design(replace(problem, locate=kind).posed, polished(design), kind)
         assert proof.proved, proof.reason
         assert float(proof.tangents["lambda_s"]) == pytest.approx(T, abs=1e-12)
         proofs.append(proof)
@@ -350,11 +354,11 @@ def test_a_rounded_design_is_refused(name, digits):
     """
     design = solved(name)
     rounded = {n: float(f"{v:.{digits}g}") for n, v in design.parameters.items()}
-    proof = prove_design(design.problem, rounded, design.structure)
+    proof = prove_design(design.problem.posed, rounded, design.structure)
     assert not proof.proved
     assert proof.stored
     assert "not the design's" in proof.reason or "finds no solution" in proof.reason
-    assert prove_design(design.problem, dict(design.parameters), design.structure).proved
+    assert prove_design(design.problem.posed, dict(design.parameters), design.structure).proved
 
 
 def test_a_fold_is_refused():
@@ -369,7 +373,7 @@ def test_a_fold_is_refused():
         fixed = {**HEIGHTS, "Fr": Fr}
         free = {"chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.4)}
         problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, locate="2EP2")
-        proof = prove_design(problem, {**fixed, "chi_B": r, "lambda_s": tilt}, "2EP2")
+        proof = prove_design(problem.posed, {**fixed, "chi_B": r, "lambda_s": tilt}, "2EP2")
         assert not proof.proved
         reasons.append(proof.reason)
     assert all("singular" in reason for reason in reasons)
@@ -381,7 +385,7 @@ def test_a_parameter_without_effect_is_no_unknown():
     fixed = {n: v for n, v in HEIGHTS.items() if n != "mu"} | {"chi_B": SQRT2}
     free = {"mu": (0.05, 0.2), "Fr": (1.0, 4.0), "lambda_s": (0.1, 1.0)}
     problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, locate="EP4")
-    proof = prove_design(problem, solved("ep4").parameters, "EP4")
+    proof = prove_design(problem.posed, solved("ep4").parameters, "EP4")
     assert not proof.proved
     assert "do not depend on mu" in proof.reason
 
@@ -423,7 +427,7 @@ def test_too_few_free_parameters():
         free={"lambda_s": (0.1, 1.0)},
         locate="EP4",
     )
-    proof = prove_design(problem, solved("ep4").parameters, "EP4")
+    proof = prove_design(problem.posed, solved("ep4").parameters, "EP4")
     assert not proof.proved
     assert "3 conditions and 1 free parameter" in proof.reason
     assert "free 2 more" in proof.reason
@@ -441,23 +445,23 @@ def test_numbers_in_the_unit_of_the_roots_have_it():
     """In SI the roots are per √(g/w); a dimensionless design has no such unit."""
     design = solved("point_mass_robot")
     proof = tmsopt.prove(design)
-    units = {row[0]: row[3] for row in tmsopt.report.number_rows(design.problem, proof)}
+    units = {row[0]: row[3] for row in tmsopt.report.number_rows(design.problem.posed, proof)}
     assert {units[n] for n in ("abscissa", "r")} == {"√(g/w)"}
     assert proof.to_json()["units"]["abscissa"] == "√(g/w)"
     r, times = float(proof.abscissa), math.sqrt(design.parameters["g"] / design.parameters["w"])
     assert r * times == pytest.approx(-design.quantities["decay_rate"], rel=1e-9)
-    free = tmsopt.report.number_rows(solved("ep4").problem, tmsopt.prove(solved("ep4")))
+    free = tmsopt.report.number_rows(solved("ep4").problem.posed, tmsopt.prove(solved("ep4")))
     assert {row[3] for row in free if row[0] in ("abscissa", "r")} == {""}
 
 
 def test_a_singular_mass_matrix_is_refused():
     """χ_H = 1 and λ_s = 0 make a0 = 0."""
     design = {**solved("ep4").parameters, "lambda_s": 0.0}
-    proof = prove_design(solved("ep4").problem, design, "EP4")
+    proof = prove_design(solved("ep4").problem.posed, design, "EP4")
     assert not proof.proved
     assert "a0" in proof.reason
     assert proof.stable.holds is None
-    tiny = prove_design(solved("ep4").problem, {**design, "lambda_s": 1e-14}, "EP4")
+    tiny = prove_design(solved("ep4").problem.posed, {**design, "lambda_s": 1e-14}, "EP4")
     assert not tiny.proved
 
 
@@ -472,13 +476,13 @@ def test_the_other_kind_of_pair_is_refused(asked, T):
 def test_the_wrong_structure_is_refused():
     """An EP3 and a pair of double roots are no EP4, an EP4 is no EP3 with a root apart, and a weave is elsewhere."""
     triple = solved("heavily_damped")
-    problem = solved("ep4").problem
+    problem = solved("ep4").problem.posed
     wrong = [
         prove_design(problem, triple.parameters, "EP4"),
         prove_design(problem, triple.parameters, "2EP2"),
         prove_design(problem, solved("ep4").parameters, "EP3"),
-        prove_design(replace(problem, minimize=None, locate="weave"), solved("ep4").parameters, "pair"),
-        prove_design(solved("benchmark").problem, solved("benchmark").parameters, "real"),
+        prove_design(problem.derive(minimize=None, locate="weave"), solved("ep4").parameters, "pair"),
+        prove_design(solved("benchmark").problem.posed, solved("benchmark").parameters, "real"),
         prove_design(problem, solved("ep4").parameters, "undecided"),
     ]
     assert [p.proved for p in wrong] == [False] * 6
@@ -494,8 +498,8 @@ def test_an_EP3_that_a_last_bit_chooses_is_not_the_designs():
     tilt = design["lambda_s"]
     for bits in range(-4, 5):
         near = {**design, "lambda_s": tilt + bits * math.ulp(tilt)}
-        assert prove_design(problem, near, "EP4").proved
-        refused = prove_design(problem, near, "EP3")
+        assert prove_design(problem.posed, near, "EP4").proved
+        refused = prove_design(problem.posed, near, "EP3")
         assert not refused.proved
         assert "singular" in refused.reason
     away = located("EP3", {"lambda_s": tilt - 1e-4}, {"Fr": (1.0, 3.0), "chi_B": (1.01, 3.0)})
@@ -608,11 +612,11 @@ def test_a_proof_is_plain_data():
 def test_a_band_is_proved_in_its_worst_case():
     problem = tmsopt.load(PROBLEMS / "speed_band.toml")
     design = {**HEIGHTS, "Fr": 1.8, "chi_B": 1.28, "lambda_s": 0.12}
-    proof = prove_design(problem, design, "pair", case=Case(at={"Fr": 1.2}))
+    proof = prove_design(problem.posed, design, "pair", case=Case(at={"Fr": 1.2}))
     assert proof.proved
     assert proof.parameters["Fr"] == Number("1.2", "0")
     assert (proof.stable.holds, proof.inside.holds) == (True, True)
-    assert "worst case" in proof_text(problem, proof)
+    assert "worst case" in proof_text(problem.posed, proof)
 
 
 def run(*arguments):

@@ -243,9 +243,9 @@ def test_laws_charts_and_traces_are_of_the_nominal_design():
         tms, fixed=heights, free=free, scenarios=band, tolerances={"chi_B": 0.01}, minimize="abscissa"
     )
     plain = tmsopt.Problem(tms, fixed={**heights, "Fr": 1.8}, free=free, minimize="abscissa")
-    assert (asked.nominal.scenarios, asked.nominal.tolerances) == ({}, {})
-    assert asked.nominal.fixed == pytest.approx(plain.fixed, abs=1e-15)
-    assert plain.nominal is plain
+    assert (asked.posed.nominal.scenarios, asked.posed.nominal.tolerances) == ({}, {})
+    assert asked.posed.nominal.fixed == pytest.approx(plain.fixed, abs=1e-15)
+    assert plain.posed.nominal is plain.posed
     assert tmsopt.compare(asked).design.abscissa == pytest.approx(tmsopt.solve(plain).abscissa, abs=1e-12)
 
 

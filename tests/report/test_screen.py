@@ -47,7 +47,7 @@ def test_it_fits_a_screen_in_one_unit_each(file):
     found = one_each(list(design.parameters), "\n".join(alone))
     assert found
     for name, units in found.items():
-        assert units <= {unit_of(design.problem, name).text}, name
+        assert units <= {unit_of(design.problem.posed, name).text}, name
     full = design.report(full=True).splitlines() if file.stem in QUICK else []
     headed = [name for name, below in pairwise(full) if below and set(below) == {"-"}]
     order = [
@@ -95,7 +95,7 @@ def test_numbers_with_units_in_python_are_those_of_a_file():
     assert problem.free == {"z_H": (-0.6, -0.2), "lambda_s": (-30 * 0.017453292519943295, 0.5)}
     assert (problem.start, problem.tolerances) == ({"z_H": -0.3}, {"x_B": 0.005})
     texts = ("v", "m_B", "x_B", "z_H", "lambda_s.min", "u_H", "N_R", "v_c", "w * m_B", "tan(lambda_s)", "v**2/w/g")
-    shown = [unit_of(problem, text).text for text in texts]
+    shown = [unit_of(problem.posed, text).text for text in texts]
     # u_H is a length, and two of the three lengths that were typed with a unit are in cm
     assert shown == ["km/h", "g", "m", "cm", "deg", "cm", "N", "km/h", "kg m", "", ""]
     with pytest.raises(tmsopt.InputError, match=r"parameters\.w: found the unit 'furlong/h'"):

@@ -57,14 +57,14 @@ def test_a_limit_that_a_needle_meets_is_not_out_of_reach():
 def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish():
     """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
     search = import_module("tmsopt.search.search")
-    found, told = search._reached(workspace(FAST), ["far"])
+    found, told = search._reached(workspace(FAST.posed), ["far"])
     assert told
-    shifted = [Fraction(float(c)) for c in FAST.values(found).coefficients]
+    shifted = [Fraction(float(c)) for c in FAST.posed.values(found).coefficients]
     for end in range(len(shifted), 1, -1):
         for k in range(1, end):
             shifted[k] -= Fraction(98, 100) * shifted[k - 1]
     assert routh_exact(shifted)
-    assert search._reached(workspace(DAMPED), ["damped"]) == (None, False)
+    assert search._reached(workspace(DAMPED.posed), ["damped"]) == (None, False)
 
 
 def test_where_a0_may_vanish_a_search_is_not_said_to_tell():
@@ -98,7 +98,7 @@ def named(problem, reached):
     relaxation = replace(relaxation, parameters=Table(near), amounts=Table({"b": 0.6}), conflict=(), irreducible=False)
     options = import_module("tmsopt.program.options").DEFAULTS
     irreducible = import_module("tmsopt.search.remedies.needs").irreducible
-    return irreducible(problem, relaxation, ("b",), problem, options, reached)
+    return irreducible(problem.posed, relaxation, ("b",), problem.posed, options, reached)
 
 
 @pytest.fixture

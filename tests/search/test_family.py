@@ -111,17 +111,17 @@ def test_nothing_grows_without_end():
     """Each box of a pattern without an objective makes another program."""
     problem = replace(EP4, minimize=None, locate="EP3")
     for k in range(80):
-        assert formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)})).compiled
+        assert formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)}).posed).compiled
     assert nlp._MADE.of.cache_info().currsize == nlp._MADE.of.cache_info().maxsize == 64
 
 
 def test_a_number_is_a_parameter_unless_it_is_nothing():
     """What differs in numbers alone is the same formula; a 0 leaves terms out."""
-    ours, others = (formulate(with_fixed(EP4, chi_H=1.02, mu=mu)) for mu in (0.1, 0.7))
+    ours, others = (formulate(with_fixed(EP4, chi_H=1.02, mu=mu).posed) for mu in (0.1, 0.7))
     assert ours.formula == others.formula
     assert ours.compiled is others.compiled
     assert ours.constants != others.constants
-    lighter = formulate(with_fixed(EP4, chi_H=1.02, mu=0.0))
+    lighter = formulate(with_fixed(EP4, chi_H=1.02, mu=0.0).posed)
     assert len(lighter.formula.steps) < len(ours.formula.steps)
     x = np.linspace(0.3, 1.2, len(ours.variables))
     own = np.array([ours.at(x)[0], *ours.at(x)[1]])
@@ -151,5 +151,5 @@ def test_a_pole_in_the_box_of_one_member_is_none_in_that_of_another():
     ends = ((0.5, 3.0), (-0.5, 3.0))
     boxes = [Problem(model, fixed={"y": 2.0}, free={"x": e}, minimize="abscissa + 0.1/x") for e in ends]
     for order in (boxes, boxes[::-1]):
-        sizes = {problem.free["x"]: len(formulate(problem).variables) for problem in order}
+        sizes = {problem.free["x"]: len(formulate(problem.posed).variables) for problem in order}
         assert sizes[ends[1]] == sizes[ends[0]] + 1

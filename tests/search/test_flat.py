@@ -18,7 +18,7 @@ def bicycle(*limits, **asked):
 
 def violated(limit, **parameters):
     problem = bicycle(limit, minimize="abscissa")
-    return set(recheck(problem, problem.ordered({**DESIGN, **parameters})).violations)
+    return set(recheck(problem.posed, problem.posed.ordered({**DESIGN, **parameters})).violations)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_flat_limit_on_a_root_quantity():
     design = tmsopt.solve(problem)
     assert design.abscissa == pytest.approx(-0.3, abs=1e-9)
     off = {**design.parameters, "Fr": design.parameters["Fr"] + 1e-4}
-    assert set(recheck(problem, off).violations) == {"limit0"}
+    assert set(recheck(problem.posed, off).violations) == {"limit0"}
 
 
 @pytest.mark.parametrize(

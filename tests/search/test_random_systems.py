@@ -52,7 +52,7 @@ def test_judges_and_model_agree_on_the_polynomial(index):
     """Eigenvalues of the state matrix, the exact polynomial of the text, and the model's own coefficients."""
     system = SUITE[index]
     design = middle(system)
-    of = system.problem.parameter_set
+    of = system.problem.posed.parameter_set
     coefficients = np.array([float(c) for c in system.model.coefficients({**system.fixed, **design}, of)])
     polynomial = exact_polynomial(system, design)
     leading = polynomial[polynomial.degree()]
@@ -125,7 +125,7 @@ def test_a_structure_holds_within_the_last_places_of_the_parameters():
     found = solve(steep(1e6))
     assert found.structure == "EP2"
     assert found.abscissa == pytest.approx(-0.01, rel=1e-8)
-    off = found.problem.values(found.parameters).roundings()
+    off = found.problem.posed.values(found.parameters).roundings()
     assert off[1] == pytest.approx(2e6 * 2**-53 / 3, rel=0.2)  # of 2 d, x being near 1/3: 5e-9 of it
 
 
@@ -133,7 +133,7 @@ def test_without_cancellation_rounding_explains_nothing():
     """s² + 2 s + 1 + 1e-9: as far from a double root as it says, whatever the parameters round."""
     d = ca.SX.sym("d")
     problem = Problem(models.from_coefficients([1, d, 1 + 1e-9], name="plain"), fixed={"d": 2.0}, free={})
-    values = problem.values(problem.fixed)
+    values = problem.posed.values(problem.fixed)
     assert values.roundings() == pytest.approx([0.0, 2 * 2**-53, 0.0], abs=1e-20)
     assert values["structure"].name == "pair"
 
@@ -149,7 +149,7 @@ def test_a_start_better_than_its_basin_is_not_lost():
     system, one = SUITE[4], KNOWN[4]
     found = solve(started_at(system.problem, one.parameters), starts=1)
     assert found.value == pytest.approx(one.known["evolution"], rel=1e-7)
-    assert start_worth(system.problem, one.parameters) == pytest.approx(one.value, rel=1e-9)
+    assert start_worth(system.problem.posed, one.parameters) == pytest.approx(one.value, rel=1e-9)
 
 
 def test_a_limit_on_the_damping_ratio_below_minus_one_forbids_nothing():

@@ -113,8 +113,8 @@ def test_no_optimum_stands_that_a_start_ended_better_than(found, between, status
     """On the left designs change between the three values of a band that are looked at first, for better or worse."""
     worse = between * ca.sin(2 * np.pi * y) ** 2 * (x - RIGHT) ** 2
     asked = problem([1, WELLS[1] - worse], WIDE, scenarios={"y": tmsopt.Band(0.0, 1.0, 3)}, minimize="abscissa")
-    work = workspaces.workspace(asked)
-    nlp = work.formulate(asked.cases)
+    work = workspaces.workspace(asked.posed)
+    nlp = work.formulate(asked.posed.cases)
     ends = {at: multistart.Runner(work, nlp).solve_from({"x": at}, near=True) for at in (LEFT, RIGHT)}
     trial = outcome.best_checked(work, nlp, [ends[found]])
     own = searching._covered(work, nlp, [ends[found]], trial, outcome.counted([], 0.0))

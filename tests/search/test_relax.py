@@ -205,7 +205,7 @@ def test_a_change_asks_no_more_than_what_the_nearest_design_misses(tmp_path):
     asked = written(tmp_path, DAMPED)
     (change,) = tmsopt.solve(asked, throw=False).relaxation.remedies
     assert dict(change) == {"decay": "abscissa <= -0.1118", "zeta": "damping_ratio >= 0.1147"}
-    assert tmsopt.solve(with_limits(asked, change)).status == "optimal"
+    assert tmsopt.solve(with_limits(asked.posed, change)).status == "optimal"
 
 
 @pytest.mark.slow

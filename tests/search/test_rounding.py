@@ -20,7 +20,7 @@ def unclear(roots, stored, asked="abscissa"):
     structure = SimpleNamespace(roots=listed, abscissa=max(re for re, _ in roots))
     checked = SimpleNamespace(structure=structure, realised=stored)
     problem = replace(PLAIN, minimize=None, maximize=asked) if asked == "damping_ratio" else PLAIN
-    return bool(import_module("tmsopt.search.outcome").unclear(problem, checked))
+    return bool(import_module("tmsopt.search.outcome").unclear(problem.posed, checked))
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ def cube():
         "chi_B": (1.0, 99.0),
         "zeta_B": (-9.0, -0.01),
     }
-    return Cube(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
+    return Cube(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa").posed)
 
 
 def test_a_design_has_one_point_of_the_cube_and_a_point_one_design():
@@ -76,7 +76,7 @@ def test_every_design_that_is_judged_is_counted(monkeypatch):
 
 def test_the_sample_fills_the_box_to_its_faces_and_corners():
     """No hole of a tenth of the box, inside or on a face; and all corners."""
-    drawn = Sampler(problem(), 0).draw()
+    drawn = Sampler(problem().posed, 0).draw()
     assert drawn.u.min() == 0
     assert drawn.u.max() == 1
     assert {(0, 0), (0, 1), (1, 0), (1, 1)} <= {tuple(u) for u in drawn.u.tolist()}
@@ -90,7 +90,7 @@ def test_the_sample_fills_the_box_to_its_faces_and_corners():
 
 
 def test_the_sample_stands_for_its_seed():
-    first, again, other = (Sampler(problem(("x*y >= 0.1",)), seed).sample() for seed in (5, 5, 6))
+    first, again, other = (Sampler(problem(("x*y >= 0.1",)).posed, seed).sample() for seed in (5, 5, 6))
     assert np.array_equal(first.refined.u, again.refined.u)
     assert not np.array_equal(first.refined.u, other.refined.u)
 
@@ -100,7 +100,7 @@ def test_the_sample_stands_for_its_seed():
 
 def sought(stated, seed=0, count=64):
     """A sampler, designs that violate its limits, and what becomes of them."""
-    sampler = Sampler(stated, seed)
+    sampler = Sampler(stated.posed, seed)
     drawn = sampler.draw()
     start = drawn.take(np.flatnonzero((drawn.violation > 0) & np.isfinite(drawn.violation))[:count])
     return sampler, start, sampler.nearer(start)
@@ -136,7 +136,7 @@ def test_limits_are_met_by_the_way_of_newton(limits, share, seed):
 
 def test_a_pole_is_approached_from_its_own_side():
     """1/(x − y) ≥ 1000 is met for 0 < x − y ≤ 0.001, and from x < y by no small step."""
-    sampler = Sampler(problem(("1/(x - y) >= 1000",)), 0)
+    sampler = Sampler(problem(("1/(x - y) >= 1000",)).posed, 0)
     sampler.draw()
     gaps = np.geomspace(2e-3, 0.2, 20)
     points = [sampler.space.points({"x": 0.3 + gap / 2, "y": 0.3 - gap / 2}) for gap in gaps]
@@ -148,7 +148,7 @@ def test_a_pole_is_approached_from_its_own_side():
 
 def test_what_is_refined_is_no_worse_limits_first():
     stated = problem(("x**2 + 2*y**2 <= 0.3", "x - y >= 0.5"), minimize="(x - 0.3)**2 - y + 0.1*abscissa")
-    sampler = Sampler(stated, 2)
+    sampler = Sampler(stated.posed, 2)
     start = sampler.draw().take(np.arange(0, 4000, 40))
     ends = sampler.refined(start)
     assert len(ends) == len(start)
@@ -165,10 +165,10 @@ def test_what_is_refined_is_no_worse_limits_first():
 def test_the_neighbourhood_of_a_design_reaches_from_a_hair_to_the_other_end_of_the_box():
     """Best of all is (−1, −1), a corner; or, of a well 2e-4 wide, its bottom."""
     far = problem(minimize="x + 0.1*abs(y - 0.3)")
-    seen = Sampler(far, 0).around({"x": 1.0, "y": 0.3})
+    seen = Sampler(far.posed, 0).around({"x": 1.0, "y": 0.3})
     assert seen.worth.min() == pytest.approx(-1.0, abs=1e-3)
     well = problem(minimize="-1/(1 + ((x - 0.2003)**2 + (y - 0.3)**2)/1e-8)")
-    assert Sampler(well, 0).around({"x": 0.2, "y": 0.3}).worth.min() < -0.8
+    assert Sampler(well.posed, 0).around({"x": 0.2, "y": 0.3}).worth.min() < -0.8
 
 
 # Basins

@@ -12,7 +12,7 @@ from tmsopt.models import from_coefficients
 from tmsopt.problem import expected_unseen, is_enough
 
 x = ca.SX.sym("x")
-PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x")
+PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x").posed
 
 
 def settled(ends, share, far_off=False, left=0):

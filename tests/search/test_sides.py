@@ -100,7 +100,7 @@ def test_a_start_on_the_losing_side_does_not_decide():
 @pytest.mark.parametrize("tilt", [(0.0, 1.2), (0.05, 1.2), (-1.2, 0.0), (-1.2, -0.05)])
 def test_one_sign_has_no_sides(tilt):
     stated = problem(free={**BOX, "lambda_s": tilt}, minimize="Fr - lambda_s**2")
-    assert [part.name for part in workspace(stated).parts()] == [""]
+    assert [part.name for part in workspace(stated.posed).parts()] == [""]
     design = tmsopt.solve(stated)
     assert design.sides == {}
     assert "sides" not in design.to_json()

@@ -73,7 +73,7 @@ def test_optimised_benchmark_of_the_paper():
         constraints={"decay": "omega0 == -1"},
         locate="EP4",
     )
-    assert degrees_of_freedom(problem).kind == "square"
+    assert degrees_of_freedom(problem.posed).kind == "square"
     design = tmsopt.solve(problem)
     first, second = laws.ep4(-1.0, -0.4, -0.2, 1.02)  # closed form for any chi_H
     expected = {"Fr": 2.337214016650773, "mu": 20.8462670127613, "lambda_s": 0.8514403685251676, "chi_B": 1.19}
@@ -170,7 +170,7 @@ def test_over_determined_and_inconsistent_pattern_is_infeasible():
         minimize=None,
         locate="EP4",
     )
-    assert degrees_of_freedom(problem).kind == "over-determined"
+    assert degrees_of_freedom(problem.posed).kind == "over-determined"
     design = tmsopt.solve(problem, throw=False)
     assert design.status == "infeasible"
     assert "EP4" in design.violations
@@ -374,7 +374,7 @@ def test_bound_holds_on_random_designs():
             a, b = sorted(rng.uniform(low, high, 2))
             free[name] = (a, b)
         problem = tmsopt.Problem(TMS, free=free, minimize="abscissa")
-        bound = omega0_bound(problem, 0.0).value
+        bound = omega0_bound(problem.posed, 0.0).value
         columns = {n: rng.uniform(a, b, 4000) for n, (a, b) in free.items()}
         a = np.moveaxis(laws.copo(**columns), 0, -1)
         omega = np.abs(a[:, 4] / a[:, 0]) ** 0.25

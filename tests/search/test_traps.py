@@ -46,7 +46,7 @@ def test_a_worst_case_along_an_edge_of_many_tolerances(n, width):
     peak = f"exp(-(({units[0]} - 0.43)/{width})**2) + {' + '.join(units[1:])} <= 0"
     tolerances = dict.fromkeys(list(at)[:n], 0.01)
     problem = tmsopt.Problem(TMS, fixed=at, tolerances=tolerances, constraints={"peak": peak})
-    assert worst_cases(problem, problem.ordered({}))["constraint peak"].value == pytest.approx(n, abs=1e-8)
+    assert worst_cases(problem.posed, problem.posed.ordered({}))["constraint peak"].value == pytest.approx(n, abs=1e-8)
 
 
 @pytest.mark.slow

@@ -120,7 +120,7 @@ def test_the_headers():
     assert ",".join(heads[:11]) == (
         "number,seed,varied.mu,status,cause,objective,abscissa,abscissa_realised,damping_ratio,structure,stable"
     )
-    assert heads[11:18] == list(PROBLEM.parameter_set.names)
+    assert heads[11:18] == list(PROBLEM.posed.parameter_set.names)
     assert heads[18:23] == ["report.Fr / Fr_c", "bound", "gap", "proven", "method"]
     laws = [name for name in heads if name.startswith("law.")]
     after = ["violation.trail", "violation.a0", "violation.coefficients", "starts", "warm", "seconds", "host"]

@@ -110,7 +110,7 @@ def test_what_is_searched_or_listed_is_not_judged_at_once():
         replace(study.problem, minimize=None, maximize="radius"),
     ):
         assert not judge.applies(Study(problem, {"Fr": [2.0, 2.1]}))
-    assert verdicts(study.problem, {"Fr": np.array([2.0])}) is not None
+    assert verdicts(study.problem.posed, {"Fr": np.array([2.0])}) is not None
 
 
 def test_columns_and_summary_are_those_of_the_rows():

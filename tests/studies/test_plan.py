@@ -122,7 +122,7 @@ def test_problem_of_a_row():
     assert problem.fixed == {**PROBLEM.fixed, "mu": 0.3}
     assert problem.free == {"chi_B": (1.1, 3.0), "Fr": (0.1, 3.0), "lambda_s": (0.05, 0.9)}
     assert problem.constraints == {**PROBLEM.constraints, "decay": f"abscissa <= {-1 / 3!r}"}
-    assert problem.conditions["decay"].sides({"abscissa": 2.0}) == (2.0, -1 / 3)
+    assert problem.posed.conditions["decay"].sides({"abscissa": 2.0}) == (2.0, -1 / 3)
     assert problem.start == {"Fr": 3.0}  # moved to the nearer of the row's own bounds
     assert Study(PROBLEM, {"Fr.min": [5.0]}).row_problem(0).fixed["Fr"] == 5.0  # no room left: fixed
 
@@ -161,10 +161,10 @@ def test_number_that_a_constraint_compares_with(text, number):
         return
     for value in (0.1 + 0.2, -5e-324, 1e300, 0.0):
         problem = replace(PROBLEM, constraints={"c": with_limit(text, value)})
-        own = replace(PROBLEM, constraints={"c": text}).conditions["c"]
-        values = dict.fromkeys(PROBLEM.vocabulary, 0.7)
-        sides, before = problem.conditions["c"].sides(values), own.sides(values)
-        assert (problem.conditions["c"].comparison, value in sides) == (own.comparison, True)
+        own = replace(PROBLEM, constraints={"c": text}).posed.conditions["c"]
+        values = dict.fromkeys(PROBLEM.posed.vocabulary, 0.7)
+        sides, before = problem.posed.conditions["c"].sides(values), own.sides(values)
+        assert (problem.posed.conditions["c"].comparison, value in sides) == (own.comparison, True)
         assert {*sides} - {value} == {*before} - {number}  # the other side is what it was
 
 
@@ -633,7 +633,7 @@ def test_monte_carlo_is_reproducible_and_longer_ones_begin_alike(design):
 
 def test_monte_carlo_plans_from_its_problem(design):
     tolerances = dict(design.problem.tolerances)
-    sampling = Sampling(design.problem.nominal, 20, seed=1, tolerances=tolerances)
+    sampling = Sampling(design.problem.posed.nominal, 20, seed=1, tolerances=tolerances)
     assert planned(sampling).columns == monte_carlo(design, 20, seed=1).columns
     study = Study(PROBLEM, ABOUT)
     assert planned(study) is study

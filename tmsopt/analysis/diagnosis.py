@@ -94,7 +94,7 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
     """
     solution = solved_first(design, progress)
     start_steps(progress, "splitting roots")
-    problem = solution.problem
+    problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
     values, told = problem.values(parameters), solution.of_polynomial
     found = values["structure"]

@@ -79,7 +79,7 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
     """
     solution = solved_first(design, progress)
     steps = start_steps(progress, "moving limits" if resolve else "weighing limits", "limit")
-    problem = solution.problem
+    problem = solution.problem.posed
     alone, together = rounded_designs(solution) if not solution.violations else (Table[Rounded](), ())
     return Explanation(
         summary=summary(solution),

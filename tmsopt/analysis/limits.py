@@ -10,7 +10,7 @@ from tmsopt.analysis.again import moved, solve_again
 from tmsopt.analysis.steps import natural_step, step_within
 from tmsopt.errors import InputError
 from tmsopt.problem.expression import written_sides
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, dimension_of, limit_text, unit_of, unit_of_all
 from tmsopt.progress import Counts
@@ -106,7 +106,7 @@ def levers(solution: Solution, resolve: bool = True, progress: Counts | None = N
     return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
 
 
-def is_physical(problem: Problem, bound: str) -> bool:
+def is_physical(problem: Posed, bound: str) -> bool:
     """Whether a bound such as ``mu.min`` is a physical end of its parameter."""
     name, end = bound.rsplit(".", 1)
     allowed = problem.parameter_set[name].range
@@ -114,12 +114,12 @@ def is_physical(problem: Problem, bound: str) -> bool:
 
 
 def _is_bound(solution: Solution, name: str) -> bool:
-    problem = solution.problem
+    problem = solution.problem.posed
     return name not in problem.constraints and name.rsplit(".", 1)[0] in problem.free
 
 
 def _of_bound(solution: Solution, bound: str) -> Lever:
-    problem = solution.problem
+    problem = solution.problem.posed
     name, end = bound.rsplit(".", 1)
     parameter, (lower, upper) = problem.parameter_set[name], problem.free[name]
     limit, direction = (upper, 1.0) if end == "max" else (lower, -1.0)
@@ -134,7 +134,7 @@ def _of_bound(solution: Solution, bound: str) -> Lever:
 
 
 def _of_row(solution: Solution, name: str) -> Lever:
-    problem = solution.problem
+    problem = solution.problem.posed
     condition, text, shown = problem.conditions[name], problem.constraints[name], limit_text(problem, name)
     step = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, text))
     sign, words = condition.sign, f"relaxing {name} ({shown}) by {step.text}"
@@ -146,13 +146,13 @@ def _of_row(solution: Solution, name: str) -> Lever:
 
 def _lever(solution: Solution, name: str, kind: str, limit: str, physical: bool, move: str, step: float) -> Lever:
     text = solution.problem.minimize or solution.problem.maximize
-    gained = unit_of_all(solution.problem, text) if text else Unit()
+    gained = unit_of_all(solution.problem.posed, text) if text else Unit()
     return Lever(name, kind, limit, physical, move, step, abs(solution.active[name]), gained=gained)
 
 
 def _size(solution: Solution, text: str) -> float:
     """Size of the sides of a constraint at the optimum, where they are equal but for rounding."""
-    problem = solution.problem
+    problem = solution.problem.posed
     left, _, right = written_sides(text)
     values = problem.values(solution.parameters)
     sides = (abs(float(problem.read(side)(values))) for side in (left, right))
@@ -161,7 +161,7 @@ def _size(solution: Solution, text: str) -> float:
 
 def _lets_in(solution: Solution, found: Sequence[Lever]) -> bool:
     """Whether a better design than the optimum leads to is let in elsewhere where all limits are moved at once."""
-    problem = solution.problem
+    problem = solution.problem.posed
     for lever in found:
         with suppress(InputError):
             problem = moved(problem, lever.name, lever.step)
@@ -172,13 +172,13 @@ def _lets_in(solution: Solution, found: Sequence[Lever]) -> bool:
 def _resolved(solution: Solution, lever: Lever, look: bool) -> Lever:
     """A lever with the gain found by solving again from the optimum."""
     try:
-        asked = moved(solution.problem, lever.name, lever.step)
+        asked = moved(solution.problem.posed, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
     gain, found = math.nan, None
     for starts in (1, _RETRY):
         ended = solve_again(solution, asked, starts, look or starts > 1)
-        better = -solution.problem.sign * (ended.value - solution.value)
+        better = -solution.problem.posed.sign * (ended.value - solution.value)
         if ended.status == "optimal" and not better <= gain:
             gain, found = better, ended
             checked = replace(lever, resolved=gain, structure=found.structure)

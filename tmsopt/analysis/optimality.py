@@ -28,7 +28,7 @@ from tmsopt.models import Model
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.dependence import demands_heavy_damping
 from tmsopt.problem.files import Given
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_NAMES
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import formulate
@@ -169,18 +169,18 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     )
 
 
-def _judged(solution: Solution) -> Problem:
+def _judged(solution: Solution) -> Posed:
     """The problem whose optimum the design may be.
 
     Raises:
         NotCovered: with the reason why there is none.
     """
-    problem = solution.problem
+    problem = solution.problem.posed
     if not problem.free:
         raise NotCovered("nothing is free")
     if solution.status != "optimal":
         raise NotCovered("the design is not a solution")
-    if problem.variations or problem.tolerances:
+    if problem.scenarios or problem.tolerances:
         raise NotCovered("the worst of several cases is minimised, and these conditions are those of one design")
     if problem.asks_radius:
         raise NotCovered("the robustness radius is asked for")
@@ -189,7 +189,7 @@ def _judged(solution: Solution) -> Problem:
     if solution.structure == "undecided":
         raise NotCovered("double precision cannot tell which roots meet")
     if problem.locate:
-        problem = replace(problem, locate=None, minimize="abscissa")
+        problem = problem.derive(locate=None, minimize="abscissa")
     if demands_heavy_damping(problem):
         raise NotCovered("heavy damping is asked for, which holds the roots on the real line as well")
     nlp = formulate(problem)
@@ -223,7 +223,7 @@ def _verdict(
     idle = f"; without effect: {', '.join(around.idle)}" if around.idle else ""
     if np.isnan(found.curvature):
         return STRICT, 1, f"{name} a strict {extreme}: {held} none of the {unknowns} unknowns free to move{idle}"
-    bend = "downwards" if solution.problem.sense == "maximize" else "upwards"
+    bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
     free = f"{held} some of the {unknowns} unknowns free to move"
     return STRICT, 2, f"{name} a strict {extreme}: {free}, and along these it curves {bend}{idle}"
 
@@ -244,7 +244,7 @@ def _doubt(around: LocalProgram, found: Conditions) -> str:
     return ""
 
 
-def _goal(problem: Problem) -> str:
+def _goal(problem: Posed) -> str:
     return (problem.minimize or problem.maximize or "").strip()
 
 

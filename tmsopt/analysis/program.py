@@ -23,7 +23,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import abscissa, variables_of
@@ -73,7 +73,7 @@ class LocalProgram:
         idle: free parameters without any part in the program.
     """
 
-    problem: Problem
+    problem: Posed
     variables: tuple[str, ...]
     x: Array
     sizes: Array
@@ -90,7 +90,7 @@ class LocalProgram:
         return float(f.item()), gradient.ravel(), h.ravel(), jacobian, hessian
 
 
-def program(problem: Problem, solution: Solution) -> LocalProgram:
+def program(problem: Posed, solution: Solution) -> LocalProgram:
     """The program of a problem at a design, from the roots of its structure; none is computed again.
 
     Raises:
@@ -291,7 +291,7 @@ def _value(values: Mapping[str, Any], name: str) -> float:
     return float(values[name]) if name in set(values) else np.nan
 
 
-def _natural_size(problem: Problem, name: str, value: float) -> float:
+def _natural_size(problem: Posed, name: str, value: float) -> float:
     """Size of a parameter: its own, or the width of its range as the program sees it, which beyond 1 says nothing."""
     ends = problem.free[name]
     low, high = (float(np.tan(e)) if problem.parameter_set[name].tangent else e for e in ends)

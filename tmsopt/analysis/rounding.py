@@ -13,7 +13,7 @@ import numpy as np
 from tmsopt.evaluation.recheck import FEASIBLE, judged_exactly
 from tmsopt.evaluation.worst_case import peaks
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, unit_of
 from tmsopt.records import Table, plain
@@ -71,7 +71,7 @@ def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) ->
     """A design with some of its parameters rounded, for each choice of these and of significant digits, all at once."""
     if not choices:
         return ()
-    problem = solution.problem
+    problem = solution.problem.posed
     units = {n: unit_of(problem, n) for n in problem.free}
     written = [{n: _rounded(solution, n, units[n], digits) for n in names} for names, digits in choices]
     found = []
@@ -103,7 +103,7 @@ def worst(alone: Mapping[str, Rounded]) -> str:
 
 def _cases(solution: Solution, designs: Sequence[Mapping[str, Any]]) -> list[list[Case]]:
     """Of each rounded design: the listed cases, the worst of the design and its own; one that changes nothing else."""
-    problem = solution.problem
+    problem = solution.problem.posed
     listed = [case for case in problem.cases if not case.direction]
     shared = [*listed, *([solution.worst] if solution.worst else [])]
     columns = {n: np.array([float(design[n]) for design in designs]) for n in designs[0]}
@@ -111,7 +111,7 @@ def _cases(solution: Solution, designs: Sequence[Mapping[str, Any]]) -> list[lis
     return [list(dict.fromkeys([*shared, *cases])) or [Case()] for cases in own]
 
 
-def _beyond_box(problem: Problem, design: Mapping[str, Any]) -> dict[str, float]:
+def _beyond_box(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
     """Ends of ranges that a design is beyond, by how much."""
     found = {}
     for name, (lower, upper) in problem.free.items():
@@ -124,7 +124,7 @@ def _beyond_box(problem: Problem, design: Mapping[str, Any]) -> dict[str, float]
 
 def _short(solution: Solution, name: str, digits: int) -> bool:
     """Whether a parameter has no more digits than that."""
-    value, unit = solution.parameters[name], unit_of(solution.problem, name)
+    value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
     there = float(_rounded(solution, name, unit, digits)) * unit.one
     return abs(there - value) <= _SAME * abs(value)
 

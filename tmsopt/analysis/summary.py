@@ -8,7 +8,7 @@ import numpy as np
 from tmsopt.analysis.limits import is_physical
 from tmsopt.models.user_spectrum import structure_in_words
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_QUANTITIES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
@@ -36,7 +36,7 @@ def warnings(solution: Solution) -> tuple[str, ...]:
     """Arbitrary bounds that the design leans on, bounds touched for nothing, parameters without effect."""
     if solution.status == "infeasible":
         return ()
-    problem = solution.problem
+    problem = solution.problem.posed
     idle = {name: _idle(solution, name) for name in problem.free}
     return (
         *_timeless(problem),
@@ -46,7 +46,7 @@ def warnings(solution: Solution) -> tuple[str, ...]:
     )
 
 
-def none_of(problem: Problem) -> str:
+def none_of(problem: Posed) -> str:
     """Of whom it is said that none is better: the designs that a proof is about."""
     located = f" with {problem.locate}" if problem.locate else ""
     return f"no design{located} in the box{' within the limits' if problem.constraints else ''}"
@@ -60,7 +60,7 @@ def faster_than(solution: Solution) -> str:
 
 
 def _quality(solution: Solution) -> str:
-    problem, bound = solution.problem, solution.bound
+    problem, bound = solution.problem.posed, solution.bound
     text = (problem.minimize or problem.maximize or "").strip()
     if not problem.free:
         return "the design as given, with nothing free"
@@ -82,7 +82,7 @@ def _quality(solution: Solution) -> str:
     return f"the {end} {text} found is {unit_of(problem, text).show(solution.value, 6)}, {tried}"
 
 
-def _timeless(problem: Problem) -> Iterator[str]:
+def _timeless(problem: Posed) -> Iterator[str]:
     """That an abscissa is counted in a unit of time that the search may change."""
     free = [name for name in ("w", "g") if name in problem.free]
     if free and problem.parameter_set.root_unit == "√(g/w)" and "abscissa" in (problem.minimize or ""):
@@ -92,7 +92,7 @@ def _timeless(problem: Problem) -> Iterator[str]:
 
 def _leant_on(solution: Solution) -> Iterator[str]:
     """Active bounds that are no physical ends."""
-    problem = solution.problem
+    problem = solution.problem.posed
     for name in problem.free:
         for bound in (f"{name}.min", f"{name}.max"):
             if bound in solution.active and bound not in problem.constraints and not is_physical(problem, bound):
@@ -101,17 +101,17 @@ def _leant_on(solution: Solution) -> Iterator[str]:
 
 def _leaning(solution: Solution, bounds: Sequence[str]) -> Iterator[str]:
     if bounds:
-        named = ", ".join(f"{bound} = {_limit(solution.problem, bound)}" for bound in bounds)
+        named = ", ".join(f"{bound} = {_limit(solution.problem.posed, bound)}" for bound in bounds)
         yield f"the optimum leans on {named}: widen what is arbitrary, and state what is real as a constraint"
 
 
-def _limit(problem: Problem, bound: str) -> str:
+def _limit(problem: Posed, bound: str) -> str:
     name, end = bound.rsplit(".", 1)
     return unit_of(problem, name).show(problem.free[name][end == "max"], 10)
 
 
 def _touching(solution: Solution, name: str) -> Iterator[str]:
-    problem, x = solution.problem, solution.parameters[name]
+    problem, x = solution.problem.posed, solution.parameters[name]
     for end, limit in zip(("min", "max"), problem.free[name], strict=True):
         bound = f"{name}.{end}"
         if bound not in solution.active and abs(x - limit) <= _AT * max(abs(limit), _AT):
@@ -121,7 +121,7 @@ def _touching(solution: Solution, name: str) -> Iterator[str]:
 
 def _idle(solution: Solution, name: str) -> str:
     """What there is to say of a parameter without effect on what is asked; empty for one with an effect."""
-    problem = solution.problem
+    problem = solution.problem.posed
     lower, upper = problem.free[name]
     points = [solution.parameters[name], *(lower + part * (upper - lower) for part in _PARTS)]
     conditions = problem.conditions
@@ -145,7 +145,7 @@ def _idle(solution: Solution, name: str) -> str:
 
 
 def _signature(
-    problem: Problem, parameters: dict[str, float], asked: list[Expression]
+    problem: Posed, parameters: dict[str, float], asked: list[Expression]
 ) -> tuple[list[float], list[float]]:
     """Monic coefficients, and expressions with the roots held: what they read beside the roots."""
     values = problem.values(problem.ordered(parameters))

@@ -13,8 +13,8 @@ from tmsopt.boundaries.rays import RayCrossing, between, elsewhere, most_damped,
 from tmsopt.boundaries.surroundings import WeightedDesign, placed
 from tmsopt.boundaries.witness import exactly_stable, is_boundary
 from tmsopt.errors import Fault, InputError, suggest, table_faults
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Table, plain
@@ -197,7 +197,7 @@ def robustness(
     return _surveyed(place)
 
 
-def robustness_at(problem: Problem, parameters: Mapping[str, float]) -> Robustness:
+def robustness_at(problem: Posed, parameters: Mapping[str, float]) -> Robustness:
     """The same for the boundaries of stability alone, with the weights of the problem."""
     return _surveyed(placed(problem, parameters, problem.weights or None), STABILITY)
 
@@ -214,7 +214,7 @@ def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS)) -> Rob
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
     zeros = _zeros(place) if place.stands_on else ()
-    return Robustness(place.problem, stable, place.stands_on, zeros, place.heavily_damped, *own, *found)
+    return Robustness(place.problem.problem, stable, place.stands_on, zeros, place.heavily_damped, *own, *found)
 
 
 def _each(place: WeightedDesign, seen: list[RayCrossing], kinds: Sequence[str]) -> list[Nearest]:
@@ -236,7 +236,7 @@ def _zeros(place: WeightedDesign) -> tuple[str, ...]:
 def _place(
     design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None
 ) -> WeightedDesign:
-    problem = as_problem(design)
+    problem = pose(design)
     given = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
     if faults := [f for n, (x, example) in given.items() if x is not None for f in table_faults(n, x, example)]:
         raise InputError(faults)

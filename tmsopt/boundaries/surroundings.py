@@ -12,7 +12,7 @@ from tmsopt.boundaries.boundaries import terms
 from tmsopt.boundaries.rays import Space
 from tmsopt.errors import Fault, InputError, is_number, suggest
 from tmsopt.models import Range
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
@@ -30,7 +30,7 @@ class WeightedDesign:
         weights: parameter → change that counts as 1; the others stay.
     """
 
-    problem: Problem
+    problem: Posed
     parameters: Mapping[str, float]
     weights: Mapping[str, float]
 
@@ -114,7 +114,7 @@ def _ends(allowed: Range, value: float, weight: float) -> tuple[float, float]:
     return min(lower, 0.0), max(upper, 0.0)
 
 
-def placed(problem: Problem, parameters: Mapping[str, float], weights: Mapping[str, float] | None) -> WeightedDesign:
+def placed(problem: Posed, parameters: Mapping[str, float], weights: Mapping[str, float] | None) -> WeightedDesign:
     """A design with checked parameters and weights.
 
     Raises:
@@ -129,7 +129,7 @@ def placed(problem: Problem, parameters: Mapping[str, float], weights: Mapping[s
     return WeightedDesign(problem, own, {n: float(given[n]) for n in own if given.get(n, 0.0) > 0})
 
 
-def relative(problem: Problem, parameters: Mapping[str, float]) -> dict[str, float]:
+def relative(problem: Posed, parameters: Mapping[str, float]) -> dict[str, float]:
     """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, 1 without one."""
     of = problem.parameter_set
     weights = {}
@@ -141,7 +141,7 @@ def relative(problem: Problem, parameters: Mapping[str, float]) -> dict[str, flo
     return weights
 
 
-def parameter_faults(problem: Problem, parameters: Mapping[str, float]) -> Iterator[Fault]:
+def parameter_faults(problem: Posed, parameters: Mapping[str, float]) -> Iterator[Fault]:
     """What is wrong with the parameters of a design."""
     of = problem.parameter_set
     for name in parameters:
@@ -157,7 +157,7 @@ def parameter_faults(problem: Problem, parameters: Mapping[str, float]) -> Itera
             yield Fault(f"found {parameters[name]:.6g}; {of[name].meaning} is {of[name].range}", key)
 
 
-def _weight_faults(problem: Problem, weights: Mapping[str, float]) -> Iterator[Fault]:
+def _weight_faults(problem: Posed, weights: Mapping[str, float]) -> Iterator[Fault]:
     of = problem.parameter_set
     for name, weight in weights.items():
         key = ("weights", name)

@@ -113,7 +113,7 @@ class Chart(Printable):
     @property
     def left_aside(self) -> tuple[str, ...]:
         """Names of the equality constraints: they hold on curves, which `trace` follows, and nowhere on a grid."""
-        return tuple(n for n, c in self.problem.conditions.items() if c.equality)
+        return tuple(n for n, c in self.problem.posed.conditions.items() if c.equality)
 
     def save(self, path: str | Path, layers: Sequence[str] | None = None) -> None:
         """Write axes and layers, all of them unless named, as a NumPy archive or, to a name ending in nc, as netCDF.
@@ -126,7 +126,7 @@ class Chart(Printable):
         if faults := layer_faults(names, list(self.layers)):
             raise InputError(faults)
         chosen = {n: self.layers[n] for n in names}
-        save_layers(self.problem, Grid(self.axes, self.grid), chosen, path_of(path, "the file to write"))
+        save_layers(self.problem.posed, Grid(self.axes, self.grid), chosen, path_of(path, "the file to write"))
 
     def to_xarray(self) -> "Dataset":
         """Every layer over the axes, with units.
@@ -134,13 +134,13 @@ class Chart(Printable):
         Raises:
             InputError: where xarray is not installed.
         """
-        made: Dataset = make_dataset(self.problem, Grid(self.axes, self.grid), self.layers)
+        made: Dataset = make_dataset(self.problem.posed, Grid(self.axes, self.grid), self.layers)
         return made
 
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
         counts, plane = self.counts, self.path is None and len(self.grid) == 2
-        of = self.asked.parameter_set if self.asked else None  # a folder may not hold its model
+        of = self.asked.posed.parameter_set if self.asked else None  # a folder may not hold its model
         grid = Grid(self.axes, self.grid)
         place = grid.design(counts.place) if counts.place >= 0 else None
         data: dict[str, Any] = {
@@ -243,8 +243,9 @@ def chart(
         layer.flags.writeable = False
     run = {"engine": "numpy", **({} if path is None else {"designs": done - before}), "seconds": seconds}
     run["per_second"] = (done - before) / seconds
-    edges = domain(work.problem, progress=progress) if boundaries and len(grid.axes) == 2 else None
-    return Chart(about, grid.values, target.layers, add_tallies(target.done.values()), edges, path, run, work.problem)
+    asked = work.problem.problem
+    edges = domain(asked, progress=progress) if boundaries and len(grid.axes) == 2 else None
+    return Chart(about, grid.values, target.layers, add_tallies(target.done.values()), edges, path, run, asked)
 
 
 def open_chart(path: str | Path) -> Chart:

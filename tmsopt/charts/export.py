@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from tmsopt.charts.survey import Grid
 from tmsopt.errors import import_optional, refusal
 from tmsopt.files import netcdf_errors, write_atomic
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.roots import CLASSES
 
 Layers = Mapping[str, NDArray[Any]]
 
 
-def save_layers(problem: Problem, grid: Grid, layers: Layers, path: Path) -> None:
+def save_layers(problem: Posed, grid: Grid, layers: Layers, path: Path) -> None:
     """Write axes and layers by name, with what they are about, as the ending of the file says.
 
     Raises:
@@ -52,7 +52,7 @@ def check_netcdf() -> None:
         raise refusal(message, "--output")
 
 
-def make_dataset(problem: Problem, grid: Grid, layers: Layers) -> Any:
+def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:
     """Axes and layers as a dataset of xarray, with their units and meanings.
 
     Raises:

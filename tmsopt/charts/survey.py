@@ -14,8 +14,8 @@ from tmsopt.charts.tally import Tally, count_tile
 from tmsopt.errors import Fault, InputError, list_faults, refusal, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
 from tmsopt.problem.array_function import ArrayFunction, array_function, parse_all
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
 from tmsopt.records import Array
 from tmsopt.roots import classify, find_motion
@@ -107,7 +107,7 @@ class Survey:
         before, after: what is computed before the roots, coefficients among it, and what takes them.
     """
 
-    problem: Problem
+    problem: Posed
     grid: Grid
     layers: tuple[str, ...]
     quantities: Mapping[str, str]
@@ -151,7 +151,7 @@ _QUANTITY, _LIMIT = "quantity ", "limit "
 """Before the names of outputs, which users choose."""
 
 
-def limits_of(problem: Problem) -> dict[str, Any]:
+def limits_of(problem: Posed) -> dict[str, Any]:
     """The constraints that hold on parts of a grid: all but equalities."""
     return {n: c for n, c in problem.conditions.items() if not c.equality}
 
@@ -170,7 +170,7 @@ def survey(
         InputError: unless two or three parameters are free and the axes name them; for other numbers of points,
             unknown layers, bad expressions.
     """
-    problem = as_problem(problem)
+    problem = pose(problem)
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
     extra = {} if quantities is None else quantities
@@ -211,7 +211,7 @@ def layer_faults(names: Any, accepted: Sequence[str]) -> list[Fault]:
     ]
 
 
-def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, ...]:
+def axes_of(problem: Posed, axes: Sequence[str] | None = None) -> tuple[str, ...]:
     """The two or three free parameters of a problem, in the order asked for.
 
     Raises:

@@ -31,7 +31,7 @@ from tmsopt.errors import refusal, suggest
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
-    from tmsopt.problem import Problem
+    from tmsopt.problem import Posed
 
 _EXAMPLES = """
 \b
@@ -136,7 +136,7 @@ def chart(
         from tmsopt.charts import USUAL, axes_of
 
         check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
-        problem = nominal_of(tmsopt.load(file))
+        problem = nominal_of(tmsopt.load(file).posed)
         free = axes_of(problem)
         names = plane(problem, axes) if len(free) == 2 else _space(free, axes)
         kept = tuple(n.strip() for n in layers.split(",")) if layers is not None else USUAL
@@ -259,7 +259,7 @@ def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: 
         raise refusal("two parameters are free, so there is nothing to hold; leave it out", "--slice")
 
 
-def _held(problem: "Problem", cut: dict[str, str]) -> dict[str, float]:
+def _held(problem: "Posed", cut: dict[str, str]) -> dict[str, float]:
     """The parameter that a figure holds, as a number in its box."""
 
     held = {}

@@ -15,7 +15,7 @@ from tmsopt.cli.terminal import doing, quiet, shown
 from tmsopt.errors import MOST_STARTS, Fault, InputError, refusal
 
 if TYPE_CHECKING:
-    from tmsopt import Problem
+    from tmsopt.problem import Posed
 
 DONE, INFEASIBLE, NOT_CONVERGED = 0, 3, 4
 """Exit status, beside those of `ending`."""
@@ -170,7 +170,7 @@ def write_file(option: str, path: Path | None, write: Callable[[Path], object]) 
             write(path)
 
 
-def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
+def plane(problem: "Posed", axes: str | None) -> tuple[str, str]:
     """Two parameters to draw over: the given ones, or the first two that are free.
 
     Raises:
@@ -189,7 +189,7 @@ def options(**given: Any) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def nominal_of(problem: "Problem") -> "Problem":
+def nominal_of(problem: "Posed") -> "Posed":
     """A problem about one design; says so where it has scenarios or tolerances."""
     if problem.nominal is not problem:
         values = ", ".join(f"{n} = {problem.fixed[n]:.6g}" for n in problem.scenarios)
@@ -197,7 +197,7 @@ def nominal_of(problem: "Problem") -> "Problem":
     return problem.nominal
 
 
-def say_nominal(problem: "Problem", varied: Iterable[str] = ()) -> None:
+def say_nominal(problem: "Posed", varied: Iterable[str] = ()) -> None:
     """Where a design is the one for several scenarios, say which of them it is looked at in."""
     if values := ", ".join(f"{n} = {problem.fixed[n]:.6g}" for n in problem.scenarios if n not in varied):
         click.echo(f"the design for all scenarios, looked at for {values}", err=True)

@@ -174,7 +174,7 @@ def solve(
 
     w, m_B = _scale("--wheelbase", wheelbase or "1", "m"), _scale("--rear-mass", rear_mass or "1", "kg")
     problem = as_solvable(file, front=True)
-    _check_options(problem, _given(context), every)
+    _check_options(problem.problem, _given(context), every)
     if certify:
         from tmsopt.proofs import check_installed
 
@@ -241,7 +241,7 @@ def _check_options(problem: "tmsopt.Problem", given: list[str], every: bool) -> 
     else:
         message = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
         wrong |= dict.fromkeys(("--points", "--csv", "--workers"), message)
-    if problem.model.name != "tms" or problem.parameter_set.rate is not None:
+    if problem.model.name != "tms" or problem.posed.parameter_set.rate is not None:
         message = "scales a dimensionless bicycle, and the file is not one; leave it out"
         wrong |= dict.fromkeys(scaled, message)
     if faults := [Fault(wrong[option], (option,)) for option in given if option in wrong]:

@@ -67,7 +67,7 @@ def trace(
     **asked: Any,
 ) -> None:
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
-    problem = nominal_of(tmsopt.load(file))
+    problem = nominal_of(tmsopt.load(file).posed)
     if axes is not None:
         if plot is None:
             raise refusal("says what --plot draws; add --plot FILE", "--axes")

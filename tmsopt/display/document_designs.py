@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from tmsopt.models import in_words_of
-from tmsopt.problem import Problem, Solution, unit_at
+from tmsopt.problem import Posed, Solution, pose, unit_at
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -21,7 +21,7 @@ Named = tuple[str, Mapping[str, float]]
 _MOST = 8  # designs that have a button
 
 
-def explored(result: Any, design: Solution | None) -> tuple[Problem | Solution | None, list[Named]]:
+def explored(result: Any, design: Solution | None) -> tuple[Posed | Solution | None, list[Named]]:
     """What the explorer of a result is about, None for one without a problem, and designs by their names."""
     name = type(result).__name__
     holder = getattr(result, "study", result)
@@ -29,7 +29,7 @@ def explored(result: Any, design: Solution | None) -> tuple[Problem | Solution |
     of = of or next(iter(getattr(result, "solutions", ())), None)
     if of is None or of is design or name not in _DESIGNS:
         return of, []
-    problem = of.problem if isinstance(of, Solution) else of
+    problem = pose(of)
     names = set(problem.parameter_set.names)
     return of, _listed((n, values) for n, values in _DESIGNS[name](result) if names <= set(values))
 
@@ -59,7 +59,7 @@ def _of_front(front: "Front") -> Iterator[Named]:
 
 def _decay(solution: "Solution") -> float:
     """Abscissa by the clock, where there is one."""
-    return solution.abscissa / unit_at(solution.problem, "abscissa", solution.parameters).one
+    return solution.abscissa / unit_at(solution.problem.posed, "abscissa", solution.parameters).one
 
 
 def _of_trace(trace: "Trace") -> Iterator[Named]:
@@ -78,7 +78,7 @@ def _of_trace(trace: "Trace") -> Iterator[Named]:
 def _of_chart(chart: "Chart") -> Iterator[Named]:
     """The best design of the grid."""
     if best := chart.to_json()["least_abscissa"]:
-        yield "least abscissa", chart.problem.ordered({n: best[n] for n in chart.axes})
+        yield "least abscissa", chart.problem.posed.ordered({n: best[n] for n in chart.axes})
 
 
 def _of_results(results: "Results") -> Iterator[Named]:
@@ -86,7 +86,7 @@ def _of_results(results: "Results") -> Iterator[Named]:
     known = [row for row in results.rows if math.isfinite(row.abscissa)]
     if known:
         problem = results.study.problem
-        decays = {row.number: row.abscissa / unit_at(problem, "abscissa", row.parameters).one for row in known}
+        decays = {row.number: row.abscissa / unit_at(problem.posed, "abscissa", row.parameters).one for row in known}
         best = results.summary.best or min(known, key=lambda row: decays[row.number])
         last = max(known, key=lambda row: decays[row.number])
         yield f"best, row {best.number}", best.parameters

@@ -19,7 +19,7 @@ from tmsopt.display.pictures import picture, untitled
 from tmsopt.display.writers import drawn, report
 from tmsopt.guide import describe
 from tmsopt.models import in_words_of, tms
-from tmsopt.problem import Problem, unit_of
+from tmsopt.problem import Posed, unit_of
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -62,10 +62,10 @@ def of_solution(solution: "Solution", full: bool) -> Chapters:
 
 def of_proof(proof: "Proof", design: "Solution | None") -> Chapters:
     """What is proved, every digit, and of the design that it was proved of its pictures."""
-    problem = proof.problem
-    if problem is None:
+    if proof.problem is None:
         yield from of_other(proof)
         return
+    problem = proof.problem.posed
     yield Chapter("answer", "Answer", _opening(proof))
     digits = [("number", "decimal", "radius", "unit"), *texts.number_rows(problem, proof)]
     yield Chapter("digits", "Digits", table(f"Numbers that were proved, to {proof.digits} digits", digits), "wide")
@@ -85,7 +85,7 @@ def of_chart(chart: "Chart") -> Chapters:
     yield Chapter("answer", "Answer", _opening(chart))
     met = {in_words_of(chart.problem.model, name): share for name, share in chart.shares.items() if share}
     shares = [("class", "share in %"), *((name, f"{100 * share:.2f}") for name, share in met.items())]
-    corners = [("corner",)] if chart.domain is None else texts.corner_rows(chart.domain, chart.problem)
+    corners = [("corner",)] if chart.domain is None else texts.corner_rows(chart.domain, chart.problem.posed)
     yield Chapter("classes", "Classes", table("Share of each class", shares) + table("Corners of the domains", corners))
     plain = spread(untitled(chart), _POINTS)
     yield Chapter(
@@ -97,7 +97,7 @@ def of_chart(chart: "Chart") -> Chapters:
         ),
         "wide",
     )
-    yield _asked(chart.problem)
+    yield _asked(chart.problem.posed)
     rows, note = chart_rows(chart)
     yield Chapter("rows", "Designs", note + table("Designs of the grid", rows), "whole")
 
@@ -107,12 +107,12 @@ def of_trace(trace: "Trace") -> Chapters:
     yield Chapter("answer", "Answer", _opening(trace))
     caption = f"Branches of {in_words_of(trace.problem.model, trace.pattern)}"
     yield Chapter("picture", "Branches", picture(lambda: drawn(untitled(trace)), caption))
-    units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
+    units = {n: unit_of(trace.problem.posed, n) for n in (*trace.problem.free, "abscissa")}
     listed = [texts.event_rows(branch, units, trace.problem.model) for branch in trace.branches]
     rows = [("branch", "event", *listed[0][0][1:])] if listed else [("branch",)]
     rows += [(str(k), *row) for k, found in enumerate(listed, start=1) for row in found[1:]]
     yield Chapter("events", "Events", table("Events along the branches, to all digits", rows), "whole")
-    yield _asked(trace.problem)
+    yield _asked(trace.problem.posed)
     rows, note = point_rows(trace)
     yield Chapter("rows", "Points", note + table("Points of the branches", rows), "whole")
 
@@ -122,7 +122,7 @@ def of_front(front: "Front") -> Chapters:
     yield Chapter("answer", "Answer", _opening(front))
     caption = f"Front of {', '.join(front.objectives)}"
     yield Chapter("picture", "Front", picture(lambda: plots.front_figure(untitled(front)), caption))
-    yield _asked(front.problem)
+    yield _asked(front.problem.posed)
     yield Chapter("rows", "Points", table("Points of the front", texts.front_rows(front, full=True)), "whole")
 
 
@@ -132,7 +132,7 @@ def of_results(results: "Results") -> Chapters:
     yield Chapter("answer", "Answer", _opening(results))
     caption = "How the designs are distributed" if study.method == "monte_carlo" else "The objective over what varies"
     yield Chapter("picture", "Rows together", picture(lambda: drawn(untitled(results)), caption))
-    yield _asked(study.problem)
+    yield _asked(study.problem.posed)
     rows, note = thinned(results.rows, "rows", "tmsopt study FILE --export rows.csv writes all")
     yield Chapter("rows", "Rows", note + table("Rows of the study", texts.study_rows(study, rows)), "whole")
 
@@ -159,7 +159,7 @@ def _opening(result: Any) -> str:
     return _lead([line for line in lines if line.strip() and not line.startswith("  ")])
 
 
-def _asked(problem: Problem) -> Chapter:
+def _asked(problem: Posed) -> Chapter:
     """What was asked: parameters, values and ranges with their meaning, objective and limits."""
     asked = describe(problem).asked.items()
     said = ((part, "; ".join(f"{name}: {text}" for name, text in keys.items())) for part, keys in asked)
@@ -204,7 +204,7 @@ def _limits(solution: "Solution", found: "texts.Findings") -> str:
 
 def _bound(solution: "Solution") -> str:
     """What no design can beat, by whom, to all digits; empty where nobody looked for it."""
-    bound, problem = solution.bound, solution.problem
+    bound, problem = solution.bound, solution.problem.posed
     unit = unit_of(problem, problem.minimize or problem.maximize or "abscissa")
     if not (bound.proven or bound.solver or math.isfinite(bound.value)):
         return ""
@@ -225,7 +225,7 @@ def _bound(solution: "Solution") -> str:
 def _parameter_rows(solution: "Solution", si: Mapping[str, float]) -> Rows:
     """Those of the report, with the range of each that is free; of a problem in SI, without units beside."""
     ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
-    own = solution.problem.parameter_set.rate is not None
+    own = solution.problem.posed.parameter_set.rate is not None
     heads = ("parameter", "value", "unit", "free or fixed", "range", "without units", "likewise", "meaning")
     rows: list[tuple[str, ...]] = [heads]
     for name, value, unit, how, other, number, _, meaning in texts.parameter_rows(solution, si):

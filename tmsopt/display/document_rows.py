@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt.display.markup import Rows, paragraphs
 from tmsopt.guide import describe
 from tmsopt.models import in_words_of
-from tmsopt.problem import NO_RADIUS, Case, Problem, Unit, unit_of
+from tmsopt.problem import NO_RADIUS, Case, Posed, Unit, unit_of
 from tmsopt.problem.unit_system import limit_text
 from tmsopt.roots import CLASSES
 
@@ -43,7 +43,7 @@ def thinned(rows: Sequence[T], name: str, whole: str, keep: Iterable[int] = ()) 
     return kept, paragraphs([f"{len(kept)} of {len(rows)} {name}, spread evenly; {whole}."])
 
 
-def range_rows(problem: Problem) -> Rows:
+def range_rows(problem: Posed) -> Rows:
     """Parameters of a problem: value or range as typed, what is physically possible, and the meaning."""
     given = [w for of in describe(problem).sets for w in of.parameters]
     heads = [("parameter", "value or range", "", "possible", "meaning")]
@@ -52,7 +52,7 @@ def range_rows(problem: Problem) -> Rows:
 
 def limit_rows(solution: "Solution") -> list[Row]:
     """Constraints, and what else is violated: what each says, and whether it holds, binds or is violated."""
-    problem = solution.problem
+    problem = solution.problem.posed
     others = [name for name in solution.violations if name not in problem.constraints]
     rows: list[Row] = [("limit", "says", "stands")]
     for name in (*problem.constraints, *others):
@@ -63,14 +63,14 @@ def limit_rows(solution: "Solution") -> list[Row]:
 
 def _stands(solution: "Solution", name: str) -> str:
     if name in solution.violations:
-        by = solution.violations[name]
-        return f"violated by {unit_of(solution.problem, name).show(by, 4)}" if math.isfinite(by) else "has no value"
+        by, unit = solution.violations[name], unit_of(solution.problem.posed, name)
+        return f"violated by {unit.show(by, 4)}" if math.isfinite(by) else "has no value"
     return "binds" if name in solution.active else f"holds{_margin(solution, name)}"
 
 
 def _margin(solution: "Solution", name: str) -> str:
     """By how much an inequality holds, the least over the cases of the design; empty where that is no number."""
-    problem, condition = solution.problem, solution.problem.conditions[name]
+    problem, condition = solution.problem.posed, solution.problem.posed.conditions[name]
     if condition.equality:
         return ""
     cases = [case for case in problem.cases if not case.direction]
@@ -89,7 +89,7 @@ def _margin(solution: "Solution", name: str) -> str:
 
 def point_rows(trace: "Trace") -> tuple[list[Row], str]:
     """Points of all branches with their events, in the units of the problem."""
-    units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
+    units = {n: unit_of(trace.problem.posed, n) for n in (*trace.problem.free, "abscissa")}
     heads = ("branch", *(f"{n} {u.text}".rstrip() for n, u in units.items()))
     model = trace.problem.model
     swings = () if model.carrier is not None else ("heavily damped",)
@@ -108,7 +108,7 @@ def point_rows(trace: "Trace") -> tuple[list[Row], str]:
 def chart_rows(chart: "Chart") -> tuple[list[Row], str]:
     """Designs of the grid, every so many along each axis where they are too many."""
     problem, shown = chart.problem, spread(chart, MOST)
-    units = {n: unit_of(problem, n) for n in (*chart.axes, "abscissa")}
+    units = {n: unit_of(problem.posed, n) for n in (*chart.axes, "abscissa")}
     grid = np.meshgrid(*reversed(shown.grid), indexing="ij")
     columns: dict[str, list[str]] = {
         f"{n} {units[n].text}".rstrip(): [units[n].number(x, _DIGITS) for x in values.ravel().tolist()]

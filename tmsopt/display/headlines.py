@@ -27,7 +27,7 @@ Words = Iterator[str]
 
 def of_solution(solution: "Solution") -> Words:
     """Status, objective, structure, proof, stability."""
-    problem = solution.problem
+    problem = solution.problem.posed
     yield status_text(problem, solution.status)
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
@@ -77,14 +77,14 @@ def of_chart(chart: "Chart") -> Words:
 def of_speeds(speeds: "Speeds") -> Words:
     """Where the design is stable."""
     yield speeds.parameter
-    yield f"stable {_bands(speeds.stable, unit_of(speeds.problem, speeds.parameter))}"
+    yield f"stable {_bands(speeds.stable, unit_of(speeds.problem.posed, speeds.parameter))}"
     yield _count(len(speeds.found), "critical value")
 
 
 def of_growth(growth: "Growth") -> Words:
     """Where the design is stable."""
     yield f"over {growth.over.name}"
-    yield f"stable {_bands(growth.stable, unit_of(growth.problem, growth.over.name))}"
+    yield f"stable {_bands(growth.stable, unit_of(growth.problem.posed, growth.over.name))}"
     yield growth.structure
 
 
@@ -108,7 +108,7 @@ def of_results(results: "Results") -> Words:
     """Rows and how they ended."""
     yield _count(len(results.rows), "row")
     for status, count in results.summary.counts.items():
-        yield f"{count} {status_text(results.study.problem, status)}"
+        yield f"{count} {status_text(results.study.problem.posed, status)}"
 
 
 def of_proof(proof: "Proof") -> Words:

@@ -13,7 +13,7 @@ from typing import Any
 
 from tmsopt.display.writers import WRITERS, drawn, report, title_of
 from tmsopt.models import Parameter
-from tmsopt.problem import Problem, unit_of
+from tmsopt.problem import Posed, unit_of
 
 _ROWS, _COLUMNS = 12, 12  # of a table shown
 _BADGE = "border:1px solid currentColor;border-radius:.7em;padding:0 .6em;margin-right:.4em;white-space:nowrap"
@@ -65,15 +65,16 @@ def _rows(result: Any) -> list[Sequence[str]]:
     problem, parameters = getattr(result, "problem", None), getattr(result, "parameters", None)
     if problem is None or not isinstance(parameters, Mapping) or not parameters:
         return []
+    posed = problem.posed
     rows = [
-        (p.name, *_number(problem, p, parameters[p.name]), p.meaning, "free" if p.name in problem.free else "fixed")
-        for p in problem.parameter_set.parameters
+        (p.name, *_number(posed, p, parameters[p.name]), p.meaning, "free" if p.name in posed.free else "fixed")
+        for p in posed.parameter_set.parameters
         if p.name in parameters
     ]
     return [("parameter", "value", "unit", "meaning", ""), *rows]
 
 
-def _number(problem: Problem, parameter: Parameter, value: Any) -> tuple[str, str]:
+def _number(problem: Posed, parameter: Parameter, value: Any) -> tuple[str, str]:
     """A value and its unit: as the problem was written; a proved number, which is a decimal, in SI."""
     if isinstance(value, float):
         unit = unit_of(problem, parameter.name)

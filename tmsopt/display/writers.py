@@ -45,7 +45,7 @@ WRITERS: Mapping[str, Writer] = {
     "Results": Writer(
         lambda x, full: texts.study_table(x.study, x.summary, x.rows, full), headlines.of_results, "draw_histogram"
     ),
-    "Proof": Writer(lambda x, full: texts.proof_text(x.problem, x), headlines.of_proof, "draw_roots"),
+    "Proof": Writer(lambda x, full: texts.proof_text(x.problem.posed, x), headlines.of_proof, "draw_roots"),
     "Every": Writer(lambda x, full: texts.every_table(x), headlines.of_every, "draw_designs"),
     "Explanation": Writer(
         lambda x, full: "\n".join(texts.explained_lines(x)), headlines.of_explanation, "draw_rounding"

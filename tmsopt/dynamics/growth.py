@@ -128,7 +128,7 @@ def growth(
     speed = name in SPEEDS
     low, high = _ends(design, name, end, at)
     try:
-        a = coefficients_over(design.problem, of, parameters, name)
+        a = coefficients_over(design.problem.posed, of, parameters, name)
         met = told(model, crossings(a, exact(low), None if speed and end is None else exact(high)))
     except InputError:  # no polynomials in it
         met = None
@@ -184,7 +184,7 @@ def growth(
 
 def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
     """The parameters of a design in the set that has the one asked for, and its name."""
-    problem = design.problem
+    problem = design.problem.posed
     own, native = problem.parameter_set, problem.model.sets[0]
     if over is None:
         over = speed_of(own) or next(iter(problem.free), own.names[0])

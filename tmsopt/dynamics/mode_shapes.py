@@ -10,7 +10,7 @@ import numpy as np
 from tmsopt.analysis import diagnosed
 from tmsopt.dynamics.system import ANGLES, coordinates_of, matrices_of
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.records import Complex, Table, plain
 from tmsopt.roots import Root, Structure
 
@@ -57,7 +57,7 @@ class ModeShape:
 
 
 def mode_shapes(
-    problem: Problem, parameters: Mapping[str, float], structure: Structure, rate: float = 1.0
+    problem: Posed, parameters: Mapping[str, float], structure: Structure, rate: float = 1.0
 ) -> tuple[ModeShape, ...]:
     """The shapes at every root of a design, rightmost first: null vectors of its matrices at the root.
 

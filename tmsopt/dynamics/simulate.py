@@ -18,8 +18,8 @@ from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
 from tmsopt.errors import Fault, InputError
 from tmsopt.files import write_csv
 from tmsopt.models.user_spectrum import user_structure
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Column, Table, Tabular, plain
 from tmsopt.roots import Structure
@@ -104,7 +104,7 @@ class Simulation(Tabular):
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         return {
-            **self.problem.heading,
+            **self.problem.posed.heading,
             **plain(self, "parameters stable structure disturbance units"),
             "measures": {m.name: {n: x for n, x in m.to_json().items() if n != "name"} for m in self.measures},
             **plain(self, "deviations modes columns"),
@@ -164,7 +164,7 @@ def simulate(
 
     More: docs/how_to/motion.md
     """
-    whole = as_problem(design)
+    whole = pose(design)
     asked = whole.nominal
     matrices_of(asked.model)
     own = asked.ordered(parameters_of(design, whole, "", progress)) | dict(at or {})
@@ -210,7 +210,7 @@ def simulate(
     deviations = _deviations(system, force) if noise and stable else Table[float]()
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
-        asked,
+        asked.problem,
         Table(own),
         disturbance,
         Table(columns),
@@ -224,7 +224,7 @@ def simulate(
     )
 
 
-def _dies_out(problem: Problem, found: Structure) -> bool:
+def _dies_out(problem: Posed, found: Structure) -> bool:
     """Whether the design is stable, multiple roots and those of a complex H by more than rounding."""
     rightmost = [r.multiplicity for r in found.roots if r.re == found.abscissa]
     exact = problem.model.carrier is None and max(rightmost, default=1) == 1

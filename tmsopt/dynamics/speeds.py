@@ -15,8 +15,8 @@ from tmsopt.boundaries.surroundings import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, told
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.models import ParameterSet
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Table, Tabular, plain
@@ -85,9 +85,9 @@ class Speeds(Tabular):
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; an end at infinity is null."""
         return {
-            **self.problem.heading,
+            **self.problem.posed.heading,
             "parameter": self.parameter,
-            "unit": self.problem.parameter_set[self.parameter].unit,
+            "unit": self.problem.posed.parameter_set[self.parameter].unit,
             "range": list(plain(self, "lower upper").values()),
             "found": [plain(row) for row in self.records()],
             **plain(self, "stable heavily_damped"),
@@ -128,7 +128,7 @@ def speeds(
 
     More: docs/explanation/weave_and_capsize.md
     """
-    whole = as_problem(problem if problem is not None and isinstance(design, Mapping) else design)
+    whole = pose(problem if problem is not None and isinstance(design, Mapping) else design)
     asked = whole.nominal
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
@@ -151,7 +151,7 @@ def speeds(
         raise InputError([Fault(message, ("between",))])
     a = coefficients_over(asked, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
-    return Speeds(asked, name, Table(own), float(lower), float(upper), **vars(told(asked.model, met)))
+    return Speeds(asked.problem, name, Table(own), float(lower), float(upper), **vars(told(asked.model, met)))
 
 
 def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
@@ -162,7 +162,7 @@ def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
     Raises:
         InputError: where the speed does not enter as a polynomial, or the design has none of its own.
     """
-    asked = design.problem.nominal
+    asked = design.problem.posed.nominal
     of, name = asked.parameter_set, speed_of(asked.parameter_set)
     if name is None or not math.isfinite(of[name].range.lower):
         return None
@@ -176,7 +176,7 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def coefficients_over(problem: Problem, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+def coefficients_over(problem: Posed, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:
@@ -201,7 +201,7 @@ def _with_fractions(x: Any) -> Any:
     return flint.fmpq_poly([rational(c) for c in x]) if isinstance(x, flint.arb_poly) else rational(x)
 
 
-def parameters_of(design: Any, whole: Problem, name: str, progress: Listener | None) -> dict[str, float]:
+def parameters_of(design: Any, whole: Posed, name: str, progress: Listener | None) -> dict[str, float]:
     """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
     if isinstance(design, Solution):
         return dict(design.parameters)

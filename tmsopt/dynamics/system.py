@@ -11,7 +11,7 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model
 from tmsopt.models.bicycles.bicycle import contact_path
 from tmsopt.models.model import Feedback
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Table
 
 ANGLES, RATES, TORQUES = ("phi", "delta"), ("phidot", "deltadot"), ("T_phi", "T_delta")
@@ -81,7 +81,7 @@ def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
     return tuple(f"{letter}{k}" for k in range(1, n + 1))
 
 
-def system_of(problem: Problem, parameters: Mapping[str, float]) -> System:
+def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     """The linear system of a design, in SI where the problem is written so, else in the model's own units.
 
     M q″ + D q′ + K q = 0 becomes x′ = A x, x = (q, q′); two matrices I, −A are it already. Of a bicycle the yaw and

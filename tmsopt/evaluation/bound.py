@@ -13,7 +13,6 @@ is reached where the parameters give that polynomial (Blondel, Gürbüzbalaban, 
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -25,7 +24,7 @@ from tmsopt.algebra.balls import Tilt, as_ball, exact
 from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, made, trace
 from tmsopt.algebra.kinds import quotient
 from tmsopt.models import Model, ParameterSet
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Bound
 from tmsopt.program.nlp import objective_size
 from tmsopt.records import Array
@@ -52,12 +51,12 @@ Exact = Mapping[str, Any]
 Known = Mapping[tuple[str, float], Any]
 
 
-def bounded(problem: Problem) -> bool:
+def bounded(problem: Posed) -> bool:
     """Whether the bound speaks of the problem: it asks for the least abscissa."""
     return problem.sense == "minimize" and (problem.minimize or "").strip() == "abscissa"
 
 
-def instant_bound(problem: Problem, value: float) -> Bound:
+def instant_bound(problem: Posed, value: float) -> Bound:
     """The better one of `omega0_bound` and, where that leaves a gap, the bound by relations of the coefficients."""
     known = omega0_bound(problem, value)
     if known.proven or not bounded(problem):
@@ -66,7 +65,7 @@ def instant_bound(problem: Problem, value: float) -> Bound:
     return other if other.value > known.value else known
 
 
-def omega0_bound(problem: Problem, value: float) -> Bound:
+def omega0_bound(problem: Posed, value: float) -> Bound:
     """Lower bound on the abscissa over the whole box, constraints ignored, and the gap of a value to it.
 
     With scenarios, that of the first of them: the worst is no better.
@@ -75,11 +74,11 @@ def omega0_bound(problem: Problem, value: float) -> Bound:
     return _bound(-(largest ** (1 / problem.model.degree)) * (1 + ROUNDING), value, "omega0", objective_size(problem))
 
 
-def _one_case(problem: Problem) -> Problem:
+def _one_case(problem: Posed) -> Posed:
     """The problem at the first of its scenarios."""
     if not problem.scenarios:
         return problem
-    return replace(problem.nominal, fixed={**problem.fixed, **problem.cases[0].at})
+    return problem.nominal.derive(fixed={**problem.fixed, **problem.cases[0].at})
 
 
 def _bound(bound: float, value: float, method: str, size: float) -> Bound:
@@ -95,7 +94,7 @@ def closed(gap: float, bound: float, size: float = 1.0) -> bool:
     return gap <= PROVEN * (size + abs(bound))
 
 
-def _largest_product(problem: Problem) -> float:
+def _largest_product(problem: Posed) -> float:
     """Greatest |aₙ/a0| over the box; inf where a0 may vanish or the maximum cannot be enclosed.
 
     Along a parameter in which aₙ and a0 are linear the quotient is monotone, so its extremes are at the ends. One
@@ -118,7 +117,7 @@ def _largest_product(problem: Problem) -> float:
     return float(quotients.max())
 
 
-def _enclosed_product(problem: Problem) -> float:
+def _enclosed_product(problem: Posed) -> float:
     """An upper end of |aₙ/a0| over the box, by balls; inf where they contain a0 = 0."""
     of = problem.parameter_set
     with flint.ctx.workprec(_BITS):
@@ -180,7 +179,7 @@ def _inside(polynomial: Array) -> Array:
     return np.asarray(np.clip(found.real[close], -1.0, 1.0))
 
 
-def _algebraic_box(problem: Problem) -> tuple[dict[str, tuple[float, float]], Known]:
+def _algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], Known]:
     """Range of each algebraic parameter as doubles, and the balls that their ends are rounded from.
 
     They are monotone in every parameter of a set, so corners suffice; √(1 + T²) is on either side of an upright axis.
@@ -245,7 +244,7 @@ def _exact(model: Model, name: str, others: Exact, at: Sequence[Fraction]) -> li
     return [(a[-1], a[0]) for a in rows]
 
 
-def relation_bound(problem: Problem) -> float:
+def relation_bound(problem: Posed) -> float:
     """The greatest of the bounds on the abscissa by relations of the coefficients; −inf without any.
 
     Constraints and the ranges of the free parameters play no role. Relations are looked for only among coefficients
@@ -312,7 +311,7 @@ def _bound_of(relation: Sequence[Any]) -> float:
     return math.nextafter(-max(zeros), -math.inf) if max(zeros) else 0.0
 
 
-def _dependent(problem: Problem) -> bool:
+def _dependent(problem: Posed) -> bool:
     """Whether the coefficients at random designs look dependent, in doubles."""
     of, rng = problem.parameter_set, np.random.default_rng(0)
     count = 2 * problem.model.degree + _MORE
@@ -329,7 +328,7 @@ def _dependent(problem: Problem) -> bool:
     return bool(values[-1] <= _DEPENDENT * values[0])
 
 
-def _exact_rows(problem: Problem) -> list[list[Any]] | None:
+def _exact_rows(problem: Posed) -> list[list[Any]] | None:
     """Coefficients at random designs of the box; None where one is no fraction."""
     of, rng = problem.parameter_set, np.random.default_rng(0)
     fixed = {n: exact(v) for n, v in problem.fixed.items()}

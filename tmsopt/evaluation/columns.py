@@ -18,7 +18,7 @@ from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.evaluation.law_rows import SAME_LAW
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import Values, tms
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
 from tmsopt.problem.validate import SMALLEST
 from tmsopt.records import Array, Truth
@@ -63,14 +63,14 @@ class Verdicts:
     reports: Mapping[str, Array]
 
 
-def judgeable(problem: Problem) -> bool:
+def judgeable(problem: Posed) -> bool:
     """Whether designs of a problem may be judged at once: nothing is free, listed, located or searched for, and roots
     are told as they are."""
-    listed = problem.free or problem.variations or problem.tolerances or problem.model.carrier is not None
+    listed = problem.free or problem.scenarios or problem.tolerances or problem.model.carrier is not None
     return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 
-def verdicts(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Verdicts | None:
+def verdicts(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Verdicts | None:
     """The designs that differ from a problem's in some of its fixed parameters; None where formulas take no arrays.
 
     Args:
@@ -84,7 +84,7 @@ def verdicts(problem: Problem, columns: Mapping[str, Array], reports: Sequence[s
         return None
 
 
-def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
+def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
     model, of = problem.model, problem.parameter_set
     given = {n: np.float64(v) for n, v in problem.ordered({}).items()} | dict(columns)
     m = len(next(iter(columns.values())))
@@ -141,7 +141,7 @@ def _column(number: Any, m: int) -> Array:
     return np.ascontiguousarray(np.broadcast_to(np.asarray(number, dtype=float), m))
 
 
-def _possible(problem: Problem, given: Mapping[str, Any]) -> Truth:
+def _possible(problem: Posed, given: Mapping[str, Any]) -> Truth:
     """Whether a design may be posed: parameters within their ranges, no angle 0, which rational bounds ask for."""
     of, possible = problem.parameter_set, np.True_
     for p in of.parameters:
@@ -155,7 +155,7 @@ def _possible(problem: Problem, given: Mapping[str, Any]) -> Truth:
     return np.asarray(possible)
 
 
-def _violations(problem: Problem, values: Values, found: Motions) -> tuple[dict[str, Array], Truth]:
+def _violations(problem: Posed, values: Values, found: Motions) -> tuple[dict[str, Array], Truth]:
     """By how much each constraint is violated, and which designs are too close to a limit to be told here."""
     m = len(found.simple)
     amounts, doubt = {}, np.zeros(m, dtype=bool)
@@ -171,7 +171,7 @@ def _violations(problem: Problem, values: Values, found: Motions) -> tuple[dict[
     return amounts, doubt
 
 
-def _bounds(problem: Problem, coefficients: Sequence[Bounded], settled: Callable[[Any], Array]) -> tuple[Array, Truth]:
+def _bounds(problem: Posed, coefficients: Sequence[Bounded], settled: Callable[[Any], Array]) -> tuple[Array, Truth]:
     """The bound of `instant_bound` on the abscissa of each design, and where it is one by relations.
 
     Coefficients that do not vary have relations of two: with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and with aₙ.

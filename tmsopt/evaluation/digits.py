@@ -19,7 +19,7 @@ from tmsopt.models import Model, Values
 from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, SIMPLE
 from tmsopt.problem.units import Reading, frequencies, readings
 from tmsopt.records import Table
@@ -46,7 +46,7 @@ class Certified:
 
 
 def certified_numbers(
-    problem: Problem, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case] = ()
+    problem: Posed, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case] = ()
 ) -> Certified:
     """The numbers of a design, correctly rounded.
 
@@ -86,7 +86,7 @@ def _known(checked: Evaluation) -> dict[_Key, float]:
     return found | {("dimensionless", n): v for n, v in checked.dimensionless.items()}
 
 
-def _structure(problem: Problem, parameters: Mapping[str, float], checked: Evaluation, case: Case) -> Structure:
+def _structure(problem: Posed, parameters: Mapping[str, float], checked: Evaluation, case: Case) -> Structure:
     """Structure of the roots in a case."""
     if case == checked.worst:
         return checked.structure
@@ -119,7 +119,7 @@ class _Roots:
 class _Design:
     """A design with all that its numbers depend on."""
 
-    problem: Problem
+    problem: Posed
     parameters: Mapping[str, float]
     checked: Evaluation
     cases: Sequence[Case]

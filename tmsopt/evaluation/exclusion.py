@@ -1,13 +1,12 @@
 """Whether limits alone exclude every design of a box: by interval arithmetic, in no time and without a tolerance."""
 
 import math
-from dataclasses import replace
 
 from tmsopt.algebra.formula import NotAccepted
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.problem.limit import limit_of, limit_side
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Bound
 from tmsopt.program.formulate import Builder
 
@@ -15,7 +14,7 @@ _BEYOND = 10 * FEASIBLE
 """Relative to a limit, by which every design must miss it: what counts as met is never excluded."""
 
 
-def known_bound(problem: Problem, status: str = "infeasible", value: float = math.nan) -> Bound:
+def known_bound(problem: Posed, status: str = "infeasible", value: float = math.nan) -> Bound:
     """What needs no search: how good an optimum is at best, or that some limit is met nowhere in the box.
 
     The box is what limits on parameters alone leave of the ranges, so two of these that exclude each other do, too.
@@ -28,7 +27,7 @@ def known_bound(problem: Problem, status: str = "infeasible", value: float = mat
     return Bound(-math.inf if problem.sense == "maximize" else math.inf, 0.0, True, "interval")
 
 
-def _excluded(problem: Problem) -> bool:
+def _excluded(problem: Posed) -> bool:
     free = dict(problem.free)
     for name, condition in problem.conditions.items():
         text, parameter = problem.constraints[name], condition.names[0]
@@ -44,7 +43,7 @@ def _excluded(problem: Problem) -> bool:
     box = {n: (min(ends), max(ends)) for n, ends in free.items()}
     inside = {n: ends for n, ends in box.items() if ends[0] < ends[1]}
     fixed = {**problem.fixed, **{n: ends[0] for n, ends in box.items() if n not in inside}}
-    build = Builder(replace(problem, free=inside, fixed=fixed, start={}), problem.cases[:1])
+    build = Builder(problem.derive(free=inside, fixed=fixed, start={}), problem.cases[:1])
     build.constraints(without=problem.asked_of_roots)
     if not build.rows:
         return False

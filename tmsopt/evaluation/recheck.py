@@ -18,7 +18,7 @@ from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE, roots_at
 from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.records import Array, Table
@@ -63,7 +63,7 @@ class Evaluation:
 
 
 def recheck(
-    problem: Problem,
+    problem: Posed,
     parameters: Mapping[str, float],
     cases: Sequence[Case] | None = None,
     around: Robustness | None = None,
@@ -113,7 +113,7 @@ def recheck(
 
 
 def missed(
-    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
+    problem: Posed, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
 ) -> dict[str, float]:
     """Limits on the roots that the exact roots of the parameters as stored miss → by how much, in their own units.
 
@@ -130,7 +130,7 @@ def missed(
 
 
 def judged_exactly(
-    problem: Problem, parameters: Mapping[str, Any], cases: Sequence[Case]
+    problem: Posed, parameters: Mapping[str, Any], cases: Sequence[Case]
 ) -> tuple[Values, dict[str, float]]:
     """Quantities of a design of exact numbers, and what it violates beyond tolerance, in the units of the sides.
 
@@ -149,7 +149,7 @@ def _is_near(condition: Expression, values: Values) -> bool:
 
 
 def _violated(
-    problem: Problem, looked: "_Look", conditions: Mapping[str, Expression]
+    problem: Posed, looked: "_Look", conditions: Mapping[str, Expression]
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Violations of conditions beyond tolerance, relative and in the units of the sides."""
     violations, amounts = {}, {}
@@ -162,7 +162,7 @@ def _violated(
     return violations, amounts
 
 
-def _beyond(problem: Problem, condition: Expression, values: Values) -> bool:
+def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
     """Whether no design within `FEASIBLE` of another meets a condition, so that a small excess is none of rounding.
 
     Parameters move by so much of their size or of their range, root quantities of theirs; (Fr - 1.7)**4 <= 0 is missed
@@ -195,7 +195,7 @@ def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str
     return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
-def excesses(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
+def excesses(problem: Posed, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
     """Amount by which each constraint's limit must be moved for a design: 0 or more, signed for an equality."""
     looked = _look(problem, parameters, cases)
     found = {}
@@ -226,13 +226,13 @@ class _Look:
     fastest: int
     around: Robustness | None
 
-    def at(self, problem: Problem, condition: Expression) -> list[Values]:
+    def at(self, problem: Posed, condition: Expression) -> list[Values]:
         """The cases that a condition holds in."""
         return self.each if depends_on_case(problem, condition, self.cases) else [self.nominal]
 
 
 def _look(
-    problem: Problem,
+    problem: Posed,
     parameters: Mapping[str, float],
     cases: Sequence[Case],
     around: Robustness | None = None,
@@ -295,7 +295,7 @@ def _off(a: Array, z: NDArray[np.complex128]) -> Array:
     return np.asarray(np.minimum(first, _SCATTER * size.max(axis=1, keepdims=True)))
 
 
-def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:
+def _objective(problem: Posed, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:
     """The objective, the worst over the cases where it differs between them."""
     if problem.objective is None:
         return math.nan
@@ -310,12 +310,12 @@ def _or_infinite(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 
-def realised_abscissa(problem: Problem, parameters: Mapping[str, float]) -> float:
+def realised_abscissa(problem: Posed, parameters: Mapping[str, float]) -> float:
     """Abscissa of the parameters exactly as stored."""
     found = realised_roots(problem, parameters)
     return found[0].re if found else math.nan
 
 
-def realised_roots(problem: Problem, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
+def realised_roots(problem: Posed, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
     """Roots of the parameters exactly as stored, rightmost first; none where a coefficient does not exist."""
     return roots_at(problem.model, problem.parameter_set, parameters)

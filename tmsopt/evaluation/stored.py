@@ -22,7 +22,7 @@ import numpy as np
 
 from tmsopt.evaluation.recheck import FEASIBLE, Evaluation, missed, recheck
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text, unit_at
@@ -78,7 +78,7 @@ class _Cluster:
 
 
 def held(
-    problem: Problem, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case]
+    problem: Posed, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case]
 ) -> tuple[Mapping[str, float], Evaluation, Mapping[str, float]]:
     """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
 
@@ -102,7 +102,7 @@ def held(
     return parameters, checked, amounts
 
 
-def multiple_roots_exist(problem: Problem, parameters: Mapping[str, float]) -> bool:
+def multiple_roots_exist(problem: Posed, parameters: Mapping[str, float]) -> bool:
     """Whether a design within rounding of one has exactly the multiple roots that this one has to rounding.
 
     There Newton's method, in 150 digits, gains digits with every step; where equations are all but singular it stalls.
@@ -128,19 +128,20 @@ def abscissa_as_stored(solution: Solution) -> str:
     if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
         return ""
     at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
-    unit, goal = unit_at(solution.problem, "abscissa", at), solution.problem.minimize or solution.problem.maximize or ""
+    problem, unit = solution.problem, unit_at(solution.problem.posed, "abscissa", at)
+    goal = problem.minimize or problem.maximize or ""
     first = "" if goal.strip() == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
     return f"{first}as stored {unit.number(realised, _SHOWN)}"
 
 
-def missed_note(problem: Problem, amounts: Mapping[str, float]) -> tuple[str, ...]:
+def missed_note(problem: Posed, amounts: Mapping[str, float]) -> tuple[str, ...]:
     """What parameters miss as they are stored, as a sentence for the reader."""
     why = "no doubles nearby that meet every limit were found" if problem.free else "the ideal design does not"
     return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
 
 
 def _clusters(
-    problem: Problem,
+    problem: Posed,
     parameters: Mapping[str, float],
     checked: Evaluation,
     cases: Sequence[Case],
@@ -167,7 +168,7 @@ def _clusters(
 
 
 def _nearest(
-    problem: Problem,
+    problem: Posed,
     parameters: Mapping[str, float],
     clusters: Sequence[_Cluster],
     names: Sequence[str],
@@ -190,13 +191,13 @@ def _nearest(
         yield {**parameters, **{n: x + count * unit for (n, x), count, unit in moves}}
 
 
-def _widths(problem: Problem, parameters: Mapping[str, float], names: Sequence[str]) -> Array:
+def _widths(problem: Posed, parameters: Mapping[str, float], names: Sequence[str]) -> Array:
     """Natural sizes of parameters."""
     return np.array([max(abs(parameters[n]), _LEAST * np.ptp(problem.free[n])) for n in names])
 
 
 def _solved(
-    problem: Problem,
+    problem: Posed,
     parameters: Mapping[str, float],
     clusters: Sequence[_Cluster],
     names: Sequence[str],
@@ -236,7 +237,7 @@ def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Ar
     return target, leeway, sizes
 
 
-def _off(problem: Problem, parameters: Mapping[str, Any], clusters: Sequence[_Cluster], target: Array) -> list[Any]:
+def _off(problem: Posed, parameters: Mapping[str, Any], clusters: Sequence[_Cluster], target: Array) -> list[Any]:
     """Each part of each cₖ of an exact design, minus what is aimed at."""
     found = []
     for cluster in clusters:
@@ -273,7 +274,7 @@ def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
         yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
 
 
-def _structured(problem: Problem, design: Mapping[str, float], checked: Evaluation, again: Evaluation) -> Evaluation:
+def _structured(problem: Posed, design: Mapping[str, float], checked: Evaluation, again: Evaluation) -> Evaluation:
     """The recheck of a design, with the structure of the ideal one that it was moved from."""
     structure = again.structure
     if structure.name != checked.structure.name:

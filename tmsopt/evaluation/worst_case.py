@@ -17,7 +17,7 @@ from tmsopt.models import Values
 from tmsopt.problem.cases import Band, Case, Cover
 from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES
 from tmsopt.records import Array, Table
 from tmsopt.roots import lienard_chipart, shift
@@ -51,7 +51,7 @@ class Worst:
     value: float
 
 
-def worst_case_targets(problem: Problem, cases: Sequence[Case]) -> dict[str, tuple[float, Expression | str]]:
+def worst_case_targets(problem: Posed, cases: Sequence[Case]) -> dict[str, tuple[float, Expression | str]]:
     """What may differ between cases: name → sign that makes the worst the greatest, and what it is."""
     found: dict[str, tuple[float, Expression | str]] = {"abscissa": (1.0, "abscissa")}
     asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
@@ -64,7 +64,7 @@ def worst_case_targets(problem: Problem, cases: Sequence[Case]) -> dict[str, tup
     return found
 
 
-def worst_cases(problem: Problem, parameters: Mapping[str, float]) -> dict[str, Worst]:
+def worst_cases(problem: Posed, parameters: Mapping[str, float]) -> dict[str, Worst]:
     """The worst case of everything that differs between cases, over whole bands and tolerance boxes.
 
     A grid with a closer look at its worst points; the value in the case found is exact, with multiple roots
@@ -80,7 +80,7 @@ def worst_cases(problem: Problem, parameters: Mapping[str, float]) -> dict[str, 
     return found
 
 
-def peaks(problem: Problem, designs: Mapping[str, float | Array], count: int) -> list[list[Case]]:
+def peaks(problem: Posed, designs: Mapping[str, float | Array], count: int) -> list[list[Case]]:
     """Of each of several designs, the cases in which something may be worst, by numeric roots.
 
     Args:
@@ -105,7 +105,7 @@ def _value(values: Values, what: Expression | str, shared: Mapping[str, float | 
 
 
 def _peaks(
-    problem: Problem,
+    problem: Posed,
     designs: Mapping[str, float | Array],
     count: int,
     sign: float,
@@ -133,7 +133,7 @@ class _Space:
 
     def peaks(
         self,
-        problem: Problem,
+        problem: Posed,
         designs: Mapping[str, float | Array],
         count: int,
         sign: float,
@@ -180,16 +180,16 @@ class _Space:
         return at, {n: t * (2 * c - 1) for (n, t), c in zip(self.tolerances.items(), rest, strict=True)}
 
 
-def _spaces(problem: Problem) -> Iterator[_Space]:
+def _spaces(problem: Posed) -> Iterator[_Space]:
     """One space for every choice of the separate scenario values."""
-    bands = {n: s for n, s in problem.variations.items() if isinstance(s, Band)}
-    separate = {n: s for n, s in problem.variations.items() if not isinstance(s, Band)}
+    bands = {n: s for n, s in problem.scenarios.items() if isinstance(s, Band)}
+    separate = {n: s for n, s in problem.scenarios.items() if not isinstance(s, Band)}
     for values in product(*separate.values()):
         yield _Space(Table(dict(zip(separate, values, strict=True))), bands, problem.tolerances)
 
 
 def _evaluated(
-    problem: Problem,
+    problem: Posed,
     parameters: Mapping[str, Any],
     offset: Mapping[str, Array],
     count: int,
@@ -242,7 +242,7 @@ def _apart(u: Array, high: Array, distance: float) -> list[int]:
     return chosen
 
 
-def cover(problem: Problem, parameters: Mapping[str, float], worst: float, boxes: int | None = None) -> Cover:
+def cover(problem: Posed, parameters: Mapping[str, float], worst: float, boxes: int | None = None) -> Cover:
     """Prove that no case has a root right of `worst` plus SLACK: Liénard–Chipart signs of p(t + limit) in balls.
 
     Boxes whose signs are undecided are halved, widest first, until none is left.
@@ -306,18 +306,18 @@ class _Box:
         return tuple(_Box(**whole | {table: {**whole[table], name: part}}) for part in parts)
 
 
-def _first(problem: Problem) -> Iterator[_Box]:
+def _first(problem: Posed) -> Iterator[_Box]:
     """Bands and tolerances whole, one box for each choice of separate scenario values."""
-    choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.variations.values()]
+    choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.scenarios.values()]
     choices = [[outwards(*ends) for ends in each] for each in choices]
     offset = {n: outwards(-t, t) for n, t in problem.tolerances.items()}
     for values in product(*choices):
-        at = dict(zip(problem.variations, values, strict=True))
+        at = dict(zip(problem.scenarios, values, strict=True))
         shares = {f"at {n}": 1.0 for n, (lo, hi) in at.items() if hi > lo} | {f"offset {n}": 1.0 for n in offset}
         yield _Box(at, offset, shares)
 
 
-def _left_of(problem: Problem, parameters: Mapping[str, float], box: _Box, gamma: Any) -> bool:
+def _left_of(problem: Posed, parameters: Mapping[str, float], box: _Box, gamma: Any) -> bool:
     """Whether every design of a box certainly has all roots left of a vertical line."""
     sides = [(table, n) for table in ("at", "offset") for n, (lo, hi) in getattr(box, table).items() if hi > lo]
     over = _tests(problem, box.varied(parameters), gamma)
@@ -335,7 +335,7 @@ def _left_of(problem: Problem, parameters: Mapping[str, float], box: _Box, gamma
     return all(test + sum(moves) > 0 for test, *moves in zip(middle, *slopes, strict=True))
 
 
-def _tests(problem: Problem, parameters: Mapping[str, Any], gamma: Any) -> list[Any]:
+def _tests(problem: Posed, parameters: Mapping[str, Any], gamma: Any) -> list[Any]:
     """Quantities that are all positive exactly when every root is left of the line; a0 first, by its sign."""
     given = problem.model.coefficients(parameters, problem.parameter_set)
     a = [flint.arb(c) if isinstance(c, int | float) else c for c in given]  # a model may have plain numbers too

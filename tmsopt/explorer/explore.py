@@ -1,7 +1,7 @@
 """One page for a problem: solved where it asks something, with what is worth going to."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from html import escape
 from os import PathLike
 from typing import Any, Unpack
@@ -10,7 +10,7 @@ from tmsopt.errors import refusal
 from tmsopt.explorer.known import known_designs
 from tmsopt.explorer.page import html_of
 from tmsopt.files import path_of, write_text
-from tmsopt.problem import Given, Problem, Solution, as_problem
+from tmsopt.problem import Given, Posed, Problem, Solution, pose
 from tmsopt.problem.toml import read_page
 from tmsopt.program.options import Asked
 from tmsopt.progress import Listener, start_steps
@@ -81,18 +81,21 @@ def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
     """
     told = options.get("progress")
     if isinstance(problem, Solution):
-        return _explorer(problem.problem, problem, {}, told)
+        return _explorer(problem.problem.posed, problem, {}, told)
     typed = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
-    posed = as_problem(problem)
+    posed = pose(problem)
     if posed.pareto:
-        posed = replace(posed, pareto=(), minimize=posed.pareto[0])
+        posed = posed.derive(pareto=(), minimize=posed.pareto[0])
     asked = posed.sense != "evaluate" or not posed.free
     solution = solve(posed, throw=False, stability=0.0, **options) if asked else None
     return _explorer(posed, solution, typed if isinstance(typed, dict) else {}, told)
 
 
 def page_of(
-    design: Problem | Solution, others: Sequence[tuple[str, Mapping[str, float]]] = (), *, trace_curves: bool = False
+    design: Problem | Posed | Solution,
+    others: Sequence[tuple[str, Mapping[str, float]]] = (),
+    *,
+    trace_curves: bool = False,
 ) -> str:
     """The page of a problem as it stands, or of a solution, as HTML; nothing is searched for it.
 
@@ -100,7 +103,7 @@ def page_of(
         others: names and parameters of more designs to go to; of a problem the page opens at the first.
         trace_curves: whether to trace what bounds stability around the design that the page opens at.
     """
-    problem, solution = (design, None) if isinstance(design, Problem) else (design.problem, design)
+    problem, solution = pose(design), design if isinstance(design, Solution) else None
     return html_of(problem, known_designs(problem, solution, search=False, others=others), {}, trace_curves)
 
 
@@ -112,8 +115,8 @@ def frame(html: str, title: str) -> str:
     )
 
 
-def _explorer(problem: Problem, solution: Solution | None, model: Mapping[str, Any], told: Listener | None) -> Explorer:
+def _explorer(problem: Posed, solution: Solution | None, model: Mapping[str, Any], told: Listener | None) -> Explorer:
     start_steps(told, "looking for designs worth going to")
     designs = known_designs(problem, solution, search=True)
     start_steps(told, "writing the page")
-    return Explorer(problem, solution, html_of(problem, designs, model, trace_curves=True))
+    return Explorer(problem.problem, solution, html_of(problem, designs, model, trace_curves=True))

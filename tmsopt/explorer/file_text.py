@@ -5,12 +5,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from tmsopt.guide import toml_key, toml_text
-from tmsopt.problem import Problem
+from tmsopt.problem import Posed
 
 _SHARED = re.compile(r"\[(\d+)\]")
 
 
-def around(problem: Problem, model: Mapping[str, Any]) -> dict[str, str]:
+def around(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
     """What stands before and after the lines of [parameters].
 
     Args:
@@ -38,7 +38,7 @@ def _model(table: Mapping[str, Any]) -> Iterator[str]:
         yield from ("", f"[model.{toml_key(name)}]", *(f"{toml_key(n)} = {_value(v)}" for n, v in values.items()))
 
 
-def _stated(problem: Problem) -> dict[str, Any]:
+def _stated(problem: Posed) -> dict[str, Any]:
     """The table of a model that was made in Python, with every shared part written out."""
     said = dict(problem.model.statement or {})
     shared, said["name"] = said.pop("shared"), problem.model.name

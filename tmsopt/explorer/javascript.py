@@ -13,7 +13,7 @@ from tmsopt.algebra.formula import Formula, Kind, fold, formula, symbol, trace
 from tmsopt.algebra.kinds import ROUNDING, as_double
 from tmsopt.models.bicycles.bicycle import contact_path
 from tmsopt.problem.array_function import array_function, nodes_of
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_QUANTITIES
 
 
@@ -63,7 +63,7 @@ class Script:
     constraints: tuple[str, ...]
 
 
-def model_script(problem: Problem) -> Script:
+def model_script(problem: Posed) -> Script:
     """The model of a problem: coefficients, derived quantities, margins of constraints, matrices, rate, ride.
 
     Constraints with the robustness radius are left out, which takes a search. The parameters are those of
@@ -94,7 +94,7 @@ def model_script(problem: Problem) -> Script:
     return Script(f"const MODEL = {{\n{text}\n}};\n", quantities, tuple(limits))
 
 
-def is_bicycle(problem: Problem) -> bool:
+def is_bicycle(problem: Posed) -> bool:
     """Whether the coordinates of a problem's model are lean and steer, with a steer axis to draw."""
     model = problem.model
     return model.pencil is not None and model.statement is None and "lambda_s" in problem.parameter_set.names
@@ -172,7 +172,7 @@ _LONGEST = 160
 """Characters of a result that stands where it is used."""
 
 
-def _pencil(problem: Problem) -> tuple[Formula | None, int, int]:
+def _pencil(problem: Posed) -> tuple[Formula | None, int, int]:
     """Entries of the matrices of a model, rows of each, and how many there are less one."""
     model, of = problem.model, problem.parameter_set
     if model.pencil is None or model.carrier is not None:  # whose carrier is no motion of the user's
@@ -181,7 +181,7 @@ def _pencil(problem: Problem) -> tuple[Formula | None, int, int]:
     return formula(e for matrix in matrices for row in matrix for e in row), len(matrices[0]), len(matrices) - 1
 
 
-def _ride(problem: Problem, p: Mapping[str, Any]) -> list[Any]:
+def _ride(problem: Posed, p: Mapping[str, Any]) -> list[Any]:
     """Rates of lean and steer after an impulse of steer torque of 1, M⁻¹ (0, 1), and the path of the contacts.
 
     In the model's own unit of time; torque and lengths are those of the file.

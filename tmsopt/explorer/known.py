@@ -8,7 +8,7 @@ from typing import Any
 from tmsopt.errors import InputError
 from tmsopt.guide import example
 from tmsopt.models.user_spectrum import user_structure
-from tmsopt.problem import Problem, Solution, degrees_of_freedom
+from tmsopt.problem import Posed, Solution, degrees_of_freedom
 from tmsopt.problem.files import problem_from_tables
 from tmsopt.problem.verdict.meetings import meetings
 from tmsopt.problem.verdict.stability import MultipleRoot
@@ -46,7 +46,7 @@ class Known:
 
 
 def known_designs(
-    problem: Problem,
+    problem: Posed,
     solution: Solution | None,
     search: bool,
     others: Sequence[tuple[str, Mapping[str, float]]] = (),
@@ -65,13 +65,13 @@ def known_designs(
     return [k if k.meetings else replace(k, meetings=_meetings(problem, k)) for k in every]
 
 
-def _meetings(problem: Problem, known: Known) -> tuple[MultipleRoot, ...]:
+def _meetings(problem: Posed, known: Known) -> tuple[MultipleRoot, ...]:
     return meetings(problem.nominal, known.parameters, problem.nominal.values(known.parameters)["structure"].roots)
 
 
 def _of_solution(solution: Solution) -> Known:
     """What was found, with how good it is known to be."""
-    problem = solution.problem
+    problem = solution.problem.posed
     names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
     words = status_in_words(solution), verdict_in_words(solution)
     facts, proof = [": ".join(filter(None, words)), *solution.notes], proof_line(solution)
@@ -89,7 +89,7 @@ def _of_solution(solution: Solution) -> Known:
     return Known(name, solution.parameters, known, (*facts, proof), True, proved, said, met)
 
 
-def _benchmark(problem: Problem) -> Known | None:
+def _benchmark(problem: Posed) -> Known | None:
     """The published bicycle of the problem's model in its own parameters, without a controller; None without one."""
     of = problem.parameter_set
     if problem.model.name not in _BENCHMARKS:
@@ -100,13 +100,13 @@ def _benchmark(problem: Problem) -> Known | None:
         return None
     if faults or found is None:
         return None
-    values, rest = found.values(found.fixed), {p.name: problem.fixed.get(p.name, 0.0) for p in of.parameters}
+    values, rest = found.posed.values(found.fixed), {p.name: problem.fixed.get(p.name, 0.0) for p in of.parameters}
     rest |= {p.name: p.default for p in of.parameters if p.default is not None}
     parameters = {n: float(values[n] if n in values else rest[n]) for n in of.names}
     return Known("benchmark", parameters, _structure(problem, parameters), (found.title,))
 
 
-def _exceptional(problem: Problem) -> Known | None:
+def _exceptional(problem: Posed) -> Known | None:
     """The highest exceptional point that the freedom of a problem allows, limits left aside; None where none is found.
 
     A k-fold root takes k − 1 free parameters.
@@ -114,7 +114,8 @@ def _exceptional(problem: Problem) -> Known | None:
     order = min(problem.model.degree, len(problem.free) + 1, _ORDER)
     if order < 2:
         return None
-    asked = Problem(problem.model, problem.nominal.fixed, problem.free, locate=f"EP{order}")
+    alone: dict[str, Any] = {"constraints": {}, "minimize": None, "maximize": None, "pareto": (), "start": {}}
+    asked = problem.nominal.derive(**alone, locate=f"EP{order}")
     if degrees_of_freedom(asked).count < 0:
         return None
     found = solve(asked, throw=False, starts=_STARTS, stability=0.0, alone=False)
@@ -124,5 +125,5 @@ def _exceptional(problem: Problem) -> Known | None:
     return Known(found.structure, found.parameters, Structure(found.structure, found.roots, 0.0), facts)
 
 
-def _structure(problem: Problem, parameters: Mapping[str, float]) -> Structure:
+def _structure(problem: Posed, parameters: Mapping[str, float]) -> Structure:
     return user_structure(problem.model, problem.nominal.values(parameters)["structure"])

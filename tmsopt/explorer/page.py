@@ -13,7 +13,7 @@ from tmsopt.explorer.javascript import model_script
 from tmsopt.explorer.kernel import kernel_script
 from tmsopt.explorer.known import Known
 from tmsopt.explorer.subject import subject
-from tmsopt.problem import Problem
+from tmsopt.problem import Posed
 
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
 _BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
@@ -22,7 +22,7 @@ _AROUND = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]])
 _PARTS = "numerics state axes chart plane growth bicycle motion controls facts api main"
 
 
-def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
+def html_of(problem: Posed, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
     """The page of a problem; arguments as of `subject`."""
     script = model_script(problem)
     data = subject(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}

@@ -13,7 +13,7 @@ from tmsopt.explorer.known import Known
 from tmsopt.guide import exact_value
 from tmsopt.models import Parameter, words_of
 from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
-from tmsopt.problem import Problem, degrees_of_freedom, limit_of, unit_of
+from tmsopt.problem import Posed, degrees_of_freedom, limit_of, unit_of
 from tmsopt.problem.validate import SMALLEST
 from tmsopt.records import Array
 from tmsopt.report.solution.rows import structure_line
@@ -33,7 +33,7 @@ _MIDDLE = "nothing was solved here, so the page opens in the middle of the box"
 
 
 def subject(
-    problem: Problem, designs: Sequence[Known], script: Script, model: Mapping[str, Any], trace_curves: bool
+    problem: Posed, designs: Sequence[Known], script: Script, model: Mapping[str, Any], trace_curves: bool
 ) -> dict[str, Any]:
     """The data of a page; numbers are those that the package computes with, in rad and SI.
 
@@ -77,16 +77,16 @@ def subject(
     }
 
 
-def _middle(problem: Problem) -> dict[str, float]:
+def _middle(problem: Posed) -> dict[str, float]:
     return problem.ordered({n: problem.start.get(n, (low + high) / 2) for n, (low, high) in problem.free.items()})
 
 
-def _unit(problem: Problem, name: str) -> dict[str, Any]:
+def _unit(problem: Posed, name: str) -> dict[str, Any]:
     unit = unit_of(problem, name)
     return {"unit": unit.text, "one": unit.one}
 
 
-def _parameter(problem: Problem, parameter: Parameter, value: float) -> dict[str, Any]:
+def _parameter(problem: Posed, parameter: Parameter, value: float) -> dict[str, Any]:
     low, high = problem.free.get(parameter.name) or _reach(parameter, value)
     room = parameter.range
     ends = {"least": room.lower, "most": room.upper, "open": not room.closed}
@@ -115,7 +115,7 @@ def _reach(parameter: Parameter, value: float) -> tuple[float, float]:
     return low, high
 
 
-def _constraint(problem: Problem, name: str) -> dict[str, Any]:
+def _constraint(problem: Posed, name: str) -> dict[str, Any]:
     condition = problem.conditions[name]
     size = max(1.0, abs(limit_of(problem.constraints[name]) or 0.0))  # of the sides where they are equal
     return {
@@ -127,7 +127,7 @@ def _constraint(problem: Problem, name: str) -> dict[str, Any]:
     }
 
 
-def _design(problem: Problem, known: Known) -> dict[str, Any]:
+def _design(problem: Posed, known: Known) -> dict[str, Any]:
     structure = known.structure
     roots = list(_drawn(problem, structure))
     return {
@@ -144,26 +144,26 @@ def _design(problem: Problem, known: Known) -> dict[str, Any]:
     }
 
 
-def _drawn(problem: Problem, found: Structure) -> Iterator[list[float]]:
+def _drawn(problem: Posed, found: Structure) -> Iterator[list[float]]:
     """Growth rate, frequency and multiplicity of each root, of conjugates of one; of a complex H Im ω and Re ω."""
     own = [[w.im, w.re, w.multiplicity] for w in eigenfrequencies(problem.model, found.roots)]
     yield from own or ([r.re, r.im, r.multiplicity] for r in found.roots if r.im >= 0)
 
 
-def _by_interest(problem: Problem) -> list[str]:
+def _by_interest(problem: Posed) -> list[str]:
     """Parameters in the order in which one looks at them: free before fixed, the speed and the tilt before others."""
     names = problem.parameter_set.names
     rank = {**dict.fromkeys(_SPEEDS, 0), _TILT: 1}
     return sorted(names, key=lambda n: (n not in problem.free, rank.get(n, 2)))
 
 
-def _over(problem: Problem) -> str:
+def _over(problem: Posed) -> str:
     """The speed of a bicycle, or else what comes first."""
     speeds = [n for n in problem.parameter_set.names if n in _SPEEDS and problem.model.statement is None]
     return (speeds or _by_interest(problem))[0]
 
 
-def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) -> Iterator[dict[str, Any]]:
+def _curves(problem: Posed, plane: Sequence[str], start: Mapping[str, float]) -> Iterator[dict[str, Any]]:
     """Traced curves in the plane of the chart: the boundaries of both domains, and the set that the problem locates."""
     names = problem.parameter_set.names
     axes = [names.index(n) for n in plane]
@@ -176,7 +176,8 @@ def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) 
     if len(plane) < 2 or not set(plane) <= set(problem.free):
         return
     others = {n: v for n, v in start.items() if n not in plane}
-    found = domain(Problem(problem.model, others, {n: problem.free[n] for n in plane}), starts=_STARTS)
+    asked = problem.nominal.derive(pareto=(), fixed=others, free={n: problem.free[n] for n in plane})
+    found = domain(asked, starts=_STARTS)
     for title, arcs in (("stability", found.stability), ("heavy damping", found.heavy_damping)):
         for arc in arcs:
             yield {"kind": arc.kind, "set": title, "axes": axes, "along": []} | _points(arc.points, plane)

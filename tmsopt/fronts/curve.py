@@ -315,7 +315,7 @@ def _thinned(search: _Search) -> Front:
     proved = dict(search.team.each(_covered, search.ask, [chain[i].solution for i in kept]))
     notes = () if not search.exhausted else ("the search was ended: too many sub-problems; ask for more points",)
     return Front(
-        problem=search.ask.problem,
+        problem=search.ask.problem.problem,
         objectives=search.ask.texts,
         points=tuple(replace(chain[i], solution=proved[k], label="; ".join(words[i])) for k, i in enumerate(kept)),
         kinks=tuple(Kink(name, place[i], width) for i, name, width in changes),

@@ -147,16 +147,16 @@ class Front(Tabular):
         write_csv(
             path,
             [{**row, "stable": words[row["stable"]]} for row in self.records()],
-            units_of(self.problem, self.objectives),
+            units_of(self.problem.posed, self.objectives),
         )
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt solve` for a front; numbers that do not exist are None."""
         return {
-            **self.problem.heading,
+            **self.problem.posed.heading,
             "status": "optimal",
             "objective": {"sense": "pareto", "expressions": list(self.objectives)},
-            "units": units_of(self.problem, self.objectives),
+            "units": units_of(self.problem.posed, self.objectives),
             **plain(self, "ideal nadir points kinks gaps notes solved"),
             "seconds": round(self.seconds, 4),
             **({"interrupted": True} if self.interrupted else {}),

@@ -12,7 +12,7 @@ from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import FrontSolver, alone, best_first, point
 from tmsopt.fronts.surface import surface
 from tmsopt.fronts.team import AT_ONCE, Team, can_send
-from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.files import Given, pose
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
 from tmsopt.program.options import Asked, Options, documents_options, options_of
@@ -58,7 +58,7 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
 
     More: docs/how_to/fronts.md
     """
-    problem = as_problem(problem)
+    problem = pose(problem)
     if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise refusal(message, "objective")
@@ -81,7 +81,7 @@ def _front(team: Team, ask: FrontSolver, points: int, progress: Steps | None) ->
     begin(progress, "looking for the ends of the front", "sub-problem")
     if progress:
         progress(0, 2 * n)
-    front = Front(ask.problem, ask.texts, (), (), (), n, 0.0)
+    front = Front(ask.problem.problem, ask.texts, (), (), (), n, 0.0)
     try:
         easier: dict[int, Solution] = {}
         for k, found in team.each(alone, ask, range(n)):

@@ -8,7 +8,7 @@ from itertools import pairwise
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.fronts.front import FrontPoint
 from tmsopt.problem.limit import limit_of
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.program.options import STARTS, Options
 from tmsopt.search.solve import solve_any_status
@@ -32,21 +32,21 @@ class FrontSolver:
         easier: the least of each objective alone, as far as known: no sub-problem has a better one.
     """
 
-    problem: Problem
+    problem: Posed
     options: Options
     ranges: tuple[float, ...] = ()
     ends: tuple[FrontPoint, ...] = ()
     easier: Mapping[int, Solution] = field(default_factory=dict)
 
     def solve(
-        self, problem: Problem, starts: int, near: Sequence[Solution] = (), without_sample: bool = False
+        self, problem: Posed, starts: int, near: Sequence[Solution] = (), without_sample: bool = False
     ) -> Solution:
         """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
         beside = [_inside(problem, n) for n in near]
         options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
         return solve_any_status(problem, options, beside, without_sample, self._hopeless(problem, near))
 
-    def _hopeless(self, problem: Problem, near: Sequence[Solution]) -> frozenset[str]:
+    def _hopeless(self, problem: Posed, near: Sequence[Solution]) -> frozenset[str]:
         """Parts of the box whose best in an objective, without any limit, is worse than what is asked or had of it."""
         names = eps_names(self)
         limits = {k: limit_of(problem.constraints[n]) for k, n in enumerate(names) if n in problem.constraints}
@@ -125,12 +125,12 @@ def solvable(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> bool:
     return ask.solve(subproblem(ask, k, limits), _RETRY).status != "infeasible"
 
 
-def subproblem(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> Problem:
+def subproblem(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> Posed:
     """The problem that minimises objective `k`, with a limit on the value of others."""
     names = eps_names(ask)
     eps = {names[j]: f"({ask.texts[j]}) <= {float(value)!r}" for j, value in limits.items()}
     constraints = {**ask.problem.constraints, **eps}
-    return replace(ask.problem, pareto=(), minimize=ask.texts[k], constraints=constraints)
+    return ask.problem.derive(pareto=(), minimize=ask.texts[k], constraints=constraints)
 
 
 def eps_names(ask: FrontSolver) -> tuple[str, ...]:
@@ -147,7 +147,7 @@ def eps_names(ask: FrontSolver) -> tuple[str, ...]:
 def objectives(ask: FrontSolver, solution: Solution) -> tuple[float, ...]:
     """Values of all objectives, from the parameters alone; the worst over the cases that the design was made for."""
     problem = ask.problem
-    if not (problem.variations or problem.tolerances or solution.problem.asks_radius):
+    if not (problem.scenarios or problem.tolerances or solution.problem.posed.asks_radius):
         values = problem.values(solution.parameters)
         known = {**solution.quantities, "abscissa": solution.abscissa}  # certified, where an objective is one of these
         found = ((expression, expression.text.strip()) for expression in problem.objectives)
@@ -157,7 +157,7 @@ def objectives(ask: FrontSolver, solution: Solution) -> tuple[float, ...]:
     known = {n: x for n, x in solution.parameters.items() if n not in moved}  # the same in every case
     if solution.problem.minimize and not math.isnan(solution.value):
         known[solution.problem.minimize] = solution.value
-    alone = (replace(problem, pareto=(), minimize=text) for text in ask.texts if text not in known)
+    alone = (problem.derive(pareto=(), minimize=text) for text in ask.texts if text not in known)
     known |= {one.minimize or "": recheck(one, solution.parameters, cases).objective for one in alone}
     return tuple(known[text] for text in ask.texts)
 
@@ -180,17 +180,17 @@ def _tightened(ask: FrontSolver, k: int, limits: Mapping[int, float], found: Sol
     values = objectives(ask, found)
     held = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
     rest = " + ".join(f"({ask.texts[j]}) / {ask.ranges[j]!r}" for j in loose)
-    asked = _pinned(ask, replace(subproblem(ask, k, held), minimize=rest), k, found)
+    asked = _pinned(ask, subproblem(ask, k, held).derive(minimize=rest), k, found)
     better = ask.solve(asked, ask.options.starts, [found])
     gain = sum((values[j] - b) / ask.ranges[j] for j, b in enumerate(objectives(ask, better)) if j in loose)
     return better if better.status == "optimal" and gain > _WORTH else found
 
 
-def _inside(problem: Problem, near: Solution) -> dict[str, float]:
+def _inside(problem: Posed, near: Solution) -> dict[str, float]:
     return {n: min(max(near.parameters[n], lo), hi) for n, (lo, hi) in problem.free.items()}
 
 
-def _pinned(ask: FrontSolver, asked: Problem, k: int, best: Solution) -> Problem:
+def _pinned(ask: FrontSolver, asked: Posed, k: int, best: Solution) -> Posed:
     """The problem without slack where objective `k` is a parameter, or minus one, that ended at its bound."""
     name = ask.texts[k].strip().removeprefix("-").strip()
     if name not in asked.free or best.parameters[name] not in asked.free[name]:
@@ -199,4 +199,4 @@ def _pinned(ask: FrontSolver, asked: Problem, k: int, best: Solution) -> Problem
     free = {n: ends for n, ends in asked.free.items() if n != name}
     constraints = {n: text for n, text in asked.constraints.items() if n != eps_names(ask)[k]}
     start = {n: v for n, v in asked.start.items() if n in free}
-    return replace(asked, fixed=fixed, free=free, constraints=constraints, start=start)
+    return asked.derive(fixed=fixed, free=free, constraints=constraints, start=start)

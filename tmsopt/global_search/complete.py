@@ -20,7 +20,7 @@ from tmsopt.global_search.conditions import Ends, Sheet, sheet, sheets
 from tmsopt.global_search.pruning import Box, Pruned, Puzzle, check, ends, halves, prune
 from tmsopt.killable import Killable
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
 from tmsopt.program.nlp import Scale, reaches_of, scale_of
 from tmsopt.progress import Counts
@@ -88,7 +88,7 @@ def available() -> bool:
     return importlib.util.find_spec("codac") is not None
 
 
-def completeness(problem: Problem, seconds: float = SECONDS, progress: Counts | None = None) -> Completeness:
+def completeness(problem: Posed, seconds: float = SECONDS, progress: Counts | None = None) -> Completeness:
     """Every design in the box of a problem with its pattern, and whether that is proved.
 
     Boxes in the parameters and the unknowns of the pattern are contracted and split until interval arithmetic shows
@@ -195,7 +195,7 @@ class _Run:
         self.stopped = self.stopped or _TIME
         return Pruned(0, tuple(boxes), (), ())
 
-    def stated(self, problem: Problem, seconds: float) -> Completeness:
+    def stated(self, problem: Posed, seconds: float) -> Completeness:
         """What is proved by now."""
         designs: list[tuple[Mapping[str, Any], str]] = []
         for zero in self.zeros:
@@ -219,7 +219,7 @@ class _Run:
         )
 
 
-def _sheets(problem: Problem) -> Iterator[Sheet]:
+def _sheets(problem: Posed) -> Iterator[Sheet]:
     """The equations, one for each way in which the roots may be small or large."""
     assert problem.pattern is not None
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
@@ -317,13 +317,13 @@ def _standing(zero: _Zero) -> str | None:
     return ", ".join(on + ["a0 = 0"] * flint.arb(fold(sheet.leading, at, BALLS)[0]).contains(0))
 
 
-def _met(problem: Problem, condition: Expression, at: Mapping[str, Any]) -> bool:
+def _met(problem: Posed, condition: Expression, at: Mapping[str, Any]) -> bool:
     """Whether a constraint that may not exist somewhere near exists at the middle, and is met."""
     values = problem.values(problem.ordered({name: float(at[name].mid()) for name in problem.free}))
     return bool(condition.violation(values) <= 0)
 
 
-def _places(problem: Problem, left: Iterable[tuple[Sheet, Box, str]]) -> list[tuple[Box, str]]:
+def _places(problem: Posed, left: Iterable[tuple[Sheet, Box, str]]) -> list[tuple[Box, str]]:
     """Hulls in the free parameters of boxes that touch."""
     count = len(problem.free)
     places: list[tuple[Box, str]] = []
@@ -341,7 +341,7 @@ def _places(problem: Problem, left: Iterable[tuple[Sheet, Box, str]]) -> list[tu
     return places
 
 
-def _ranges(problem: Problem, box: Box) -> Table[Ends]:
+def _ranges(problem: Posed, box: Box) -> Table[Ends]:
     """A box in the parameters themselves, angles in radians."""
     of = problem.parameter_set
     return Table(
@@ -352,6 +352,6 @@ def _ranges(problem: Problem, box: Box) -> Table[Ends]:
     )
 
 
-def _numbers(problem: Problem, at: Mapping[str, Any]) -> dict[str, Any]:
+def _numbers(problem: Posed, at: Mapping[str, Any]) -> dict[str, Any]:
     of = problem.parameter_set
     return {n: number(x.atan() if of[n].tangent else x, _SHOWN) for n, x in at.items()}

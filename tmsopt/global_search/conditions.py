@@ -15,7 +15,7 @@ from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.algebra.kinds import atan, quotient
 from tmsopt.models import Quantity, Values
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.roots import product as multiplied
 from tmsopt.roots.patterns.parts import Part, parts_of
@@ -108,7 +108,7 @@ def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
             yield [(kind, part.order, k >= inner) for k in range(part.count)]
 
 
-def values_at(problem: Problem, lifted: Sequence[Quantity], at: Mapping[str, Any], held: Mapping[str, Any]) -> Values:
+def values_at(problem: Posed, lifted: Sequence[Quantity], at: Mapping[str, Any], held: Mapping[str, Any]) -> Values:
     """Everything that follows from numbers by name, angles by their tangents; `held` are parameters themselves."""
     of, known = problem.parameter_set, {q.name for q in lifted}
     own = {n: held[n] if n in held else atan(at[n]) if of[n].tangent else at[n] for n in of.names}
@@ -141,7 +141,7 @@ class Sheet:
         limits: of each constraint that is no equality, left minus right.
     """
 
-    problem: Problem
+    problem: Posed
     pieces: tuple[Piece, ...]
     names: tuple[str, ...]
     lifted: tuple[Quantity, ...]
@@ -153,7 +153,7 @@ class Sheet:
     limits: Mapping[str, Formula]
 
 
-def sheet(problem: Problem, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple[Quantity, ...]) -> Sheet:
+def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple[Quantity, ...]) -> Sheet:
     """The sheet of some factors.
 
     Args:
@@ -187,7 +187,7 @@ def sheet(problem: Problem, pieces: tuple[Piece, ...], scale: Scale, lifted: tup
     )
 
 
-def _abscissa(problem: Problem, pieces: Sequence[Piece], scale: Scale, u: Sequence[Any]) -> Any:
+def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale, u: Sequence[Any]) -> Any:
     """Largest real part where the pattern makes up all roots; None elsewhere."""
     if problem.pattern is None or problem.pattern.abscissa is None:
         return None

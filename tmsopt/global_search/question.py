@@ -17,7 +17,7 @@ from tmsopt.global_search.half_planes import Frame, bound_unknowns, compact, hal
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import rewards_change_of
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.program.formulate import Builder, Lifting
 from tmsopt.program.nlp import NLP
@@ -40,7 +40,7 @@ class Question:
         compact: put squared frequencies on a finite range; slower, but nothing grows with them.
     """
 
-    problem: Problem
+    problem: Posed
     cases: tuple[Case, ...] = ()
     limit: float | None = None
     unit: float = 1.0

@@ -7,13 +7,13 @@ import numpy as np
 
 from tmsopt.algebra.formula import NotAccepted, formula, symbol
 from tmsopt.algebra.intervals import ranges
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.roots import hurwitz_minors
 
 _BOXES = 300  # looked at, beyond which it is left to others
 
 
-def none_stable(problem: Problem) -> bool:
+def none_stable(problem: Posed) -> bool:
     """Whether it is certain, by interval arithmetic alone, that no design of the box is stable, limits or not.
 
     In each part of the box two coefficients have different signs, or one and a Hurwitz determinant of degree 3 or 4. Of

@@ -11,7 +11,7 @@ from tmsopt.global_search.race import SolverPool
 from tmsopt.global_search.scip import SCIP
 from tmsopt.global_search.signs import none_stable
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, Failed
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import middle
 from tmsopt.progress import Counts
 
@@ -40,7 +40,7 @@ class Stability:
 
 
 def any_stable(
-    problem: Problem,
+    problem: Posed,
     seconds: float,
     known: Mapping[str, float] | None = None,
     progress: Counts | None = None,
@@ -64,7 +64,7 @@ def any_stable(
     if not SOLVER.available or not problem.free:
         return Stability()
     kept = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
-    asked = replace(problem, minimize="abscissa", maximize=None, pareto=(), constraints=kept)
+    asked = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=kept)
     best = _checked(asked, {n: known[n] for n in problem.free} if known else middle(problem))
     unit = unit_of(best.structure.roots)
     at_axis = Question(asked, asked.cases, 0.0, unit)
@@ -92,11 +92,11 @@ def _any(design: Mapping[str, float]) -> Answer:
     return Answer(FOUND, other=design)
 
 
-def _checked(problem: Problem, design: Mapping[str, float]) -> Evaluation:
+def _checked(problem: Posed, design: Mapping[str, float]) -> Evaluation:
     return recheck(problem, problem.ordered(design))
 
 
-def _judged(problem: Problem, design: Mapping[str, float] | None) -> Stability:
+def _judged(problem: Posed, design: Mapping[str, float] | None) -> Stability:
     """What a design says that the solver found."""
     if design is None or not max((checked := _checked(problem, design)).structure.abscissa, checked.realised) < 0:
         return Stability()

@@ -7,8 +7,8 @@ from dataclasses import replace
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.guide.problem_text import toml_problem
 from tmsopt.models import CONSTANTS, FUNCTIONS, controlled, whipple
-from tmsopt.problem import Problem
-from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem import Posed, Problem
+from tmsopt.problem.files import Given, pose
 from tmsopt.problem.units import with_unit
 
 INERTIAS = ("boxes", "none")
@@ -74,7 +74,7 @@ def convert(
 
     More: docs/how_to/inertia.md
     """
-    problem = as_problem(given)
+    problem = pose(given)
     if faults := [*_not_taken(problem, to, inertia)]:
         raise InputError(faults)
     sizes = _sizes(problem, {"B": body, "H": front}) if inertia == "boxes" else {}
@@ -93,7 +93,7 @@ def convert(
             else:
                 fixed[name] = _rounded(share * problem.fixed[mass])
     return replace(
-        problem,
+        problem.problem,
         model=whipple,
         fixed=fixed,
         free=free,
@@ -112,7 +112,7 @@ def converted_file(
     front: str | Size | None = None,
 ) -> str:
     """The text of a converted problem file, with what was assumed in comments; arguments as of `convert`."""
-    problem = as_problem(given)
+    problem = pose(given)
     converted = convert(problem, to, inertia, body, front)
     lines = ["The two masses of the model tms in the model whipple, without wheels and trail."]
     for which, size in _sizes(problem, {"B": body, "H": front}).items() if inertia == "boxes" else ():
@@ -129,10 +129,10 @@ def converted_file(
         f"  I_Fxx = {radius**2 / 4:.4g}    # m r^2/4 about a diameter",
         f"  I_Fyy = {radius**2 / 2:.4g}    # m r^2/2 about its axle",
     ]
-    return toml_problem(converted, lines)
+    return toml_problem(converted.posed, lines)
 
 
-def _not_taken(problem: Problem, to: str, inertia: str) -> Iterator[Fault]:
+def _not_taken(problem: Posed, to: str, inertia: str) -> Iterator[Fault]:
     """What cannot be converted at all."""
     if problem.model.name != "tms":
         yield Fault(f"found the model {short(problem.model.name)}; accepted: tms", ("model",))
@@ -146,7 +146,7 @@ def _not_taken(problem: Problem, to: str, inertia: str) -> Iterator[Fault]:
         yield Fault(f"found {short(inertia)}; {suggest(inertia, INERTIAS)}", ("inertia",))
 
 
-def _without_counterpart(problem: Problem) -> Iterator[Fault]:
+def _without_counterpart(problem: Posed) -> Iterator[Fault]:
     """Words of the objective and the constraints that Whipple's model does not have."""
     asked = {("objective", sense): text for sense in ("minimize", "maximize") if (text := getattr(problem, sense))}
     asked |= {("objective", "pareto"): " ".join(problem.pareto)}
@@ -156,7 +156,7 @@ def _without_counterpart(problem: Problem) -> Iterator[Fault]:
             yield Fault(f"{name} has no counterpart in the model whipple", key)
 
 
-def _varied_masses(problem: Problem, sizes: Mapping[str, Size]) -> Iterator[Fault]:
+def _varied_masses(problem: Posed, sizes: Mapping[str, Size]) -> Iterator[Fault]:
     for which in sizes:
         if f"m_{which}" in problem.scenarios:
             message = "varies, and the inertia of a box would vary with it; give it one value, or --inertia none"
@@ -166,26 +166,26 @@ def _varied_masses(problem: Problem, sizes: Mapping[str, Size]) -> Iterator[Faul
 _WORD = re.compile(r"\b[A-Za-z_]\w*")
 
 
-def _counterparts(problem: Problem) -> dict[str, str]:
+def _counterparts(problem: Posed) -> dict[str, str]:
     """Word of an expression → what to write for it."""
     of, other = problem.parameter_set, controlled(whipple, problem.parameter_set.names)
     in_si = {*of.names, *(q.name for q in of.quantities)} & {*other.sets[0].names, *other.quantity_names(other.sets[0])}
     return {**{name: name for name in in_si}, **_WORDS}
 
 
-def _translated(problem: Problem, text: str) -> str:
+def _translated(problem: Posed, text: str) -> str:
     words = _counterparts(problem)
     return _WORD.sub(lambda word: words[word[0]], text)
 
 
-def _objective(problem: Problem, text: str | None) -> str | None:
+def _objective(problem: Posed, text: str | None) -> str | None:
     """An objective; the abscissa alone stays as it is where √(g/w) is but a factor."""
     if text is None or (text.strip() == "abscissa" and not {"g", "w"} & {*problem.free, *problem.scenarios}):
         return text
     return _translated(problem, text)
 
 
-def _sizes(problem: Problem, given: Mapping[str, str | Size | None]) -> dict[str, Size]:
+def _sizes(problem: Posed, given: Mapping[str, str | Size | None]) -> dict[str, Size]:
     """Body → length, width and height of its box."""
     found, faults = {}, []
     for which, size in given.items():
@@ -227,7 +227,7 @@ def _per_mass(size: Size) -> dict[str, float]:
     return {"xx": (width**2 + height**2) / 12, "zz": (length**2 + width**2) / 12}
 
 
-def _middle(problem: Problem, name: str) -> float:
+def _middle(problem: Posed, name: str) -> float:
     return sum(problem.free[name]) / 2 if name in problem.free else problem.fixed[name]
 
 

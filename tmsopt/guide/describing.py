@@ -11,7 +11,7 @@ from tmsopt.guide.description import Description, Word, Words
 from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
 from tmsopt.models.built_in import controlled, gain_names
 from tmsopt.models.user_spectrum import pattern_of, patterns_of
-from tmsopt.problem import Band, Problem, Solution, Unit, load, unit_of
+from tmsopt.problem import Band, Given, Posed, Problem, Solution, Unit, load, pose, unit_of
 from tmsopt.problem.advice.names import vocabulary
 from tmsopt.problem.toml import read_page
 from tmsopt.records import Table
@@ -21,7 +21,7 @@ Typed = Mapping[str, Any]
 """The tables of a file as typed; empty for what is no file."""
 
 
-def describe(given: str | PathLike[str] | Model | Problem | Solution) -> Description:
+def describe(given: Given | Model) -> Description:
     """Words, units, signs and meanings of a model (by name too), a problem, a solution, or a problem or study file.
 
     Raises:
@@ -38,9 +38,9 @@ def describe(given: str | PathLike[str] | Model | Problem | Solution) -> Descrip
         return _described(given, None, {})
     if isinstance(given, str) and given in MODELS:
         return _described(MODELS[given], None, {})
-    if isinstance(given, Problem | Solution):
-        problem = given if isinstance(given, Problem) else given.problem
-        return _described(problem.model, problem, {})
+    if isinstance(given, Problem | Posed | Solution):
+        posed = pose(given)
+        return _described(posed.model, posed, {})
     if not isinstance(given, str | PathLike):
         accepted = f"the name of a model ({', '.join(MODELS)}), the path of a file, a Model, a Problem, or a Solution"
         raise refusal(f"found {short(given)}; accepted: {accepted}", "given")
@@ -48,7 +48,7 @@ def describe(given: str | PathLike[str] | Model | Problem | Solution) -> Descrip
         problem, typed = _read(given)
     except InputError as error:
         raise _with_models(error, given) from None
-    return _described(problem.model, problem, typed)
+    return _described(problem.model, problem.posed, typed)
 
 
 def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
@@ -70,7 +70,7 @@ def _with_models(error: InputError, given: str | PathLike[str]) -> InputError:
     return InputError([Fault(f"{fault.message}; models: {' '.join(MODELS)}", fault.key, fault.file, fault.line)])
 
 
-def _described(model: Model, problem: Problem | None, typed: Typed) -> Description:
+def _described(model: Model, problem: Posed | None, typed: Typed) -> Description:
     size = model.degree if model.carrier is None else model.degree // 2
     return Description(
         model=model.name,
@@ -89,7 +89,7 @@ def _described(model: Model, problem: Problem | None, typed: Typed) -> Descripti
     )
 
 
-def _words(model: Model, of: ParameterSet, problem: Problem | None, typed: Typed) -> Words:
+def _words(model: Model, of: ParameterSet, problem: Posed | None, typed: Typed) -> Words:
     written = _written(typed).get("quantities", (model.statement or {}).get("quantities", {}))
     quantities = [s for n, s in vocabulary(model, of).items() if n not in of.names]
     return Words(
@@ -113,7 +113,7 @@ def _quantity(q: Parameter | Quantity, formula: str) -> Word:
     return Word(q.name, q.unit, f"= {formula}" if formula else q.meaning)
 
 
-def _parameter(p: Parameter, problem: Problem | None, of_user: bool) -> Word:
+def _parameter(p: Parameter, problem: Posed | None, of_user: bool) -> Word:
     meaning = "" if of_user else p.meaning  # only its name is known
     return Word(p.name, p.unit, meaning, _limits(p), _given(p, problem))
 
@@ -127,7 +127,7 @@ def _limits(p: Parameter) -> str:
     return f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
 
 
-def _given(p: Parameter, problem: Problem | None) -> str:
+def _given(p: Parameter, problem: Posed | None) -> str:
     """What a parameter is, or may be, in the unit in which it was typed."""
     if problem is None:
         return "" if p.default is None else f"{p.default:.12g} if left out"
@@ -153,7 +153,7 @@ def _matrices(model: Model, typed: Typed) -> Iterator[tuple[str, tuple[tuple[str
             yield name, tuple(tuple(str(entry) for entry in row) for row in listed)
 
 
-def _asked(problem: Problem, typed: Typed) -> dict[str, Table[str]]:
+def _asked(problem: Posed, typed: Typed) -> dict[str, Table[str]]:
     """What a problem asks, section by section."""
     if problem.pareto:
         objective = {"pareto": ", ".join(problem.pareto)}

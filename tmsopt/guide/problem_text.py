@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from tmsopt.models import Parameter, gain_names
-from tmsopt.problem import Band, Problem
+from tmsopt.problem import Band, Posed
 from tmsopt.problem.cases import middle_of
 from tmsopt.problem.units import factor, with_unit
 from tmsopt.problem.units.text import read
@@ -18,7 +18,7 @@ _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
 _PLACES = 22  # of a decimal that only one double is nearest to, in any unit
 
 
-def toml_problem(problem: Problem, comments: Iterable[str] = ()) -> str:
+def toml_problem(problem: Posed, comments: Iterable[str] = ()) -> str:
     """A file that is read as the same problem, of one of the bicycles.
 
     Args:
@@ -70,15 +70,15 @@ def exact_value(value: float, written: str, own: str) -> str:
     return next((toml_text(text) for text in texts if with_unit(text, own) == value), repr(value))
 
 
-def _is_written(problem: Problem, parameter: Parameter) -> bool:
+def _is_written(problem: Posed, parameter: Parameter) -> bool:
     """Whether a parameter must be in the file: no default, nor the middle of a scenario."""
     if parameter.name in problem.free:
         return True
-    default, varied = parameter.default, problem.variations.get(parameter.name)
+    default, varied = parameter.default, problem.scenarios.get(parameter.name)
     return problem.fixed[parameter.name] != (default if varied is None else middle_of(varied))
 
 
-def _row(problem: Problem, parameter: Parameter) -> str:
+def _row(problem: Posed, parameter: Parameter) -> str:
     name = parameter.name
     comment = f"# {parameter.meaning}" + ("" if name in problem.units else f", {parameter.unit}")
     if name not in problem.free:
@@ -88,11 +88,11 @@ def _row(problem: Problem, parameter: Parameter) -> str:
     return f"{_table(problem, name, ends)}  {comment}"
 
 
-def _table(problem: Problem, name: str, entries: Mapping[str, float]) -> str:
+def _table(problem: Posed, name: str, entries: Mapping[str, float]) -> str:
     return f"{{ {', '.join(f'{end} = {_number(problem, name, x)}' for end, x in entries.items())} }}"
 
 
-def _value(problem: Problem, name: str, value: Any) -> str:
+def _value(problem: Posed, name: str, value: Any) -> str:
     if isinstance(value, Band):
         return f"{_table(problem, name, {'min': value.min, 'max': value.max})[:-2]}, points = {value.points} }}"
     if isinstance(value, tuple):
@@ -100,7 +100,7 @@ def _value(problem: Problem, name: str, value: Any) -> str:
     return _number(problem, name, value)
 
 
-def _number(problem: Problem, name: str, value: float) -> str:
+def _number(problem: Posed, name: str, value: float) -> str:
     """As it was typed, where it is exactly that number; in the unit of the file if it reads back so."""
     kept, typed = problem.parameter_set[name].unit, problem.typed({name: value}).get(name, "")
     text = exact_value(value, problem.units.get(name, ""), kept)
@@ -109,7 +109,7 @@ def _number(problem: Problem, name: str, value: float) -> str:
     return text
 
 
-def _objective(problem: Problem) -> Iterator[tuple[str, str]]:
+def _objective(problem: Posed) -> Iterator[tuple[str, str]]:
     for sense in ("locate", "minimize", "maximize"):
         if text := getattr(problem, sense):
             yield sense, toml_text(text)

@@ -1,7 +1,7 @@
 """A numeric optimum beside the closed-form laws, law by law, and beside the other formulation."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Unpack
 
 from tmsopt.evaluation.law_rows import LawRow, law_rows
@@ -85,20 +85,20 @@ def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
 
 
 def _other_formulation(design: Solution, options: Options) -> tuple[Solution | None, str]:
-    problem = design.problem
+    problem = design.problem.posed
     if design.status != "optimal":
         return None, f"the design is {design.status}"
     if not problem.free:
         return None, "nothing is free"
     if problem.locate:
-        restated = replace(problem, locate=None, minimize="abscissa", maximize=None, start={})
+        restated = problem.derive(locate=None, minimize="abscissa", maximize=None, start={})
     elif design.structure not in PATTERNS:
         return None, f"the structure '{design.structure}' is not a pattern that can be matched"
     else:
         square = len(problem.free) == PATTERNS[design.structure].codimension and not problem.constraints
-        restated = replace(problem, locate=design.structure, start={})
+        restated = problem.derive(locate=design.structure, start={})
         if square:  # there may be several such designs: the one near this
-            restated = replace(restated, minimize=None, maximize=None, start=_near(design))
+            restated = restated.derive(minimize=None, maximize=None, start=_near(design))
     other = solve_any_status(restated, options)
     if other.status != "optimal":
         return None, f"the {other.formulation} formulation ended {other.status}"

@@ -122,7 +122,7 @@ def plane_of(chart: Chart) -> Plane:
         message = f"found {len(chart.axes)} parameters; a picture shows a plane: chart two, with the third one fixed"
         raise refusal(message, "axes")
     first, second = chart.axes
-    return scale_of(chart.problem, first), scale_of(chart.problem, second)
+    return scale_of(chart.problem.posed, first), scale_of(chart.problem.posed, second)
 
 
 def draw_domain(
@@ -147,7 +147,7 @@ def draw_domain(
     arcs = (*data.stability, *data.heavy_damping, *data.parting)
     varying = [n for n in (arcs[0].points if arcs else ()) if any(np.ptp(a.points[n]) > 0 for a in arcs)]
     chosen = [*(n for n in (horizontal, vertical) if n), *varying, "", ""][:2]
-    first, second = (scale_of(problem, n) if problem else AxisScale(n, n, Unit()) for n in chosen)
+    first, second = (scale_of(problem.posed, n) if problem else AxisScale(n, n, Unit()) for n in chosen)
     drawn = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
     names = _in_words(domain_curves(drawn, data, (first, second)), problem)
     drawn.set(xlabel=first.label, ylabel=second.label)
@@ -262,7 +262,7 @@ def _fill_layer(ax: Axes, chart: Chart, plane: Plane, layer: str) -> None:
             text.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
         if chart.domain is None:
             ax.contour(*grid, np.ma.masked_invalid(values), levels=[0.0], colors=LINE, linewidths=1.6)
-        figure.colorbar(mesh, ax=ax, label=abscissa_label(chart.problem), extend="both")
+        figure.colorbar(mesh, ax=ax, label=abscissa_label(chart.problem.posed), extend="both")
         return
     mesh = ax.pcolormesh(*grid, values, cmap="cividis", vmin=low, vmax=high, rasterized=True)
     label = LAYERS.get(layer, layer)
@@ -271,7 +271,7 @@ def _fill_layer(ax: Axes, chart: Chart, plane: Plane, layer: str) -> None:
 
 def _optimum(ax: Axes, chart: Chart, plane: Plane) -> list[Line2D]:
     """The best design of the plane, solved for or of the grid: a star, and the legend says which."""
-    problem = chart.problem.nominal
+    problem = chart.problem.posed.nominal
     if problem.objective is not None or problem.pattern is not None:
         found = solve(problem, throw=False, interruptible=False)
         if found.status == "optimal":

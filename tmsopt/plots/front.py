@@ -59,7 +59,7 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
     More: docs/how_to/fronts.md
     """
     drawn = on_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
-    scales = [scale_of(data.problem, text) for text in data.objectives]
+    scales = [scale_of(data.problem.posed, text) for text in data.objectives]
     values = np.stack([s.of([p.objectives[k] for p in data.points]) for k, s in enumerate(scales)], axis=-1)
     drawn.set(xlabel=scales[0].label, ylabel=scales[1].label)
     (_draw_two if len(scales) == 2 else _draw_three)(drawn, data, values)
@@ -102,7 +102,7 @@ def _draw_two(ax: Axes, front: Front, values: Array) -> None:
 
 def _draw_three(ax: Axes, front: Front, values: Array) -> None:
     drawn = ax.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap="viridis", s=22, zorder=3)
-    figure_of(ax).colorbar(drawn, ax=ax, label=scale_of(front.problem, front.objectives[2]).label)
+    figure_of(ax).colorbar(drawn, ax=ax, label=scale_of(front.problem.posed, front.objectives[2]).label)
 
 
 def _ring_unstable(ax: Axes, front: Front, values: Array) -> None:

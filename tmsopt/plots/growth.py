@@ -125,7 +125,7 @@ def _drawn(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
 
 def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     """Everything but the legend; the names of the modes, to place."""
-    scale = scale_over(data.problem, data.over)
+    scale = scale_over(data.problem.posed, data.over)
     draw_bands(ax, scale.of(data.stable), scale.of(data.heavily_damped))
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _reached(m, data.design))))
     for mode in data.modes:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from tmsopt.models import Model, Parameter, words_of
 from tmsopt.plots.style import figure_of, legend_below
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import Unit, unit_of
 from tmsopt.records import Array
 
@@ -60,7 +60,7 @@ class AxisScale:
         return np.asarray(values, dtype=float) / self.unit.one
 
 
-def scale_of(problem: Problem, text: str) -> AxisScale:
+def scale_of(problem: Posed, text: str) -> AxisScale:
     """The axis of a parameter of a problem, or of an expression in them."""
     plain = text.strip()
     name = plain.removeprefix("-").strip()
@@ -71,7 +71,7 @@ def scale_of(problem: Problem, text: str) -> AxisScale:
     return AxisScale(plain, symbol + (f" in {unit.text}" if unit.text else ""), unit)
 
 
-def scale_over(problem: Problem, parameter: Parameter) -> AxisScale:
+def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
     """The axis of a parameter of a problem, or of a native one that the problem is not written in."""
     if parameter.name in problem.parameter_set.names:
         found = scale_of(problem, parameter.name)
@@ -80,7 +80,7 @@ def scale_over(problem: Problem, parameter: Parameter) -> AxisScale:
     return AxisScale("Fr", FROUDE, found.unit) if parameter.name == "Fr" else found
 
 
-def abscissa_label(problem: Problem, words: str = "spectral abscissa") -> str:
+def abscissa_label(problem: Posed, words: str = "spectral abscissa") -> str:
     """The abscissa with its unit: 1/s of a model in SI, per √(g/w) where the model is dimensionless and its data SI."""
     of = problem.parameter_set
     if problem.model.carrier is not None:

@@ -147,10 +147,10 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
         return on_axes(ax, 6.0, 4.4, "no design found")
     problem = data.solutions[0].problem
     ax = on_axes(ax, 6.0, 4.4, problem.title)
-    scales = [scale_of(problem, name) for name in [*problem.free][:2]]
+    scales = [scale_of(problem.posed, name) for name in [*problem.free][:2]]
     points = np.stack([s.of([d.parameters[s.name] for d in data.solutions]) for s in scales], axis=-1)
     if len(scales) < 2:
-        ax.set_ylabel(abscissa_label(problem))
+        ax.set_ylabel(abscissa_label(problem.posed))
         points = np.stack([points[:, 0], [d.abscissa for d in data.solutions]], axis=-1)
     proved = data.proved or (False,) * len(points)
     for wanted, inside, label in ((True, CRITICAL, "proved"), (False, "white", "found")):

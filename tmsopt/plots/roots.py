@@ -32,7 +32,7 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     """
     rate, unit = 1.0, ""
     if isinstance(data, Solution):
-        if (of := data.problem.parameter_set).rate is not None:
+        if (of := data.problem.posed.parameter_set).rate is not None:
             rate, unit = float(of.rate(data.parameters)), " in 1/s"
         reach = f"rightmost at {rate * data.abscissa:.5g}{unit[3:]}"
         if _of_H(data):

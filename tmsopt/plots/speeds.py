@@ -29,7 +29,7 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
     """
     own, problem = ax is None, data.problem
     ax = on_axes(ax, 6.4, 2.4, problem.title)
-    scale, words = scale_over(problem, problem.parameter_set[data.parameter]), events_of(problem.model)
+    scale, words = scale_over(problem.posed, problem.posed.parameter_set[data.parameter]), events_of(problem.model)
     at = data.parameters.get(data.parameter, data.lower)
     last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
     high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)

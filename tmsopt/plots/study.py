@@ -44,7 +44,7 @@ def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
 
 def _drawn_around(ax: Axes, data: Results) -> str:
     problem, rows = data.study.problem, data.rows
-    rate, names = problem.parameter_set.rate, problem.parameter_set.names
+    rate, names = problem.posed.parameter_set.rate, problem.posed.parameter_set.names
     values = rows.values("abscissa")
     values = _shown(values, {n: rows.values(header("parameters", n)) for n in names}, rate)
     known = np.isfinite(values)
@@ -64,7 +64,8 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     at = float(_shown(np.float64(nominal.abscissa), nominal.parameters, rate))
     ax.axvline(at, color=LINE, linestyle="--", linewidth=1.2, label=f"nominal design, {at:.4g}")
     ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
-    ax.set(ylabel="designs", xlabel=abscissa_label(problem) if rate is None else "decay rate in 1/s (negative: growth)")
+    words = abscissa_label(problem.posed) if rate is None else "decay rate in 1/s (negative: growth)"
+    ax.set(ylabel="designs", xlabel=words)
     counts = (beyond, "far beyond the axis"), (~known & ~beyond, "without roots")
     left_out = "".join(f", {np.count_nonzero(which)} {where}" for which, where in counts if which.any())
     share = f"{stable.sum()} of {len(stable)} stable ({100 * stable.mean():.3g} %)" if len(stable) else "no rows"
@@ -97,22 +98,23 @@ def _edges(values: Array) -> Array:
 def _over_what_varies(ax: Axes, data: Results) -> str:
     study, rows = data.study, data.rows
     first, second = [*study.columns, None, None][:2]
-    sense = study.problem.minimize or study.problem.maximize
+    problem = study.problem.posed
+    sense = problem.minimize or problem.maximize
     found = rows.values("status") == "optimal"
-    scale = scale_of(study.problem, sense) if sense else AxisScale("abscissa", abscissa_label(study.problem), _PLAIN)
+    scale = scale_of(problem, sense) if sense else AxisScale("abscissa", abscissa_label(problem), _PLAIN)
     y = scale.of(rows.values("objective" if sense else "abscissa")[found])
 
     def varied(name: str) -> Array:
         return np.asarray(rows.values(header("varied", name))[found])
 
-    across = scale_of(study.problem, first) if first else None
+    across = scale_of(problem, first) if first else None
     x = across.of(varied(across.name)) if across else rows.numbers[found]
     if second is None or not found.any():
         ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
     else:
-        aside = scale_of(study.problem, second)
+        aside = scale_of(study.problem.posed, second)
         drawn = ax.scatter(x, y, c=aside.of(varied(second)), s=26, cmap="cividis", edgecolors="0.3")
         figure_of(ax).colorbar(drawn, ax=ax, label=aside.label)
     ax.set(xlabel=across.label if across else "row", ylabel=scale.label)
     ax.xaxis.set_major_locator(MaxNLocator(6))
-    return f"{np.count_nonzero(found)} of {len(found)} rows {status_text(study.problem, 'optimal')}"
+    return f"{np.count_nonzero(found)} of {len(found)} rows {status_text(study.problem.posed, 'optimal')}"

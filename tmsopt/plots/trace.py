@@ -43,7 +43,7 @@ def draw_trace(data: Trace, ax: Axes | None = None, horizontal: str | None = Non
     More: docs/how_to/tracing.md
     """
     first, second, *_ = [*(n for n in (horizontal, vertical) if n), *data.varying, *data.problem.free]
-    plane = scale_of(data.problem, first), scale_of(data.problem, second)
+    plane = scale_of(data.problem.posed, first), scale_of(data.problem.posed, second)
     model = data.problem.model
     drawn = on_axes(ax, 6.4, 5.0, data.problem.title or in_words_of(model, data.pattern))
     _bands(drawn, data, plane)
@@ -124,7 +124,7 @@ def _bands(ax: Axes, data: Trace, plane: tuple[AxisScale, AxisScale]) -> None:
         )
         drawn.set_array(np.concatenate(values))
         ax.add_collection(drawn)
-        figure_of(ax).colorbar(drawn, ax=ax, label=abscissa_label(data.problem))
+        figure_of(ax).colorbar(drawn, ax=ax, label=abscissa_label(data.problem.posed))
 
 
 def _label(ax: Axes, text: str) -> str | None:

@@ -5,9 +5,10 @@ from .expression import (
     Expression as Expression, ExpressionError as ExpressionError, parse_comparison as parse_comparison,
     parse_value as parse_value,
 )
-from .files import Given as Given, load as load, as_problem as as_problem, as_solvable as as_solvable
+from .files import Given as Given, load as load, as_solvable as as_solvable, pose as pose
+from .freedom import degrees_of_freedom as degrees_of_freedom
 from .limit import limit_of as limit_of, with_limit as with_limit
-from .problem import Problem as Problem, degrees_of_freedom as degrees_of_freedom
+from .problem import Posed as Posed, Problem as Problem
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
 from .searches import Starts as Starts, expected_unseen as expected_unseen, is_enough as is_enough
 from .solution import Bound as Bound, Solution as Solution

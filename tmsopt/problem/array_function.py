@@ -11,7 +11,7 @@ from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Values
 from tmsopt.problem.expression import Expression, ExpressionError
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUANTITIES
 
 _ROOT = tuple(q.name for q in ROOT_QUANTITIES)
@@ -26,7 +26,7 @@ class ArrayFunction:
         names: of the expressions.
     """
 
-    problem: Problem
+    problem: Posed
     formula: Formula = field(repr=False)
     names: tuple[str, ...]
 
@@ -49,7 +49,7 @@ class ArrayFunction:
         return dict(zip(self.names, on_arrays(self.formula, known), strict=True))
 
 
-def array_function(problem: Problem, expressions: Mapping[str, str | Expression]) -> ArrayFunction:
+def array_function(problem: Posed, expressions: Mapping[str, str | Expression]) -> ArrayFunction:
     """Expressions in the vocabulary of a problem as a function of arrays of designs.
 
     Args:
@@ -62,7 +62,7 @@ def array_function(problem: Problem, expressions: Mapping[str, str | Expression]
     return ArrayFunction(problem, formula(nodes.values(), (*problem.parameter_set.names, *_ROOT)), tuple(nodes))
 
 
-def nodes_of(problem: Problem, expressions: Mapping[str, str | Expression]) -> dict[str, Any]:
+def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dict[str, Any]:
     """Expressions as nodes in the parameters and the root quantities; of comparisons left minus right."""
     of = problem.parameter_set
     values = Values(problem.model, of, {n: symbol(n) for n in of.names}, extra=(NO_RADIUS,))
@@ -71,7 +71,7 @@ def nodes_of(problem: Problem, expressions: Mapping[str, str | Expression]) -> d
     return {n: e(values) for n, e in parse_all(problem, expressions).items()}
 
 
-def parse_all(problem: Problem, expressions: Mapping[str, str | Expression]) -> dict[str, Expression]:
+def parse_all(problem: Posed, expressions: Mapping[str, str | Expression]) -> dict[str, Expression]:
     """Expressions in the vocabulary of a problem; what is parsed already stays as it is.
 
     Raises:

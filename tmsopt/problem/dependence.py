@@ -11,7 +11,7 @@ from tmsopt.models import Model, Quantity, Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.limit import limit_side
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
 
 WORSE_DIRECTION = {"abscissa": 1.0, "damping_ratio": -1.0, ANGULAR_FREQUENCY: 1.0}
@@ -26,7 +26,7 @@ _DECADES = 3.0  # from 1, up and down, over which values of a root quantity are 
 _STEP = 1e-3
 
 
-def depends_on_case(problem: Problem, expression: Expression, cases: Sequence[Case]) -> bool:
+def depends_on_case(problem: Posed, expression: Expression, cases: Sequence[Case]) -> bool:
     """Whether the value of an expression depends on what differs between cases, its root quantities aside.
 
     Those are shared by all cases, as the worst of them. An equality is one of the nominal design, for it cannot hold
@@ -38,7 +38,7 @@ def depends_on_case(problem: Problem, expression: Expression, cases: Sequence[Ca
     return bool(varied & _dependencies(problem.model, problem.parameter_set.name, expression))
 
 
-def needs_two_sided_bounds(problem: Problem) -> bool:
+def needs_two_sided_bounds(problem: Posed) -> bool:
     """Whether a bound on a root quantity, in place of the quantity, would make a problem easier than it is.
 
     The factors bound the abscissa and the angular frequency from above and the damping ratio from below; that is exact
@@ -47,13 +47,13 @@ def needs_two_sided_bounds(problem: Problem) -> bool:
     return any(rewards_change_of(problem, name, worse) for name, worse in WORSE_DIRECTION.items())
 
 
-def rewards_change_of(problem: Problem, name: str, worse: float = 1.0) -> bool:
+def rewards_change_of(problem: Posed, name: str, worse: float = 1.0) -> bool:
     """Whether objective or constraints get better, at some design, as a quantity moves up (or down: `worse` −1)."""
     asked = [(problem.sign, problem.objective), *((c.sign, c) for c in problem.conditions.values())]
     return any(e is not None and _falls(problem, sign, e, name, worse) for sign, e in asked)
 
 
-def stability_wanted(problem: Problem, steady: float = _STEADY) -> dict[str, str]:
+def stability_wanted(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
     """A limit that keeps designs stable, by its name; none where limits and objective do not want that.
 
     Limits that are met on the edge of stability are content with it.
@@ -82,7 +82,7 @@ def stability_wanted(problem: Problem, steady: float = _STEADY) -> dict[str, str
     return {STABLE: f"abscissa <= {0.0 - least!r}"}
 
 
-def only_worsens(problem: Problem, name: str, worse: float) -> bool:
+def only_worsens(problem: Posed, name: str, worse: float) -> bool:
     """Whether the objective gets better as a quantity gets worse, and at no design as it gets better."""
     goal = problem.objective
     if goal is None or name not in goal.names:
@@ -90,7 +90,7 @@ def only_worsens(problem: Problem, name: str, worse: float) -> bool:
     return _falls(problem, problem.sign, goal, name, worse) and not _falls(problem, problem.sign, goal, name, -worse)
 
 
-def demands_heavy_damping(problem: Problem) -> bool:
+def demands_heavy_damping(problem: Posed) -> bool:
     """Whether a constraint on the damping ratio alone leaves nothing but 1: all roots real and negative."""
     for condition in problem.conditions.values():
         if condition.names == ("damping_ratio",):
@@ -100,7 +100,7 @@ def demands_heavy_damping(problem: Problem) -> bool:
     return False
 
 
-def _falls(problem: Problem, sign: float, expression: Expression, name: str, worse: float) -> bool:
+def _falls(problem: Posed, sign: float, expression: Expression, name: str, worse: float) -> bool:
     """Whether an expression, the smaller the better, falls as a quantity changes; an equality, if it does anything."""
     if name in ROOT_NAMES and name not in expression.names:
         return False

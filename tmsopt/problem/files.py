@@ -14,8 +14,9 @@ from tmsopt.models import MODELS, Model, gain_names
 from tmsopt.models.bicycle_files import read_bicycle
 from tmsopt.problem.advice.names import unknown_key
 from tmsopt.problem.cases import POINTS, Band
+from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.model_table import stated_model
-from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.toml import Number, Page, Section, read_page, validate_tables
 from tmsopt.problem.validate import VARIATIONS
@@ -95,7 +96,7 @@ class _File(Section):
 SHAPE: type[Section] = _File
 """The shape of a problem file, for editors."""
 
-Given = Problem | Solution | str | PathLike[str]
+Given = Problem | Posed | Solution | str | PathLike[str]
 """What every verb takes: a problem, the path of its file, or a solution, which has its problem."""
 
 
@@ -115,37 +116,38 @@ def load(path: str | PathLike[str]) -> Problem:
     return _read(path, lambda problem: [])
 
 
-def as_problem(given: object) -> Problem:
-    """What a verb is given: a problem as it is, the one in a file, or the one that a solution is of.
+def pose(given: object) -> Posed:
+    """What a verb is given as it is solved: a problem, the one in a file, or the one that a solution is of.
 
     Raises:
         InputError: for a file with faults, and for anything else.
     """
-    return _given(given, lambda problem: [])
+    return _pose(given, lambda problem: [])
 
 
-def as_solvable(given: object, front: bool = False) -> Problem:
+def as_solvable(given: object, front: bool = False) -> Posed:
     """The same, which must ask for one design, or may ask for a `front` as well.
 
     Raises:
         InputError: also where parameters are free and nothing is asked of them; of a file, at its line.
     """
-    return _given(given, lambda problem: [] if front and problem.pareto else question_faults(problem))
+    return _pose(given, lambda problem: [] if front and problem.pareto else question_faults(problem))
 
 
-def _given(given: object, faults_of: Callable[[Problem], list[Fault]]) -> Problem:
+def _pose(given: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
     if isinstance(given, str | PathLike):
-        return _read(given, faults_of)
-    if not isinstance(given, Problem | Solution):
+        return _read(given, faults_of).posed
+    if not isinstance(given, Problem | Posed | Solution):
         message = f"found {short(given)}; accepted: a Problem, the path of a problem file, or a Solution"
         raise InputError([Fault(message, ("problem",))])
-    problem = given if isinstance(given, Problem) else given.problem
-    if faults := faults_of(problem):
+    stated = given.problem if isinstance(given, Solution) else given
+    posed = stated if isinstance(stated, Posed) else stated.posed
+    if faults := faults_of(posed):
         raise InputError(faults)
-    return problem
+    return posed
 
 
-def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]) -> Problem:
+def _read(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]]) -> Problem:
     page = read_page(path, "problem")
     if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
         written = page.data.get("problem")
@@ -154,7 +156,7 @@ def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]
         raise InputError([Fault(message, file=page.file)])
     faults, problem = problem_from_tables(_with_bicycle(page), visible(Path(page.file).stem))
     if problem is not None and not faults:  # a misspelt [objective] asks something
-        faults = [*faults, *faults_of(problem)]
+        faults = [*faults, *faults_of(problem.posed)]
     if problem is None or faults:
         raise page.error(faults)
     return problem

@@ -1,19 +1,19 @@
-"""A design problem as data: which parameters are fixed, which are free, and what is asked of them."""
+"""A design problem as data: what its author states, and the same as it is solved."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
 from tmsopt.algebra.formula import Node, fold, formula
 from tmsopt.algebra.kinds import BALLS
-from tmsopt.errors import Fault, InputError
-from tmsopt.models import Model, ParameterSet, Values, controlled
+from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.exact import number
 from tmsopt.models.user_spectrum import pattern_of
-from tmsopt.problem.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of, points_of
+from tmsopt.problem.cases import Case, Scenario, first_cases
 from tmsopt.problem.expression import Expression, parse_comparison, parse_value
+from tmsopt.problem.normalise import normalise, settle
 from tmsopt.problem.quantities import (
     NO_RADIUS,
     RADIUS,
@@ -23,16 +23,12 @@ from tmsopt.problem.quantities import (
     expand_names,
     root_names,
 )
-from tmsopt.problem.units import TABLES, numbers
-from tmsopt.problem.validate import faults, guess_parameter_set, shape_faults
+from tmsopt.records import Table
 from tmsopt.roots import Pattern
 from tmsopt.versions import SCHEMA
 
-_POINT = 1e-12
-"""Relative width below which a range is a number: a few roundings leave nothing to move in."""
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Problem:
     """A design problem; see `load` for its file form.
 
@@ -70,76 +66,93 @@ class Problem:
     """
 
     model: Model
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    free: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    constraints: Mapping[str, str] = field(default_factory=dict)
-    minimize: str | None = None
-    maximize: str | None = None
-    locate: str | None = None
-    start: Mapping[str, float] = field(default_factory=dict)
-    title: str = ""
-    scenarios: Mapping[str, Scenario | Sequence[float] | Mapping[str, float]] = field(default_factory=dict)
-    tolerances: Mapping[str, float] = field(default_factory=dict)
-    weights: Mapping[str, float] = field(default_factory=dict)
-    pareto: Sequence[str] = ()
-    units: Mapping[str, str] = field(default_factory=dict, compare=False)
-    written: Mapping[str, Mapping[float, str]] = field(default_factory=dict, compare=False)
+    fixed: Mapping[str, float]
+    free: Mapping[str, tuple[float, float]]
+    constraints: Mapping[str, str]
+    minimize: str | None
+    maximize: str | None
+    locate: str | None
+    start: Mapping[str, float]
+    title: str
+    scenarios: Mapping[str, Scenario]
+    tolerances: Mapping[str, float]
+    weights: Mapping[str, float]
+    pareto: Sequence[str]
+    units: Mapping[str, str] = field(compare=False)
+    written: Mapping[str, Mapping[float, str]] = field(compare=False)
 
-    def __post_init__(self) -> None:
-        if found := list(shape_faults(self)):
-            raise InputError(found)
-        object.__setattr__(self, "scenarios", {n: as_scenario(s) for n, s in self.scenarios.items()})
-        object.__setattr__(self, "model", controlled(self.model, (*self.fixed, *self.free, *self.scenarios)))
-        of = guess_parameter_set(self.model, {**self.fixed, **self.free, **self.scenarios})
-        read, units, typed, unreadable = numbers({table: getattr(self, table) for table in TABLES}, of)
-        written = {n: {**typed.get(n, {}), **self.written.get(n, {})} for n in (*self.written, *typed)}
-        for name, value in (*read.items(), ("units", {**units, **self.units}), ("written", written)):
-            object.__setattr__(self, name, value)
-        places = {f.key[:2] for f in unreadable}
-        if found := [*unreadable, *(f for f in faults(self) if f.key[:2] not in places)]:
-            raise InputError(found)
-        nominal = {n: middle_of(s) for n, s in self.variations.items()}
-        given = {p.name: p.default for p in of.parameters if p.default is not None} | nominal | dict(self.fixed)
-        given = {n: v for n, v in given.items() if n not in self.free}
-        pinned = {n: lo for n, (lo, hi) in self.free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
-        ends = {n: (float(lo), float(hi)) for n, (lo, hi) in self.free.items() if n not in pinned}
-        kept = {"fixed": {**given, **pinned}, "tolerances": self.tolerances, "weights": self.weights}
-        kept["start"] = {n: v for n, v in self.start.items() if n in ends}
-        plain: dict[str, Any] = {table: {n: float(v) for n, v in values.items()} for table, values in kept.items()}
-        plain |= {"free": ends, "constraints": {n: text.strip() for n, text in self.constraints.items()}}
-        plain |= {"pareto": tuple(text.strip() for text in self.pareto)}  # reports show it on one line
-        plain |= {s: text and text.strip() for s, text in (("minimize", self.minimize), ("maximize", self.maximize))}
-        plain |= {"model": self.model.within(self._reach(plain["fixed"], ends))}
-        for name, value in plain.items():
-            object.__setattr__(self, name, value)
+    def __init__(
+        self,
+        model: Model,
+        fixed: Mapping[str, Any] = Table(),
+        free: Mapping[str, Any] = Table(),
+        constraints: Mapping[str, str] = Table(),
+        minimize: str | None = None,
+        maximize: str | None = None,
+        locate: str | None = None,
+        start: Mapping[str, Any] = Table(),
+        title: str = "",
+        scenarios: Mapping[str, Scenario | Sequence[Any] | Mapping[str, Any]] = Table(),
+        tolerances: Mapping[str, Any] = Table(),
+        weights: Mapping[str, Any] = Table(),
+        pareto: Sequence[str] = (),
+        units: Mapping[str, str] = Table(),
+        written: Mapping[str, Mapping[float, str]] = Table(),
+    ) -> None:
+        stated = locals()
+        vars(self).update(normalise(**{f.name: stated[f.name] for f in fields(self)}))
 
-    def _reach(
-        self, fixed: Mapping[str, float], ends: Mapping[str, tuple[float, float]]
-    ) -> dict[str, tuple[float, float]]:
-        """Least and greatest value of every parameter, in all cases."""
-        found = {n: (x, x) for n, x in fixed.items()} | dict(ends)
-        for name, scenario in self.variations.items():
-            points = [*points_of(scenario), fixed[name]]
-            found[name] = min(points), max(points)
-        return {
-            n: (lo - self.tolerances.get(n, 0.0), hi + self.tolerances.get(n, 0.0)) for n, (lo, hi) in found.items()
-        }
+    @cached_property
+    def posed(self) -> "Posed":
+        """The problem as it is solved, found once."""
+        return Posed(**self.__getstate__())
 
-    @property
-    def variations(self) -> dict[str, Scenario]:
-        """The scenarios, each a band or a tuple of values."""
-        return {n: s for n, s in self.scenarios.items() if isinstance(s, Band | tuple)}
+    def __getstate__(self) -> dict[str, Any]:
+        """What was stated, without what is kept of it."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A problem as it is solved: the numbers of a `Problem`, its texts as formulas, its cases."""
+
+    model: Model
+    fixed: Mapping[str, float]
+    free: Mapping[str, tuple[float, float]]
+    constraints: Mapping[str, str]
+    minimize: str | None
+    maximize: str | None
+    locate: str | None
+    start: Mapping[str, float]
+    title: str
+    scenarios: Mapping[str, Scenario]
+    tolerances: Mapping[str, float]
+    weights: Mapping[str, float]
+    pareto: Sequence[str]
+    units: Mapping[str, str] = field(compare=False)
+    written: Mapping[str, Mapping[float, str]] = field(compare=False)
+
+    def derive(self, **changes: Any) -> "Posed":
+        """The same problem with other fields, of numbers in rad and SI and texts that are right: nothing is checked."""
+        return Posed(**settle(**{f.name: getattr(self, f.name) for f in fields(self)} | changes))
+
+    @cached_property
+    def problem(self) -> Problem:
+        """What asks this question."""
+        found = object.__new__(Problem)
+        vars(found).update(self.__getstate__(), posed=self)
+        return found
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The cases that a search starts with; none for a problem that asks about one design alone."""
         far = weighted(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
-        return first_cases(self.variations, self.tolerances, far)
+        return first_cases(self.scenarios, self.tolerances, far)
 
     @property
-    def nominal(self) -> "Problem":
+    def nominal(self) -> "Posed":
         """The same question about one design at its nominal values: no scenarios, no tolerances."""
-        return replace(self, scenarios={}, tolerances={}) if self.scenarios or self.tolerances else self
+        return self.derive(scenarios={}, tolerances={}) if self.scenarios or self.tolerances else self
 
     @property
     def heading(self) -> dict[str, Any]:
@@ -258,47 +271,3 @@ def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str,
     if weights:
         return tuple(n for n, w in weights.items() if w > 0)
     return tuple(p.name for p in of.parameters if p.may_change(fixed.get(p.name, math.inf)))
-
-
-def question_faults(problem: Problem) -> list[Fault]:
-    """What is wrong with solving a problem that has not one question; a chart needs none."""
-    if problem.pareto:
-        advice = "use tmsopt.pareto, or write minimize with one of the expressions"
-        message = f"asks for a front, not for one design; {advice}"
-        return [Fault(message, ("objective", "pareto"))]
-    if not problem.free or problem.sense != "evaluate":
-        return []
-    message = (
-        "parameters are free, but nothing is asked of them; write minimize, maximize or locate, "
-        "or pareto for a front (chart and trace need none)"
-    )
-    return [Fault(message, ("objective",))]
-
-
-@dataclass(frozen=True)
-class Freedom:
-    """Counting of a pattern problem before it is solved.
-
-    Attributes:
-        free: free parameters.
-        conditions: codimension of the pattern plus the equality constraints.
-    """
-
-    free: int
-    conditions: int
-
-    @property
-    def count(self) -> int:
-        """Degrees of freedom left; negative when there are more conditions than parameters."""
-        return self.free - self.conditions
-
-    @property
-    def kind(self) -> str:
-        """``square``, ``under-determined`` or ``over-determined``."""
-        return "square" if self.count == 0 else "under-determined" if self.count > 0 else "over-determined"
-
-
-def degrees_of_freedom(problem: Problem) -> Freedom:
-    """Degrees of freedom of a problem: free parameters against pattern conditions and equality constraints."""
-    equalities = sum(c.equality for c in problem.conditions.values())
-    return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)

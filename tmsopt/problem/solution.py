@@ -8,7 +8,8 @@ from tmsopt.models import inertia_margin
 from tmsopt.models.user_spectrum import beyond_axis, eigenfrequencies, polynomial_structure
 from tmsopt.problem.advice.remedies import Need, Relaxation
 from tmsopt.problem.cases import Case, Cover
-from tmsopt.problem.problem import Freedom, Problem
+from tmsopt.problem.freedom import Freedom
+from tmsopt.problem.problem import Problem
 from tmsopt.problem.quantities import ROOT_NAMES
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.unit_system import units_of
@@ -167,12 +168,13 @@ class Solution(Printable):
     @property
     def beyond_axis(self) -> float | None:
         """The abscissa where the located pattern ties roots to the axis, 0 on the edge of stability; else None."""
-        return beyond_axis(self.problem.model, self.problem.located if self.status == "optimal" else (), self.roots)
+        located = self.problem.posed.located if self.status == "optimal" else ()
+        return beyond_axis(self.problem.model, located, self.roots)
 
     @property
     def stability_sought(self) -> bool:
         """Whether parameters are free for what a limit that is violated, or else the objective, says of the roots."""
-        problem = self.problem
+        problem = self.problem.posed
         objective = () if problem.objective is None else problem.objective.names
         limits = set(self.violations) & set(problem.asked_of_roots)
         return bool(problem.free and (limits if self.violations else set(objective) & set(ROOT_NAMES)))
@@ -182,7 +184,7 @@ class Solution(Printable):
         """Whether any design in the box is stable, limits on the roots aside: True, False where proved, or None."""
         if self.stable:
             return True
-        problem = self.problem
+        problem = self.problem.posed
         least = (problem.minimize or "").strip() == "abscissa" and not problem.asked_of_roots
         bounded = least and self.status == "optimal" and self.bound.value >= 0
         return False if bounded else self.stable_elsewhere
@@ -190,7 +192,7 @@ class Solution(Printable):
     @property
     def units(self) -> dict[str, str]:
         """The unit of each number that has one, as they are kept and as JSON has them: rad and SI."""
-        return units_of(self.problem, filter(None, [self.problem.minimize or self.problem.maximize]))
+        return units_of(self.problem.posed, filter(None, [self.problem.minimize or self.problem.maximize]))
 
     @property
     def eigenfrequencies(self) -> tuple[Root, ...]:
@@ -200,7 +202,7 @@ class Solution(Printable):
     @property
     def inertia_margin(self) -> Table[float | None] | None:
         """Of a stable design of point masses in SI, by `models.inertia_margin` at its nominal values; else None."""
-        in_si = self.problem.model.name == "tms" and self.problem.parameter_set.rate is not None
+        in_si = self.problem.model.name == "tms" and self.problem.posed.parameter_set.rate is not None
         return inertia_margin(self.parameters) if in_si and self.stable else None
 
     @property
@@ -228,7 +230,7 @@ class Solution(Printable):
         independently at 60 digits, confirm; so have ``violations``. ``sides`` are objectives of designs that are not
         shown, to 9 digits.
         """
-        problem = self.problem
+        problem = self.problem.posed
         text = problem.minimize or problem.maximize or problem.locate or "abscissa"
         cases = {"worst_case": self.worst, "least_damped_case": self.least_damped, "fastest_case": self.fastest}
         optional = {
@@ -261,5 +263,5 @@ class Solution(Printable):
             "freedom": plain(self.freedom, "free conditions count kind"),
             **plain(self, "branches notes"),
             **{name: value for name, value in optional.items() if value},
-            **(plain(self, "inertia_margin") if self.problem.model.omits and self.problem.parameter_set.rate else {}),
+            **(plain(self, "inertia_margin") if problem.model.omits and problem.parameter_set.rate else {}),
         }

@@ -10,7 +10,7 @@ from typing import Any
 from tmsopt.models import Parameter, Quantity
 from tmsopt.problem.expression import Expression, dimension, parse_comparison, parse_value, written_sides
 from tmsopt.problem.limit import limit_of
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.units import Dimension, factor
 from tmsopt.problem.validate import SMALLEST
@@ -51,7 +51,7 @@ class Unit:
         return f"{self.number(value, digits)}{f' {self.text}' if self.text and math.isfinite(value) else ''}"
 
 
-def unit_of(problem: Problem, text: str) -> Unit:
+def unit_of(problem: Posed, text: str) -> Unit:
     """The unit in which a problem has a parameter, a bound such as ``v.max``, a constraint or any expression.
 
     What was typed with a unit has that one; a quantity has the one in which most parameters of its kind were typed; a
@@ -70,7 +70,7 @@ def unit_of(problem: Problem, text: str) -> Unit:
     return _of_kind(problem, dimension_of(problem, text, units))
 
 
-def rate_of(problem: Problem, text: str, parameters: Mapping[str, Any]) -> Any:
+def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
     """How many 1/s one unit of an expression is at a design, where it is per √(g/w) and a second is known; else None.
 
     Of numbers and of arrays.
@@ -81,13 +81,13 @@ def rate_of(problem: Problem, text: str, parameters: Mapping[str, Any]) -> Any:
     return of.rate(parameters)
 
 
-def unit_at(problem: Problem, text: str, parameters: Mapping[str, float]) -> Unit:
+def unit_at(problem: Posed, text: str, parameters: Mapping[str, float]) -> Unit:
     """The unit in which a reader has an expression at a design: rates in 1/s where there are seconds."""
     rate = rate_of(problem, text, parameters)
     return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
 
 
-def unit_of_all(problem: Problem, text: str, held: Mapping[str, float] | None = None) -> Unit:
+def unit_of_all(problem: Posed, text: str, held: Mapping[str, float] | None = None) -> Unit:
     """The same where a second is one for all designs of a problem, for bounds and differences; else its own unit.
 
     Args:
@@ -101,14 +101,14 @@ def unit_of_all(problem: Problem, text: str, held: Mapping[str, float] | None = 
         return unit_of(problem, text)
 
 
-def show_at(problem: Problem, text: str, parameters: Mapping[str, float], value: float, digits: int = 5) -> str:
+def show_at(problem: Posed, text: str, parameters: Mapping[str, float], value: float, digits: int = 5) -> str:
     """A number in the unit of `unit_at`, and where that is another in its own behind."""
     shown, own = unit_at(problem, text, parameters), unit_of(problem, text)
     behind = f" ({own.show(value, digits)})" if shown != own and math.isfinite(value) else ""
     return f"{shown.show(value, digits)}{behind}"
 
 
-def si_units(problem: Problem) -> dict[str, str]:
+def si_units(problem: Posed) -> dict[str, str]:
     """The unit in which each parameter, quantity and root quantity of a problem is computed; ``1`` without one."""
     of = problem.parameter_set
     listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
@@ -118,12 +118,12 @@ def si_units(problem: Problem) -> dict[str, str]:
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 
 
-def amounts_text(problem: Problem, amounts: Mapping[str, float]) -> str:
+def amounts_text(problem: Posed, amounts: Mapping[str, float]) -> str:
     """By how much each limit is violated, in the units in which the problem was written."""
     return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in amounts.items())
 
 
-def limit_text(problem: Problem, name: str) -> str:
+def limit_text(problem: Posed, name: str) -> str:
     """A limit with its number in the unit in which the problem was written; empty for what is none."""
     parameter, _, end = name.rpartition(".")
     if name not in problem.constraints:
@@ -150,7 +150,7 @@ def _is_number(side: str) -> bool:
     return True
 
 
-def units_of(problem: Problem, texts: Iterable[str] = ()) -> dict[str, str]:
+def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
     """The unit of each number that has one, as it is kept, computed and written as data: rad and SI.
 
     Args:
@@ -164,7 +164,7 @@ def units_of(problem: Problem, texts: Iterable[str] = ()) -> dict[str, str]:
     return {name: unit for name, unit in {**units, **asked}.items() if unit != "1"}
 
 
-def dimension_of(problem: Problem, text: str, units: Mapping[str, str] | None = None) -> Dimension:
+def dimension_of(problem: Posed, text: str, units: Mapping[str, str] | None = None) -> Dimension:
     """Of an expression, or of a constraint, by its name or its text."""
     text = problem.constraints.get(text, text)
     parse: Callable[..., Expression] = (
@@ -176,7 +176,7 @@ def dimension_of(problem: Problem, text: str, units: Mapping[str, str] | None = 
         return Dimension()
 
 
-def _of_kind(problem: Problem, dimension: Dimension) -> Unit:
+def _of_kind(problem: Posed, dimension: Dimension) -> Unit:
     """The unit most parameters of a dimension were typed in."""
     of, unit = problem.parameter_set, dimension.unit
     typed = Counter(problem.units[n] for n in of.names if n in problem.units and Dimension.of(of[n].unit) == dimension)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 
 _STEEP = 7.0  # half of the scale beside zero sees the inner 3 % of a range, its inner tenth the inner 2e-3
@@ -18,7 +18,7 @@ _DECADES = 100.0  # ratio of the ends of a range beyond which its values are spr
 class Cube:
     """The box of a problem as a unit cube: tangents and, over decades, logarithms evenly spread."""
 
-    problem: Problem
+    problem: Posed
 
     @property
     def size(self) -> int:

@@ -19,8 +19,9 @@ from tmsopt.models import Quantity, Values, decimal
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import demands_heavy_damping, depends_on_case, needs_two_sided_bounds, rewards_change_of
 from tmsopt.problem.expression import Expression
+from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.limit import limit_of
-from tmsopt.problem.problem import Problem, degrees_of_freedom
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
 from tmsopt.program.boundary_points import lift_displacements, lift_feet
 from tmsopt.program.flat import remove_even_powers
@@ -60,7 +61,7 @@ _LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 
 def formulate(
-    problem: Problem,
+    problem: Posed,
     cases: Sequence[Case] = (),
     elastic: bool = False,
     damping_ratio: float | None = None,
@@ -82,7 +83,7 @@ def formulate(
 
 
 def abscissa(
-    problem: Problem,
+    problem: Posed,
     cases: Sequence[Case] = (),
     elastic: bool = False,
     damping_ratio: float | None = None,
@@ -101,7 +102,7 @@ def abscissa(
     return build.finish("abscissa")
 
 
-def matching(problem: Problem, pattern: Pattern | None = None, cases: Sequence[Case] = ()) -> NLP:
+def matching(problem: Posed, pattern: Pattern | None = None, cases: Sequence[Case] = ()) -> NLP:
     """Match coefficients with a pattern: a_k = a0 · c_k(unknowns).
 
     Square: the equations alone. Under-determined: the objective, or the distance to the start relative to the box.
@@ -121,20 +122,20 @@ def matching(problem: Problem, pattern: Pattern | None = None, cases: Sequence[C
     return build.finish("matching")
 
 
-def variables_of(problem: Problem, design: Mapping[str, float]) -> list[float]:
+def variables_of(problem: Posed, design: Mapping[str, float]) -> list[float]:
     """The NLP's first variables for free parameters."""
     of = problem.parameter_set
     return [float(np.tan(design[n])) if of[n].tangent else float(design[n]) for n in problem.free]
 
 
-def design_of(problem: Problem, x: Sequence[float]) -> dict[str, float]:
+def design_of(problem: Posed, x: Sequence[float]) -> dict[str, float]:
     """The free parameters for variables of the NLP, inside their ranges."""
     of = problem.parameter_set
     plain = {n: float(np.arctan(v)) if of[n].tangent else float(v) for n, v in zip(problem.free, x, strict=False)}
     return {n: min(max(v, problem.free[n][0]), problem.free[n][1]) for n, v in plain.items()}
 
 
-def middle(problem: Problem) -> dict[str, float]:
+def middle(problem: Posed) -> dict[str, float]:
     """The start of each free parameter, or the middle of its range."""
     return {n: problem.start.get(n, (lo + hi) / 2) for n, (lo, hi) in problem.free.items()}
 
@@ -149,7 +150,7 @@ class Builder:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: Posed,
         cases: Sequence[Case],
         lifts: Mapping[str, Lifting] | None = None,
         lead: int = 0,
@@ -363,13 +364,13 @@ _LIFTED: Mapping[str, Lifting] = {
 }
 
 
-def _known(problem: Problem, values: Values) -> dict[str, float]:
+def _known(problem: Posed, values: Values) -> dict[str, float]:
     """The first variables of a numeric design and the numbers, by their names in formulas."""
     own = {name_of(k): x for k, x in enumerate(variables_of(problem, values))}
     return {**own, **{n: float(values[n]) for n in problem.fixed}}
 
 
-def numbers_of(problem: Problem) -> Mapping[str, float]:
+def numbers_of(problem: Posed) -> Mapping[str, float]:
     """Numbers that a program takes as parameters: fixed values and limits; one that is 0 shapes it instead."""
     limits = {name + LIMIT: limit_of(text) for name, text in problem.constraints.items()}
     every = {**problem.fixed, **limits}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tmsopt.models import Values
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES
 from tmsopt.records import Array
 
@@ -39,7 +39,7 @@ class Judged:
         return np.where(np.isnan(amount), np.inf, amount)
 
 
-def evaluate(problem: Problem, columns: Mapping[str, Array]) -> Judged:
+def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
     """Judge designs.
 
     Args:
@@ -89,12 +89,12 @@ def _graded(asked: Expression, sign: float, values: Values, shape: tuple[int, ..
     return np.where(values[_FLAT] <= -1, found + values["abscissa"], found)
 
 
-def values_of(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
+def values_of(problem: Posed, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
     """Everything derived from designs, as arrays of one shape."""
     return _values(problem, {n: np.broadcast_to(np.asarray(x, dtype=float), shape) for n, x in parameters.items()})
 
 
-def _values(problem: Problem, arrays: Mapping[str, Array]) -> Values:
+def _values(problem: Posed, arrays: Mapping[str, Array]) -> Values:
     return Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
 
 

@@ -15,7 +15,7 @@ from tmsopt.algebra.kinds import CASADI, FLOATS, NODES
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES, regular
 from tmsopt.records import Array
 from tmsopt.roots import roots
@@ -329,7 +329,7 @@ class Scale:
         return [c / (self.lead * self.unit**k) for k, c in zip(range(n + 1), coefficients, strict=True)]
 
 
-def scale_of(problem: Problem) -> Scale:
+def scale_of(problem: Posed) -> Scale:
     """Median sizes of roots and leading coefficients over some designs of the box.
 
     Every unit is as exact as another; this one makes tolerances mean the same for all equations.
@@ -349,13 +349,13 @@ def scale_of(problem: Problem) -> Scale:
     return Scale(_power_of_two(size), _power_of_two(np.abs(a[:, 0])))
 
 
-def objective_size(problem: Problem) -> float:
+def objective_size(problem: Posed) -> float:
     """Size below which differences of the objective are none, relative: that of the roots where it is about these."""
     about = problem.objective.names if problem.objective else ()
     return min(1.0, scale_of(problem).unit) if about == ("abscissa",) else 1.0
 
 
-def _designs(problem: Problem) -> dict[str, Any]:
+def _designs(problem: Posed) -> dict[str, Any]:
     """Columns of designs spread over the box."""
     names = list(problem.free)
     share = (0.5 + np.arange(_DESIGNS)[:, None] * golden_steps(len(names))) % 1.0 if names else np.zeros((1, 0))
@@ -363,7 +363,7 @@ def _designs(problem: Problem) -> dict[str, Any]:
     return dict(zip(names, (lower + (upper - lower) * share).T, strict=True))
 
 
-def objective_unit(problem: Problem) -> float:
+def objective_unit(problem: Posed) -> float:
     """A power of 2 near the size of a small objective: a solver brings large ones down by itself, but none up."""
     if problem.model.natural or problem.objective is None or not problem.free:
         return 1.0
@@ -374,7 +374,7 @@ def objective_unit(problem: Problem) -> float:
     return _power_of_two(size) if len(size) and np.median(size) < _ORDINARY[0] else 1.0
 
 
-def units_of(problem: Problem) -> tuple[float, ...]:
+def units_of(problem: Posed) -> tuple[float, ...]:
     """For each free parameter a power of 2 near the size of its range, or 1 where that is near enough."""
     if problem.model.natural:
         return ()
@@ -382,7 +382,7 @@ def units_of(problem: Problem) -> tuple[float, ...]:
     return tuple(ordinary(size) for size in sizes)
 
 
-def reaches_of(problem: Problem) -> dict[str, float]:
+def reaches_of(problem: Posed) -> dict[str, float]:
     """For each free parameter a power of 2 near its size, or its range where it is large: what a proof moves it by."""
     units = dict(zip(problem.free, units_of(problem), strict=False))  # none of natural units
     return {n: u if u <= 1 else ordinary(problem.free[n][1] - problem.free[n][0]) for n, u in units.items()}

@@ -6,7 +6,7 @@ from itertools import islice, product
 import numpy as np
 
 from tmsopt.algebra.sequence import golden_steps
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, regular
 from tmsopt.program.formulate import middle, variables_of
 from tmsopt.program.judgement import evaluate, values_of
@@ -27,7 +27,7 @@ _AT_END = 1e-4  # of a range: distance at which a parameter is at an end of it
 _BATCH = 16  # starts whose candidates are looked at together
 
 
-def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float]]:
+def designs(problem: Posed, seed: int, count: int) -> Iterator[dict[str, float]]:
     """`count` designs to start from: the most promising of each few of a quasi-random sequence over the box.
 
     Every other one is chosen by the constraints alone, lest all starts fall into the basin of one good region; every
@@ -51,7 +51,7 @@ def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float
         yield from (pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(size))
 
 
-def _stable_radius(nlp: NLP, problem: Problem, nominal: Mapping[str, float]) -> float:
+def _stable_radius(nlp: NLP, problem: Posed, nominal: Mapping[str, float]) -> float:
     """A radius at which the design is stable in all directions of an NLP; small where there is none."""
     directed = [case for case in nlp.cases if case.direction and not case.edge]
     feet = (float(np.linalg.norm(list(case.direction.values()))) for case in nlp.cases if case.edge)
@@ -65,7 +65,7 @@ def _stable_radius(nlp: NLP, problem: Problem, nominal: Mapping[str, float]) -> 
     return _RADII[-1]
 
 
-def _cornered(problem: Problem, design: Mapping[str, float]) -> dict[str, float]:
+def _cornered(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
     """A design with each parameter in the outer thirds of its range moved to the end of it."""
     moved = {}
     for name, (lower, upper) in problem.free.items():
@@ -74,7 +74,7 @@ def _cornered(problem: Problem, design: Mapping[str, float]) -> dict[str, float]
     return moved
 
 
-def initial_point(nlp: NLP, problem: Problem, design: Mapping[str, float], near: bool = False) -> Array:
+def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: bool = False) -> Array:
     """Start of all variables of an NLP: the design, and lifted variables that satisfy their equations with it.
 
     Args:
@@ -95,7 +95,7 @@ def initial_point(nlp: NLP, problem: Problem, design: Mapping[str, float], near:
     return nlp.filled(np.array(x))
 
 
-def completions(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Iterator[Array]:
+def completions(nlp: NLP, problem: Posed, design: Mapping[str, float]) -> Iterator[Array]:
     """Starts from a design with every guess of what an NLP lifts, such as a pattern's unknowns."""
     values = [problem.values(problem.ordered(design))]
     z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
@@ -103,7 +103,7 @@ def completions(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Iter
         yield np.array([*variables_of(problem, design), *(x for guess in guesses for x in guess)])
 
 
-def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
+def spread(problem: Posed, seed: int) -> Iterator[dict[str, float]]:
     """The middle of the box, then a quasi-random sequence without end."""
     yield middle(problem)
     names = list(problem.free)
@@ -117,14 +117,14 @@ def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
         k += 1
 
 
-def start_objective(problem: Problem, design: Mapping[str, float]) -> float:
+def start_objective(problem: Posed, design: Mapping[str, float]) -> float:
     """Objective of a design in its worst case, by numeric roots; larger is worse, inf where a limit is violated."""
     found = evaluate(problem, {n: np.array(x) for n, x in design.items()})
     feasible = found.worth is not None and np.isfinite(found.worth) and np.all(found.excess <= 0)
     return float(found.worth) if feasible and found.worth is not None else np.inf
 
 
-def opposite(problem: Problem, design: Mapping[str, float]) -> list[dict[str, float]]:
+def opposite(problem: Posed, design: Mapping[str, float]) -> list[dict[str, float]]:
     """Designs with one parameter at the other end of its range, for each that is at an end of it."""
     found = []
     for name, (lower, upper) in problem.free.items():
@@ -134,7 +134,7 @@ def opposite(problem: Problem, design: Mapping[str, float]) -> list[dict[str, fl
     return found
 
 
-def _merit(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array, Array]:
+def _merit(problem: Posed, columns: Mapping[str, Array]) -> tuple[Array, Array]:
     """Objective, and violated constraints, of many designs in their worst cases, each in units of its own spread."""
     found = evaluate(problem, columns)
     shape = next(iter(columns.values())).shape

@@ -15,7 +15,7 @@ from tmsopt.global_search.stability import SOLVER
 from tmsopt.global_search.tasks import INFEASIBLE, Failed
 from tmsopt.problem.cases import Case
 from tmsopt.problem.files import Given, as_solvable
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.program.formulate import Builder
@@ -123,7 +123,8 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 def _told(design: Solution, gap: float, level: float) -> str:
     """How good the design is known to be, and what is asked next."""
-    known = f"gap {gap:.2g}, bound {design.value - design.problem.sign * gap:.6g}" if math.isfinite(gap) else "no bound"
+    bound = design.value - design.problem.posed.sign * gap
+    known = f"gap {gap:.2g}, bound {bound:.6g}" if math.isfinite(gap) else "no bound"
     return f"{known}, best {design.value:.6g}; asking for {_gap(design.value, level):.2g}"
 
 
@@ -148,15 +149,15 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if design.bound.proven:
         return design, False
     clock.note = "whether there is any design"
-    anything = Question(design.problem, _cases(design), None, unit_of(design.of_polynomial.roots))
+    anything = Question(design.problem.posed, _cases(design), None, unit_of(design.of_polynomial.roots))
     answered = answer(anything, clock, 1.0, partial(confirmed, design, _cases(design)))
     if answered.better is not None:
         return answered.better, True
     if answered.verdict == INFEASIBLE:
-        if not recheck(design.problem, design.parameters, _cases(design)).violations:
+        if not recheck(design.problem.posed, design.parameters, _cases(design)).violations:
             words = f"no proof: {SOLVER.name}'s relaxation excludes the feasible design that was found"
             return _in_vain(design, words), False
-        none = -math.inf if design.problem.sense == "maximize" else math.inf
+        none = -math.inf if design.problem.posed.sense == "maximize" else math.inf
         bound = _searched(none, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False
     words = "branch and bound did not decide in time whether any design is feasible"
@@ -165,16 +166,16 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 def _known(design: Solution) -> Bound:
     """The bound there is without a search, found anew; a damping ratio is at most 1, a frequency at least 0."""
-    if design.problem.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
+    if design.problem.posed.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
         gap = max(1.0 - design.value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
-    if _is_frequency(design.problem):
+    if _is_frequency(design.problem.posed):
         return Bound(0.0, design.value, design.value == 0, "definition")
-    bound = instant_bound(design.problem, design.value)
+    bound = instant_bound(design.problem.posed, design.value)
     return bound if math.isfinite(bound.value) else _over_the_box(design)
 
 
-def _is_frequency(problem: Problem) -> bool:
+def _is_frequency(problem: Posed) -> bool:
     """Whether the least frequency is asked for, which is no name of a model's own."""
     found = problem.objective
     named = (problem.minimize or "").strip() in (ANGULAR_FREQUENCY, "frequency")
@@ -183,7 +184,7 @@ def _is_frequency(problem: Problem) -> bool:
 
 def _over_the_box(design: Solution) -> Bound:
     """The range of an objective that is none of the roots, by interval arithmetic."""
-    problem = design.problem
+    problem = design.problem.posed
     if problem.objective is None or set(problem.objective.names) & set(ROOT_NAMES) or not math.isfinite(design.value):
         return Bound()
     build = Builder(problem, _cases(design))
@@ -196,14 +197,15 @@ def _over_the_box(design: Solution) -> Bound:
 
 def _question(design: Solution, level: float) -> Question:
     """Whether any design is better by a gap of some level."""
-    limit = design.value - design.problem.sign * _gap(design.value, level)
-    return Question(design.problem, _cases(design), limit, unit_of(design.of_polynomial.roots))
+    limit = design.value - design.problem.posed.sign * _gap(design.value, level)
+    return Question(design.problem.posed, _cases(design), limit, unit_of(design.of_polynomial.roots))
 
 
 def _bound(design: Solution, level: float, clock: Clock) -> Bound:
     """What has been proved."""
     gap = _gap(design.value, level) if math.isfinite(level) else math.inf
-    value = design.value - design.problem.sign * gap if math.isfinite(gap) else -design.problem.sign * math.inf
+    sign = design.problem.posed.sign
+    value = design.value - sign * gap if math.isfinite(gap) else -sign * math.inf
     return _searched(value, gap, level <= PROVEN, clock)
 
 
@@ -230,7 +232,7 @@ def _free(design: Solution) -> dict[str, float]:
 
 def _cases(design: Solution) -> tuple[Case, ...]:
     """The cases listed, and those found to be the worst ones between them."""
-    listed = design.problem.cases
+    listed = design.problem.posed.cases
     worst = [case for case in (design.worst, design.least_damped) if case is not None and case not in listed]
     return (*listed, *dict.fromkeys(worst)) if listed else ()
 

@@ -9,7 +9,7 @@ import flint
 from tmsopt.algebra.balls import GUARD, largest_radius, upper
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.models.exact import Written
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.proofs.factored import Factored, factored, has_pattern, of_pattern
 from tmsopt.proofs.system import ROUNDINGS, Chosen, Equations, choose, equations
@@ -50,7 +50,7 @@ class Existing:
     explained: float = 0.0
 
 
-def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | None:
+def exactly(problem: Posed, pattern: Pattern, design: Written) -> Existing | None:
     """The design itself, if its numbers are fractions and have the pattern exactly."""
     found = as_stored(problem, design)
     equal = any(c.equality for c in problem.conditions.values())
@@ -61,7 +61,7 @@ def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | N
     )
 
 
-def as_stored(problem: Problem, design: Written) -> Existing | None:
+def as_stored(problem: Posed, design: Written) -> Existing | None:
     """The design as its numbers are, whatever its roots; None where a0 cannot be told from 0."""
     balls, of = design.balls(), problem.parameter_set
     tangents = {n: b.tan() for n, b in balls.items() if of[n].tangent}
@@ -76,7 +76,7 @@ def as_stored(problem: Problem, design: Written) -> Existing | None:
     return Existing("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
 
 
-def beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
+def beside(problem: Posed, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
     """The design with a pattern that a stored one stands for, by Krawczyk's test.
 
     Raises:
@@ -109,7 +109,7 @@ def _beside(system: Equations, design: Written, stored: Mapping[str, float], dig
     raise Refused(reasons[0] if reasons else f"no {pattern.name} is anywhere near the design")
 
 
-def _choices(problem: Problem, stored: Mapping[str, float], free: list[str], count: int) -> Iterator[list[str]]:
+def _choices(problem: Posed, stored: Mapping[str, float], free: list[str], count: int) -> Iterator[list[str]]:
     """Free parameters to move: first only those inside their ranges, so that the proved design stays in the box."""
     ends = {n: problem.free[n] for n in free}
     inner = [n for n, (lo, hi) in ends.items() if min(stored[n] - lo, hi - stored[n]) > _INSIDE * (hi - lo)]
@@ -119,7 +119,7 @@ def _choices(problem: Problem, stored: Mapping[str, float], free: list[str], cou
         yield free
 
 
-def _starts(system: Equations, held: Mapping[str, Any], problem: Problem) -> Iterator[dict[str, Any]]:
+def _starts(system: Equations, held: Mapping[str, Any], problem: Posed) -> Iterator[dict[str, Any]]:
     """Unknowns to start from: those of the nearest polynomials of the pattern, and the quantities' own values."""
     of = problem.parameter_set
     own = {n: float(held[n].atan()) if of[n].tangent else float(held[n]) for n in of.names}
@@ -239,7 +239,7 @@ def _of_quadratics(pattern: Pattern) -> bool:
     return any(u.startswith("b") for u in pattern.unknowns) and "EP" in pattern.name
 
 
-def _numbers(problem: Problem, design: Written) -> dict[str, Any]:
+def _numbers(problem: Posed, design: Written) -> dict[str, Any]:
     """Every parameter as it is taken exactly: a ball, of an angle that of its tangent."""
     of = problem.parameter_set
     numbers = {n: e.ball() for n, e in design.values.items()}

@@ -9,7 +9,7 @@ from tmsopt.algebra.balls import rational
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.models import Values
 from tmsopt.models.exact import Written
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.proofs.existence import EXACT, Existing
 from tmsopt.proofs.factored import Factored, roots_of
@@ -37,7 +37,7 @@ BINDS = 1e-9
 """Room between the sides of an inequality up to which it binds: what a solver leaves."""
 
 
-def eigenvectors(problem: Problem, design: Written, found: Existing) -> tuple[int | None, Verdict]:
+def eigenvectors(problem: Posed, design: Written, found: Existing) -> tuple[int | None, Verdict]:
     """The most independent eigenvectors of a multiple root, and whether all multiple roots lack some.
 
     In fractions where the design is exact; else by minors in balls, which show that there are no more than one.
@@ -96,7 +96,7 @@ def heavy_damping(factored: Factored) -> Verdict:
     return Verdict(True, "all roots are real, negative and different: strictly inside heavy damping")
 
 
-def inside(problem: Problem, design: Written, found: Existing) -> Verdict:
+def inside(problem: Posed, design: Written, found: Existing) -> Verdict:
     """Whether every free parameter is certainly within its limits."""
     if not problem.free:
         return Verdict(True, "nothing is free")
@@ -117,9 +117,9 @@ def inside(problem: Problem, design: Written, found: Existing) -> Verdict:
     return Verdict(True, "every free parameter is within its limits")
 
 
-def limits(problem: Problem, found: Existing) -> dict[str, str]:
+def limits(problem: Posed, found: Existing) -> dict[str, str]:
     """Each comparison at the nominal design; none where it must hold in several cases."""
-    if problem.variations or problem.tolerances:
+    if problem.scenarios or problem.tolerances:
         return {}
     values = Values(problem.model, problem.parameter_set, found.parameters)
     nothing = flint.arb("nan")

@@ -8,7 +8,7 @@ from tmsopt.evaluation.recheck import excesses, recheck
 from tmsopt.global_search.answer import Answer
 from tmsopt.global_search.tasks import FOUND, UNDECIDED
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
 from tmsopt.search.solve import evaluate_design, solve
@@ -24,7 +24,7 @@ _NEARLY = 1e-3  # violation and loss beyond which a design that the solver found
 
 def feasible(design: Solution) -> bool:
     """Whether a solution is a design that does all that is asked, an optimum or not."""
-    valued = design.problem.objective is None or math.isfinite(design.value)
+    valued = design.problem.posed.objective is None or math.isfinite(design.value)
     return design.status == "optimal" or (design.status == "not_converged" and not design.violations and valued)
 
 
@@ -35,7 +35,7 @@ def confirmed(design: Solution, cases: Sequence[Case], point: Mapping[str, float
     What is better only while it violates a limit, if by no more than the solver's tolerance, or while cases between
     those of the question are left out, is none: then the question is answered, and of no use.
     """
-    problem = design.problem
+    problem = design.problem.posed
     known = design.value if feasible(design) and problem.objective is not None else None
     seen = recheck(problem, problem.ordered(point), cases)
     gain = gained(problem, known, seen.objective)
@@ -50,21 +50,21 @@ def confirmed(design: Solution, cases: Sequence[Case], point: Mapping[str, float
                 words = f"branch and bound found a better design than the search from many starts: {before} before"
             words = next((note for note in design.notes if note.startswith("branch and bound found a ")), words)
             notes = (*found.notes, words)
-            kept = replace(found, problem=problem, notes=notes, stable_elsewhere=design.stable_elsewhere)
+            kept = replace(found, problem=problem.problem, notes=notes, stable_elsewhere=design.stable_elsewhere)
             return Answer(FOUND, better=kept)
     return Answer(FOUND if known is not None and gain > _BETTER and not seen.violations else UNDECIDED)
 
 
-def _reached(problem: Problem, known: float | None, point: Mapping[str, float], trusted: bool) -> Iterator[Solution]:
+def _reached(problem: Posed, known: float | None, point: Mapping[str, float], trusted: bool) -> Iterator[Solution]:
     """Designs to which a point leads: optima, the feasible one nearest to it, or itself if it is trusted."""
     yield _solved(problem, near=point)
     note = "the solver does not converge from the design that branch and bound found, or to a worse one"
     itself = evaluate_design(problem, point, note)
     if gained(problem, known, itself.value) <= _BETTER:  # in its own worst case
         return
-    yield _solved(replace(problem, start=point))
+    yield _solved(problem.derive(start=point))
     ranges = [f"(({n} - ({point[n]!r})) / {hi - lo!r})**2" for n, (lo, hi) in problem.free.items()]
-    nearest = replace(problem, minimize=" + ".join(ranges), maximize=None, start={})
+    nearest = problem.derive(minimize=" + ".join(ranges), maximize=None, start={})
     moved = _solved(nearest, starts=1, near=point)
     if moved.status == "optimal":
         yield evaluate_design(problem, {n: moved.parameters[n] for n in problem.free}, note)
@@ -72,11 +72,11 @@ def _reached(problem: Problem, known: float | None, point: Mapping[str, float], 
         yield itself
 
 
-def _solved(problem: Problem, starts: int = _STARTS, near: Mapping[str, float] | None = None) -> Solution:
+def _solved(problem: Posed, starts: int = _STARTS, near: Mapping[str, float] | None = None) -> Solution:
     return solve(problem, starts=starts, near=near, throw=False, alone=False, stability=0.0, interruptible=False)
 
 
-def gained(problem: Problem, known: float | None, value: float) -> float:
+def gained(problem: Posed, known: float | None, value: float) -> float:
     """Relative improvement of the objective; inf where none is known, −inf for a value that does not exist."""
     if known is None or not math.isfinite(known):
         return math.inf

@@ -16,7 +16,7 @@ from tmsopt.models.names import number_text
 from tmsopt.models.user_spectrum import pattern_of, user_roots, user_structure_name
 from tmsopt.problem.cases import Case
 from tmsopt.problem.files import Given
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.verdict.stability import CROSSING, crossing_in_words
@@ -126,7 +126,7 @@ class Proof(Printable):
             **plain(self, "claim proved reason pattern method digits"),
             "of": "the design as stored" if self.stored or not self.proved else "the proved design",
             **plain(self, "parameters tangents unknowns moved held stated numbers"),
-            "units": units_of(self.problem) if self.problem else {},
+            "units": units_of(self.problem.posed) if self.problem else {},
             **plain(self, "radius uniqueness distance explained roots"),
             **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}),
             **plain(self, "abscissa geometric_multiplicity defective stable heavily_damped inside limits"),
@@ -167,21 +167,21 @@ def prove(
         raise InputError([Fault(message, ("options",))])
     how = options_of(options, AskedOfSolve)
     found = solve_any_status(design, how)
-    problem = found.problem
+    problem = found.problem.posed
     if found.status != "optimal":
         crossings = [crossing_in_words(m) for m in found.meetings if not m.exceptional]
         reason = f"the problem is not solved ({found.status}): there is no design to prove"
         if problem.pattern and crossings:
             reason = f"none found: where roots meet is {crossings[0]}"
         claim = f"a design of '{problem.title or 'the problem'}' exists"
-        return Proof(claim, False, reason, digits=digits, problem=problem)
+        return Proof(claim, False, reason, digits=digits, problem=problem.problem)
     begin(how.progress, f"proving to {digits} digits")
     shown = found.of_polynomial
     return prove_design(problem, found.parameters, shown.name, digits, exact, found.worst, shown.roots)
 
 
 def prove_design(
-    problem: Problem,
+    problem: Posed,
     parameters: Mapping[str, float],
     structure: str,
     digits: int = DIGITS,
@@ -213,16 +213,16 @@ def prove_design(
     with flint.ctx.workdps(2 * digits + _EXTRA):
         patterns = _patterns(problem, structure, roots)
         proof = _proved(_asked(problem, case), design, varied, structure, patterns, digits)
-        return replace(proof, problem=problem, seconds=time.perf_counter() - began)
+        return replace(proof, problem=problem.problem, seconds=time.perf_counter() - began)
 
 
-def _asked(problem: Problem, case: Case | None) -> Problem:
+def _asked(problem: Posed, case: Case | None) -> Posed:
     """The problem about one case alone: its constraints are those of the nominal design, or of every case."""
-    return replace(problem.nominal, constraints={}) if case and (case.at or case.offset) else problem
+    return problem.nominal.derive(constraints={}) if case and (case.at or case.offset) else problem
 
 
 def _proved(
-    problem: Problem,
+    problem: Posed,
     design: Written,
     varied: Mapping[str, float],
     structure: str,
@@ -251,7 +251,7 @@ def _proved(
     return _assembled(problem, design, name, meant, stored, digits, why, stored=True)
 
 
-def _patterns(problem: Problem, structure: str, roots: Sequence[Root]) -> list[Pattern]:
+def _patterns(problem: Posed, structure: str, roots: Sequence[Root]) -> list[Pattern]:
     """Patterns to prove: that of the structure, if it has the one that is located, and then the latter."""
     located = problem.pattern
     quartic = PATTERNS if problem.model.degree == _QUARTIC else {}
@@ -264,14 +264,14 @@ def _patterns(problem: Problem, structure: str, roots: Sequence[Root]) -> list[P
     return list({p.name: p for p in [*named, *([located] if located else [])]}.values())
 
 
-def _decided(problem: Problem, design: Written) -> list[Pattern]:
+def _decided(problem: Posed, design: Written) -> list[Pattern]:
     """The pattern of all multiple roots of a design that is exact."""
     a = design.coefficients(problem.model, problem.parameter_set)
     name = multiple_roots(a) if a else ""
     return [pattern_of(problem.model, user_structure_name(problem.model, name))] if name else []
 
 
-def _of_simple(problem: Problem, structure: str, found: Existing) -> list[str]:
+def _of_simple(problem: Posed, structure: str, found: Existing) -> list[str]:
     """Why the structure of a design without multiple roots is not proved; nothing if it is."""
     if structure not in _SIMPLE:
         name = user_structure_name(problem.model, structure)
@@ -288,7 +288,7 @@ def _of_simple(problem: Problem, structure: str, found: Existing) -> list[str]:
 
 
 def _assembled(
-    problem: Problem,
+    problem: Posed,
     design: Written,
     name: str,
     pattern: Pattern | None,
@@ -344,7 +344,7 @@ def _assembled(
     )
 
 
-def _numbers(problem: Problem) -> tuple[str, ...]:
+def _numbers(problem: Posed) -> tuple[str, ...]:
     """Texts of the numbers in formulas that are not whole."""
     constants = [x for c in problem.conditions.values() if c.equality for x in c.formula.constants]
     equalities = [text for x in constants if not (text := number_text(x)).lstrip("-").isdigit()]

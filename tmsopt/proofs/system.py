@@ -10,7 +10,7 @@ from tmsopt.algebra.krawczyk import Refused, slopes
 from tmsopt.global_search.conditions import others, values_at
 from tmsopt.models import Quantity
 from tmsopt.problem.expression import Expression
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
 from tmsopt.program.nlp import ordinary, reaches_of, scale_of
 from tmsopt.proofs.factored import abscissa_formula
@@ -40,7 +40,7 @@ class Equations:
         units: of numbers that are not of the size of 1, powers of 2.
     """
 
-    problem: Problem
+    problem: Posed
     pattern: Pattern
     equalities: tuple[Expression, ...]
     lifted: tuple[Quantity, ...]
@@ -75,7 +75,7 @@ class Equations:
         return left + others(values, self.lifted, self.equalities, at)
 
 
-def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:
+def equations(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:
     """The equations of a pattern in a problem.
 
     Raises:

@@ -11,7 +11,7 @@ from tmsopt.evaluation import missed_note
 from tmsopt.fronts.front import Front
 from tmsopt.models import Model, in_words_of
 from tmsopt.models.user_spectrum import pattern_of
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import Unit, unit_at, unit_of, unit_of_all
 from tmsopt.report.text import HEIGHT, columns, screen, yes_no
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
@@ -37,7 +37,7 @@ def chart_table(chart: Chart) -> str:
     data: dict[str, Any] = chart.to_json()
     model = chart.problem.model
     if chart.path is not None or len(chart.axes) != 2:
-        return _summary_table(chart.problem, data)
+        return _summary_table(chart.problem.posed, data)
     first, second = chart.axes
     size = f"{len(chart.grid[0])} × {len(chart.grid[1])}"
     lines = [chart.problem.title or "untitled problem", f"{size} designs over {first} and {second}", ""]
@@ -47,13 +47,13 @@ def chart_table(chart: Chart) -> str:
     for name in chart.left_aside:
         lines.append(f"  {name} is an equality, which holds on curves and not on a grid: left aside")
     if best := data["least_abscissa"]:
-        lines += ["", _best(chart.problem, (first, second), best)]
+        lines += ["", _best(chart.problem.posed, (first, second), best)]
     if chart.domain is not None:
-        lines += ["", domain_table(chart.domain, chart.problem)]
+        lines += ["", domain_table(chart.domain, chart.problem.posed)]
     return "\n".join(line.rstrip() for line in lines)
 
 
-def domain_table(domain: Domain, problem: Problem | None = None) -> str:
+def domain_table(domain: Domain, problem: Posed | None = None) -> str:
     """What bounds stability and heavy damping, and the corners, in the units of the problem where it is known.
 
     Example:
@@ -83,7 +83,7 @@ def _curves(sizes: Sequence[int]) -> str:
     return f"{len(sizes)} curves, " if len(sizes) > 1 else ""
 
 
-def corner_rows(domain: Domain, problem: Problem | None = None) -> list[tuple[str, ...]]:
+def corner_rows(domain: Domain, problem: Posed | None = None) -> list[tuple[str, ...]]:
     """Headings, and the cells of each corner, to all digits.
 
     Example:
@@ -112,7 +112,7 @@ def swallowtail_table(found: Swallowtail) -> str:
 
     More: docs/explanation/exceptional_points.md
     """
-    problem = found.problem
+    problem = found.problem.posed
     damped = sum(patch.heavily_damped for patch in found.patches)
     lines = [
         problem.title or "untitled problem",
@@ -129,13 +129,13 @@ def _said(model: Model | None, name: str) -> str:
     return in_words_of(model, name) if model else name
 
 
-def _best(problem: Problem, names: Iterable[str], best: Mapping[str, float]) -> str:
+def _best(problem: Posed, names: Iterable[str], best: Mapping[str, float]) -> str:
     """The best design of a grid."""
     where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in names)
     return f"least abscissa on the grid: {unit_of_all(problem, 'abscissa').show(best['value'], 6)} at {where}"
 
 
-def _summary_table(problem: Problem, data: Mapping[str, Any]) -> str:
+def _summary_table(problem: Posed, data: Mapping[str, Any]) -> str:
     """A space, or a chart in a folder: shares of the classes, the best grid point, and how fast it was made."""
     axes = data["axes"]
     size = " × ".join(str(a["points"]) for a in axes.values())
@@ -165,7 +165,7 @@ def front_table(front: Front, full: bool = False) -> str:
 
     More: docs/how_to/fronts.md
     """
-    problem = front.problem
+    problem = front.problem.posed
     texts = [t.strip() for t in front.objectives]
     count = f"{len(front)} point" + ("s" if len(front) != 1 else "")
     where = f", designs with {problem.locate}" if problem.locate else ""
@@ -180,7 +180,7 @@ def front_table(front: Front, full: bool = False) -> str:
     rows = front_rows(front, full)
     remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
     for k, p in enumerate(front.points, start=1):
-        remarks += [f"point {k}: {note}" for note in missed_note(p.solution.problem, p.solution.missed)]
+        remarks += [f"point {k}: {note}" for note in missed_note(p.solution.problem.posed, p.solution.missed)]
     labelled = [k for k, p in enumerate(front.points) if p.label]
     height = HEIGHT - len(lines) - len(remarks) - 2 * bool(remarks) - 3
     lines += columns(rows) if full else screen(rows, height, labelled, "--full, --csv")
@@ -200,12 +200,12 @@ def front_rows(front: Front, full: bool = False) -> list[tuple[str, ...]]:
     """
     texts = [t.strip() for t in front.objectives]
     free = [n for n in front.problem.free if n not in texts]
-    units, digits = {n: unit_of(front.problem, n) for n in (*texts, *free)}, 12 if full else 6
-    some = dict.fromkeys(front.problem.parameter_set.names, 1.0)  # a unit has one name for all designs
-    heads = {n: f"{n} {unit_at(front.problem, n, some).text}".rstrip() for n in units}
+    units, digits = {n: unit_of(front.problem.posed, n) for n in (*texts, *free)}, 12 if full else 6
+    some = dict.fromkeys(front.problem.posed.parameter_set.names, 1.0)  # a unit has one name for all designs
+    heads = {n: f"{n} {unit_at(front.problem.posed, n, some).text}".rstrip() for n in units}
     rows = [(*(heads[t] for t in texts), "stable", "", *(heads[n] for n in free), "structure", "limits that bind")]
     for p in front.points:
-        each = (unit_at(front.problem, t, p.solution.parameters) for t in texts)
+        each = (unit_at(front.problem.posed, t, p.solution.parameters) for t in texts)
         numbers = [unit.number(v, digits) for unit, v in zip(each, p.objectives, strict=True)]
         design = [units[n].number(p.solution.parameters[n], digits) for n in free]
         label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
@@ -222,7 +222,7 @@ def trace_table(trace: Trace) -> str:
 
     More: docs/how_to/tracing.md
     """
-    units = {n: unit_of_all(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
+    units = {n: unit_of_all(trace.problem.posed, n) for n in (*trace.problem.free, "abscissa")}
     lines = [trace.problem.title or "untitled problem", trace_headline(trace)]
     for number_, branch in enumerate(trace.branches, start=1):
         lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
@@ -282,7 +282,7 @@ def _summary(branch: Branch, trace: Trace) -> str:
     share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
     rest = pattern_of(trace.problem.model, branch.pattern).rest
     states = f"{'bounds stability' if rest else 'stable'} on {share}"
-    if any(not c.equality for c in trace.problem.conditions.values()):
+    if any(not c.equality for c in trace.problem.posed.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"
     kinds = " and ".join(dict.fromkeys(kinds_along(branch)))

@@ -32,7 +32,7 @@ def every_table(every: Every) -> str:
         rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
         off: Sequence[Mapping[str, float]] = every.errors or ({},) * len(found)
         rows += [(n, *(number(s.parameters[n], e.get(n, 0.0)) for s, e in zip(found, off, strict=True))) for n in names]
-        each = [unit_at(problem, "abscissa", s.parameters) for s in found]
+        each = [unit_at(problem.posed, "abscissa", s.parameters) for s in found]
         decays = [
             number(s.abscissa / unit.one, e.get("abscissa", 0.0) / unit.one)
             for s, unit, e in zip(found, each, off, strict=True)

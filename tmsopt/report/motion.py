@@ -29,8 +29,8 @@ def motion_table(motion: "Simulation", full: bool = False) -> str:
     More: docs/how_to/motion.md
     """
     title, time = motion.problem.title or "untitled problem", _with(motion, "t", motion["t"][-1])
-    name = speed_of(motion.problem.parameter_set)
-    at = f" at {name} = {unit_of(motion.problem, name).show(motion.parameters[name])}" if name else ""
+    name = speed_of(motion.problem.posed.parameter_set)
+    at = f" at {name} = {unit_of(motion.problem.posed, name).show(motion.parameters[name])}" if name else ""
     lines = [title, f"motion over {time}{at} {_cause(motion)}", *model_lines(motion.problem.model), ""]
     lines += [*columns(_cut([*_measured(motion)], full)), ""]
     lines += [*columns(_cut([*_modes(motion, full)], full)), "", *_notes(motion)]

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from tmsopt.algebra.balls import Number, fraction
 from tmsopt.models.user_spectrum import pattern_of
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import units_of
 from tmsopt.proofs.facts import NOTHING, Verdict
 from tmsopt.proofs.proof import Proof
@@ -14,12 +14,12 @@ from tmsopt.report.text import columns
 _OF_OTHERS = re.compile(r"(.*\.)?[bcdW]\d+")  # of factors whose roots are listed
 
 
-def proof_text(problem: Problem, proof: Proof) -> str:
+def proof_text(problem: Posed, proof: Proof) -> str:
     """What is proved, the numbers with their radii, and what they were taken for.
 
     Example:
         >>> design = tmsopt.solve("problems/ep4.toml")
-        >>> print(tmsopt.report.proof_text(design.problem, tmsopt.prove(design)).splitlines()[1])
+        >>> print(tmsopt.report.proof_text(design.problem.posed, tmsopt.prove(design)).splitlines()[1])
         proved: a design with EP4 exists: 4-fold real root
 
     More: docs/explanation/proofs.md
@@ -35,19 +35,19 @@ def proof_text(problem: Problem, proof: Proof) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _numbers(problem: Problem, proof: Proof) -> list[str]:
+def _numbers(problem: Posed, proof: Proof) -> list[str]:
     """What was solved for, and the roots, under a heading where they are the stored design's."""
     rows = number_rows(problem, proof)
     head = ["", "the design as stored:"] if proof.stored and proof.reason else [""]
     return [*head, *columns(rows), ""] if rows else [""]
 
 
-def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str]]:
+def number_rows(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
     """What was solved for, and the roots: name, decimal, radius, unit.
 
     Example:
         >>> design = tmsopt.solve("problems/ep4.toml")
-        >>> name, value, *_ = tmsopt.report.number_rows(design.problem, tmsopt.prove(design))[1]
+        >>> name, value, *_ = tmsopt.report.number_rows(design.problem.posed, tmsopt.prove(design))[1]
         >>> name, value  # the square root of 2
         ('chi_B', '1.41421356237309504880168872420...')
 
@@ -80,7 +80,7 @@ def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str
     return rows
 
 
-def _units(problem: Problem, proof: Proof) -> dict[str, str]:
+def _units(problem: Posed, proof: Proof) -> dict[str, str]:
     """The unit of each number that has one: of the unknowns of a pattern, powers of that of the roots."""
     units = units_of(problem)
     per = units.get("abscissa", "")
@@ -92,7 +92,7 @@ def _units(problem: Problem, proof: Proof) -> dict[str, str]:
     return units
 
 
-def _place(problem: Problem, proof: Proof) -> list[str]:
+def _place(problem: Posed, proof: Proof) -> list[str]:
     """How near, and how alone."""
     if proof.method == "exact factorisation":
         return ["method: square-free factorisation of the polynomial, whose coefficients are fractions"]
@@ -116,7 +116,7 @@ def _facts(proof: Proof) -> list[str]:
     return facts + [f"{name}: {verdict}" for name, verdict in proof.limits.items()]
 
 
-def _held(problem: Problem, proof: Proof) -> list[str]:
+def _held(problem: Posed, proof: Proof) -> list[str]:
     """Numbers that were taken exactly, and a word on angles."""
     exact = [*(f"{name} = {_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
     if not exact:

@@ -24,7 +24,7 @@ def speeds_table(found: Speeds) -> str:
 
     More: docs/explanation/weave_and_capsize.md
     """
-    unit = unit_of(found.problem, found.parameter)
+    unit = unit_of(found.problem.posed, found.parameter)
     end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
     within = f" {unit.text}" if unit.text else ""
     lines = [
@@ -36,7 +36,7 @@ def speeds_table(found: Speeds) -> str:
     ]
     real = found.problem.model.carrier is None
     held = {n: x for n, x in found.parameters.items() if n != found.parameter}
-    per = unit_of_all(found.problem, "abscissa", held)
+    per = unit_of_all(found.problem.posed, "abscissa", held)
     roots = "eigenfrequency" if not real else f"root {per.text}".rstrip()
     rows: list[Sequence[str]] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
     for c in found.found:
@@ -64,7 +64,7 @@ def growth_table(found: Growth) -> str:
 
     More: docs/explanation/weave_and_capsize.md
     """
-    unit = unit_of(found.problem, found.over.name)
+    unit = unit_of(found.problem.posed, found.over.name)
     critical = f", critical value {unit.show(found.critical, 8)}" if math.isfinite(found.critical) else ""
     roots = "roots" if found.problem.model.carrier is None else "eigenfrequencies"
     lines = [
@@ -124,7 +124,7 @@ def _meaning(c: Crossing) -> str:
 
 
 def _bands(found: Speeds, bands: Sequence[Stretch]) -> str:
-    return _written(bands, (found.lower, found.upper), unit_of(found.problem, found.parameter))
+    return _written(bands, (found.lower, found.upper), unit_of(found.problem.posed, found.parameter))
 
 
 def _written(bands: Sequence[Stretch], within: Stretch, unit: Unit, digits: int = 8) -> str:
@@ -141,9 +141,9 @@ def _written(bands: Sequence[Stretch], within: Stretch, unit: Unit, digits: int 
 
 def range_line(stable: Sequence[Stretch], solution: Solution) -> str:
     """In one line: the bands of its speed in which a design is stable, and its own speed."""
-    of = solution.problem.parameter_set
+    of = solution.problem.posed.parameter_set
     name = speed_of(of)
     assert name is not None
-    unit, ends = unit_of(solution.problem, name), of[name].range
+    unit, ends = unit_of(solution.problem.posed, name), of[name].range
     bands = _written(stable, (ends.lower, ends.upper), unit, 5)
     return f"stable in {name}: {bands}; this design at {unit.show(solution.parameters[name])}"

@@ -57,7 +57,7 @@ def row_lines(study: Study, row: Row) -> str:
     More: docs/tutorials/study.md
     """
     given = ", ".join(f"{name} = {number(value)}" for name, value in row.varied.items())
-    parts = [f"row {row.number}: {given}", f"seed {row.seed}", status_text(study.problem, row.status), row.cause]
+    parts = [f"row {row.number}: {given}", f"seed {row.seed}", status_text(study.problem.posed, row.status), row.cause]
     return "; ".join(part for part in parts if part)
 
 
@@ -67,7 +67,7 @@ def _headline(study: Study, found: Summary) -> str:
     if study.grid_shape is not None:
         names = " × ".join(f"{name} ({size})" for name, size in study.grid_shape.items())
     made = f"{study.method.replace('_', ' ')} over {names}: {found.rows} rows"
-    counts = ", ".join(f"{count} {status_text(study.problem, status)}" for status, count in found.counts.items())
+    counts = ", ".join(f"{count} {status_text(study.problem.posed, status)}" for status, count in found.counts.items())
     missing = found.rows - sum(found.counts.values())
     return f"{made}; {counts or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
 
@@ -84,7 +84,7 @@ def study_rows(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
 
     More: docs/tutorials/study.md
     """
-    problem = study.problem
+    problem = study.problem.posed
     free = [name for name in problem.free if name not in study.columns]
     text = problem.minimize or problem.maximize
     asked = [text] if text and text != "abscissa" and text not in free else []
@@ -97,7 +97,7 @@ def study_rows(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
 
 
 def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) -> tuple[str, ...]:
-    problem = study.problem
+    problem = study.problem.posed
     known = row.status in ("optimal", "not_converged") or (row.status == "infeasible" and not problem.free)
 
     def shown(name: str, values: Mapping[str, float]) -> str:
@@ -120,7 +120,7 @@ def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) ->
 def _facts(study: Study, found: Summary) -> list[str]:
     lines = []
     if found.best is not None and study.problem.free:
-        problem = study.problem
+        problem = study.problem.posed
         given = ", ".join(f"{n} = {unit_of(problem, n).show(x, _DIGITS)}" for n, x in found.best.varied.items())
         text = problem.minimize or problem.maximize or ""
         best = show_at(problem, text, found.best.parameters, found.best.objective, _DIGITS)
@@ -147,7 +147,7 @@ def _facts(study: Study, found: Summary) -> list[str]:
         values = found.clocked.get("quantiles", tuple(found.product.abscissa.values()))
         each = zip(found.product.abscissa, values, strict=True)
         at = ", ".join(f"{100 * float(q):g} % {_short(value)}" for q, value in each)
-        unit = "1/s" if "quantiles" in found.clocked else unit_of(study.problem, "abscissa").text
+        unit = "1/s" if "quantiles" in found.clocked else unit_of(study.problem.posed, "abscissa").text
         lines.append(f"abscissa{f' in {unit}' if unit else ''} at most, for a share of all rows: {at}")
     for cause, count in islice(found.causes.items(), _CAUSES):
         lines.append(f"{count} × {cause}")

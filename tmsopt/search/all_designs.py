@@ -11,8 +11,9 @@ from tmsopt.algebra.balls import Number
 from tmsopt.errors import Fault, InputError, is_number, short
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.global_search.complete import SECONDS, Completeness, completeness
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem, degrees_of_freedom
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.freedom import degrees_of_freedom
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.validate import SMALLEST
 from tmsopt.program.formulate import design_of, matching
@@ -143,7 +144,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
 
     More: docs/how_to/all_designs.md
     """
-    problem = as_problem(problem)
+    problem = pose(problem)
     if not is_number(seconds):
         raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
     nlp = _posed(problem)
@@ -173,7 +174,7 @@ def _errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, f
     return Table({n: max(known.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
 
 
-def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], list[dict[str, float]], Coverage]:
+def _search(problem: Posed, nlp: NLP, work: Workspace) -> tuple[list[Array], list[dict[str, float]], Coverage]:
     """Solutions that many starts lead to, those met most often first, and their errors."""
     starts, progress = work.options.starts, work.options.progress
     begin(progress, "searching", "start")
@@ -223,13 +224,13 @@ def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], l
     return [found[k] for k in order], [errors[k] for k in order], replace(coverage, crossings=crossings)
 
 
-def _off(problem: Problem, off: Array) -> dict[str, float]:
+def _off(problem: Posed, off: Array) -> dict[str, float]:
     """Errors of free parameters, of an angle no greater than that of its tangent, and of the roots."""
     own = dict(zip(problem.free, off.tolist(), strict=False))
     return own | {"abscissa": max(off[len(own) :].tolist(), default=0.0)}
 
 
-def _posed(problem: Problem) -> NLP:
+def _posed(problem: Posed) -> NLP:
     """The equations of a problem; refused where they are not those of single solutions in the parameters alone."""
     counted = degrees_of_freedom(problem)
     if problem.pattern is None or problem.objective is not None:
@@ -259,17 +260,17 @@ def _same(one: Array, other: Array, width: Array) -> bool:
     return bool(np.max(np.abs(one - other) / width) <= _SAME)
 
 
-def _clipped(problem: Problem, design: Mapping[str, Number]) -> Array:
+def _clipped(problem: Posed, design: Mapping[str, Number]) -> Array:
     """A proved design as doubles in the box."""
     return np.array([min(max(float(design[n]), lo), hi) for n, (lo, hi) in problem.free.items()])
 
 
-def _named(problem: Problem, point: Array) -> dict[str, float]:
+def _named(problem: Posed, point: Array) -> dict[str, float]:
     """What is nearer to 0 than any number of a problem is 0."""
     return {n: x if abs(x) >= SMALLEST else 0.0 for n, x in zip(problem.free, point.tolist(), strict=True)}
 
 
-def _inside(problem: Problem, nlp: NLP, x: Array) -> Array | None:
+def _inside(problem: Posed, nlp: NLP, x: Array) -> Array | None:
     """The free parameters of a solution in the box; None for one outside."""
     lower, upper = (np.array(ends[: len(problem.free)]) for ends in (nlp.lower, nlp.upper))
     room = _INSIDE * (upper - lower)
@@ -299,7 +300,7 @@ def coverage_of(done: int, hits: list[int], singular: int = 0) -> Coverage:
     return Coverage(done, tuple(hits), _expected(hits), chance, singular)
 
 
-def _solution(problem: Problem, design: Mapping[str, float]) -> Solution:
+def _solution(problem: Posed, design: Mapping[str, float]) -> Solution:
     """A design with its standing: of the same problem, where nothing is free."""
-    fixed = solve_any_status(replace(problem, fixed=problem.ordered(design), free={}, start={}))
-    return replace(fixed, problem=problem, freedom=degrees_of_freedom(problem), formulation="matching")
+    fixed = solve_any_status(problem.derive(fixed=problem.ordered(design), free={}, start={}))
+    return replace(fixed, problem=problem.problem, freedom=degrees_of_freedom(problem), formulation="matching")

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
 
 from tmsopt.evaluation.bound import bounded, closed, instant_bound
-from tmsopt.problem.problem import Problem, degrees_of_freedom
+from tmsopt.problem.freedom import degrees_of_freedom
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import is_enough
 from tmsopt.program.formulate import abscissa, design_of, middle
 from tmsopt.program.ipopt import Run, ipopt
@@ -211,7 +212,7 @@ def distinct(candidates: Sequence[LocalEnd], known: Sequence[LocalEnd] = ()) -> 
     return kept
 
 
-def candidate_of(problem: Problem, nlp: NLP, run: Run) -> LocalEnd:
+def candidate_of(problem: Posed, nlp: NLP, run: Run) -> LocalEnd:
     """What a run of IPOPT came to."""
     f, rows = nlp.at(run.x)
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(f)):
@@ -223,7 +224,7 @@ def candidate_of(problem: Problem, nlp: NLP, run: Run) -> LocalEnd:
     return LocalEnd(nlp, run, f + claim, bool(feasible) and not _spurious(problem, nlp, run))
 
 
-def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:
+def _spurious(problem: Posed, nlp: NLP, run: Run) -> bool:
     """Whether the factors claim an abscissa left of the roots: near a0 = 0 equations hold as all terms vanish."""
     if "abscissa" not in nlp.variables:
         return False
@@ -273,7 +274,7 @@ def optima(candidates: Sequence[LocalEnd]) -> int:
     return bool(ordered) + sum(not same_objective(a, b, candidates[0].nlp.size) for a, b in pairwise(ordered))
 
 
-def _proven(problem: Problem, candidate: LocalEnd) -> bool:
+def _proven(problem: Posed, candidate: LocalEnd) -> bool:
     """Whether the bound is reached; it is looked at only where the design itself has all roots of one modulus."""
     if not bounded(problem):
         return False
@@ -283,7 +284,7 @@ def _proven(problem: Problem, candidate: LocalEnd) -> bool:
     return near and instant_bound(problem, candidate.objective).proven
 
 
-def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:
+def _coefficients(problem: Posed, nlp: NLP, run: Run) -> Array:
     """Coefficients in every case, shape (cases, n + 1)."""
     nominal = problem.ordered(design_of(problem, run.x.tolist()))
     varied = [c.applied(nominal) for c in nlp.cases if not c.direction] or [nominal]
@@ -293,7 +294,7 @@ def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:
 
 def _rescued(work: Workspace, nlp: NLP) -> list[LocalEnd]:
     """Starts where the abscissa is least under the same constraints: multiple roots are often met there."""
-    relaxed = replace(work.part, locate=None, minimize="abscissa", maximize=None, scenarios={}, tolerances={})
+    relaxed = work.part.derive(locate=None, minimize="abscissa", maximize=None, scenarios={}, tolerances={})
     leading = abscissa(relaxed)
     lead = ipopt(leading, work.options)
     ended = [lead(initial_point(leading, relaxed, d)).x for d in designs(relaxed, work.options.seed, _RESCUES)]

@@ -12,7 +12,7 @@ from tmsopt.evaluation.stored import multiple_roots_exist
 from tmsopt.evaluation.worst_case import Worst, worst_cases
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import OtherBranch
 from tmsopt.program.formulate import abscissa, design_of, matching
@@ -74,7 +74,7 @@ class CheckedEnd:
     checked: Evaluation
 
 
-def evaluated(problem: Problem, cases: Sequence[Case]) -> Outcome:
+def evaluated(problem: Posed, cases: Sequence[Case]) -> Outcome:
     """Nothing is free: the design is what it is."""
     parameters = problem.ordered({})
     checked = recheck(problem, parameters, cases)
@@ -129,14 +129,14 @@ def converged(trial: CheckedEnd) -> bool:
     return ended and exact  # its word is one on rows as it scales them
 
 
-def _fewer_conditions(problem: Problem, short: int) -> str:
+def _fewer_conditions(problem: Posed, short: int) -> str:
     """How there could be as many free parameters as conditions, where there is something to free or to drop."""
     ways = [f"free {short} more"] if len(problem.fixed) >= short else []
     ways += ["drop a constraint"] if any(c.equality for c in problem.conditions.values()) else []
     return f"; {', or '.join(ways)}" if ways else ""
 
 
-def mass_advice(problem: Problem) -> str:
+def mass_advice(problem: Posed) -> str:
     """How to keep the mass matrix from being singular, in the names of a model."""
     known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
     return f"keep {known.get(problem.model.name, 'a0')} away from 0 by a constraint"
@@ -199,7 +199,7 @@ def claim_matches(work: Workspace, trial: CheckedEnd) -> bool:
     return math.isclose(claimed, trial.checked.objective, rel_tol=_CLAIMED, abs_tol=_CLAIMED)
 
 
-def better(problem: Problem, one: Outcome, other: Outcome) -> bool:
+def better(problem: Posed, one: Outcome, other: Outcome) -> bool:
     """Whether one finding beats another: feasible before not, then by objective, then optimal before not."""
     values = [problem.sign * f.checked.objective for f in (one, other)]
     doubtful = [bool(f.checked.violations) or math.isinf(v) for f, v in zip((one, other), values, strict=True)]
@@ -223,7 +223,7 @@ def is_better(work: Workspace, one: CheckedEnd, other: CheckedEnd) -> bool:
     return ranks[0] < ranks[1]
 
 
-def unclear(problem: Problem, checked: Evaluation) -> bool:
+def unclear(problem: Posed, checked: Evaluation) -> bool:
     """Whether the roots as stored are farther from the multiple ones that they count as than an m-th root explains.
 
     Several that are 0 but for rounding have no damping ratio to speak of.
@@ -246,7 +246,7 @@ def _flattered(trial: CheckedEnd) -> bool:
     return not converged(trial) and not math.isclose(ideal, stored, rel_tol=_CLAIMED, abs_tol=_CLAIMED)
 
 
-def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
+def _active(problem: Posed, nlp: NLP, point: Point) -> dict[str, float]:
     """Gain of the objective per unit by which a named constraint or a bound is relaxed.
 
     For an equality constraint, the change of the objective per unit added to its right-hand side; for one that holds
@@ -278,7 +278,7 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
     return active
 
 
-def _other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tuple[OtherBranch, ...]:
+def _other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -> tuple[OtherBranch, ...]:
     """Solutions of the equations other than the one found, each with the bounds and rows that it violates."""
     of = problem.parameter_set
     branches: list[OtherBranch] = []
@@ -294,7 +294,7 @@ def _other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> t
     return tuple(sorted(branches, key=lambda b: len(b.excluded_by)))
 
 
-def _excluded(problem: Problem, nlp: NLP, x: Array) -> tuple[str, ...]:
+def _excluded(problem: Posed, nlp: NLP, x: Array) -> tuple[str, ...]:
     """Names of the bounds and inequality rows that a solution violates."""
     values = (*x, *nlp.at(x)[1])
     lower, upper = (*nlp.lower, *nlp.row_lower), (*nlp.upper, *nlp.row_upper)
@@ -306,11 +306,11 @@ def _excluded(problem: Problem, nlp: NLP, x: Array) -> tuple[str, ...]:
     return tuple(names)
 
 
-def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:
+def evaluated_cases(problem: Posed, parameters: Mapping[str, float]) -> tuple[Case, ...]:
     """The listed cases of a design and the worst ones between them."""
     return listed_cases(problem, worst_cases(problem, parameters) if problem.cases else {})
 
 
-def listed_cases(problem: Problem, worst: Mapping[str, Worst]) -> tuple[Case, ...]:
+def listed_cases(problem: Posed, worst: Mapping[str, Worst]) -> tuple[Case, ...]:
     """The listed cases, and the worst ones that were found."""
     return (*problem.cases, *(w.case for w in worst.values())) if problem.cases else ()

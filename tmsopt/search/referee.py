@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.worst_case import worst_cases
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.program.nlp import NLP
 from tmsopt.search.basins import Looked
@@ -91,7 +91,7 @@ def _at_infinity(work: Workspace, sample: Sample, trial: CheckedEnd | None) -> L
         return sample.refined.take(np.arange(0))
     a0 = work.part.model.coefficient_names()[0]
     limits = {**work.part.constraints, "a singular mass matrix": f"{a0} == 0"}
-    sampler = Sampler(replace(work.part, constraints=limits), work.options.seed)
+    sampler = Sampler(work.part.derive(constraints=limits), work.options.seed)
     return _better(sampler.sample().refined, _least(work, trial))
 
 
@@ -178,7 +178,7 @@ def runs_away(finding: Outcome) -> bool:
     return bool(sizes) and sizes[-1] > _RUNAWAY * sizes[(len(sizes) - 1) // 2]
 
 
-def _held_off(problem: Problem, finding: Outcome) -> bool:
+def _held_off(problem: Posed, finding: Outcome) -> bool:
     """Whether no parameter moves a0, or a limit that binds is about one that does."""
     about: set[str] = set()
     for name in finding.active:

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from tmsopt.algebra.sequence import golden_steps
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.cube import Cube
 from tmsopt.program.judgement import Judged, evaluate
 from tmsopt.records import Array
@@ -82,14 +82,14 @@ class Sampler:
         drawn: the first ones, and what they are.
     """
 
-    def __init__(self, problem: Problem, seed: int) -> None:
+    def __init__(self, problem: Posed, seed: int) -> None:
         self.space, self.rng = Cube(problem), np.random.default_rng([seed, 16])
         self.count = 0
         self.scales = np.ones(len(problem.conditions))
         self._offset = np.random.default_rng(seed).random(self.space.size)
 
     @property
-    def problem(self) -> Problem:
+    def problem(self) -> Posed:
         return self.space.problem
 
     def look(self, u: Array) -> Looked:

@@ -12,7 +12,7 @@ from tmsopt.evaluation.recheck import FEASIBLE, recheck
 from tmsopt.evaluation.worst_case import Worst, worst_cases
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import STABLE, WORSE_DIRECTION
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.problem.searches import Starts
 from tmsopt.program.formulate import design_of, formulate, middle
@@ -131,11 +131,11 @@ def _from(work: Workspace, nlp: NLP, designs: Sequence[Mapping[str, float]]) -> 
 def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[LocalEnd]:
     """Where starts end from designs sought for their stability alone; all starts are spent where there is any such."""
     limits = {**work.part.constraints, STABLE: "abscissa <= 0"}
-    asked = replace(work.part, minimize="abscissa", maximize=None, constraints=limits)
+    asked = work.part.derive(minimize="abscissa", maximize=None, constraints=limits)
     seed = work.options.seed + 1
     sampler, run = Sampler(asked, seed), Runner(work, nlp)
     if bounded(work.part) and work.sample:  # without limits the boldest designs show whether any is near the axis
-        free = Sampler(replace(asked, constraints={}), seed)
+        free = Sampler(asked.derive(constraints={}), seed)
         if not np.any(free.refined(free.look(work.sample.boldest.u)).worth < 0):
             return []
     sample, ended = sampler.sample(), list[LocalEnd]()
@@ -145,7 +145,7 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[LocalEnd]:
     return [*ended, *further(work, nlp, tried)] if ended else ended
 
 
-def _wants_stability(problem: Problem, trial: CheckedEnd) -> bool:
+def _wants_stability(problem: Posed, trial: CheckedEnd) -> bool:
     """Whether a design is unstable, and the objective or a constraint is about the roots."""
     asked = (problem.objective, *problem.conditions.values())
     about = any(set(WORSE_DIRECTION) & set(e.names) for e in asked if e)
@@ -180,7 +180,7 @@ def without_any(work: Workspace, tried: int) -> Outcome:
     return Outcome(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
 
 
-def answered(problem: Problem, options: Options, asked: Problem, thorough: bool = False) -> Mapping[str, float] | None:
+def answered(problem: Posed, options: Options, asked: Posed, thorough: bool = False) -> Mapping[str, float] | None:
     """The optimum of a problem that is solved again; {} where it is not stable, though `asked` wants that; or None.
 
     As many starts are enough as a search takes to settle, for none that follow make an optimum worse; where these end
@@ -198,7 +198,7 @@ def answered(problem: Problem, options: Options, asked: Problem, thorough: bool 
     return best.parameters if _meets(stable, best) else {}
 
 
-def _settled(part: Workspace, stable: Problem, thorough: bool) -> Outcome | None:
+def _settled(part: Workspace, stable: Posed, thorough: bool) -> Outcome | None:
     """Where few starts end that settle it: at what is stable, or all of them at one least abscissa that is not."""
     nlp = part.formulate(())
     ended = search(part, nlp, _SETTLED)
@@ -209,16 +209,16 @@ def _settled(part: Workspace, stable: Problem, thorough: bool) -> Outcome | None
     return finding if agreed or _meets(stable, finding) else None
 
 
-def _meets(problem: Problem, finding: Outcome) -> bool:
+def _meets(problem: Posed, finding: Outcome) -> bool:
     return not recheck(problem, finding.parameters, finding.cases).violations
 
 
 def _reached(work: Workspace, names: Sequence[str]) -> tuple[Mapping[str, float] | None, bool]:
     """A design that meets the constraints of these names, whatever it does to others; and whether that can be told."""
     problem, options = work.problem, replace(work.options, progress=None, near=None)
-    kept = replace(problem, constraints={n: text for n, text in problem.constraints.items() if n in names}, pareto=())
+    kept = problem.derive(constraints={n: text for n, text in problem.constraints.items() if n in names}, pareto=())
     if kept.objective and (RADIUS in kept.objective.names or not (kept.pattern or set(names) & {*kept.asked_of_roots})):
-        kept = replace(kept, minimize=None, maximize=None)
+        kept = kept.derive(minimize=None, maximize=None)
     parts = workspace(kept, options).parts()
     if any(part.needles for part in parts):
         return None, False
@@ -238,7 +238,7 @@ def _ratios(work: Workspace, nlp: NLP, trial: CheckedEnd | None) -> Iterator[tup
         yield -1.0, _FEWER if (trial and nlp.touches) or on_plateau(work.problem) else work.options.starts
 
 
-def _unstable(problem: Problem, nlp: NLP, trial: CheckedEnd) -> bool:
+def _unstable(problem: Posed, nlp: NLP, trial: CheckedEnd) -> bool:
     """Whether the best design may have been kept from positive real roots, where the damping ratio is not the goal."""
     if "damping_ratio" in nlp.touches:  # the less of it the better, somewhere
         return True
@@ -298,7 +298,7 @@ def _lost(work: Workspace, trial: CheckedEnd | None, leaders: Sequence[Mapping[s
     )
 
 
-def _uncovered(problem: Problem, trial: CheckedEnd, found: Mapping[str, Worst]) -> list[Case]:
+def _uncovered(problem: Posed, trial: CheckedEnd, found: Mapping[str, Worst]) -> list[Case]:
     """Cases in which the design does worse than in all that it was made for."""
     more: list[Case] = []
     known = trial.checked
@@ -336,7 +336,7 @@ def _nearer(nlp: NLP, trial: CheckedEnd) -> list[Case]:
     return [Case(direction=Table(step))]
 
 
-def _apart(problem: Problem, designs: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
+def _apart(problem: Posed, designs: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
     """The designs without those beside an earlier one, as an end of the solver is beside what it was polished to."""
     kept: list[Mapping[str, float]] = []
     for d in designs:

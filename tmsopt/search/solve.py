@@ -16,7 +16,8 @@ from tmsopt.evaluation.worst_case import cover
 from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, user_structure_name, without_rounding
 from tmsopt.problem.advice.senses import sense_notes
 from tmsopt.problem.files import Given, as_solvable
-from tmsopt.problem.problem import Problem, degrees_of_freedom
+from tmsopt.problem.freedom import degrees_of_freedom
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import Bound, Solution
@@ -152,8 +153,8 @@ def solve_any_status(
 
 def covered(solution: Solution) -> Solution:
     """The same, with the proof that no case between those listed is worse, where that is asked of an optimum."""
-    problem = solution.problem
-    if solution.status != "optimal" or solution.cover or not (problem.variations or problem.tolerances):
+    problem = solution.problem.posed
+    if solution.status != "optimal" or solution.cover or not (problem.scenarios or problem.tolerances):
         return solution
     return replace(solution, cover=cover(problem, solution.parameters, solution.abscissa))
 
@@ -163,13 +164,13 @@ def solved_first(design: Given, progress: Listener | None) -> Solution:
     return solve_any_status(design, replace(DEFAULTS, progress=steps_for(progress)))
 
 
-def evaluate_design(problem: Problem, design: Mapping[str, float], note: str) -> Solution:
+def evaluate_design(problem: Posed, design: Mapping[str, float], note: str) -> Solution:
     """A design as it is, whoever found it: ``not_converged``, or ``infeasible`` where it violates something."""
     began = time.perf_counter()
     return _assembled(problem, replace(_as_it_is(problem, design), notes=(note,)), (), {}, began)
 
 
-def _as_it_is(problem: Problem, design: Mapping[str, float]) -> Outcome:
+def _as_it_is(problem: Posed, design: Mapping[str, float]) -> Outcome:
     parameters = problem.ordered(design)
     cases = evaluated_cases(problem, parameters)
     checked = recheck(problem, parameters, cases)
@@ -199,7 +200,7 @@ def _so_far(parts: Sequence[Workspace]) -> Outcome | None:
     return replace(best, starts=starts, formulation=met[0][0].formulation if met else "none", notes=(words,))
 
 
-def _order(problem: Problem, finding: Outcome) -> tuple[float, float]:
+def _order(problem: Posed, finding: Outcome) -> tuple[float, float]:
     """Of two designs as they are, the better one comes first: by violation, then by objective."""
     value = problem.sign * finding.checked.objective
     worth = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
@@ -208,7 +209,7 @@ def _order(problem: Problem, finding: Outcome) -> tuple[float, float]:
 
 def _with_stability(solution: Solution, options: Options, began: float) -> Solution:
     """Of a search for stability that found none: whether there is any, and the design that one leads to."""
-    problem = solution.problem
+    problem = solution.problem.posed
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
     from tmsopt.global_search.stability import any_stable  # a tenth of all imports, which few problems need
@@ -228,7 +229,7 @@ def _with_stability(solution: Solution, options: Options, began: float) -> Solut
 
 def _led(solution: Solution, design: Mapping[str, float], words: str, options: Options) -> Solution:
     """Where a design leads that the search has missed, if that is better."""
-    problem = solution.problem
+    problem = solution.problem.posed
     few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
     found = solve_any_status(problem, replace(few, near=design))
     gain = problem.sign * (solution.value - found.value)
@@ -246,7 +247,7 @@ def _promising(parts: Sequence[Workspace], options: Options) -> Sequence[Workspa
     return [parts[k] for k in sorted(range(len(parts)), key=ranks.__getitem__)]
 
 
-def _winner(problem: Problem, explored: Sequence[Explored]) -> Outcome | None:
+def _winner(problem: Posed, explored: Sequence[Explored]) -> Outcome | None:
     """The best of the findings of all parts of the box, with the starts of all of them."""
     best: Outcome | None = None
     for part in explored:
@@ -264,7 +265,7 @@ def _side_values(explored: Sequence[Explored]) -> dict[str, float]:
     return {n: f.checked.objective if f and f.status == "optimal" else math.nan for n, f in found.items()}
 
 
-def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Outcome) -> tuple[str, ...]:
+def _sides_note(problem: Posed, explored: Sequence[Explored], finding: Outcome) -> tuple[str, ...]:
     """Which part of the box the best design is in, and what the other one offers."""
     won = next((part for part in explored if part.finding and part.finding.parameters == finding.parameters), None)
     if len(explored) == 1 or won is None or finding.status != "optimal":
@@ -287,7 +288,7 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Outcome
 
 
 def _assembled(
-    problem: Problem,
+    problem: Posed,
     finding: Outcome,
     notes: tuple[str, ...],
     sides: dict[str, float],
@@ -300,13 +301,13 @@ def _assembled(
     told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
     if finding.status == "optimal" and problem.free and problem.objective is not None and not told:
         finding = replace(finding, status="not_converged", notes=(*finding.notes, UNCLEAR))
-    optimal, listed = finding.status == "optimal", bool(problem.variations or problem.tolerances)
+    optimal, listed = finding.status == "optimal", bool(problem.scenarios or problem.tolerances)
     name, worst = user_structure_name(problem.model, checked.structure.name), checked.worst.applied(parameters)
     whole = polynomial_structure(problem.model, name, numbers.roots).roots
     met = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
     edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, met)
     return Solution(
-        problem=problem,
+        problem=problem.problem,
         status=finding.status,
         value=numbers.value,
         parameters=Table(finding.parameters),
@@ -340,7 +341,7 @@ def _assembled(
     )
 
 
-def _stability_note(problem: Problem, checked: Evaluation, edges: Sequence[str], optimal: bool) -> tuple[str, ...]:
+def _stability_note(problem: Posed, checked: Evaluation, edges: Sequence[str], optimal: bool) -> tuple[str, ...]:
     if "coefficients" in checked.violations:
         return ("a coefficient has no value at this design; keep away from what divides by 0, or has no root",)
     if "a0" in checked.violations:

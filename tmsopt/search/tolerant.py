@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt.boundaries.nearest import Nearest, Robustness
 from tmsopt.problem.cases import Case, weight_of
-from tmsopt.problem.problem import Problem, weighted
+from tmsopt.problem.problem import Posed, weighted
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.formulate import middle
 from tmsopt.program.nlp import NLP
@@ -89,14 +89,14 @@ def _climb(
     return None
 
 
-def _joined(problem: Problem, feet: list[Case], around: Robustness) -> list[Case]:
+def _joined(problem: Posed, feet: list[Case], around: Robustness) -> list[Case]:
     """The feet so far, and those of a design that are others."""
     near = [n for n in (around.weave, around.capsize, around.infinity) if n.distance <= _BESIDE * around.radius]
     found = [_foot(problem, n) for n in near]
     return [*feet, *(case for case in found if not any(_alike(case, other) for other in feet))]
 
 
-def _foot(problem: Problem, nearest: Nearest) -> Case:
+def _foot(problem: Posed, nearest: Nearest) -> Case:
     """In all that the radius lets change: what is 0 in a design, such as a gain, has no part in its own direction."""
     names = weighted(problem.parameter_set, problem.weights, problem.fixed)
     return Case(direction=Table({n: nearest.direction.get(n, 0.0) for n in names}), edge=nearest.kind)
@@ -117,7 +117,7 @@ def promising(work: Workspace) -> Iterator[dict[str, float]]:
     """Designs that lie apart, those of the greatest radius along some rays first; one near the optimum before all."""
     problem = work.part
     limits = {name: text for name, text in problem.constraints.items() if RADIUS not in problem.conditions[name].names}
-    sampler = Sampler(replace(problem, minimize="abscissa", maximize=None, constraints=limits), work.options.seed)
+    sampler = Sampler(problem.derive(minimize="abscissa", maximize=None, constraints=limits), work.options.seed)
     if problem.start or work.options.near:
         yield {**middle(problem), **(work.options.near or {})}
     seen = sampler.draw()
@@ -134,7 +134,7 @@ def promising(work: Workspace) -> Iterator[dict[str, float]]:
         yield sampler.design(ranked, k)
 
 
-def estimated(problem: Problem, columns: Mapping[str, Array], seed: int) -> Array:
+def estimated(problem: Posed, columns: Mapping[str, Array], seed: int) -> Array:
     """Radii up to which designs, columns of free parameters, stay stable in some directions; too large, if anything."""
     of, nominal = problem.parameter_set, {n: np.asarray(x, dtype=float) for n, x in problem.ordered(columns).items()}
     names = list(weighted(of, problem.weights, problem.fixed))

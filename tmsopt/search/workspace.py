@@ -11,7 +11,8 @@ from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.evaluation.recheck import Evaluation, recheck
 from tmsopt.global_search.signs import none_stable
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Freedom, Problem, degrees_of_freedom
+from tmsopt.problem.freedom import Freedom, degrees_of_freedom
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.program.formulate import design_of, formulate
 from tmsopt.program.ipopt import Run
@@ -55,8 +56,8 @@ class Workspace:
         nearest: boundaries nearest to designs that were met.
     """
 
-    problem: Problem
-    part: Problem
+    problem: Posed
+    part: Posed
     options: Options
     name: str = ""
     extra_starts: tuple[Mapping[str, float], ...] = ()
@@ -93,7 +94,7 @@ class Workspace:
         """The sample, of a pattern that of the limits alone."""
         part = self.part
         limits_alone = part.pattern and part.conditions and not (part.asks_radius or self.without_sample)
-        return Sampler(replace(part, locate=None), self.options.seed).sample() if limits_alone else self.sample
+        return Sampler(part.derive(locate=None), self.options.seed).sample() if limits_alone else self.sample
 
     @property
     def out_of_reach(self) -> bool:
@@ -155,7 +156,7 @@ class Workspace:
 
 
 def workspace(
-    problem: Problem,
+    problem: Posed,
     options: Options = DEFAULTS,
     extra_starts: Sequence[Mapping[str, float]] = (),
     without_sample: bool = False,
@@ -164,13 +165,13 @@ def workspace(
     return Workspace(problem, problem, options, extra_starts=tuple(extra_starts), without_sample=without_sample)
 
 
-def _on(problem: Problem, name: str, ends: tuple[float, float]) -> Problem:
+def _on(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
     """The problem with a smaller range of one parameter, and its start where that fits."""
     inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
-    return replace(problem, free={**problem.free, name: ends}, start=problem.start if inside else {})
+    return problem.derive(free={**problem.free, name: ends}, start=problem.start if inside else {})
 
 
-def narrowed(nlp: NLP, problem: Problem) -> NLP:
+def narrowed(nlp: NLP, problem: Posed) -> NLP:
     """An NLP with the box of a problem that has the same free parameters."""
     of = problem.parameter_set
     lower, upper = list(nlp.lower), list(nlp.upper)
@@ -179,7 +180,7 @@ def narrowed(nlp: NLP, problem: Problem) -> NLP:
     return replace(nlp, lower=tuple(lower), upper=tuple(upper))
 
 
-def check_near(problem: Problem, near: Mapping[str, float]) -> None:
+def check_near(problem: Posed, near: Mapping[str, float]) -> None:
     """Refuse a design to start near that names no parameters, or has no numbers.
 
     Raises:

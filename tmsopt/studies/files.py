@@ -16,7 +16,8 @@ from tmsopt.files import read_lines
 from tmsopt.models import Parameter, Quantity
 from tmsopt.problem.expression import written_sides
 from tmsopt.problem.files import as_solvable, problem_from_tables
-from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.freedom import question_faults
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.toml import Key, Number, Page, Section, read_page, validate_tables, within
 from tmsopt.problem.units import TABLES, numbers, with_unit
 from tmsopt.program.options import STARTS
@@ -52,7 +53,7 @@ _VARIED = {
 """How what varies is written, by method."""
 
 
-def unit_of(problem: Problem, name: str) -> str:
+def unit_of(problem: Posed, name: str) -> str:
     """The unit in which what varies is a number; empty where that is not known."""
     of, (stem, _, end) = problem.parameter_set, name.rpartition(".")
     named: tuple[Quantity | Parameter, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
@@ -73,7 +74,7 @@ def _entries(table: Mapping[str, Any]) -> dict[str, tuple[Key, Any]]:
     return found
 
 
-def _read_vary(problem: Problem, written: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
+def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
     """Name → list of numbers, `Span` of a sample, or span and points of an axis; adds what is wrong to `faults`."""
     entries, method, read = _entries(written.vary), written.study.method, {}
     if not entries:
@@ -341,17 +342,20 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
     options = written.study
     common: dict[str, Any] = {"title": written.title.strip() or title, "seed": options.seed, "starts": options.starts}
     common |= {"problem": problem, "report": options.report}
-    faults += [*_method_faults(written, {f.key for f in faults}), *within("study", _option_faults(options, problem))]
+    faults += [
+        *_method_faults(written, {f.key for f in faults}),
+        *within("study", _option_faults(options, problem.posed)),
+    ]
     wrong = {f.key for f in faults} & {("study", "method"), ("study", "csv"), ("vary",)}
     read: dict[str, Any] = {}
     if options.method == "monte_carlo":
         tables = {table: written.tolerances if table == "tolerances" else {} for table in TABLES}
-        read, _, _, unreadable = numbers(tables, problem.parameter_set)
+        read, _, _, unreadable = numbers(tables, problem.posed.parameter_set)
         faults += unreadable
     elif options.method == "csv" and not wrong:
-        read = _read_rows(page, options.csv or "", problem, faults)
+        read = _read_rows(page, options.csv or "", problem.posed, faults)
     elif not wrong:
-        read = _read_vary(problem, written, faults)
+        read = _read_vary(problem.posed, written, faults)
     if faults:
         raise page.error(faults)
     try:
@@ -372,11 +376,11 @@ def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
     stated = page.data.get("problem")
     if isinstance(stated, dict):
         found, problem = problem_from_tables(stated, str(page.data.get("title", "")).strip() or title)
-        faults += within("problem", [*found, *(question_faults(problem) if problem else ())])
+        faults += within("problem", [*found, *(question_faults(problem.posed) if problem else ())])
         return problem
     if isinstance(stated, str):  # anything else is reported as a fault of shape
         try:
-            return as_solvable(Path(page.file).parent / stated)
+            return as_solvable(Path(page.file).parent / stated).problem
         except InputError as error:
             faults += _named(stated, error, ("problem",))
     return None
@@ -388,7 +392,7 @@ def _named(name: str, error: InputError, key: Key) -> list[Fault]:
     return [f if f.line else Fault(f"'{name}' {f.message}; {more}", key) for f in error.faults]
 
 
-def _read_rows(page: Page, name: str, problem: Problem, faults: list[Fault]) -> dict[str, Column]:
+def _read_rows(page: Page, name: str, problem: Posed, faults: list[Fault]) -> dict[str, Column]:
     """The columns of a CSV file that a study names; adds what is wrong with them to `faults`."""
     file, columns = str(Path(page.file).parent / name), dict[str, Column]()
     try:
@@ -425,7 +429,7 @@ def _method_faults(written: _StudyFile, reported: Set[Key]) -> Iterator[Fault]:
         yield Fault("nothing is free in a Monte Carlo study, so nothing starts warm; leave it out", ("study", "warm"))
 
 
-def _option_faults(options: _Options, problem: Problem) -> Iterator[Fault]:
+def _option_faults(options: _Options, problem: Posed) -> Iterator[Fault]:
     if options.rows is not None:
         yield from count_faults("rows", options.rows, 1, MOST_ROWS)
     if options.distribution not in (None, *DISTRIBUTIONS):

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, at_first, count_faults, is_number, short, suggest, text_faults
 from tmsopt.files import path_of
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.freedom import question_faults
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
 from tmsopt.program.options import STARTS
@@ -61,8 +62,8 @@ class Sampling:
     report: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        problem = as_problem(self.problem)
-        object.__setattr__(self, "problem", problem)
+        problem = pose(self.problem)
+        object.__setattr__(self, "problem", problem.problem)
         if not self.tolerances:
             object.__setattr__(self, "tolerances", problem.tolerances)
         found = [*question_faults(problem), *_tolerance_faults(problem, self.tolerances)]
@@ -142,7 +143,7 @@ def _drawn(asked: Sampling, design: Mapping[str, float]) -> Study:
         InputError: for tolerances that take the design out of its physical range.
     """
     problem = asked.problem
-    equal = [name for name, condition in problem.conditions.items() if condition.equality]
+    equal = [name for name, condition in problem.posed.conditions.items() if condition.equality]
     left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     kept = {n: text for n, text in problem.constraints.items() if n not in equal}
     stated: dict[str, Any] = {"free": {}, "start": {}, "tolerances": {}, "locate": None, "constraints": kept}
@@ -181,14 +182,14 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
     with view_store(path) as opened:
         known = opened.about()["definition"]
     try:
-        design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.parameter_set.names}
+        design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.posed.parameter_set.names}
         drawn = _drawn(study, {**design, **study.problem.fixed})
     except (InputError, KeyError, TypeError, ValueError):  # of another model, or a design that cannot be drawn around
         return
     check_same(path, drawn)
 
 
-def _tolerance_faults(problem: Problem, tolerances: Any) -> list[Fault]:
+def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
     """What is wrong with tolerances to draw from."""
     if not isinstance(tolerances, Mapping) or not tolerances:
         found = f"found {short(tolerances)}" if tolerances else "no tolerances"

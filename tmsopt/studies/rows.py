@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tmsopt.errors import short
 from tmsopt.evaluation.law_rows import LAWS
 from tmsopt.models import tms
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import unit_of
 from tmsopt.records import Table
 from tmsopt.search.solve import UNSTABLE
@@ -153,7 +153,7 @@ def header(table: str, key: str) -> str:
 
 def headers(study: Study) -> dict[str, tuple[str, str]]:
     """Header of every column that rows of a study have → field of the row, and name in it where that is a table."""
-    problem = study.problem
+    problem = study.problem.posed
     names = {
         "varied": tuple(study.columns),
         "parameters": problem.parameter_set.names,
@@ -200,7 +200,7 @@ def _merged(parts: Sequence[Part]) -> Part:
     }
 
 
-def _judged_causes(problem: Problem, judged: Part) -> NDArray[Any]:
+def _judged_causes(problem: Posed, judged: Part) -> NDArray[Any]:
     """Why rows are infeasible that were judged without a solver."""
     texts, unstable = judged["cause"], np.zeros(len(judged["cause"]), dtype=bool)
     for name, condition in problem.conditions.items():
@@ -281,7 +281,7 @@ class RowTable(Sequence[Row]):
         """Why rows are not optimal; of those that were judged without a solver it follows from their numbers."""
         texts = self._kept["cause"]
         judged = np.flatnonzero((self._kept["status"] == "infeasible") & (texts == ""))
-        texts[judged] = _judged_causes(self.study.problem, {head: x[judged] for head, x in self._kept.items()})
+        texts[judged] = _judged_causes(self.study.problem.posed, {head: x[judged] for head, x in self._kept.items()})
         return texts
 
     def values(self, head: str) -> NDArray[Any]:

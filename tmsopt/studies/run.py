@@ -117,7 +117,7 @@ class Results(Printable):
     def export(self, path: str | PathLike[str], progress: Listener | None = None) -> None:
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
         about = dict(self.about or {"definition": definition(self.study)})
-        about["units"] = units_of(self.study.problem, self.study.report)
+        about["units"] = units_of(self.study.problem.posed, self.study.report)
         export(self.rows, path_of(path, "the file to write"), about, progress)
 
 

@@ -102,7 +102,7 @@ class Solver:
         """Whether one solution of a row beats another by more than rounding."""
         if one.status != "optimal" or other.status != "optimal":
             return one.status == "optimal" and other.status != "optimal"
-        sign = self.study.problem.sign
+        sign = self.study.problem.posed.sign
         return sign * one.objective < sign * other.objective and not same_objective(one.objective, other.objective)
 
     def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> SolvedRow:
@@ -133,7 +133,7 @@ class Solver:
 
 def _fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
     """What a row says of its solution."""
-    problem, bound = solution.problem, solution.bound
+    problem, bound = solution.problem.posed, solution.bound
     values = problem.values(solution.parameters)
     return {
         "status": solution.status,
@@ -172,9 +172,9 @@ def _new(answer: SolvedRow) -> bool:
 def _cause(solution: Solution) -> str:
     """Why a solution is not optimal, in words."""
     if solution.status == "optimal":
-        lost = amounts_text(solution.problem, solution.missed)
+        lost = amounts_text(solution.problem.posed, solution.missed)
         return f"as stored in doubles, misses {lost}" if lost else ""
-    violated = amounts_text(solution.problem, solution.violations)
+    violated = amounts_text(solution.problem.posed, solution.violations)
     conflict = solution.relaxation.conflict if solution.relaxation else ()
     parts = [
         f"violated: {violated}" if violated else "",
@@ -196,8 +196,8 @@ _JUDGED = ("objective", "abscissa", "damping_ratio", "bound", "gap", "oscillates
 
 def applies(study: Study) -> bool:
     """Whether rows of a study may be judged at once: only fixed parameters vary, and nothing is free."""
-    names = study.problem.parameter_set.names
-    return not study.warm and judgeable(study.problem) and all(name in names for name in study.columns)
+    names = study.problem.posed.parameter_set.names
+    return not study.warm and judgeable(study.problem.posed) and all(name in names for name in study.columns)
 
 
 def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
@@ -209,7 +209,7 @@ def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
     given = {name: np.asarray(column) for name, column in study.columns.items()}
     for first in range(0, len(numbers), BLOCK):
         began, some = time.perf_counter(), numbers[first : first + BLOCK]
-        found = verdicts(study.problem, {name: column[some] for name, column in given.items()}, study.report)
+        found = verdicts(study.problem.posed, {name: column[some] for name, column in given.items()}, study.report)
         if found is None:
             return
         if found.certain.any():

@@ -21,9 +21,10 @@ from tmsopt.errors import (
 )
 from tmsopt.problem.cases import Band
 from tmsopt.problem.expression import ExpressionError
-from tmsopt.problem.files import Given, as_problem
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.limit import limit_of, with_limit
-from tmsopt.problem.problem import Problem, question_faults
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.program.options import STARTS
 from tmsopt.records import Array, Column, Table
 from tmsopt.studies.sampling import MOST_ROWS, column_of_numbers, grid
@@ -156,7 +157,7 @@ def over_grid(
     if wrong := table_faults("axes", axes, "{'mu': [0.1, 0.2]}"):
         raise InputError(wrong)
     return Study(
-        problem=as_problem(problem),
+        problem=pose(problem).problem,
         columns=grid(axes),
         title=title,
         seed=seed,
@@ -182,7 +183,7 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
     else:
         columns = {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
     return {
-        "problem": _problem(study.problem),
+        "problem": _problem(study.problem.posed),
         **columns,
         "seed": int(study.seed),
         "starts": int(study.starts),
@@ -191,14 +192,14 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
     }
 
 
-def _problem(problem: Problem) -> dict[str, Any]:
+def _problem(problem: Posed) -> dict[str, Any]:
     tables: dict[str, dict[str, Any]] = {
         "fixed": dict(problem.fixed),
         "free": {name: list(ends) for name, ends in problem.free.items()},
         "constraints": dict(problem.constraints),
         "scenarios": {
             name: {"min": float(s.min), "max": float(s.max), "points": s.points} if isinstance(s, Band) else list(s)
-            for name, s in problem.variations.items()
+            for name, s in problem.scenarios.items()
         },
         "tolerances": dict(problem.tolerances),
         "weights": dict(problem.weights),
@@ -233,7 +234,7 @@ def faults(study: Stated) -> Iterator[Fault]:
         message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
         yield Fault(message, ("problem",))
         return
-    yield from (Fault(f.message, ("problem", *f.key)) for f in question_faults(study.problem))
+    yield from (Fault(f.message, ("problem", *f.key)) for f in question_faults(study.problem.posed))
     if isinstance(study.columns, Mapping):
         yield from _column_faults(study)
     else:
@@ -242,7 +243,7 @@ def faults(study: Stated) -> Iterator[Fault]:
     yield from _option_faults(study)
 
 
-def variable_names(problem: Problem) -> tuple[str, ...]:
+def variable_names(problem: Posed) -> tuple[str, ...]:
     """What may vary from row to row of a study of a problem."""
     fixed = tuple(n for n in problem.parameter_set.names if n in problem.fixed and n not in problem.scenarios)
     ends = tuple(f"{n}.{end}" for n in problem.parameter_set.names if n in problem.free for end in ("min", "max"))
@@ -250,7 +251,7 @@ def variable_names(problem: Problem) -> tuple[str, ...]:
     return fixed + ends + limits
 
 
-def name_faults(problem: Problem) -> Callable[[Any], str]:
+def name_faults(problem: Posed) -> Callable[[Any], str]:
     """Says why a name cannot vary, one after the other; empty where it can."""
     accepted, advice = variable_names(problem), at_first(suggest)
 
@@ -276,11 +277,11 @@ def name_faults(problem: Problem) -> Callable[[Any], str]:
 
 def _column_faults(study: Stated) -> Iterator[Fault]:
     if not study.columns:
-        accepted = " ".join(variable_names(study.problem))
+        accepted = " ".join(variable_names(study.problem.posed))
         yield Fault(f"nothing varies; give at least one column, of: {accepted}", ("columns",))
         return
     lengths: dict[str, int] = {}
-    wrong_with = name_faults(study.problem)
+    wrong_with = name_faults(study.problem.posed)
     for name, values in study.columns.items():
         key, column = ("columns", str(name)), column_of_numbers(values)
         if wrong := wrong_with(name):
@@ -323,10 +324,10 @@ def _option_faults(study: Stated) -> Iterator[Fault]:
     yield from list_faults("notes", study.notes, "['left out: the lamp']") or (
         fault for note in study.notes for fault in text_faults(note, "notes")
     )
-    yield from common_faults(study.problem, study.seed, study.starts, study.report)
+    yield from common_faults(study.problem.posed, study.seed, study.starts, study.report)
 
 
-def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iterator[Fault]:
+def common_faults(problem: Posed, seed: Any, starts: Any, report: Any) -> Iterator[Fault]:
     """What is wrong with the seed, the starts and the report of a study."""
     yield from count_faults("seed", seed, 0)
     yield from count_faults("starts", starts, 1, MOST_STARTS)

@@ -123,7 +123,7 @@ def summary(rows: RowTable) -> Summary:
     counts, optimal = Counter(status.tolist()), status == "optimal"
     clocked = _clocked(rows, values)
     ranked = np.flatnonzero(optimal & np.isfinite(judged := clocked.get("objective", values["objective"])))
-    best = rows[int(ranked[np.argmin(problem.sign * judged[ranked])])] if ranked.size else None
+    best = rows[int(ranked[np.argmin(problem.posed.sign * judged[ranked])])] if ranked.size else None
     spreads = [{n: ends for n, x in some.items() if (ends := _ends(x[optimal]))} for some in (values, clocked)]
     in_seconds: dict[str, tuple[float, ...]] = dict(spreads[1])
     product = None
@@ -152,9 +152,9 @@ def summary(rows: RowTable) -> Summary:
 def _clocked(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
     """Objective and abscissa of every row in 1/s, where they are per √(g/w) and a second is known: w may differ."""
     problem, found = rows.study.problem, {}
-    parameters = {name: rows.values(header("parameters", name)) for name in problem.parameter_set.names}
+    parameters = {name: rows.values(header("parameters", name)) for name in problem.posed.parameter_set.names}
     for name, text in (("objective", problem.minimize or problem.maximize), ("abscissa", "abscissa")):
-        if text and (rates := rate_of(problem, text, parameters)) is not None:
+        if text and (rates := rate_of(problem.posed, text, parameters)) is not None:
             found[name] = values[name] * rates
     return found
 

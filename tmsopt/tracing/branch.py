@@ -176,15 +176,15 @@ class Trace(Tabular):
         Raises:
             OSError: when the file cannot be written.
         """
-        write_csv(path, list(self.records()), units_of(self.problem))
+        write_csv(path, list(self.records()), units_of(self.problem.posed))
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt trace`."""
         return {
-            **self.problem.heading,
+            **self.problem.posed.heading,
             "pattern": self.pattern,
             "free": list(self.problem.free),
-            "units": units_of(self.problem),
+            "units": units_of(self.problem.posed),
             **plain(self, "branches starts points seconds"),
             "seconds_per_point": self.seconds_walking / max(self.points, 1),
         }

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from tmsopt.models.user_spectrum import pattern_of
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.problem import Posed
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
@@ -103,7 +103,7 @@ def domain(
 
     More: docs/how_to/charts.md
     """
-    plane = replace(as_problem(problem), constraints={}, minimize=None, maximize=None, locate=None)
+    plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
     how: dict[str, Any] = {"step": step, "starts": starts, "seed": seed, "progress": progress}
     bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
     found: dict[str, list[Branch]] = {"capsize": [], "EP2": []}
@@ -126,7 +126,7 @@ def domain(
     )
 
 
-def _in_edge(branch: Branch, problem: Problem) -> bool:
+def _in_edge(branch: Branch, problem: Posed) -> bool:
     """Whether a branch lies in an edge of the box, which bounds the picture anyway: it has one side only."""
     limits = ((n, limit, high - low) for n, (low, high) in problem.free.items() for limit in (low, high))
     return any(bool(np.all(np.abs(branch.parameters[n] - limit) <= _EDGE * width)) for n, limit, width in limits)
@@ -153,7 +153,7 @@ def _changes(curve: Infinity, corners: bool = False) -> Iterator[Corner]:
         yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
 
 
-def _pieces(branch: Branch, inside: Truth, problem: Problem, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
+def _pieces(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
     """Runs of points that bound a domain; the events at their ends belong to them."""
     marked = inside.copy()
     beyond: dict[int, Corner] = {}
@@ -173,7 +173,7 @@ def _pieces(branch: Branch, inside: Truth, problem: Problem, at_infinity: Sequen
             yield Arc(branch.pattern, {n: np.array([p[n] for p in points]) for n in problem.free})
 
 
-def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Corner]:
+def _near(problem: Posed, event: Event, corners: Sequence[Corner]) -> list[Corner]:
     """The corners within reach of an event, the nearest last."""
 
     def distance(corner: Corner) -> float:
@@ -183,7 +183,7 @@ def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Cor
     return sorted((c for c in corners if distance(c) <= _CLOSE), key=distance, reverse=True)
 
 
-def _bounds(branch: Branch, problem: Problem) -> Truth:
+def _bounds(branch: Branch, problem: Posed) -> Truth:
     """Where the other roots are stable, or on the axis too and the designs of one side alone stable.
 
     Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
@@ -225,7 +225,7 @@ def _once(branch: Branch) -> Truth:
     return np.asarray((branch.kinds != "2EP2") | (r - other >= -1e-12 * np.abs(other)))
 
 
-def _corners(branch: Branch, problem: Problem) -> Iterator[Corner]:
+def _corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
     inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
     for event in branch.events:
@@ -234,7 +234,7 @@ def _corners(branch: Branch, problem: Problem) -> Iterator[Corner]:
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 
 
-def _turns(branch: Branch, event: Event, problem: Problem) -> bool:
+def _turns(branch: Branch, event: Event, problem: Posed) -> bool:
     if event.name == "end":
         return event.detail in pattern_of(problem.model, branch.pattern).ends.values()
     return event.name not in ("fold", "constraint")

@@ -1,7 +1,7 @@
 """How large the coefficients of a problem are over its box, so that no unit of time or mass matters."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from tmsopt.errors import Fault, InputError
 from tmsopt.models.user_spectrum import pattern_of
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import matching, variables_of
 from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import spread
@@ -22,21 +22,21 @@ _SAMPLE = 32  # designs by which sizes are judged
 _VANISHED = 1e-9
 
 
-def sizes(problem: Problem) -> Array:
+def sizes(problem: Posed) -> Array:
     """Median sizes of the coefficients over the box of the free parameters; 0 of one that is mostly 0 there."""
     a = _coefficients(problem, list(islice(spread(problem, 0), _SAMPLE)))
     a = np.abs(a[np.all(np.isfinite(a), axis=1)])
     return np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1)
 
 
-def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
+def coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
     """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
     a = problem.model.coefficients(problem.ordered(columns), problem.parameter_set)
     shape = np.shape(next(iter(columns.values())))
     return np.stack([np.broadcast_to(np.asarray(c, dtype=float), shape) for c in a], axis=-1)
 
 
-def _coefficients(problem: Problem, designs: Sequence[Mapping[str, float]]) -> Array:
+def _coefficients(problem: Posed, designs: Sequence[Mapping[str, float]]) -> Array:
     """Likewise of a list of designs, with a parameter or more."""
     with np.errstate(all="ignore"):
         return coefficients(problem, {n: np.array([d[n] for d in designs]) for n in problem.free})
@@ -52,7 +52,7 @@ class Traced:
         size: of the coefficients over the box.
     """
 
-    problem: Problem
+    problem: Posed
     pattern: Pattern
     nlp: NLP
     on: Curve
@@ -66,11 +66,11 @@ class Traced:
         return np.asarray(np.abs(a[..., 0]) > _VANISHED * self.size[0] * share.max(axis=-1, initial=0.0))
 
 
-def prepare(problem: Problem) -> Traced:
+def prepare(problem: Posed) -> Traced:
     """The equations of a pattern problem, compiled for tracing."""
     pattern = pattern_of(problem.model, str(problem.locate))
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
-    nlp = matching(replace(problem, constraints=equalities))
+    nlp = matching(problem.derive(constraints=equalities))
     free = len(problem.free)
     unknowns = slice(free, free + len(pattern.unknowns))
     unit = np.ones(len(nlp.variables))
@@ -96,20 +96,20 @@ def prepare(problem: Problem) -> Traced:
     return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
 
 
-def symbols_of(problem: Problem, x: Sequence[Any]) -> dict[str, Any]:
+def symbols_of(problem: Posed, x: Sequence[Any]) -> dict[str, Any]:
     """Free parameters for traced variables that are CasADi expressions."""
     of = problem.parameter_set
     return {n: ca.atan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)}
 
 
-def design_at(problem: Problem, x: Array) -> dict[str, Any]:
+def design_at(problem: Posed, x: Array) -> dict[str, Any]:
     """Free parameters for traced variables, floats or columns."""
     of = problem.parameter_set
     return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
 def starting_points(
-    nlp: NLP, problem: Problem, designs: Sequence[Mapping[str, float]], count: int | None = None
+    nlp: NLP, problem: Posed, designs: Sequence[Mapping[str, float]], count: int | None = None
 ) -> list[list[Array]]:
     """All variables for each design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
     a = _coefficients(problem, designs)
@@ -119,7 +119,7 @@ def starting_points(
     return [_guessed(nlp, problem, d, next(found), count) if there else [] for d, there in known]
 
 
-def _guessed(nlp: NLP, problem: Problem, design: Mapping[str, float], z: Complex, count: int | None) -> list[Array]:
+def _guessed(nlp: NLP, problem: Posed, design: Mapping[str, float], z: Complex, count: int | None) -> list[Array]:
     values = [problem.values(problem.ordered(design))] if len(nlp.lifts) > 1 else []  # the pattern's takes the roots
     guesses = [lift.guess(values, [z / nlp.unit if k else z]) for k, lift in enumerate(nlp.lifts)]  # those in its unit
     if not all(guesses):

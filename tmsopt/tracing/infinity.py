@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.models import Values
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import variables_of
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
@@ -47,7 +47,7 @@ class Infinity:
     changes: dict[int, str]
 
 
-def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> Iterator[Infinity]:
+def through_infinity(problem: Posed, step: float, starts: int, seed: int) -> Iterator[Infinity]:
     """Every curve a0 = 0 found in the box of a problem with two free parameters."""
     x = ca.SX.sym("x", 2)
     of = problem.parameter_set
@@ -65,7 +65,7 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
         yield Infinity(design_at(problem, x_on), *bounds, changes)
 
 
-def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> Iterator[Walk]:
+def _walks(problem: Posed, on: Curve, step: float, starts: int, seed: int) -> Iterator[Walk]:
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
 

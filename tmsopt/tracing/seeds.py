@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
@@ -30,7 +30,7 @@ _BLOCK = 256  # points whose distances from a line are found at once
 
 
 def unexplained(
-    problem: Problem, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]]
+    problem: Posed, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]]
 ) -> Iterator[dict[str, float]]:
     """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile.
 
@@ -42,7 +42,7 @@ def unexplained(
 
 
 def _apart_from(
-    lines: Sequence[Mapping[str, Array]], problem: Problem, left: Array, patience: float
+    lines: Sequence[Mapping[str, Array]], problem: Posed, left: Array, patience: float
 ) -> Iterator[dict[str, float]]:
     low, high = np.array(list(problem.free.values())).T
     np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
@@ -58,12 +58,12 @@ def _apart_from(
             vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
-def points_of(problem: Problem) -> int:
+def points_of(problem: Posed) -> int:
     """Points of the grid along each axis."""
     return POINTS if problem.model.degree <= CLOSED else FEWER
 
 
-def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], points: int | None = None) -> tuple[Array, Array]:
+def changes(problem: Posed, test: Callable[[Sequence[Any]], Any], points: int | None = None) -> tuple[Array, Array]:
     """Middles of the edges over which a function of the coefficients changes sign, in shares of the box, shape (n, 2).
 
     Two parts: those where a0 keeps its sign, or is the function, and the others. Where it is nan it does not count.

@@ -6,7 +6,7 @@ where the root is triple (EP3) and meets itself where a second pair is double (2
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tmsopt.errors import Fault, InputError
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, plain
 from tmsopt.roots import determinant, is_stable, real_roots
@@ -74,7 +74,7 @@ class Swallowtail(Printable):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: patches as rows of their points, edges as traces."""
-        return self.problem.heading | plain(self, "axes patches cusps crossing")
+        return self.problem.posed.heading | plain(self, "axes patches cusps crossing")
 
 
 def swallowtail(
@@ -100,7 +100,7 @@ def swallowtail(
 
     More: docs/how_to/tracing.md
     """
-    problem = as_problem(problem)
+    problem = pose(problem)
     if problem.model.degree < _LEAST:
         message = (
             f"model '{problem.model.name}' has degree {problem.model.degree}; accepted: {_LEAST} or more, for a "
@@ -110,7 +110,7 @@ def swallowtail(
     if len(problem.free) != 3:
         message = f"a surface takes three free parameters, and {len(problem.free)} are free"
         raise InputError([Fault(message, ("parameters",))])
-    plain = replace(problem, constraints={}, minimize=None, maximize=None, locate=None)
+    plain = problem.derive(constraints={}, minimize=None, maximize=None, locate=None)
     names = list(plain.free)
     axes = (names[0], names[1], names[2])
     affine = _Affine(plain, axes)
@@ -124,7 +124,7 @@ def swallowtail(
         np.concatenate([np.linspace(low, high, rows), *(e.parameters[axes[0]] + _AROUND for e in changes)])
     )
     grid = grid[(grid >= low) & (grid <= high)]
-    ready, cuts, steps = prepare(crossing.problem), [], start_steps(progress, "cutting the surface", "row")
+    ready, cuts, steps = prepare(crossing.problem.posed), [], start_steps(progress, "cutting the surface", "row")
     for done, value in enumerate(grid, 1):
         cuts.append(_cuts(affine, float(value), crossing, ready))
         if steps:
@@ -141,13 +141,13 @@ def swallowtail(
                 _patch(affine, grid[inside], left, right, across)
                 for left, right in zip(table.T[:-1], table.T[1:], strict=True)
             ]
-    return Swallowtail(plain, axes, tuple(patches), cusps, crossing)
+    return Swallowtail(plain.problem, axes, tuple(patches), cusps, crossing)
 
 
 class _Affine:
     """Coefficients p = A + x B + y C in the affine pair (x, y), at a value of the first parameter."""
 
-    def __init__(self, problem: Problem, axes: Sequence[str]) -> None:
+    def __init__(self, problem: Posed, axes: Sequence[str]) -> None:
         self.problem, self.axes = problem, axes
         self._is_affine()
 

@@ -21,8 +21,9 @@ from tmsopt.errors import (
     table_faults,
 )
 from tmsopt.models.user_spectrum import pattern_of, patterns_of
-from tmsopt.problem.files import Given, as_problem
-from tmsopt.problem.problem import Problem, degrees_of_freedom
+from tmsopt.problem.files import Given, pose
+from tmsopt.problem.freedom import degrees_of_freedom
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.progress import Listener, start_steps
@@ -73,7 +74,7 @@ def trace(
     More: docs/how_to/tracing.md
     """
     began = time.perf_counter()
-    problem = _asked(as_problem(problem), pattern)
+    problem = _asked(pose(problem), pattern)
     _check(problem, step, starts, seed, most, through, progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
     ready = prepare(problem)
@@ -100,10 +101,10 @@ def trace(
     with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
         branches = [b for b in (describe(ready, w) for w in walks) if b.residual <= _MET]  # not where it is nan
     ordered = _meeting(sorted(branches, key=lambda b: -float(b.arclength[-1])), problem)
-    return Trace(problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)
+    return Trace(problem.problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)
 
 
-def _meeting(branches: Sequence[Branch], problem: Problem) -> tuple[Branch, ...]:
+def _meeting(branches: Sequence[Branch], problem: Posed) -> tuple[Branch, ...]:
     """The branches, with a word at singular ends that lie together: cusps or crossings, known to fewer digits."""
     widths = {n: high - low for n, (low, high) in problem.free.items()}
     ends = [e for b in branches for e in b.events if e.name == "end" and e.detail == SINGULAR]
@@ -123,7 +124,7 @@ def _meeting(branches: Sequence[Branch], problem: Problem) -> tuple[Branch, ...]
     return tuple(replace(b, events=tuple(said(e) for e in b.events)) for b in branches)
 
 
-def _asked(problem: Problem, name: str | None) -> Problem:
+def _asked(problem: Posed, name: str | None) -> Posed:
     """The problem with the pattern as its only question, checked to leave a curve."""
     name = name or problem.locate
     names = patterns_of(problem.model)
@@ -136,7 +137,7 @@ def _asked(problem: Problem, name: str | None) -> Problem:
         why = "" if str(error).endswith("is no pattern") else f": {error}"
         message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
         raise InputError([Fault(message, ("objective", "locate"))]) from error
-    asked = replace(problem, locate=name, minimize=None, maximize=None)
+    asked = problem.derive(locate=name, minimize=None, maximize=None)
     count = degrees_of_freedom(asked)
     if count.count != 1:
         free, needed = ", ".join(problem.free) or "none", count.conditions + 1
@@ -155,7 +156,7 @@ def _asked(problem: Problem, name: str | None) -> Problem:
 
 
 def _check(
-    problem: Problem,
+    problem: Posed,
     step: float,
     starts: int,
     seed: int,

@@ -91,7 +91,7 @@ def _surpassed(problem: Problem, own: Verdict) -> bool:
     """Whether a design that is said not to be the best is what it claims to be, and better than the best known."""
     if confirmed_value(problem, own.design, own.value):
         return False
-    return not own.target.solvable or problem.sign * (own.value - own.target.value) <= SOLVED * SCALE
+    return not own.target.solvable or problem.posed.sign * (own.value - own.target.value) <= SOLVED * SCALE
 
 
 def open_ended(problem: Problem, target: Target) -> bool:
@@ -117,7 +117,7 @@ def _optimal(problem: Problem, own: Verdict) -> Verdict:
     best = own.target.value
     if not own.target.solvable:
         return replace(own, label=RIGHT, better=True)
-    excess = problem.sign * (own.value - best) / max(SCALE, abs(best))
+    excess = problem.posed.sign * (own.value - best) / max(SCALE, abs(best))
     label, why = (OPTIMAL, f"{excess:.1e} off the best known") if excess > SOLVED else (RIGHT, "")
     return replace(own, label=label, why=why, excess=excess, better=excess < -SOLVED)
 

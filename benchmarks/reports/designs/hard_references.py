@@ -22,14 +22,14 @@ def target(index: int, seed: int, searches: range = range(SEARCHES)) -> Target:
     """The best of a few searches."""
     problem = hard_problem(index, seed)
     found = [best_known(problem, number) for number in searches]
-    best = min(found, key=lambda b: (not b.feasible, problem.sign * b.value if b.feasible else b.violation))
+    best = min(found, key=lambda b: (not b.feasible, problem.posed.sign * b.value if b.feasible else b.violation))
     seconds = round(sum(b.seconds for b in found), 1)
     return Target(index, hard_family(index), best.value, best.violation, best.design, best.how, seconds)
 
 
 def better(seed: int, one: Target, other: Target) -> Target:
     """Of two references of one problem: feasible before not, then by value, then by violation."""
-    sign = hard_problem(one.index, seed).sign
+    sign = hard_problem(one.index, seed).posed.sign
     return min((one, other), key=lambda t: (not t.solvable, sign * t.value if t.solvable else 0.0, t.violation))
 
 

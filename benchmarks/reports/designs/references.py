@@ -84,9 +84,9 @@ def best_of(
         index=index,
         solvable=bool(feasible),
         value=best.value if feasible else math.nan,
-        realised=realised_abscissa(problem, problem.ordered(best.parameters)) if feasible else math.nan,
+        realised=realised_abscissa(problem.posed, problem.posed.ordered(best.parameters)) if feasible else math.nan,
         violation=best.violation,
-        parameters=problem.ordered(best.parameters),
+        parameters=problem.posed.ordered(best.parameters),
         known=known,
         doubtful=tuple(sorted(doubtful)),
     )
@@ -94,8 +94,8 @@ def best_of(
 
 def _ended(problem: Problem, end: Mapping[str, float]) -> _Reached:
     """An evolution's end; eigenvalues may flatter a design beside a multiple root by 1e-4, isolated roots do not."""
-    design = problem.ordered({n: end[n] for n in problem.free})
-    return _Reached("evolution", realised_abscissa(problem, design), verdict(problem, design).violation, design)
+    design = problem.posed.ordered({n: end[n] for n in problem.free})
+    return _Reached("evolution", realised_abscissa(problem.posed, design), verdict(problem, design).violation, design)
 
 
 def run(count: int, settings: Settings, workers: int, path: Path, command: str) -> dict[int, Reference]:

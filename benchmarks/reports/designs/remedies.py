@@ -90,7 +90,7 @@ def _judged(changed: File, file: File) -> str:
     if again.status != "optimal":
         return again.status
     beyond = verdict(again.problem, again.parameters).violation
-    if beyond > FEASIBLE and not again.problem.cases:  # beside a triple root eigenvalues are 1e-5 off
+    if beyond > FEASIBLE and not again.problem.posed.cases:  # beside a triple root eigenvalues are 1e-5 off
         beyond = min(one.violation for one in exactly(again.problem, again.parameters))
     if beyond > FEASIBLE:
         return f"violates by {beyond:.1e}"

@@ -99,7 +99,7 @@ def _problems(heats: Sequence[Heat]) -> str:
         (
             h.title,
             len(h.problem.free),
-            len(h.problem.conditions),
+            len(h.problem.posed.conditions),
             f"{h.optimum:.12g}",
             h.proof,
             duration(h.runs[0].seconds),

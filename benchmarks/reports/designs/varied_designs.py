@@ -41,7 +41,7 @@ class Trial:
     @property
     def sign(self) -> float:
         """−1 where the objective is maximised."""
-        return -1.0 if self.problem.sense == "maximize" else 1.0
+        return -1.0 if self.problem.posed.sense == "maximize" else 1.0
 
     @cached_property
     def known(self) -> dict[str, float]:
@@ -130,7 +130,7 @@ def report(asked: Asked) -> str:
                 ("problems", len(every)),
                 ("with scenarios", sum(bool(t.problem.scenarios) for t in every)),
                 ("with tolerances", sum(bool(t.problem.tolerances) for t in every)),
-                ("in SI", sum(t.problem.parameter_set.name == "SI" for t in every)),
+                ("in SI", sum(t.problem.posed.parameter_set.name == "SI" for t in every)),
                 ("somebody found a feasible design", sum(t.solvable for t in every)),
                 ("of these, stable at the best known", stable),
                 ("**solved at default settings**", f"**{share(not t.cause for t in every)}**"),
@@ -160,8 +160,8 @@ def _objectives(trials: Sequence[Trial]) -> str:
 
 
 def _asked(trial: Trial) -> str:
-    assert trial.problem.objective is not None
-    return f"{trial.problem.sense} {trial.problem.objective.text}".replace("**", "^")
+    assert trial.problem.posed.objective is not None
+    return f"{trial.problem.posed.sense} {trial.problem.posed.objective.text}".replace("**", "^")
 
 
 def _failures(trials: Sequence[Trial]) -> str:

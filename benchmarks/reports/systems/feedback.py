@@ -25,7 +25,7 @@ def _rows(problem: Problem, design: Solution, repeats: int) -> Iterator[tuple[ob
     import control  # of the extra bench
 
     assert problem.model.pencil is not None
-    passive = problem.model.pencil(problem.ordered(dict.fromkeys(problem.free, 0.0)))
+    passive = problem.model.pencil(problem.posed.ordered(dict.fromkeys(problem.free, 0.0)))
     M, D, K = (np.array(m, dtype=float) for m in passive)
     inverse = np.linalg.inv(M)
     A = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ D]])

@@ -80,7 +80,7 @@ def simulate(
     states = _numbers("--start", start, "phidot=0.1")
     problem = tmsopt.load(file)
     values = _numbers("--at", at, "v=1.5")
-    say_nominal(problem, values)
+    say_nominal(problem.posed, values)
     found = tmsopt.simulate(problem, start=states or None, at=values or None, progress=shown(), **options(**asked))
     answer(as_json, found.to_json, found.report)
     write_file("--csv", csv_file, lambda path: found.write_csv(path, whole=whole))

@@ -41,6 +41,6 @@ def _ends(_context: click.Context, _option: click.Parameter, value: str | None) 
 def speeds(file: Path, parameter: str | None, between: tuple[float, float] | None, as_json: bool) -> None:
     """Find every weave and capsize speed of FILE, and every speed at which roots meet."""
     problem = tmsopt.load(file)
-    say_nominal(problem, [parameter] if parameter else ("v", "Fr"))
+    say_nominal(problem.posed, [parameter] if parameter else ("v", "Fr"))
     found = tmsopt.speeds(problem, parameter, between=between, progress=shown())
     answer(as_json, found.to_json, lambda: tmsopt.report.speeds_table(found))

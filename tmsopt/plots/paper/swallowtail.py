@@ -52,7 +52,7 @@ def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
             place = np.array([event.parameters[n] for n in data.axes])
             ax.plot(*place[:, None], "o", color=MARK, markersize=6, zorder=10)
             ax.text(*place[:2], place[2] + 0.05 * width[2], "EP4", fontsize=9, zorder=11)
-    of = data.problem.parameter_set
+    of = data.problem.posed.parameter_set
     for letter, name, ends in zip("xyz", data.axes, ranges, strict=True):
         ax.set(**{f"{letter}lim": ends, f"{letter}label": f"${of[name].latex}$"})
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from tmsopt.problem.expression import written_sides
 from tmsopt.problem.limit import limit_of, with_limit
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import unit_of
 from tmsopt.records import Table, plain
 
@@ -82,7 +82,7 @@ def rounded_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
     return (math.ceil if up else math.floor)(round(x / step, 6)) * step
 
 
-def moved_limits(problem: Problem, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
+def moved_limits(problem: Posed, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
     """Limits moved by amounts, as a file would write them, rounded so that they suffice.
 
     Of an end of a range, such as ``v.max``, the number with its unit; of a constraint its whole text, in which numbers
@@ -91,7 +91,7 @@ def moved_limits(problem: Problem, amounts: Mapping[str, float], digits: int = D
     return {name: _moved(problem, name, amount, digits) for name, amount in amounts.items()}
 
 
-def with_limits(problem: Problem, written: Mapping[str, str]) -> Problem:
+def with_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
     """The problem with limits as they are written.
 
     Raises:
@@ -104,10 +104,10 @@ def with_limits(problem: Problem, written: Mapping[str, str]) -> Problem:
             (low, high), new = ends[parameter], text if unit_of(problem, name).text else float(text)
             ends[parameter] = (low, new) if end == "max" else (new, high)
     kept = {name: written.get(name, text) for name, text in problem.constraints.items()}
-    return replace(problem, constraints=kept, free=ends, start={})
+    return problem.derive(constraints=kept, free=ends, start={})
 
 
-def _moved(problem: Problem, name: str, amount: float, digits: int) -> str:
+def _moved(problem: Posed, name: str, amount: float, digits: int) -> str:
     if name not in problem.constraints:
         parameter, _, end = name.rpartition(".")
         up, unit = end == "max", unit_of(problem, name)

@@ -8,7 +8,7 @@ import flint
 import numpy as np
 
 from tmsopt.models.user_spectrum import user_roots
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot
 from tmsopt.records import Array, Complex
 from tmsopt.roots import Pattern, Root, jordan
@@ -24,7 +24,7 @@ _NEAR = 1e-6  # of their size: a located root and one shown are the same
 _UNIT = 1e-3  # of the largest root: the unit in which matrices are weighed at a smaller one
 
 
-def meetings(problem: Problem, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
+def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
     """The multiple ones among roots of the polynomial of a design, rightmost first, as users read them."""
     found: list[MultipleRoot] = []
     of_H = problem.model.carrier is not None
@@ -36,19 +36,19 @@ def meetings(problem: Problem, parameters: Mapping[str, float], roots: Sequence[
     return tuple(sorted(found, key=lambda m: (-m.re, -m.im)))
 
 
-def is_crossing(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> bool:
+def is_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> bool:
     """Whether a located multiple root has more than one eigenvector, so that it is no exceptional point."""
     return any(not m.exceptional for m in located_meetings(problem, pattern, parameters))
 
 
-def located_meetings(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> tuple[MultipleRoot, ...]:
+def located_meetings(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> tuple[MultipleRoot, ...]:
     """The multiple roots that ``EP`` in the name of a pattern asks for; none without matrices."""
     if problem.model.pencil is None or "EP" not in pattern.name:
         return ()
     return meetings(problem, parameters, _located(problem, pattern, parameters))
 
 
-def _located(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
+def _located(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
     """The multiple roots of the nearest polynomial of a pattern."""
     values = problem.values(parameters)
     try:
@@ -65,7 +65,7 @@ def _located(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]
 
 
 def every_meeting(
-    problem: Problem, parameters: Mapping[str, float], roots: Sequence[Root], violated: Collection[str]
+    problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root], violated: Collection[str]
 ) -> tuple[MultipleRoot, ...]:
     """The multiple roots of a solution: first those of its pattern, unless that is violated, then the others."""
     shown, pattern = meetings(problem, parameters, roots), problem.pattern
@@ -81,7 +81,7 @@ def _beside(one: MultipleRoot, other: MultipleRoot) -> bool:
     return abs(complex(one.re - other.re, one.im - other.im)) <= _NEAR * (size or 1.0)
 
 
-def nearest_crossing(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
+def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
     """The parameters at which located roots cross beside a design: sharper than coefficients see them."""
     roots = _located(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
@@ -90,7 +90,7 @@ def nearest_crossing(problem: Problem, pattern: Pattern, parameters: Mapping[str
 
 
 def _meeting(
-    problem: Problem, parameters: Mapping[str, float], root: Root, told: Root, roots: Sequence[Root]
+    problem: Posed, parameters: Mapping[str, float], root: Root, told: Root, roots: Sequence[Root]
 ) -> MultipleRoot:
     k, pencil = root.multiplicity, problem.model.pencil
     if pencil is None:
@@ -110,7 +110,7 @@ def _unit(root: Root, roots: Sequence[Root]) -> float:
 
 
 def _crossed(
-    problem: Problem, parameters: Mapping[str, float], s: complex, k: int, unit: float
+    problem: Posed, parameters: Mapping[str, float], s: complex, k: int, unit: float
 ) -> tuple[Mapping[str, float], complex]:
     """The crossing beside a design, and its root: the design itself where there is none so near.
 
@@ -143,7 +143,7 @@ def _crossed(
     return parameters, s
 
 
-def _matrices(problem: Problem, parameters: Mapping[str, float]) -> Sequence[Any]:
+def _matrices(problem: Posed, parameters: Mapping[str, float]) -> Sequence[Any]:
     assert problem.model.pencil is not None
     return problem.model.pencil(problem.parameter_set.native(dict(parameters)))
 

@@ -6,11 +6,11 @@ from tmsopt.problem.unit_system import amounts_text
 from tmsopt.problem.verdict.stability import UNSTABLE, stability_in_words
 
 if TYPE_CHECKING:
-    from tmsopt.problem.problem import Problem
+    from tmsopt.problem.problem import Posed
     from tmsopt.problem.solution import Solution
 
 
-def status_text(problem: "Problem", status: str) -> str:
+def status_text(problem: "Posed", status: str) -> str:
     """A status in words; where nothing is free, a design is judged: it is not optimal but feasible."""
     return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
 
@@ -26,8 +26,8 @@ def status_in_words(solution: "Solution") -> str:
     if solution.without_best:
         return "no best design exists"
     if status != "optimal":
-        return "none found" if problem.sense == "locate" else "not converged, so a better design may be near"
-    if problem.objective is None or not problem.free:
+        return "none found" if problem.posed.sense == "locate" else "not converged, so a better design may be near"
+    if problem.posed.objective is None or not problem.free:
         return "found" if problem.free else "as given"
     unproved = "stopped before it was proved" if solution.interrupted else "not proved"
     return ", ".join(["optimal", *(["proved"] if bound.proven else [*solution.starts.sureness, unproved])])
@@ -36,10 +36,10 @@ def status_in_words(solution: "Solution") -> str:
 def verdict_in_words(solution: "Solution") -> str:
     """Whether a solution is stable; for one that is not though that was sought, whether any is."""
     problem, known, found = solution.problem, solution.any_stable, solution.stability
-    located_none = problem.sense == "locate" and solution.status == "not_converged"
+    located_none = problem.posed.sense == "locate" and solution.status == "not_converged"
     if located_none or (solution.status == "infeasible" and known is not False):
         return ""
-    limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
+    limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
     none = f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
     others = none if known is False else "" if solution.interrupted else "no stable design found, not proved"
     sought = solution.stability_sought and not known
@@ -70,7 +70,7 @@ class NotSolved(RuntimeError):
     """
 
     def __init__(self, solution: "Solution") -> None:
-        self.solution, violated = solution, amounts_text(solution.problem, solution.violations)
+        self.solution, violated = solution, amounts_text(solution.problem.posed, solution.violations)
         super().__init__(
             f"{solution.problem.title or 'problem'}: {solution.status}"
             + (f"; violated: {violated}" if violated else "")

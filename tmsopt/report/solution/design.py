@@ -85,7 +85,7 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
 
     More: docs/how_to/units.md
     """
-    own = solution.problem.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
+    own = solution.problem.posed.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
@@ -155,7 +155,7 @@ def design_parts(solution: Solution, found: Findings, si: Mapping[str, float], b
 
 def headline(solution: Solution) -> tuple[str, str]:
     """How it ended, and what was asked, in words."""
-    problem = solution.problem
+    problem = solution.problem.posed
     text = problem.minimize or problem.maximize
     value = show_at(problem, text, at_worst(solution), solution.value, 8) if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
@@ -168,7 +168,7 @@ def headline(solution: Solution) -> tuple[str, str]:
 
 
 def _violated(solution: Solution) -> list[str]:
-    problem, lines = solution.problem, []
+    problem, lines = solution.problem.posed, []
     for name, value in solution.violations.items():
         asked = limit_text(problem, name) or ("pattern" if name in problem.located else _ASKED.get(name, ""))
         by = f" by {unit_of(problem, name).show(value, 4)}" if math.isfinite(value) else ", which has no value"
@@ -178,7 +178,7 @@ def _violated(solution: Solution) -> list[str]:
 
 def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
     """Free parameters one a row, or side by side where they are many; the others in a sentence."""
-    problem, of = solution.problem, solution.problem.parameter_set
+    problem, of = solution.problem.posed, solution.problem.posed.parameter_set
     shown = {p.name: unit_of(problem, p.name).show(tidy(solution, p.name), _DIGITS) for p in of.parameters}
     free = [p for p in of.parameters if p.name in problem.free]
     full = parameter_rows(solution, si) if si is not None else []
@@ -211,7 +211,7 @@ def _motion(solution: Solution, found: Findings) -> list[str]:
 
 def _more(solution: Solution, found: Findings) -> str:
     """How to see more, and the commands that have something to say of the same file."""
-    problem, solved = solution.problem, solution.status == "optimal"
+    problem, solved = solution.problem.posed, solution.status == "optimal"
     commands = {
         "prove": solved,
         "compare": problem.model is tms,
@@ -225,7 +225,7 @@ def _more(solution: Solution, found: Findings) -> str:
 
 def _stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
-    problem, at = solution.problem, at_worst(solution)
+    problem, at = solution.problem.posed, at_worst(solution)
     size = max((math.hypot(r.re, r.im) for r in solution.of_polynomial.roots), default=1.0)
     abscissa, stored = (x if abs(x) > NOTHING * size else 0.0 for x in (solution.abscissa, solution.abscissa_realised))
     realised = unit_at(problem, "abscissa", at).number(stored, ALL)
@@ -245,10 +245,10 @@ def lever_cells(solution: Solution, lever: Lever) -> tuple[str, ...]:
 
     More: docs/how_to/report.md
     """
-    limit = limit_text(solution.problem, lever.name)
+    limit = limit_text(solution.problem.posed, lever.name)
     if not lever.step:
         return f"{lever.name}:", limit, "a physical end", ""
-    step = unit_of(solution.problem, lever.name).show(abs(lever.step), 4)
+    step = unit_of(solution.problem.posed, lever.name).show(abs(lever.step), 4)
     return f"{lever.name}:", limit, f"by {step}", f"buys {lever.gained.show(lever.predicted, 3)}"
 
 
@@ -267,7 +267,7 @@ def _search(solution: Solution) -> Iterator[str]:
 
 def branch_lines(solution: Solution) -> list[str]:
     """Other designs that solve the same equations, and what excludes them."""
-    problem, lines = solution.problem, []
+    problem, lines = solution.problem.posed, []
     for branch in solution.branches:
         where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL)}" for n in problem.free)
         lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")

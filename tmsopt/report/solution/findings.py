@@ -66,7 +66,7 @@ def _around(solution: Solution, full: bool, progress: Listener | None) -> Robust
     if full:
         return robustness(solution, progress=progress)
     start_steps(progress, "looking for the nearest boundaries")
-    return robustness_at(solution.problem, solution.parameters)
+    return robustness_at(solution.problem.posed, solution.parameters)
 
 
 def _unless_refused(found: Callable[[], T]) -> T | None:

@@ -3,12 +3,11 @@
 import math
 import re
 from collections.abc import Collection
-from dataclasses import replace
 
 from tmsopt.evaluation.exclusion import known_bound
 from tmsopt.problem import limit_of, unit_of
 from tmsopt.problem.advice.remedies import Need, Relaxation
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import dimension_of, limit_text
 from tmsopt.records import Table
@@ -31,7 +30,7 @@ def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
 
     More: docs/how_to/infeasible.md
     """
-    relaxation, problem, need = solution.relaxation, solution.problem, solution.need
+    relaxation, problem, need = solution.relaxation, solution.problem.posed, solution.need
     lines = [text for text in [_sentence(solution)] if text]
     if solution.status != "infeasible" or relaxation is None or not relaxation.amounts:
         return lines
@@ -48,7 +47,7 @@ def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
 
 
 def _sentence(solution: Solution) -> str:
-    problem, relaxation = solution.problem, solution.relaxation
+    problem, relaxation = solution.problem.posed, solution.relaxation
     stands_alone = relaxation is None or not set(relaxation.conflict) - set(problem.asked_of_roots)
     if solution.need and (solution.need.found or (_unstable(solution) and stands_alone)):
         return _speed(solution, solution.need)
@@ -64,7 +63,7 @@ def _sentence(solution: Solution) -> str:
 
 def _conflict(solution: Solution, relaxation: Relaxation) -> str:
     """What one limit needs that another does not allow, or how near to it a design comes."""
-    problem = solution.problem
+    problem = solution.problem.posed
     asked = [n for n in relaxation.conflict if not _end(problem, n)] or list(solution.violations)
     remedies = (found for found in relaxation.remedies if all(_end(problem, n) for n in found))
     ends = next(remedies, Table[str]())
@@ -84,15 +83,15 @@ def _conflict(solution: Solution, relaxation: Relaxation) -> str:
 
 def _proved(solution: Solution, names: Collection[str]) -> bool:
     """Whether it is proved that no design meets these limits: all there are, or some that intervals exclude."""
-    problem = solution.problem
+    problem = solution.problem.posed
     kept = {name: text for name, text in problem.constraints.items() if name in names}
     some = kept.keys() < problem.constraints.keys()
-    return solution.bound.proven and not (some and not known_bound(replace(problem, constraints=kept)).proven)
+    return solution.bound.proven and not (some and not known_bound(problem.derive(constraints=kept)).proven)
 
 
 def _speed(solution: Solution, need: Need) -> str:
     """Nothing at this speed, and where there is something."""
-    problem, name = solution.problem, need.parameter
+    problem, name = solution.problem.posed, need.parameter
     unit = unit_of(problem, name)
     about = [n for n in solution.violations if n in problem.asked_of_roots or n in problem.located]
     unstable = _unstable(solution)
@@ -112,7 +111,7 @@ def _unstable(solution: Solution) -> bool:
     return solution.stable is False and solution.any_stable is not True
 
 
-def _needed(problem: Problem, bound: str, new: str) -> str:
+def _needed(problem: Posed, bound: str, new: str) -> str:
     """What is needed of a parameter that its range does not allow."""
     name, end = bound.rsplit(".", 1)
     word, other = ("at least", "at most") if end == "max" else ("at most", "at least")
@@ -122,25 +121,26 @@ def _needed(problem: Problem, bound: str, new: str) -> str:
 
 def _nearest(solution: Solution, name: str) -> str:
     """How near a design comes to a limit: its side that is no number."""
-    relaxation, condition = solution.relaxation, solution.problem.conditions.get(name)
+    problem, relaxation = solution.problem.posed, solution.relaxation
+    condition = problem.conditions.get(name)
     if relaxation is None or condition is None:
         return ""
-    sides = _SIGN.split(solution.problem.constraints[name])
-    reached = condition.sides(solution.problem.values(relaxation.parameters))
+    sides = _SIGN.split(problem.constraints[name])
+    reached = condition.sides(problem.values(relaxation.parameters))
     amount = relaxation.amounts.get(name, 0.0)
     for side, other, own, sign in zip(sides, reversed(sides), reached, (1, -1), strict=True):
         if (limit := _number(other)) is not None:
-            varied = solution.problem.nominal is not solution.problem
+            varied = problem.nominal is not problem
             # The radius is none of a design's own values, and over several cases the worst one counts.
             value = own if math.isfinite(own) and not varied else limit + sign * condition.sign * amount
             if not math.isfinite(value) or not math.isfinite(amount):
                 return f": {side.strip()} has no value where the search ended"
-            shown = f"{side.strip()} = {unit_of(solution.problem, name).show(value)}"
+            shown = f"{side.strip()} = {unit_of(problem, name).show(value)}"
             return f": the nearest design found has {shown}{' in its worst case' if varied else ''}"
     return ""
 
 
-def _changed(problem: Problem, name: str, new: str) -> str:
+def _changed(problem: Posed, name: str, new: str) -> str:
     """A limit as it is to be written, and the number that it has now."""
     if _end(problem, name):
         parameter, end = name.rsplit(".", 1)
@@ -150,13 +150,13 @@ def _changed(problem: Problem, name: str, new: str) -> str:
     return f"{new}{'' if limit is None else f' instead of {limit:.{_AS_WRITTEN}g}'} ({_in_unit(problem, name)})"
 
 
-def _in_unit(problem: Problem, name: str) -> str:
+def _in_unit(problem: Posed, name: str) -> str:
     """The name of a constraint, with the unit that numbers in it are in: its own, whatever was typed for parameters."""
     unit = dimension_of(problem, name).unit
     return name if unit == "1" else f"{name}, in {unit}"
 
 
-def _limit(problem: Problem, name: str) -> str:
+def _limit(problem: Posed, name: str) -> str:
     """A limit in words: a constraint with what it says, an end of a range."""
     if _end(problem, name):
         parameter, end = name.rsplit(".", 1)
@@ -165,7 +165,7 @@ def _limit(problem: Problem, name: str) -> str:
     return f"{name} ({limit_text(problem, name)})" if name in problem.constraints else _OTHER.get(name, name)
 
 
-def _end(problem: Problem, name: str) -> bool:
+def _end(problem: Posed, name: str) -> bool:
     return name not in problem.constraints and name.rpartition(".")[0] in problem.free
 
 

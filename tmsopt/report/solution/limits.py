@@ -4,7 +4,7 @@ import math
 
 from tmsopt.analysis import faster_than, none_of
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.problem.unit_system import unit_of, unit_of_all
@@ -22,8 +22,8 @@ def bound_lines(solution: Solution) -> list[str]:
         return [f"proved: no design in the box satisfies all constraints ({how}"] if bound.proven else []
     if not math.isfinite(bound.value):
         return [f"bound: none found in time ({search})"] if bound.seconds else []
-    side = "above" if solution.problem.sense == "maximize" else "below"
-    which = f"{none_of(solution.problem)} is {side} {number(bound.value)}"
+    side = "above" if solution.problem.posed.sense == "maximize" else "below"
+    which = f"{none_of(solution.problem.posed)} is {side} {number(bound.value)}"
     lines = [f"bound: {which} ({bound.method}); gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
         lines.append(f"       {search}; {kind}")
@@ -34,7 +34,7 @@ def bound_lines(solution: Solution) -> list[str]:
 
 def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
     """Whether it is proved that none is better, in one line, and how to go on where it is not."""
-    bound, problem = solution.bound, solution.problem
+    bound, problem = solution.bound, solution.problem.posed
     text = (problem.minimize or problem.maximize or "").strip()
     beyond = {ANGULAR_FREQUENCY: "frequencies", RADIUS: "the robustness radius"}
     beyond = {name: words for name, words in beyond.items() if problem.asks(name)}
@@ -92,27 +92,27 @@ def case_lines(solution: Solution) -> list[str]:
     if solution.worst is None:
         return []
     of = solution.problem
-    lines = [f"worst case: {_place(of, solution.worst)}; motion and roots are those there, the rest nominal"]
+    lines = [f"worst case: {_place(of.posed, solution.worst)}; motion and roots are those there, the rest nominal"]
     if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
         found = "least damped of those looked at" if solution.problem.tolerances else "least damped case"
-        lines.append(f"{found}: {_place(of, solution.least_damped)}; the damping ratio is that there")
+        lines.append(f"{found}: {_place(of.posed, solution.least_damped)}; the damping ratio is that there")
     if solution.fastest is not None and solution.fastest != solution.worst:
-        lines.append(f"fastest case: {_place(of, solution.fastest)}; limits on the frequency are on that there")
+        lines.append(f"fastest case: {_place(of.posed, solution.fastest)}; limits on the frequency are on that there")
     cover = solution.cover
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
-        unit = unit_of_all(of, "abscissa")
+        unit = unit_of_all(of.posed, "abscissa")
         limit = f"{number(cover.limit / unit.one)} {unit.text}".rstrip()
         lines.append(f"every case: abscissa at most {limit}, {means}")
     return lines
 
 
-def _place(of: Problem, case: Case) -> str:
+def _place(of: Posed, case: Case) -> str:
     """Values of scenarios and errors of parameters in a case."""
     at = [f"{n} = {_short(of, n, v)}" for n, v in case.at.items()]
     at += [f"{n} {'+' if v >= 0 else '−'} {_short(of, n, abs(v))}" for n, v in case.offset.items()]
     return ", ".join(at)
 
 
-def _short(problem: Problem, name: str, value: float) -> str:
+def _short(problem: Posed, name: str, value: float) -> str:
     return unit_of(problem, name).show(value, 6)

@@ -76,7 +76,7 @@ def robustness_table(found: Robustness) -> str:
     for n in kinds:
         moves = _moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
         rows.append((_robust_row(n, found), _distance(n, found), *moves))
-    units = {name: unit_of(found.problem, name) for name in names}
+    units = {name: unit_of(found.problem.posed, name) for name in names}
     rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
     for n in kinds:
         if n.found and n.distance > 0:

@@ -12,7 +12,7 @@ from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import INERTIAS, Model, Parameter, ParameterSet, Quantity, Values
 from tmsopt.models.user_spectrum import eigenfrequencies, on_axis, structure_in_words
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, unit_at, unit_of
 from tmsopt.problem.units import frequencies
@@ -44,7 +44,7 @@ def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow
 
     More: docs/reference/quantities.md
     """
-    problem = solution.problem
+    problem = solution.problem.posed
     of, other = problem.parameter_set, _other(problem.model, problem.parameter_set)
     values = {} if other is None else solution.dimensionless if other.rate is None else si
     rows: list[TableRow] = []
@@ -79,7 +79,7 @@ def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]
 
     More: docs/reference/quantities.md
     """
-    problem, found = solution.problem, solution.quantities
+    problem, found = solution.problem.posed, solution.quantities
     of = problem.parameter_set
     rows: list[TableRow] = []
     scaled = next((s for s in problem.model.sets if s.rate is not None), None)
@@ -106,7 +106,7 @@ def tidy(solution: Solution, name: str) -> float:
 
 def role(solution: Solution, name: str) -> str:
     """``free``, ``scenario`` or ``fixed``."""
-    problem = solution.problem
+    problem = solution.problem.posed
     return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
 
 
@@ -117,14 +117,14 @@ def at_worst(solution: Solution) -> Mapping[str, float]:
 
 def clock(solution: Solution) -> tuple[float, Unit, Unit]:
     """What a rate of 1 is, and the units of times and of frequencies: s and Hz, or the model's own time."""
-    of = solution.problem.parameter_set
+    of = solution.problem.posed.parameter_set
     if of.rate is not None:
         return float(of.rate(at_worst(solution))), Unit("s"), Unit("Hz")
     natural = any(s.rate is not None for s in solution.problem.model.sets)
     return 1.0, Unit("√(w/g)" if natural else ""), Unit("√(g/w)" if natural else "")
 
 
-def structure_line(problem: Problem, structure: str, abscissa: float, known: Sequence[MultipleRoot]) -> str:
+def structure_line(problem: Posed, structure: str, abscissa: float, known: Sequence[MultipleRoot]) -> str:
     """The structure of the roots in words, and what it is where eigenvectors do not meet, or nobody can tell.
 
     Args:
@@ -132,7 +132,7 @@ def structure_line(problem: Problem, structure: str, abscissa: float, known: Seq
 
     Example:
         >>> design = tmsopt.solve("problems/ep4.toml")
-        >>> tmsopt.report.structure_line(design.problem, design.structure, design.abscissa, design.meetings)
+        >>> tmsopt.report.structure_line(design.problem.posed, design.structure, design.abscissa, design.meetings)
         'four roots meet in one (EP4)'
 
     More: docs/how_to/report.md
@@ -179,10 +179,10 @@ def motion(solution: Solution) -> str:
 
 def speed_in(solution: Solution, case: Case | None) -> str:
     """The speed of a case, where speeds differ from case to case; else empty."""
-    name = speed_of(solution.problem.parameter_set)
+    name = speed_of(solution.problem.posed.parameter_set)
     if name is None or case is None or name not in {**case.at, **case.offset}:
         return ""
-    return f"{name} = {unit_of(solution.problem, name).show(case.applied(solution.parameters)[name])}"
+    return f"{name} = {unit_of(solution.problem.posed, name).show(case.applied(solution.parameters)[name])}"
 
 
 def _real(solution: Solution) -> str:
@@ -195,7 +195,7 @@ def _real(solution: Solution) -> str:
 
 def loads(solution: Solution) -> str:
     """What each wheel carries."""
-    found, problem = solution.quantities, solution.problem
+    found, problem = solution.quantities, solution.problem.posed
     named = [("front", "load_front", "N_F"), ("rear", "load_rear", "N_R")]
     at_rest = {
         n: x if abs(found[share]) > FEASIBLE else 0.0
@@ -210,7 +210,7 @@ def loads(solution: Solution) -> str:
 
 def inertia_lines(solution: Solution) -> list[str]:
     """How much of each moment of inertia a stable design of point masses bears, also as a radius of gyration √(I/m)."""
-    length, words = unit_of(solution.problem, "w"), []
+    length, words = unit_of(solution.problem.posed, "w"), []
     for name, inertia in (solution.inertia_margin or {}).items():
         radius = "" if inertia is None else length.show(math.sqrt(inertia / solution.parameters[INERTIAS[name]]), 3)
         words.append(f"{name} {inertia:.4g} kg m^2 ({radius})" if radius else f"{name} none")
@@ -221,7 +221,8 @@ def inertia_lines(solution: Solution) -> list[str]:
 def roots_line(solution: Solution, digits: int) -> str:
     """The roots, or of a complex system its eigenfrequencies."""
     if solution.problem.model.carrier is None:
-        unit, own = unit_at(solution.problem, "abscissa", at_worst(solution)), unit_of(solution.problem, "abscissa")
+        problem = solution.problem.posed
+        unit, own = unit_at(problem, "abscissa", at_worst(solution)), unit_of(problem, "abscissa")
         named = f"  in {unit.text}" if unit.text else ""
         named += f"; √(g/w) = {1 / unit.one:.{digits}g} {unit.text}" if unit != own else ""
         return "roots: " + (", ".join(roots_of(solution.roots, digits, 1 / unit.one)) or "none") + named
@@ -279,7 +280,7 @@ def _own(unit: str) -> str:
 
 def pitching(solution: Solution, si: Mapping[str, float]) -> str:
     """Whether the bicycle pitches over, in any of its cases, and the ballast that prevents it."""
-    problem, parameters = solution.problem, solution.parameters
+    problem, parameters = solution.problem.posed, solution.parameters
     listed = [case for case in problem.cases if not case.direction]
     listed += [case for case in (solution.worst, solution.least_damped) if case]
     each: list[Mapping[str, Any]] = [problem.values(case.applied(parameters)) for case in listed]
@@ -296,7 +297,7 @@ def pitching(solution: Solution, si: Mapping[str, float]) -> str:
 
 def _prevented(solution: Solution, si: Mapping[str, float], each: Sequence[Mapping[str, Any]], lifted: str) -> str:
     """The ballast at a wheel's contact that has no part in the lateral motion: with trail, at the rear one alone."""
-    problem = solution.problem
+    problem = solution.problem.posed
     if f"m_ballast_{lifted}" in problem.vocabulary:
         mass = max(float(values[f"m_ballast_{lifted}"]) for values in each)
         needed = unit_of(problem, "m_B").show(mass, 4)

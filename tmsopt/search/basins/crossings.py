@@ -1,7 +1,6 @@
 """Where roots only cross nearest to a start: exceptional points elsewhere, or the word that none was found."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from itertools import islice
 
 from tmsopt.problem.searches import Starts
@@ -23,7 +22,7 @@ def search_elsewhere(
     part, ended = work.part, list(candidates)
     most = _HOPEFUL if work.freedom.count > 0 else 0
     for design in islice(designs(part, work.options.seed, work.options.starts), most):
-        near = matching(replace(part, minimize=None, maximize=None, start=design))
+        near = matching(part.derive(minimize=None, maximize=None, start=design))
         ended.append(Runner(work, near).solve_from(design, near=True))
         if ended[-1].feasible and (trial := best_checked(work, near, ended[-1:])):
             return near, ended, trial

@@ -1,10 +1,9 @@
 """Where to start from beside a sample: designs with one root, or one pair, of full multiplicity."""
 
-from dataclasses import replace
 from itertools import zip_longest
 
 from tmsopt.models.user_spectrum import full_patterns
-from tmsopt.problem.problem import degrees_of_freedom
+from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.program.formulate import matching
 from tmsopt.program.ipopt import ipopt
 from tmsopt.program.starts import initial_point
@@ -28,8 +27,8 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         return []
     most = HOPELESS_AFAR if sample.far_off else _LEADLESS
     for pattern in full_patterns(part.model):
-        asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
-        asked = replace(asked, scenarios={}, tolerances={})
+        asked = part.derive(locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
+        asked = asked.derive(scenarios={}, tolerances={})
         if degrees_of_freedom(asked).count < 0:
             continue
         leading = matching(asked)

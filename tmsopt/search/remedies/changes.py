@@ -12,7 +12,7 @@ from tmsopt.errors import InputError
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem.advice.remedies import DIGITS, Relaxation, moved_limits, with_limits
 from tmsopt.problem.dependence import STABLE, stability_wanted
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.options import Options
 from tmsopt.records import Table
 from tmsopt.search.remedies.allowance import Spent, within
@@ -38,7 +38,7 @@ _FEW = 3  # starts of a relaxation that is sought besides
 
 _NO_GOAL: Mapping[str, Any] = {"minimize": None, "maximize": None, "pareto": ()}
 
-Named = Callable[[Problem, Relaxation, Sequence[str], Problem, Options], Relaxation]
+Named = Callable[[Posed, Relaxation, Sequence[str], Posed, Options], Relaxation]
 """A relaxation with the limits that exclude each other; see `needs.irreducible`."""
 
 
@@ -52,7 +52,7 @@ def relax(work: Workspace, named: Named, answered: Answered) -> Relaxation | Non
     move as constraints.
     """
     options, began = work.options, time.process_time()
-    problem = replace(work.problem, **_NO_GOAL)  # what else is asked plays no part
+    problem = work.problem.derive(**_NO_GOAL)  # what else is asked plays no part
     for wide, limits in stages(problem):
         relaxation, trial, nlp = least_relaxation(work, wide, limits)
         if relaxation is None:
@@ -71,7 +71,7 @@ def relax(work: Workspace, named: Named, answered: Answered) -> Relaxation | Non
 
 
 def _tried(
-    work: Workspace, relaxation: Relaxation, wide: Problem, limits: Sequence[Limit], answered: Answered
+    work: Workspace, relaxation: Relaxation, wide: Posed, limits: Sequence[Limit], answered: Answered
 ) -> Relaxation:
     """A relaxation with remedies, as long as there is time to try them; alone are limits that were tried.
 
@@ -79,8 +79,8 @@ def _tried(
     """
     remedies, enough = dict[Table[str], None](), dict[str, float]()
     wanted = stability_wanted(work.problem)
-    stable = replace(work.problem, constraints=wanted, **_NO_GOAL)
-    box = replace(wide, constraints={**wide.constraints, **wanted})
+    stable = work.problem.derive(constraints=wanted, **_NO_GOAL)
+    box = wide.derive(constraints={**wide.constraints, **wanted})
     joint = [] if recheck(stable, relaxation.parameters).violations else [relaxation.amounts]
     choices = {tuple(each): each for each in (*joint, *({n: a} for n, a in relaxation.alone.items()))}
     with suppress(Spent):
@@ -97,7 +97,7 @@ def _tried(
 
 def _less(
     work: Workspace,
-    box: Problem,
+    box: Posed,
     limits: Sequence[Limit],
     text: dict[str, str],
     design: Mapping[str, float],
@@ -134,17 +134,17 @@ def _written(
     return {}, {}
 
 
-def _unsettled(problem: Problem, moved: Problem, names: Collection[str]) -> bool:
+def _unsettled(problem: Posed, moved: Posed, names: Collection[str]) -> bool:
     """Whether a limit that kept designs stable no longer does."""
 
     def settles(text: str) -> bool:
-        return bool(stability_wanted(replace(problem, constraints={"limit": text}, **_NO_GOAL)))
+        return bool(stability_wanted(problem.derive(constraints={"limit": text}, **_NO_GOAL)))
 
     about = [name for name in names if name in problem.asked_of_roots]
     return any(settles(problem.constraints[n]) and not settles(moved.constraints[n]) for n in about)
 
 
-def _steadied(work: Workspace, wide: Problem, answered: Answered) -> tuple[Table[str], ...]:
+def _steadied(work: Workspace, wide: Posed, answered: Answered) -> tuple[Table[str], ...]:
     """The least relaxation after which a design is stable, of constraints and ends of the box alike, if it is answered.
 
     Args:
@@ -152,7 +152,7 @@ def _steadied(work: Workspace, wide: Problem, answered: Answered) -> tuple[Table
     """
     stable = stability_wanted(work.problem)
     limits = {**work.problem.constraints, **stable}
-    asked = replace(work.problem, constraints=limits, **_NO_GOAL)
+    asked = work.problem.derive(constraints=limits, **_NO_GOAL)
     *_, (box, movable) = stages(asked)
     if not stable and box.free == wide.free:
         return ()

@@ -10,7 +10,7 @@ from tmsopt.evaluation.recheck import recheck
 from tmsopt.evaluation.worst_case import worst_cases
 from tmsopt.problem.advice.remedies import DIGITS, Need, Relaxation, rounded_outwards
 from tmsopt.problem.dependence import STABLE, stability_wanted
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
 from tmsopt.program.options import Options
@@ -29,7 +29,7 @@ _ENDS = "min", "max"
 _ASKED = 16  # sets of limits that are searched for designs at most
 _ANEW = 3  # times that limits in conflict are sought, where whole searches meet them after all
 
-Answered = Callable[[Problem, Options], Mapping[str, float] | None]
+Answered = Callable[[Posed, Options], Mapping[str, float] | None]
 """The design that answers a problem where it is solved again, {} or None; see `search.answered`."""
 
 Reached = Callable[[Sequence[str]], tuple[Mapping[str, float] | None, bool]]
@@ -44,16 +44,15 @@ def add_required_speed(
 
     The problem is solved again at the speed that is shown. A design that was missed in the box comes with it.
     """
-    name, problem = _speed(solution.problem), solution.problem
-    if not name or problem.cases or not problem.free or not _asked(solution):
+    name, problem = _speed(solution.problem.posed), solution.problem
+    if not name or problem.posed.cases or not problem.free or not _asked(solution):
         return solution, None
-    limits = {} if set(problem.asked_of_roots) or problem.pattern else {STABLE: "abscissa <= 0"}
+    limits = {} if set(problem.posed.asked_of_roots) or problem.posed.pattern else {STABLE: "abscissa <= 0"}
     few = replace(options, starts=_STARTS, stability=0.0, alone=False, progress=None, near=None)
     began, looked = time.perf_counter(), list[float]()
     begin(options.progress, f"looking for the {name} that it takes")
-    for most, ends in _ranges(problem, name):
-        asked = replace(
-            _freed(problem, name, ends),
+    for most, ends in _ranges(problem.posed, name):
+        asked = _freed(problem.posed, name, ends).derive(
             constraints={**problem.constraints, **limits},
             minimize=None if most else name,
             maximize=name if most else None,
@@ -67,8 +66,8 @@ def add_required_speed(
                 return solution, design
             short = within(options)
             with suppress(Spent):
-                for shown in _shown(problem, name, design[name], not most):
-                    if answered(_freed(problem, name, (shown, shown)), short):
+                for shown in _shown(problem.posed, name, design[name], not most):
+                    if answered(_freed(problem.posed, name, (shown, shown)), short):
                         need = Need(name, design[name], most, ends, Table(design), shown)
                         return replace(solution, need=need), None
             return solution, None
@@ -78,24 +77,24 @@ def add_required_speed(
     return (replace(solution, need=Need(name, math.nan, False, beyond)) if beyond else solution), None
 
 
-def _freed(problem: Problem, name: str, ends: tuple[float, float]) -> Problem:
+def _freed(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
     """The problem with another range of a parameter; with a value, where both ends are that."""
     freed = {**problem.free, name: ends}
     free = {n: freed[n] for n in problem.parameter_set.names if n in freed}
-    return replace(problem, fixed={n: x for n, x in problem.fixed.items() if n != name}, free=free, start={})
+    return problem.derive(fixed={n: x for n, x in problem.fixed.items() if n != name}, free=free, start={})
 
 
-def _shown(problem: Problem, name: str, value: float, up: bool) -> Iterator[float]:
+def _shown(problem: Posed, name: str, value: float, up: bool) -> Iterator[float]:
     """A value as it is shown, to fewer and fewer digits, rounded to where a design is."""
     one = unit_of(problem, name).one
     yield from dict.fromkeys(rounded_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
 
 
 def irreducible(
-    problem: Problem,
+    problem: Posed,
     relaxation: Relaxation,
     likely: Sequence[str],
-    wide: Problem,
+    wide: Posed,
     options: Options,
     reached: Reached,
 ) -> Relaxation:
@@ -140,7 +139,7 @@ class _Found:
         asked: sets of limits that starts have been spent on, with what these came to.
     """
 
-    problem: Problem
+    problem: Posed
     options: Options
     designs: Sequence[Mapping[str, float]] = ()
     asked: dict[Hashable, bool | None] = field(default_factory=dict)
@@ -149,7 +148,7 @@ class _Found:
         """Whether a design meets the constraints of these names, with other ends of some ranges; None: not known."""
         free = self.problem.free
         rest = {n: text for n, text in self.problem.constraints.items() if n in names}
-        part = replace(self.problem, constraints=rest, free={**free, **ends})
+        part = self.problem.derive(constraints=rest, free={**free, **ends})
         if any(_inside(part, d) and _holds(part, part.ordered(d)) for d in self.designs):
             return True
         key = (tuple(rest), tuple(ends.items()))
@@ -172,7 +171,7 @@ def _fewest(found: _Found, likely: Sequence[str]) -> tuple[tuple[str, ...], bool
     return kept, sure
 
 
-def _ends(found: _Found, kept: Sequence[str], likely: Sequence[str], wide: Problem) -> list[str]:
+def _ends(found: _Found, kept: Sequence[str], likely: Sequence[str], wide: Posed) -> list[str]:
     """Ends of ranges beyond which constraints are met that no design in the box meets together."""
     problem = found.problem
     named = [n for n in problem.free if any(n in problem.conditions[k].names for k in kept)]
@@ -183,7 +182,7 @@ def _ends(found: _Found, kept: Sequence[str], likely: Sequence[str], wide: Probl
     return [name for name in names if found.met(kept, _beyond(problem, wide, [name]))]
 
 
-def _beyond(problem: Problem, wide: Problem, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+def _beyond(problem: Posed, wide: Posed, names: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Ranges with these ends of them as far as they may give way."""
     ranges = dict(problem.free)
     for name, end in (n.rsplit(".", 1) for n in names):
@@ -192,13 +191,13 @@ def _beyond(problem: Problem, wide: Problem, names: Sequence[str]) -> dict[str, 
     return {n: ends for n, ends in ranges.items() if ends != problem.free[n]}
 
 
-def steady(problem: Problem, asked: Problem) -> Problem:
+def steady(problem: Posed, asked: Posed) -> Posed:
     """The limits of a problem, and that of stability where the one that was asked wants that."""
     limits = {**problem.constraints, **stability_wanted(asked, _LEAST_DECAY)}
-    return replace(problem, constraints=limits, minimize=None, maximize=None)
+    return problem.derive(constraints=limits, minimize=None, maximize=None)
 
 
-def _met(problem: Problem, known: Sequence[Mapping[str, float]], options: Options, quick: bool) -> bool | None:
+def _met(problem: Posed, known: Sequence[Mapping[str, float]], options: Options, quick: bool) -> bool | None:
     """Whether a design seems to meet all that is asked, by a sample and a few starts; None where neither tells.
 
     `quick`: where no design of the sample comes near, none is looked for; of what is only not named then.
@@ -213,12 +212,12 @@ def _met(problem: Problem, known: Sequence[Mapping[str, float]], options: Option
     return any(_holds(problem, t.parameters) for t in ended) or (None if ended else False)
 
 
-def _inside(problem: Problem, design: Mapping[str, float]) -> bool:
+def _inside(problem: Posed, design: Mapping[str, float]) -> bool:
     """Whether a design is in the box."""
     return all(lower <= design[n] <= upper for n, (lower, upper) in problem.free.items())
 
 
-def _holds(problem: Problem, design: Mapping[str, float]) -> bool:
+def _holds(problem: Posed, design: Mapping[str, float]) -> bool:
     """Whether a design meets all that is asked, between the cases too."""
     if recheck(problem, design).violations:
         return False
@@ -235,21 +234,21 @@ def _best(work: Workspace) -> CheckedEnd | None:
 
 def _asked(solution: Solution) -> bool:
     """Whether the speed may help: what fails is about the roots."""
-    problem = solution.problem
+    problem = solution.problem.posed
     about = {*problem.asked_of_roots, *([problem.pattern.name] if problem.pattern else [])}
     if solution.status == "infeasible":
         return bool(about & set(solution.violations))
     return solution.stable is False and not solution.any_stable and solution.stability_sought
 
 
-def _speed(problem: Problem) -> str:
+def _speed(problem: Posed) -> str:
     """The parameter that is a speed; none where a constraint is about it, which says what it may be."""
     of = problem.parameter_set
     name = next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), "")
     return "" if any(name in c.names for c in problem.conditions.values()) else name
 
 
-def _ranges(problem: Problem, name: str) -> Iterator[tuple[bool, tuple[float, float]]]:
+def _ranges(problem: Posed, name: str) -> Iterator[tuple[bool, tuple[float, float]]]:
     """Above what the speed may be, then below it; not below where it is fixed or may be anything down to rest."""
     low, high = problem.free.get(name, (problem.fixed.get(name, math.nan),) * 2)
     middle = {

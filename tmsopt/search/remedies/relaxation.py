@@ -15,7 +15,7 @@ from tmsopt.evaluation.worst_case import worst_cases
 from tmsopt.models import Values
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import design_of, formulate
 from tmsopt.program.nlp import NLP, AddedVariable, name_of
 from tmsopt.records import Table
@@ -61,7 +61,7 @@ class Limit:
 
 
 def least_relaxation(
-    work: Workspace, wide: Problem, limits: Sequence[Limit]
+    work: Workspace, wide: Posed, limits: Sequence[Limit]
 ) -> tuple[Relaxation, CheckedEnd | None, NLP | None] | tuple[None, None, None]:
     """The least relaxation in a box, with where it ended; without, for a design that was met on the way."""
     options, listed = work.options, work.problem.cases
@@ -79,7 +79,7 @@ def least_relaxation(
     return Relaxation(Table(trial.parameters), Table(amounts)), trial, nlp
 
 
-def least_near(work: Workspace, box: Problem, limits: Sequence[Limit], design: Mapping[str, float]) -> dict[str, float]:
+def least_near(work: Workspace, box: Posed, limits: Sequence[Limit], design: Mapping[str, float]) -> dict[str, float]:
     """How far limits must be moved for the nearest design that this one leads to; {} where it leads to none."""
     side, nlp = workspace(box, work.options), _elastic(box, box.cases, limits)
     trial = best_checked(
@@ -112,7 +112,7 @@ def total(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
     return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
 
 
-def stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
+def stages(problem: Posed) -> Iterator[tuple[Posed, list[Limit]]]:
     """The problem with limits to move: the constraints in its own box, then also the box."""
     constraints = _constraint_limits(problem)
     if constraints:
@@ -120,7 +120,7 @@ def stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
     yield widened(problem, problem.free), [*constraints, *_bound_limits(problem)]
 
 
-def _constraint_limits(problem: Problem) -> list[Limit]:
+def _constraint_limits(problem: Posed) -> list[Limit]:
     """Constraints in units of the limit as written, or of the size of the sides where it is 0 or no number."""
     ends = [{n: lo + share * (hi - lo) for n, (lo, hi) in problem.free.items()} for share in (0.5, 0.3)]
     one, other = (problem.values(problem.ordered(design)) for design in ends)
@@ -134,7 +134,7 @@ def _constraint_limits(problem: Problem) -> list[Limit]:
     return found
 
 
-def _bound_limits(problem: Problem) -> list[Limit]:
+def _bound_limits(problem: Posed) -> list[Limit]:
     return [
         Limit(f"{name}.{end}", ends[1] - ends[0], name, ends[k])
         for name, ends in problem.free.items()
@@ -142,7 +142,7 @@ def _bound_limits(problem: Problem) -> list[Limit]:
     ]
 
 
-def widened(problem: Problem, names: Collection[str]) -> Problem:
+def widened(problem: Posed, names: Collection[str]) -> Posed:
     """The problem in a larger box, inside what is physical."""
     free = dict(problem.free)
     for name in names:
@@ -151,7 +151,7 @@ def widened(problem: Problem, names: Collection[str]) -> Problem:
         inset = problem.tolerances.get(name, 0.0) + (0.0 if physical.closed else _INSET * min(width, 1.0))
         least, most = lower - _WIDER * width, upper + _WIDER * width
         free[name] = (min(max(least, physical.lower + inset), lower), max(min(most, physical.upper - inset), upper))
-    return replace(problem, free=free)
+    return problem.derive(free=free)
 
 
 def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Case]) -> tuple[CheckedEnd | None, NLP]:
@@ -189,11 +189,11 @@ def _least(
 
 def _sampler(work: Workspace, extended: Limit | None = None) -> Sampler:
     """Looks at designs for their limits alone, and for how far one end of the box must be moved."""
-    asked = replace(work.part, locate=None)
+    asked = work.part.derive(locate=None)
     if extended and extended.parameter and extended.name.endswith(".max"):
-        asked = replace(asked, minimize=extended.parameter)
+        asked = asked.derive(minimize=extended.parameter)
     elif extended and extended.parameter:
-        asked = replace(asked, maximize=extended.parameter)
+        asked = asked.derive(maximize=extended.parameter)
     sampler = Sampler(asked, work.options.seed)
     sampler.draw()
     return sampler
@@ -228,10 +228,10 @@ def _unlimited(work: Workspace, limits: Sequence[Limit]) -> Workspace:
     """The same without the constraints that may move, whose violation is the point of it."""
     moved = {limit.name for limit in limits}
     kept = {n: c for n, c in work.problem.constraints.items() if n not in moved}
-    return replace(work, problem=replace(work.problem, constraints=kept, minimize=None, maximize=None))
+    return replace(work, problem=work.problem.derive(constraints=kept, minimize=None, maximize=None))
 
 
-def _beyond(wide: Problem, limits: Sequence[Limit], trial: CheckedEnd, cases: Sequence[Case]) -> list[Case]:
+def _beyond(wide: Posed, limits: Sequence[Limit], trial: CheckedEnd, cases: Sequence[Case]) -> list[Case]:
     """Cases between those listed in which a design needs more."""
     worst = [w.case for w in worst_cases(wide, trial.parameters).values()]
     known, all_ = (_amounts(wide, limits, trial.parameters, c) for c in (cases, (*cases, *worst)))
@@ -240,7 +240,7 @@ def _beyond(wide: Problem, limits: Sequence[Limit], trial: CheckedEnd, cases: Se
 
 
 def _amounts(
-    wide: Problem, limits: Sequence[Limit], parameters: Mapping[str, float], cases: Sequence[Case]
+    wide: Posed, limits: Sequence[Limit], parameters: Mapping[str, float], cases: Sequence[Case]
 ) -> dict[str, float]:
     """What the design itself needs, whatever the solver claims."""
     excess = excesses(wide, parameters, cases)
@@ -285,7 +285,7 @@ def alone(work: Workspace, conflict: Sequence[str], trial: CheckedEnd, cases: Se
     return found
 
 
-def _elastic(wide: Problem, cases: Sequence[Case], limits: Sequence[Limit]) -> NLP:
+def _elastic(wide: Posed, cases: Sequence[Case], limits: Sequence[Limit]) -> NLP:
     """minimise Σ slack / scale, with each limit moved by its slack; everything else holds."""
     nlp = formulate(wide, cases, elastic=True)
     names = [limit.name for limit in limits]
@@ -327,7 +327,7 @@ def _elastic(wide: Problem, cases: Sequence[Case], limits: Sequence[Limit]) -> N
     )
 
 
-def _slack_guess(wide: Problem, names: Sequence[str], values: Sequence[Values], z: Any) -> list[list[float]]:
+def _slack_guess(wide: Posed, names: Sequence[str], values: Sequence[Values], z: Any) -> list[list[float]]:
     """What a design needs, and a little more."""
     found = []
     for name in names:

@@ -1,0 +1,80 @@
+"""What is stated as what is solved: every number a double in rad and SI, every table complete, all faults at once."""
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from tmsopt.errors import InputError
+from tmsopt.models import Model, controlled
+from tmsopt.problem.cases import Scenario, as_scenario, middle_of, points_of
+from tmsopt.problem.units import TABLES, numbers
+from tmsopt.problem.validate import faults, guess_parameter_set, shape_faults
+
+_POINT = 1e-12
+"""Relative width below which a range is a number: a few roundings leave nothing to move in."""
+
+
+def normalise(**stated: Any) -> dict[str, Any]:
+    """The fields of a problem, for those that its author stated, of any type.
+
+    Raises:
+        InputError: listing everything that is wrong.
+    """
+    problem = SimpleNamespace(**stated)
+    if found := list(shape_faults(problem)):
+        raise InputError(found)
+    problem.scenarios = {n: as_scenario(s) for n, s in problem.scenarios.items()}
+    names = {**problem.fixed, **problem.free, **problem.scenarios}
+    problem.model = controlled(problem.model, names)
+    of = guess_parameter_set(problem.model, names)
+    read, units, typed, unreadable = numbers({table: getattr(problem, table) for table in TABLES}, of)
+    vars(problem).update(read)
+    places = {f.key[:2] for f in unreadable}
+    if found := [*unreadable, *(f for f in faults(problem) if f.key[:2] not in places)]:
+        raise InputError(found)
+    problem.units = {**units, **problem.units}
+    problem.written = {n: {**typed.get(n, {}), **problem.written.get(n, {})} for n in (*problem.written, *typed)}
+    defaults = {p.name: p.default for p in of.parameters if p.default is not None}
+    nominal = {n: middle_of(s) for n, s in problem.scenarios.items()}
+    problem.fixed = {n: v for n, v in {**defaults, **nominal, **problem.fixed}.items() if n not in problem.free}
+    for table in ("tolerances", "weights"):
+        setattr(problem, table, {n: float(v) for n, v in getattr(problem, table).items()})
+    for sense in ("minimize", "maximize"):
+        setattr(problem, sense, (text := getattr(problem, sense)) and text.strip())
+    problem.constraints = {n: text.strip() for n, text in problem.constraints.items()}
+    problem.pareto = tuple(text.strip() for text in problem.pareto)  # reports show it on one line
+    return settle(**vars(problem))
+
+
+def settle(
+    model: Model,
+    fixed: Mapping[str, float],
+    free: Mapping[str, tuple[float, float]],
+    start: Mapping[str, float],
+    **others: Any,
+) -> dict[str, Any]:
+    """The fields of a problem for numbers and texts that are right: what follows from the numbers is found anew.
+
+    A range of one value is fixed, the start is of free parameters, a complex H has a carrier for what they reach.
+    """
+    pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
+    ends = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
+    values = {n: float(v) for n, v in {**fixed, **pinned}.items()}
+    first = {n: float(v) for n, v in start.items() if n in ends}
+    within = model.within(_reach(values, ends, others["scenarios"], others["tolerances"]))
+    return {"model": within, "fixed": values, "free": ends, "start": first, **others}
+
+
+def _reach(
+    fixed: Mapping[str, float],
+    free: Mapping[str, tuple[float, float]],
+    scenarios: Mapping[str, Scenario],
+    tolerances: Mapping[str, float],
+) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of every parameter, in all cases."""
+    ends = {n: (x, x) for n, x in fixed.items()} | dict(free)
+    for name, scenario in scenarios.items():
+        points = [*points_of(scenario), fixed[name]]
+        ends[name] = min(points), max(points)
+    rooms = {n: tolerances.get(n, 0.0) for n in ends}
+    return {n: (lo - rooms[n], hi + rooms[n]) for n, (lo, hi) in ends.items()}
