@@ -6,7 +6,7 @@ import math
 import re
 import threading
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache, reduce
@@ -126,8 +126,7 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     body = _parse(_text(text))
     if isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is a comparison; accepted: a value, such as '{example}'")
-    names, value = _read(body, text, None if accepted is None else list(accepted))
-    return Expression(text, names, formula=formula([value], names))
+    return _in_names(_value, text, accepted)
 
 
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
@@ -136,7 +135,33 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     Raises:
         ExpressionError: with what was found and what is accepted.
     """
-    body = _parse(_text(text))
+    return _in_names(_comparison, _text(text), accepted)
+
+
+def _in_names(parse: Callable[..., Expression], text: str, accepted: Iterable[str] | None) -> Expression:
+    """The expression of a text, which is parsed once whatever names are accepted; what is wrong first is said."""
+    if accepted is None:
+        return parse(text)
+    known = tuple(accepted)
+    try:
+        found = parse(text)
+    except ExpressionError:
+        return parse(text, known)
+    for name in found.names:
+        if name not in known:
+            raise UnknownName(text, name, known)
+    return found
+
+
+@lru_cache(maxsize=4096)
+def _value(text: str, accepted: tuple[str, ...] | None = None) -> Expression:
+    names, value = _read(_parse(text), text, accepted)
+    return Expression(text, names, formula=formula([value], names))
+
+
+@lru_cache(maxsize=4096)
+def _comparison(text: str, accepted: tuple[str, ...] | None = None) -> Expression:
+    body = _parse(text)
     if not isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
@@ -147,8 +172,7 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     sign = COMPARISONS.get(type(body.ops[0]))
     if sign is None:
         raise ExpressionError(f"{_quoted(text)} compares with another sign than <=, >= or =={_advice(text)}")
-    known = list(accepted)
-    sides = [_read(side, text, known) for side in (body.left, *body.comparators)]
+    sides = [_read(side, text, accepted) for side in (body.left, *body.comparators)]
     names = tuple(dict.fromkeys(name for found, _ in sides for name in found))
     if not names:
         raise ExpressionError(f"{_quoted(text)} uses no parameter or quantity, so nothing can satisfy or violate it")
@@ -224,7 +248,7 @@ def _joined(op: str, *parts: _Part) -> _Part:
     return _Part(made(op, *(p.node for p in parts)), DEGREES.operations[op](*(p.degree for p in parts)))
 
 
-def _read(body: ast.expr, text: str, accepted: list[str] | None) -> tuple[tuple[str, ...], Node]:
+def _read(body: ast.expr, text: str, accepted: Sequence[str] | None) -> tuple[tuple[str, ...], Node]:
     """Names that a value uses, and its formula; raises where it is no accepted arithmetic, or too large to compute."""
     parser = _Parser(text, accepted)
     try:
@@ -243,7 +267,7 @@ def _quoted(text: str) -> str:
 class _Parser:
     """Turns a parsed text into nodes, each name an input; discarded after one text."""
 
-    def __init__(self, text: str, accepted: list[str] | None) -> None:
+    def __init__(self, text: str, accepted: Sequence[str] | None) -> None:
         self.text, self.accepted = text, accepted
         self.names: dict[str, Node] = {}
 
