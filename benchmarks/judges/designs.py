@@ -1,6 +1,7 @@
 """Designs of a problem without scenarios, in arrays by eigenvalues, and one at a time by isolated roots."""
 
 from collections.abc import Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -75,8 +76,10 @@ class _Stated(dict[str, Any]):
             raise KeyError(name)
         return self.coefficients[self._names.index(name)]
 
-    def define(self, name: str, value: Any) -> None:
-        self[name] = value
+    def knowing(self, known: Mapping[str, Any]) -> "_Stated":
+        other = copy(self)
+        other.update(known)
+        return other
 
 
 class Designs:
@@ -141,8 +144,7 @@ class Designs:
                 a = self.coefficients(few, int(held.sum()))
                 exist = np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0)
                 if rooted or self.about_roots:
-                    for name, found in zip(_ROOTS, root_values(eigenvalues(a)), strict=True):
-                        few.define(name, found)
+                    few = few.knowing(dict(zip(_ROOTS, root_values(eigenvalues(a)), strict=True)))
                 worst = np.where(exist, 0.0, NOWHERE)
                 for row in rooted:
                     worst = np.maximum(worst, row.excess(few))
@@ -187,9 +189,8 @@ def exactly(problem: Problem, design: Mapping[str, float]) -> Iterator[Exactly]:
     try:
         for z in near_roots(problem, design):
             with flint.ctx.workdps(DIGITS):
-                values = stored_values(problem, design)
-                for name, found in zip(_ROOTS, root_values(z), strict=True):
-                    values.define(name, flint.arb(float(found)))
+                known = {n: flint.arb(float(found)) for n, found in zip(_ROOTS, root_values(z), strict=True)}
+                values = stored_values(problem, design).knowing(known)
                 worst = max((float(r.excess(values)) for r in at.rows), default=0.0)
                 value = float(evaluated(at.objective, values))
             yield Exactly(value, max(worst, box) if np.isfinite(value) else NOWHERE, z)

@@ -118,9 +118,8 @@ class Judge:
                 moved = [worst_roots(a * r) for r in _rounded(a.shape[-1])]
                 scatter = [np.ptp(np.array([m[k] for m in moved]), axis=0) for k in (0, 1)]
                 abscissa, damping = abscissa - shift * scatter[0], damping + shift * scatter[1]
-            for values in (each, one):
-                values.define("abscissa", abscissa[:, None])
-                values.define("damping_ratio", damping[:, None])
+            known = {"abscissa": abscissa[:, None], "damping_ratio": damping[:, None]}
+            each, one = each.knowing(known), one.knowing(known)
             violation = np.zeros(x.shape[1])
             for left, comparison, right in self._rows:
                 values = one if comparison == "==" else each

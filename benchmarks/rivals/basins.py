@@ -73,8 +73,7 @@ class _Search:
         values = self.at.values(x)
         if rooted:
             a = self.at.coefficients(values, x.shape[1])
-            for name, found in zip(("abscissa", "damping_ratio"), root_values(eigenvalues(a)), strict=True):
-                values.define(name, found)
+            values = values.knowing(dict(zip(("abscissa", "damping_ratio"), root_values(eigenvalues(a)), strict=True)))
         return values
 
     def repaired(self, u: Array, steps: int, every: bool = False) -> Array:

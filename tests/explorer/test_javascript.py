@@ -73,10 +73,7 @@ def balls(problem, row, more=()):
     """Everything of a design in balls that allow for the rounding of each parameter, which sizes the terms of a sum."""
     of = problem.parameter_set
     given = {n: flint.arb(float(v), abs(float(v)) * 2.0**-53) for n, v in zip(of.names, row, strict=True)}
-    values = Values(problem.model, of, given)
-    for name, value in more:
-        values.define(name, exact(float(value)))
-    return values
+    return Values(problem.model, of, given).knowing({name: exact(float(value)) for name, value in more})
 
 
 def agree(found, ball, factor=1000):
@@ -170,9 +167,8 @@ def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
         for row, r, y in zip(x, motion, found, strict=True):
             of_roots = dict(zip(("abscissa", "damping_ratio", "angular_frequency"), r, strict=True))
             values = balls(problem, row, of_roots.items())
-            numbers = problem.values(dict(zip(problem.parameter_set.names, row.tolist(), strict=True)))
-            for root, value in of_roots.items():
-                numbers.define(root, value)
+            parameters = dict(zip(problem.parameter_set.names, row.tolist(), strict=True))
+            numbers = problem.values(parameters).knowing(of_roots)
             for k, n in enumerate(script.quantities):
                 expected = problem.read(n).of(values, BALLS)
                 known += bool(flint.arb(expected).is_finite())

@@ -49,9 +49,7 @@ def asked(name, of, tangents=False):
     model = MODELS[name]
     own = model.sets[of]
     given = {p.name: made("atan", symbol(p.name)) if tangents and p.tangent else symbol(p.name) for p in own.parameters}
-    values = Values(model, own, given)
-    for root in OF_ROOTS:
-        values.define(root, symbol(root))
+    values = Values(model, own, given).knowing({root: symbol(root) for root in OF_ROOTS})
     listed = [values[n] for n in model.quantity_names(own)]
     matrices = [] if model.pencil is None else model.pencil(own.native(given))
     every = [*listed, *(x for P in matrices for row in P for x in row)]

@@ -150,8 +150,7 @@ def _signature(
     """Monic coefficients, and expressions with the roots held: what they read beside the roots."""
     values = problem.values(problem.ordered(parameters))
     a = np.array([float(c) for c in values.coefficients])
-    for root_quantity in _ROOTS:
-        values.define(root_quantity, 0.5)
+    values = values.knowing(dict.fromkeys(_ROOTS, 0.5))
     with np.errstate(all="ignore"):
         return list(a / a[0]), [float(e(values)) for e in asked]
 

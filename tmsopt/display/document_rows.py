@@ -76,10 +76,9 @@ def _margin(solution: "Solution", name: str) -> str:
     cases = [case for case in problem.cases if not case.direction]
     cases += [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
     left = math.inf
+    radius = {n: x for n, x in solution.quantities.items() if n == NO_RADIUS.name}  # the search for it is over
     for case in cases or [Case()]:
-        values = problem.values(case.applied(solution.parameters))
-        if (radius := solution.quantities.get(NO_RADIUS.name)) is not None:  # of which the search is over
-            values.define(NO_RADIUS.name, radius)
+        values = problem.values(case.applied(solution.parameters)).knowing(radius)
         left = min(left, -condition.sign * float(condition(values)))
     shares = {q.name for q in (*problem.model.quantities, *problem.parameter_set.quantities) if q.share}
     unit = unit_of(problem, name)

@@ -19,7 +19,7 @@ from tmsopt.evaluation.law_rows import SAME_LAW
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import Values, tms
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
 from tmsopt.problem.validate import SMALLEST
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable
@@ -101,12 +101,10 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
 
     known = {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
     doubles = {name: settled(number) for name, number in known.items()}
-    for name, number in known.items():
-        wide.define(name, number)
+    wide = wide.knowing(known)
     objective = np.full(m, np.nan) if problem.objective is None else settled(problem.objective.of(wide, BALLS))
-    plain = Values(model, of, {n: np.asarray(x) for n, x in given.items()}, extra=ARRAY_ROOT_QUANTITIES)
-    for name, column in (doubles | {ANGULAR_FREQUENCY: found.frequency}).items():
-        plain.define(name, column)
+    roots_of = doubles | {ANGULAR_FREQUENCY: found.frequency}
+    plain = problem.columns({n: np.asarray(x) for n, x in given.items()}).knowing(roots_of)
     violations, doubt = _violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
     feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)

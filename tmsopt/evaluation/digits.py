@@ -152,8 +152,8 @@ class _Design:
         if of.rate is not None:
             fastest = roots.fastest if asked else roots.ideal
             rates = frequencies(fastest, of.rate(own), flint.arb.pi())
-            nominal.define("frequency", reduce(greater, rates, flint.arb(0)))
-        nominal.define("abscissa", known.get("abscissa", math.nan))
+            nominal = nominal.knowing({"frequency": reduce(greater, rates, flint.arb(0))})
+        nominal = nominal.knowing({"abscissa": known.get("abscissa", math.nan)})
         for name in checked.quantities:
             if name not in _ROOTS:
                 yield ("quantities", name), nominal[name], 0
@@ -211,10 +211,7 @@ class _Design:
         each = self.cases if depends_on_case(self.problem, objective, self.cases) else [Case()]
         found = []
         for case in each:
-            values = self.values(case)
-            for name, ball in known.items():
-                values.define(name, ball)
-            found.append(objective.of(values, BALLS))
+            found.append(objective.of(self.values(case).knowing(known), BALLS))
         return reduce(lesser if self.problem.sense == "maximize" else greater, found)
 
 

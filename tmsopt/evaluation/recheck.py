@@ -94,8 +94,7 @@ def recheck(
     if problem.asks(ANGULAR_FREQUENCY):
         names.append(ANGULAR_FREQUENCY)
     if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
-        nominal.define("abscissa", structure.abscissa)
-        nominal.define("structure", structure)
+        nominal = nominal.knowing({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
         realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
@@ -188,10 +187,7 @@ def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
 def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
     """A condition and its slopes, as a function of parameters and root quantities."""
     symbols, of = {name: symbol(name) for name in names}, model.parameter_set(set_name)
-    values = Values(model, of, {n: symbols[n] for n in of.names})
-    for name in names[len(of.names) :]:
-        values.define(name, symbols[name])
-    difference = condition(values)
+    difference = condition(Values(model, of, {n: symbols[n] for n in of.names}).knowing(symbols))
     return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
@@ -246,8 +242,10 @@ def _look(
     near_top, near_least, near_fastest = _candidates(each)
     if stored is not None:
         exact = [case.applied(stored) for case in listed] or [dict(stored)]
-        for design, values in zip((*exact, stored), (*each, nominal), strict=True):
-            values.define("structure", Structure("undecided", realised_roots(problem, design), 0.0))
+        nominal, *each = (
+            values.knowing({"structure": Structure("undecided", realised_roots(problem, design), 0.0)})
+            for design, values in zip((stored, *exact), (nominal, *each), strict=True)
+        )
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
@@ -259,9 +257,7 @@ def _look(
         around = robustness_at(problem, parameters)
     if around is not None:
         worst[RADIUS] = around.radius
-    for values in (nominal, *each):
-        for name, value in worst.items():
-            values.define(name, value)
+    nominal, *each = (v.knowing({"structure": v["structure"], **worst}) for v in (nominal, *each))
     return _Look(listed, nominal, each, top, least, fastest, around)
 
 

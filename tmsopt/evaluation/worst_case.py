@@ -18,7 +18,6 @@ from tmsopt.problem.cases import Band, Case, Cover
 from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES
 from tmsopt.records import Array, Table
 from tmsopt.roots import lienard_chipart, shift
 
@@ -99,8 +98,7 @@ def peaks(problem: Posed, designs: Mapping[str, float | Array], count: int) -> l
 
 def _value(values: Values, what: Expression | str, shared: Mapping[str, float | Array]) -> Any:
     """A root quantity, or an expression with the given worst root quantities."""
-    for name, value in shared.items():
-        values.define(name, value)
+    values = values.knowing(shared)
     return values[what] if isinstance(what, str) else what(values)
 
 
@@ -198,7 +196,7 @@ def _evaluated(
 ) -> Array:
     varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
     columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}
-    values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)
+    values = problem.columns(columns)
     with np.errstate(all="ignore"):
         return np.broadcast_to(np.asarray(_value(values, what, shared), dtype=float), count)
 

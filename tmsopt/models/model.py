@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -381,18 +382,21 @@ class Values(Mapping[str, Any]):
         self.model, self.kind = model, kind_of(*parameters.values())
         self.given, self._ranges = (model, of, dict(parameters)), dict(ranges or {})
         self._known = {**native, **dict(zip(model.coefficient_names(), self.coefficients, strict=True)), **parameters}
+        self._found: dict[str, Any] = {}
         self._formulas = {q.name: q for q in (*model.quantities, *of.quantities)}
         self._procedures = {q.name: q for q in extra}
         self._lift = lift
 
     def __getitem__(self, name: str) -> Any:
-        if name not in self._known:
+        if name in self._known:
+            return self._known[name]
+        if name not in self._found:
             quantity = self._procedures.get(name) or self._formulas[name]
             value = self._lift(quantity, self) if self._lift else None
             if value is None:
                 value = quantity.value(self) if name in self._procedures else self.fold(quantity.formula)[0]
-            self._known[name] = value
-        return self._known[name]
+            self._found[name] = value
+        return self._found[name]
 
     def fold(self, formula: Formula, own: Mapping[str, Any] = MappingProxyType({})) -> list[Any]:
         """The outputs of a formula in these values, and others of one's own; nan for what is not known of the roots."""
@@ -411,9 +415,11 @@ class Values(Mapping[str, Any]):
             found = model.coefficients(balls, of)
         return [float(c.rad()) if c.is_finite() else np.inf for c in found]
 
-    def define(self, name: str, value: Any) -> None:
-        """Give a quantity a value that is known otherwise, instead of its formula."""
-        self._known[name] = value
+    def knowing(self, known: Mapping[str, Any]) -> "Values":
+        """The same design where some numbers are known otherwise than by their formulas."""
+        other = copy(self)
+        other._known, other._found = {**self._known, **known}, {}
+        return other
 
     def __iter__(self) -> Iterator[str]:
         return iter(dict.fromkeys((*self._known, *self._formulas, *self._procedures)))

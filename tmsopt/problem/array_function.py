@@ -12,7 +12,7 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.models import Values
 from tmsopt.problem.expression import Expression, ExpressionError
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUANTITIES
+from tmsopt.problem.quantities import NO_RADIUS, ROOT_QUANTITIES
 
 _ROOT = tuple(q.name for q in ROOT_QUANTITIES)
 
@@ -44,7 +44,7 @@ class ArrayFunction:
         if missing := set(self.formula.inputs) - set(columns):
             with np.errstate(all="ignore"):
                 given = {n: np.asarray(columns[n], dtype=float)[()] for n in of.names}
-                values = Values(self.problem.model, of, given, extra=ARRAY_ROOT_QUANTITIES)
+                values = self.problem.columns(given)
                 known = {**columns, **{n: values[n] for n in missing}}
         return dict(zip(self.names, on_arrays(self.formula, known), strict=True))
 
@@ -66,8 +66,7 @@ def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dic
     """Expressions as nodes in the parameters and the root quantities; of comparisons left minus right."""
     of = problem.parameter_set
     values = Values(problem.model, of, {n: symbol(n) for n in of.names}, extra=(NO_RADIUS,))
-    for name in _ROOT:
-        values.define(name, symbol(name))
+    values = values.knowing({n: symbol(n) for n in _ROOT})
     return {n: e(values) for n, e in parse_all(problem, expressions).items()}
 
 

@@ -148,15 +148,16 @@ def regular(coefficients: Array) -> Array:
     return np.concatenate([np.where(_beyond(a), 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
 
 
+_MOTION = ":motion"  # no name that a text may have
+
+
 def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Abscissa and damping ratio, each kept for when it is asked; nan where a coefficient does not exist."""
+    """Abscissa and damping ratio; nan where a coefficient does not exist."""
     assert isinstance(values, Values)
     a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
     exist, a = np.all(np.isfinite(a), axis=-1), regular(a)
     motion = find_motion(list(np.moveaxis(a, -1, 0)))
     abscissa, ratio = (np.where(exist, each, np.nan) for each in (motion.abscissa, motion.damping_ratio))
-    values.define("abscissa", abscissa)
-    values.define("damping_ratio", ratio)
     return abscissa, ratio
 
 
@@ -168,13 +169,14 @@ def _array_frequency(values: Mapping[str, Any]) -> Array:
 
 
 _ARRAY_FORMULAS = (
-    lambda values: _array_motion(values)[0],
-    lambda values: _array_motion(values)[1],
+    lambda values: values[_MOTION][0],
+    lambda values: values[_MOTION][1],
     _array_frequency,
 )
 
 ARRAY_ROOT_QUANTITIES = (
     *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)),
+    Quantity(_MOTION, "1", "abscissa and damping ratio", "", _array_motion),
     NO_RADIUS,
 )
 """The same for arrays of designs, by numeric roots."""
@@ -190,9 +192,7 @@ def lifted_quantities(
         if quantity.equation is not None:
             found[quantity.name] = quantity
 
-    values = Values(model, of, parameters, lift=note)
-    for name in ROOT_NAMES:
-        values.define(name, math.nan)
+    values = Values(model, of, parameters, lift=note).knowing(dict.fromkeys(ROOT_NAMES, math.nan))
     for expression in expressions:
         expression(values)
     return tuple(found.values())

@@ -11,7 +11,6 @@ from tmsopt.models import Values
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES
 from tmsopt.records import Array
 
 _FLAT = "damping_ratio"
@@ -50,7 +49,7 @@ def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
     applied = [case.applied(nominal) for case in problem.cases if not case.direction] or [nominal]
     every = (len(applied), *shape)
     # All cases at once: one by one takes as often the time of small arrays. What is one number stays one.
-    values = _values(problem, {n: _stacked([p[n] for p in applied], len(shape)) for n in nominal})
+    values = problem.columns({n: _stacked([p[n] for p in applied], len(shape)) for n in nominal})
     conditions = list(problem.conditions.values())
     asked = [e for e in (problem.objective, *conditions) if e]
     worst_of: dict[str, Array] = {}
@@ -58,7 +57,7 @@ def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
         if len(applied) > 1 and any(name in e.names for e in asked):
             found = np.broadcast_to(values[name], every)
             worst_of[name] = found.max(axis=0) if worst > 0 else found.min(axis=0)
-            values.define(name, np.broadcast_to(worst_of[name], every))
+    values = values.knowing({n: np.broadcast_to(worst, every) for n, worst in worst_of.items()})
     moves = _moves(values, every).all(axis=0)
     worth = None
     if problem.objective is not None:
@@ -66,8 +65,7 @@ def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
         worth = np.where(moves, goal.max(axis=0), np.nan)
     equal = np.array([c.equality for c in conditions], dtype=bool)
     own = values_of(problem, nominal, shape) if equal.any() else values  # an equality is one of the nominal design
-    for name, found in worst_of.items() if own is not values else ():
-        own.define(name, found)
+    own = own.knowing(worst_of) if own is not values else values
     beyond = [
         c.sign * _evaluated(c, own, shape) if c.equality else _graded(c, c.sign, values, every).max(axis=0)
         for c in conditions
@@ -91,11 +89,7 @@ def _graded(asked: Expression, sign: float, values: Values, shape: tuple[int, ..
 
 def values_of(problem: Posed, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
     """Everything derived from designs, as arrays of one shape."""
-    return _values(problem, {n: np.broadcast_to(np.asarray(x, dtype=float), shape) for n, x in parameters.items()})
-
-
-def _values(problem: Posed, arrays: Mapping[str, Array]) -> Values:
-    return Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
+    return problem.columns({n: np.broadcast_to(np.asarray(x, dtype=float), shape) for n, x in parameters.items()})
 
 
 def _stacked(each: Sequence[Any], axes: int) -> Array:

@@ -16,7 +16,7 @@ from tmsopt.algebra.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ARRAY_ROOT_QUANTITIES, regular
+from tmsopt.problem.quantities import regular
 from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.roots.patterns.pattern import Roots
@@ -368,8 +368,7 @@ def objective_unit(problem: Posed) -> float:
     if problem.model.natural or problem.objective is None or not problem.free:
         return 1.0
     columns = {n: np.broadcast_to(x, _DESIGNS) for n, x in problem.ordered(_designs(problem)).items()}
-    values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)
-    size = np.abs(np.atleast_1d(problem.objective(values)))
+    size = np.abs(np.atleast_1d(problem.objective(problem.columns(columns))))
     size = size[np.isfinite(size) & (size > 0)]
     return _power_of_two(size) if len(size) and np.median(size) < _ORDINARY[0] else 1.0
 

@@ -121,15 +121,15 @@ def limits(problem: Posed, found: Existing) -> dict[str, str]:
     """Each comparison at the nominal design; none where it must hold in several cases."""
     if problem.scenarios or problem.tolerances:
         return {}
+    roots = found.factored
+    known = {
+        "abscissa": roots.abscissa,
+        "damping_ratio": roots.damping_ratio,
+        ANGULAR_FREQUENCY: roots.angular_frequency,
+        RADIUS: None,
+    }
     values = Values(problem.model, problem.parameter_set, found.parameters)
-    nothing = flint.arb("nan")
-    for name, value in (
-        ("abscissa", found.factored.abscissa),
-        ("damping_ratio", found.factored.damping_ratio),
-        (ANGULAR_FREQUENCY, found.factored.angular_frequency),
-        (RADIUS, None),
-    ):
-        values.define(name, nothing if value is None else value)
+    values = values.knowing({n: flint.arb("nan") if value is None else value for n, value in known.items()})
     verdicts = {}
     for name, condition in problem.conditions.items():
         difference = flint.arb(condition.of(values, BALLS))
