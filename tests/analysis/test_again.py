@@ -16,7 +16,7 @@ def test_gains_are_those_of_a_search_of_each_moved_problem(name):
     levers = [lever for lever in tmsopt.explain(solution).levers if lever.step]
     assert levers
     for lever in levers:
-        again = tmsopt.solve(moved(solution.problem, lever.name, lever.step), starts=8)
+        again = tmsopt.solve(moved(solution.problem.posed, lever.name, lever.step), starts=8)
         assert lever.resolved == pytest.approx(abs(again.value - solution.value), abs=1e-8)
         assert lever.structure == again.structure
 

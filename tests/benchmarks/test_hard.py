@@ -79,7 +79,7 @@ def test_verdicts_say_what_is_wrong():
     first = judged(index, 1, known)
     assert (first.label, first.better) == (RIGHT, True)
     assert judged(index, 1, replace(known, value=first.value)).label == RIGHT
-    sign = hard_problem(index).sign
+    sign = hard_problem(index).posed.sign
     assert judged(index, 1, replace(known, value=first.value - sign * 1e-3)).label == OPTIMAL
     assert confirmed_value(DAMPED, {"x": 1.0}, -0.5) == ""
     assert confirmed_value(DAMPED, {"x": 1.0}, -0.6) == "claims -0.6, is -0.5"

@@ -260,7 +260,7 @@ def test_quantities_are_those_of_the_design():
     assert head[:3] == ["quantity", "value", "unit"]
     assert len(rows) > 5
     for name, value, unit, _ in rows:
-        one = 0.01 if unit == "%" else unit_of(solution.problem, name).one
+        one = 0.01 if unit == "%" else unit_of(solution.problem.posed, name).one
         assert float(value) == pytest.approx(solution.quantities[name] / one, rel=1e-5, abs=1e-9), name
 
 

@@ -119,7 +119,7 @@ LOCATED = (
 def test_multiple_roots_of_regular_equations_exist(name):
     """Each of these is proved to exist elsewhere, by Krawczyk's method or in closed form."""
     found = tmsopt.solve(PROBLEMS / f"{name}.toml")
-    assert multiple_roots_exist(found.problem, found.parameters)
+    assert multiple_roots_exist(found.problem.posed, found.parameters)
 
 
 @pytest.mark.parametrize(

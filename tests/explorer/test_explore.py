@@ -103,7 +103,7 @@ def test_what_it_saves_is_the_same_system(path, tmp_path):
     assert dict(again.fixed) == values
     assert again.model.statement == problem.model.statement
     if problem.model.carrier is None:  # which that of a complex system chooses for its ranges
-        assert [*map(float, again.values(values).coefficients)] == [*map(float, problem.values(values).coefficients)]
+        assert [*map(float, again.posed.values(values).coefficients)] == [*map(float, problem.values(values).coefficients)]
 
 
 @pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)
@@ -116,7 +116,7 @@ def test_sliders_reach_what_is_possible(path):
         if p["free"]:
             assert (p["low"], p["high"]) == problem.free[p["name"]]
         else:
-            known = problem.parameter_set[p["name"]].range
+            known = problem.posed.parameter_set[p["name"]].range
             assert known.lower <= p["low"]
             assert p["high"] <= known.upper
         assert p["one"] > 0

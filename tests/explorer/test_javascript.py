@@ -55,7 +55,7 @@ def problem_of(name):
 
 def designs(problem, count, seed=0):
     """In the box, what is fixed varied by some percent within what is possible."""
-    rng, of = np.random.default_rng(seed), problem.parameter_set
+    rng, of = np.random.default_rng(seed), problem.posed.parameter_set
     columns = []
     for p in of.parameters:
         low, high = problem.free.get(p.name) or sorted(problem.fixed[p.name] * np.array([0.95, 1.05]))
@@ -155,7 +155,7 @@ DERIVED = """(rows) => {
 @pytest.mark.parametrize("name", [*FILES, "chain", "physical_machine", "realistic", "heavily_damped"])
 def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
     problem = problem_of(name)
-    script = model_script(problem)
+    script = model_script(problem.posed)
     assert [*script.constraints] == [*problem.conditions]
     x = designs(problem, FEW, seed=1)
     alpha, ratio = motion_of(python_coefficients(problem, x))
@@ -366,7 +366,7 @@ def test_roots_give_their_coefficients_back_wherever_they_meet(degree):
 )
 def test_responses_are_those_of_the_matrix_exponential(name):
     problem = problem_of(name)
-    model, of = problem.model, problem.parameter_set
+    model, of = problem.model, problem.posed.parameter_set
     even, uneven = np.linspace(0.0, 20.0, 41), np.array([0.0, 0.1, 0.7, 0.70001, 3.0])
     answer = "([x, start, times]) => response(Float64Array.from(x), start, times)"
     for row in designs(problem, 5, seed=3):
@@ -409,7 +409,7 @@ SURVEY = """([x, i, j, xs, ys]) => survey(Float64Array.from(x), i, j, Float64Arr
 )
 def test_surveys_are_the_designs_one_by_one(file):
     problem = problem_of(file)
-    names, free = problem.parameter_set.names, [*problem.free]
+    names, free = problem.posed.parameter_set.names, [*problem.free]
     i, j = names.index(free[0]), names.index(free[1])
     xs, ys = (np.linspace(*problem.free[n], m) for n, m in zip(free[:2], (31, 23), strict=True))
     x = designs(problem, 1, seed=5)[0]

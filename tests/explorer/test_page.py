@@ -85,7 +85,7 @@ def test_names_are_given_once(made):
 def test_it_opens_without_a_fault(show, explored):
     explorer, path = explored
     with show(path) as page:
-        of = explorer.problem.parameter_set.names
+        of = explorer.problem.posed.parameter_set.names
         assert values_of(page) == [explorer.solution.parameters[n] for n in of]
         way, grows = explorer.solution.abscissa, explorer.solution.stability.growth
         assert verdict(page).startswith("✓" if way < 0 else "✗" if way > 0 or grows else "≈ marginal")
@@ -110,7 +110,7 @@ def test_a_state_is_what_the_package_computes(show, explored):
                 page.evaluate("(x) => change({x: [...x.entries()]})", [*values.values()])
             drawn(page)
             assert values_of(page) == [*values.values()]
-            of_python = problem.values(values)["structure"]
+            of_python = problem.posed.values(values)["structure"]
             if not of_python.roots:
                 continue
             mine = np.array([complex(r.re, r.im) for r in of_python.roots for _ in range(r.multiplicity)])
@@ -321,7 +321,7 @@ def test_limits_of_shares_are_read_in_percent(show, made):
         shown = re.fullmatch(r"holds by ([\d.]+) %", rear)
         assert shown is not None
         assert float(shown[1]) == pytest.approx(
-            100 * (explorer.problem.values(explorer.solution.parameters)["load_rear"] - 0.1), rel=1e-3
+            100 * (explorer.problem.posed.values(explorer.solution.parameters)["load_rear"] - 0.1), rel=1e-3
         )
         assert page.evaluate("limitsInWords(drawingOf())") == "all limits hold"
         page.evaluate("change({x: [[0, NaN]]})")  # of a design that is none nothing is said
@@ -556,7 +556,7 @@ def test_limits_are_lit(show, made):
                     values[p["name"]] = random.uniform(p["low"], p["high"])
             page.evaluate("(x) => change({x: [...x.entries()]})", [values[p["name"]] for p in parameters(page)])
             drawn(page)
-            read = problem.values(values)
+            read = problem.posed.values(values)
             margins = {
                 "steer_arm": abs(read["u_H"]) - 0.02,
                 "rear_wheel_holds": read["N_R"] - 20,
@@ -580,8 +580,8 @@ def test_quantities_are_those_of_the_package(show, explored):
         drawn(page)
         names, values = [p["name"] for p in parameters(page)], values_of(page)
         quantities = page.evaluate("DATA.quantities")
-        asked = {q["name"]: explorer.problem.read(q["name"]) for q in quantities}
-        read = array_function(explorer.problem, asked)(dict(zip(names, values, strict=True)))
+        asked = {q["name"]: explorer.problem.posed.read(q["name"]) for q in quantities}
+        read = array_function(explorer.problem.posed, asked)(dict(zip(names, values, strict=True)))
         shown = page.evaluate("[...document.querySelectorAll('#quantities td.value')].map((cell) => cell.textContent)")
         computed = page.evaluate("[...drawingOf().y].map(String)")[: len(shown)]
         for quantity, value, text in zip(quantities, computed, shown, strict=True):

@@ -55,7 +55,7 @@ def equations(explorer, values):
     if "I_Rxx" in values:  # of Whipple, by the published matrices
         M, C1, K0, K2 = (np.array(m) for m in BENCHMARK.values())
         return first_order(M, values["v"] * C1, 9.81 * K0 + values["v"] ** 2 * K2), np.linalg.solve(M, [0, 1])
-    of, pencil = explorer.problem.parameter_set, explorer.problem.model.pencil
+    of, pencil = explorer.problem.posed.parameter_set, explorer.problem.model.pencil
     assert pencil is not None
     M, D, K = (np.array(m, dtype=float) for m in pencil(of.native(values)))
     rate, torque = (float(f(values)) if f else 1.0 for f in (of.rate, of.torque))
@@ -271,7 +271,7 @@ def test_programs_set_and_get_the_design(show, made):
         found = page.evaluate("tmsopt.get()")
         values = shown(page)
         assert (found["parameters"]["Fr"], found["parameters"]["chi_B"]) == (0.5, 1.5)
-        known = explorer.problem.values(values)
+        known = explorer.problem.posed.values(values)
         assert found["abscissa"] == pytest.approx(known["abscissa"], rel=1e-9)
         assert found["damping_ratio"] == pytest.approx(known["damping_ratio"], rel=1e-9)
         assert found["quantities"]["nu_H"] == pytest.approx(known["nu_H"], rel=1e-12)

@@ -231,7 +231,7 @@ def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(show):
 def test_the_bicycle_is_to_scale_and_moves_as_a_body(show, made, name):
     """The distance of H from the drawn axis is the quantity of the model; leaning and steering keep all distances."""
     explorer, path = made(name)
-    values = explorer.problem.values(explorer.solution.parameters)
+    values = explorer.problem.posed.values(explorer.solution.parameters)
     with show(path) as page:
         H, turned, foot, on_axis, moved, B, leaned, ahead = np.array(
             page.evaluate("""() => {

@@ -27,7 +27,7 @@ fs.writeFileSync(process.argv[3], JSON.stringify(answer(given), plain));
 def page_script(problem):
     """Model, kernel and numerics of the page of a problem."""
     page = files("tmsopt.explorer") / "page" / "numerics.js"
-    return "\n".join([model_script(problem).text, kernel_script(problem.model.degree), page.read_text("utf-8")])
+    return "\n".join([model_script(problem.posed).text, kernel_script(problem.model.degree), page.read_text("utf-8")])
 
 
 def run(scripts, answer, given):

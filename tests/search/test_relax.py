@@ -317,7 +317,7 @@ def test_what_starts_met_on_the_way_counts():
     design = tmsopt.solve(asked, throw=False, stability=0.0)
     assert dict(design.relaxation.amounts) == {"damped": pytest.approx(0.009, abs=1e-9)}
     relaxed = replace(asked, fixed=design.relaxation.parameters, free={})
-    roots = np.roots([float(a) for a in relaxed.values(relaxed.fixed).coefficients])
+    roots = np.roots([float(a) for a in relaxed.posed.values(relaxed.fixed).coefficients])
     assert roots.imag.tolist() == [0.0] * 4
     at = relaxed.fixed
     assert (at["zeta_B"] + 0.67) / 0.42 + (at["lambda_s"] - 0.64) / 0.61 <= 0.385 + 1e-9
