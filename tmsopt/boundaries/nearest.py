@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
 
 _ROUNDS = 3
+_KEPT = 256  # designs
 _NOTHING, _SHIFT = 1e-12, 1e-3  # of a weight: what is 0 but for rounding; how far it is moved to see what it does
 
 
@@ -199,10 +201,12 @@ def robustness(
     return _surveyed(place)
 
 
-def robustness_at(problem: Posed, parameters: Mapping[str, float]) -> Robustness:
+@lru_cache(maxsize=_KEPT)
+def robustness_at(problem: Posed, parameters: Table[float]) -> Robustness:
     """The same for the boundaries of stability alone, with the weights of the problem, without IPOPT.
 
-    Of random designs it finds the same points; the edge of heavy damping it would lose here and there.
+    Kept for when a design is looked at in more cases. Of random designs it finds the same points; of the edge of heavy
+    damping it would lose some.
     """
     return _surveyed(placed(problem, parameters, problem.weights or None), STABILITY, slsqp)
 

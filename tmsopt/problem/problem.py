@@ -113,9 +113,9 @@ class Problem:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Posed:
-    """A problem as it is solved: the numbers of a `Problem`, its texts as formulas, its cases."""
+    """A problem as it is solved: the numbers of a `Problem`, its texts as formulas, its cases; a key of caches."""
 
     model: Model
     fixed: Mapping[str, float]

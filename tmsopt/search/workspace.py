@@ -1,10 +1,8 @@
 """What solving needs of a problem again and again, made once: for one problem, or for many that differ in numbers."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-
-import numpy as np
 
 from tmsopt.boundaries.nearest import Robustness, robustness_at
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
@@ -18,7 +16,7 @@ from tmsopt.program.formulate import design_of, formulate
 from tmsopt.program.ipopt import Run
 from tmsopt.program.nlp import NLP
 from tmsopt.program.options import DEFAULTS, Options
-from tmsopt.records import Array
+from tmsopt.records import Array, Table
 from tmsopt.search.sample import Sample, Sampler
 
 _THIN = 1e-9
@@ -53,7 +51,6 @@ class Workspace:
         extra_starts: designs that may be close to the optimum, to be started from.
         without_sample: whether to do without a sample.
         met: where starts ended in any part of the box, each with the NLP that it was started in.
-        nearest: boundaries nearest to designs that were met.
     """
 
     problem: Posed
@@ -63,7 +60,6 @@ class Workspace:
     extra_starts: tuple[Mapping[str, float], ...] = ()
     without_sample: bool = False
     met: list[tuple[NLP, LocalEnd]] = field(default_factory=list, compare=False)
-    nearest: dict[Hashable, Robustness] = field(default_factory=dict, compare=False, repr=False)
 
     def chained(self, candidate: LocalEnd) -> LocalEnd:
         """The same, not feasible where roots that a pattern makes meet have no Jordan chain."""
@@ -114,17 +110,11 @@ class Workspace:
 
     def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None, lead: int = 0) -> NLP:
         """The NLP of the problem on this part of the box."""
-        nlp = formulate(self.problem, cases, damping_ratio=damping_ratio, lead=lead)
-        return narrowed(nlp, self.part) if self.part is not self.problem else nlp
+        return formulate(self.part, cases, damping_ratio=damping_ratio, lead=lead)
 
     def around(self, parameters: Mapping[str, float]) -> Robustness | None:
-        """The boundaries nearest to a design, where the problem asks for the radius; met again as cases are added."""
-        if not self.problem.asks_radius:
-            return None
-        key = tuple(parameters.items())
-        if key not in self.nearest:
-            self.nearest[key] = robustness_at(self.problem, parameters)
-        return self.nearest[key]
+        """The boundaries nearest to a design, where the problem asks for the radius."""
+        return robustness_at(self.problem, Table(parameters)) if self.problem.asks_radius else None
 
     def design_at(self, x: Array) -> dict[str, float]:
         """The free parameters at a point of an NLP, inside the part of the box."""
@@ -132,7 +122,7 @@ class Workspace:
 
     def recheck(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> Evaluation:
         """What a design is in the given cases; see `checks.recheck`."""
-        return recheck(self.problem, parameters, cases, self.around(parameters))
+        return recheck(self.problem, parameters, cases)
 
     def parts(self, near: Mapping[str, float] | None = None) -> "tuple[Workspace, ...]":
         """The parts into which a parameter with two sides divides the box, positive values first.
@@ -169,15 +159,6 @@ def _on(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
     """The problem with a smaller range of one parameter, and its start where that fits."""
     inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
     return problem.derive(free={**problem.free, name: ends}, start=problem.start if inside else {})
-
-
-def narrowed(nlp: NLP, problem: Posed) -> NLP:
-    """An NLP with the box of a problem that has the same free parameters."""
-    of = problem.parameter_set
-    lower, upper = list(nlp.lower), list(nlp.upper)
-    for k, (name, ends) in enumerate(problem.free.items()):
-        lower[k], upper[k] = (float(np.tan(e)) if of[name].tangent else e for e in ends)
-    return replace(nlp, lower=tuple(lower), upper=tuple(upper))
 
 
 def check_near(problem: Posed, near: Mapping[str, float]) -> None:
