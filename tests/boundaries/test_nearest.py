@@ -16,7 +16,7 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.boundaries import nearest, robustness
 from tmsopt.errors import InputError
-from tmsopt.evaluation.recheck import recheck
+from tmsopt.evaluation import recheck
 from tmsopt.models import from_coefficients, from_matrices, tms, to_si
 from tmsopt.problem import Problem
 from tmsopt.report import robustness_line, robustness_table

@@ -4,6 +4,7 @@ The ball of a value is that of 106 bits; what doubles may be off is bounded by a
 """
 
 import math
+from functools import lru_cache
 from importlib import import_module
 
 import casadi as ca
@@ -23,6 +24,7 @@ function = import_module("tmsopt.explorer.javascript").function
 translation = import_module("tmsopt.global_search.translation")
 
 POINTS, FEW = 1000, 20
+COUNTS = (FEW, pytest.param(POINTS, marks=[pytest.mark.slow, pytest.mark.long]))
 SHORT = 60  # steps of what is multiplied out
 
 GAINS = ("k_phi", "k_phidot_v", "k_deltadot", "lag")
@@ -124,16 +126,16 @@ def _symbolic(own, x):
     return fold(own, {n: x[k] for k, n in enumerate(own.names)}, CASADI)
 
 
+@pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize(("name", "of"), SETS)
-def test_intervals_scip_and_fractions_hold_the_ball(name, of):
+def test_intervals_scip_and_fractions_hold_the_ball(name, of, count):
     """Output by output: intervals take all of them, SCIP the coefficients at least, fractions what is rational."""
-    own, columns, needed = asked(name, of, tangents=True), drawn(name, of, FEW), coefficients_of(name, of)
-    exact, met = balls(own, columns, FEW), dict.fromkeys(("intervals", "scip", "fractions"), 0)
+    own, columns, needed = asked(name, of, tangents=True), drawn(name, of, count), coefficients_of(name, of)
+    exact, met = balls(own, columns, count), dict.fromkeys(("intervals", "scip", "fractions"), 0)
     pytest.importorskip("pyscipopt")
-    built = translation._Translation()
     for k in range(len(own.outputs)):
-        part = own.part([own.outputs[k]])
-        for j in range(FEW):
+        part, built = own.part([own.outputs[k]]), translation._Translation()
+        for j in range(count):
             point = {n: float(x[j]) for n, x in columns.items()}
             for kind in met if exact[j][k].is_finite() else ():
                 try:
@@ -161,26 +163,30 @@ def _by_fractions(built, part, point):
         raise NotAccepted("what takes long to multiply out, and what is no number")
     with flint.ctx.workprec(212):
         exact = {n: flint.fmpq(*x.as_integer_ratio()) for n, x in point.items()}
-        return flint.arb(fold(multiplied_out(part), exact, BALLS)[0])
+        return flint.arb(fold(_multiplied_out(part), exact, BALLS)[0])
+
+
+_multiplied_out = lru_cache(maxsize=1)(multiplied_out)
 
 
 HOLDS = {"intervals": _by_intervals, "scip": _by_scip, "fractions": _by_fractions}
 
 
 @pytest.mark.skipif(not available(), reason="codac is not installed")
+@pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize(("name", "of"), SETS)
-def test_codac_holds_the_ball(name, of):
+def test_codac_holds_the_ball(name, of, count):
     """In a process of its own, for codac changes how doubles are rounded; it takes the coefficients at least."""
-    own, columns, needed = asked(name, of, tangents=True), drawn(name, of, FEW), coefficients_of(name, of)
-    exact, worker = balls(own, columns, FEW), Killable()
+    own, columns, needed = asked(name, of, tangents=True), drawn(name, of, count), coefficients_of(name, of)
+    exact, worker = balls(own, columns, count), Killable()
     parts = [own.part([o]) for o in own.outputs]
-    points = [{n: float(x[j]) for n, x in columns.items()} for j in range(FEW)]
+    points = [{n: float(x[j]) for n, x in columns.items()} for j in range(count)]
     try:
-        found = worker.call(ranges_by_codac, parts, points).result(timeout=100)
+        found = worker.call(ranges_by_codac, parts, points).result(timeout=1000)
     finally:
         worker.end()
     for k, row in enumerate(found):
-        assert k not in needed or row.count(None) < FEW, k
+        assert k not in needed or row.count(None) < count, k
         for j, over in enumerate(row):
             if over is not None and exact[j][k].is_finite():
                 assert flint.arb(over[0]).union(flint.arb(over[1])).overlaps(exact[j][k]), k

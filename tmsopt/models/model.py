@@ -18,6 +18,7 @@ from tmsopt.algebra.kinds import kind_of
 _BITS = 106  # the parameters' own roundings are all that widens a ball
 _EPSILON = 2.0**-53
 _NOTHING = 1e-9  # of a range
+_PAGE = 3000  # characters of a formula in LaTeX
 
 Computed = Callable[[Mapping[str, Any]], Any]
 """A number of named ones, by ``+ - * /`` and the operations of `tmsopt.algebra.kinds`: stated once, and traced."""
@@ -308,6 +309,15 @@ class Model:
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
         """The model for parameters within ranges: of a complex H with a carrier for these, any other itself."""
         return self if self.carried is None else self.carried(ranges)
+
+    def _repr_latex_(self) -> str | None:
+        """The characteristic polynomial in the native parameters; None for one that fills pages."""
+        from tmsopt.models.latex import LATEX, Typeset, polynomial_text
+
+        of = self.sets[0]
+        found = fold(self.formulas[of.name], {p.name: Typeset(p.latex) for p in of.parameters}, LATEX)
+        text = polynomial_text(found[len(of.names) :])
+        return f"$${text} = 0$$" if len(text) <= _PAGE else None
 
     def coefficient_names(self) -> tuple[str, ...]:
         """``a0 … an``, or ``coefficient0 …`` where a parameter or quantity has one of these names."""

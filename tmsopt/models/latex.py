@@ -1,0 +1,109 @@
+"""Formulas as LaTeX, for notebooks and papers."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import NamedTuple
+
+from tmsopt.algebra.formula import Constant, Formula, Kind, fold
+from tmsopt.algebra.kinds import FLOATS
+
+_SUM, _PRODUCT, _POWER, _ALONE = range(4)
+
+
+class Typeset(NamedTuple):
+    """The text of a part of a formula, and how tightly it binds: a sum least, a symbol most."""
+
+    text: str
+    binds: int = _ALONE
+
+    def within(self, least: int) -> str:
+        """The text, in parentheses unless it binds so tightly."""
+        return self.text if self.binds >= least else rf"\left({self.text}\right)"
+
+
+def _difference(a: Typeset, b: Typeset) -> Typeset:
+    return Typeset(f"{a.text} - {b.within(_PRODUCT)}", _SUM)
+
+
+def _sum(a: Typeset, b: Typeset) -> Typeset:
+    return Typeset(f"{a.text} - {b.text[1:]}" if b.text.startswith("-") else f"{a.text} + {b.text}", _SUM)
+
+
+def _product(a: Typeset, b: Typeset) -> Typeset:
+    dot = r" \cdot " if b.text[:1].isdigit() else r" \, "
+    return Typeset(f"{a.within(_PRODUCT)}{dot}{b.within(_PRODUCT + (b.text.startswith('-')))}", _PRODUCT)
+
+
+def _fraction(a: Typeset, b: Typeset) -> Typeset:
+    return Typeset(rf"\frac{{{a.text}}}{{{b.text}}}", _POWER)
+
+
+def _power(a: Typeset, b: Typeset) -> Typeset:
+    return Typeset(f"{a.within(_ALONE)}^{{{b.text}}}", _POWER)
+
+
+def _function(name: str) -> Callable[..., Typeset]:
+    return lambda *of: Typeset(rf"{name}\left({', '.join(x.text for x in of)}\right)", _POWER)
+
+
+def _relation(sign: str) -> Callable[[Typeset, Typeset], Typeset]:
+    return lambda a, b: Typeset(f"{a.text} {sign} {b.text}", _SUM)
+
+
+def _cases(condition: Typeset, a: Typeset, b: Typeset) -> Typeset:
+    rows = rf"{a.text} & \text{{if }} {condition.text} \\ {b.text} & \text{{else}}"
+    return Typeset(rf"\begin{{cases}} {rows} \end{{cases}}", _SUM)
+
+
+def _number(x: Constant) -> Typeset:
+    if isinstance(x, Formula):
+        typeset: Typeset = fold(x, {}, LATEX)[0]
+        return typeset
+    if isinstance(x, Fraction) and Fraction(repr(float(x))) != x:
+        sign, whole = "-" * (x < 0), abs(x)
+        return Typeset(rf"{sign}\frac{{{whole.numerator}}}{{{whole.denominator}}}", _SUM if sign else _POWER)
+    text, _, power = repr(float(x)).removesuffix(".0").partition("e")
+    scale = rf" \cdot 10^{{{int(power)}}}" if power else ""
+    return Typeset(text + scale, _SUM if text.startswith("-") else _PRODUCT if scale else _ALONE)
+
+
+LATEX = Kind(
+    {
+        **{name: _function(rf"\operatorname{{{name}}}") for name in FLOATS.operations},
+        **{name: _function(rf"\{name}") for name in ("exp", "log", "sin", "cos", "tan", "min", "max")},
+        **{f"a{name}": _function(rf"\arc{name}") for name in ("sin", "cos", "tan")},
+        "add": _sum,
+        "sub": _difference,
+        "mul": _product,
+        **dict.fromkeys(("div", "quotient", "ratio"), _fraction),
+        "neg": lambda a: Typeset(f"-{a.within(_PRODUCT)}", _SUM),
+        "pow": _power,
+        "square": lambda a: _power(a, Typeset("2")),
+        "sqrt": lambda a: Typeset(rf"\sqrt{{{a.text}}}"),
+        "abs": lambda a: Typeset(rf"\left|{a.text}\right|"),
+        "less": _relation("<"),
+        "at_most": _relation(r"\leq"),
+        "equal": _relation("="),
+        "both": _relation(r"\wedge"),
+        "either": _relation(r"\vee"),
+        "not": lambda a: Typeset(rf"\neg {a.within(_ALONE)}", _POWER),
+        "choose": _cases,
+        "positive_part": lambda a: Typeset(rf"\max\left(0, {a.text}\right)", _POWER),
+        "negligible": lambda a, size: Typeset(rf"{a.text} \approx 0", _SUM),
+        "pi": lambda: Typeset(r"\pi"),
+    },
+    _number,
+)
+"""To be folded with a `Typeset` for each name."""
+
+
+def polynomial_text(coefficients: list[Typeset], variable: str = "s") -> str:
+    """A polynomial of descending coefficients."""
+    terms = []
+    for k, c in zip(range(len(coefficients) - 1, -1, -1), coefficients, strict=True):
+        power = Typeset(variable if k == 1 else f"{variable}^{{{k}}}", _POWER)
+        terms += [] if c.text == "0" else [c if k == 0 else power if c.text == "1" else _product(c, power)]
+    text = terms[0].text if terms else "0"
+    for term in terms[1:]:
+        text = _sum(Typeset(text), term).text
+    return text
