@@ -64,14 +64,14 @@ def designs(problem, count, seed=0):
 
 
 def python_coefficients(problem, x):
-    of = problem.parameter_set
+    of = problem.posed.parameter_set
     found = problem.model.coefficients(dict(zip(of.names, x.T, strict=True)), of)
     return np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in found)), axis=1)
 
 
 def balls(problem, row, more=()):
     """Everything of a design in balls that allow for the rounding of each parameter, which sizes the terms of a sum."""
-    of = problem.parameter_set
+    of = problem.posed.parameter_set
     given = {n: flint.arb(float(v), abs(float(v)) * 2.0**-53) for n, v in zip(of.names, row, strict=True)}
     return Values(problem.model, of, given).knowing({name: exact(float(value)) for name, value in more})
 
@@ -156,7 +156,7 @@ DERIVED = """(rows) => {
 def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
     problem = problem_of(name)
     script = model_script(problem.posed)
-    assert [*script.constraints] == [*problem.conditions]
+    assert [*script.constraints] == [*problem.posed.conditions]
     x = designs(problem, FEW, seed=1)
     alpha, ratio = motion_of(python_coefficients(problem, x))
     frequency = roots(python_coefficients(problem, x)).imag.max(axis=1)
@@ -503,7 +503,7 @@ def test_random_expressions_have_the_values_that_python_computes():
     model = from_coefficients(["1", "u + v", "w"], quantities=texts)
     problem = Problem(model, free=dict.fromkeys("uvw", (-2.0, 2.0)))
     x = designs(problem, 20)
-    script = model_script(problem)
+    script = model_script(problem.posed)
     assert script.quantities == tuple(texts)
     answer = DERIVED.replace("100", str(FEW))
     found = np.array(run([page_script(problem)], answer, [[row, [0, 0, 0]] for row in x.tolist()]), dtype=float)
