@@ -184,7 +184,7 @@ def test_multiplier_of_a_quantity_at_its_kink_beside_a_solved_problem():
 
 def least_sampled(solution, sizes, count):
     """Least rise of the abscissa, at 60 digits, over random feasible designs at several distances."""
-    problem = solution.problem
+    problem = solution.problem.posed
     rng = np.random.default_rng(1)
     rises = []
     for size in sizes:
@@ -195,14 +195,10 @@ def least_sampled(solution, sizes, count):
             for name, d in zip(problem.free, step / np.linalg.norm(step), strict=True):
                 lower, upper = problem.free[name]
                 moved[name] = min(max(moved[name] + size * d, lower), upper)
-            if any(
-                c.violation(problem.posed.values(moved)) > 0
-                for c in problem.posed.conditions.values()
-                if "==" not in c.text
-            ):
+            if any(c.violation(problem.values(moved)) > 0 for c in problem.conditions.values() if "==" not in c.text):
                 continue
             taken += 1
-            native = problem.posed.parameter_set.native(moved)
+            native = problem.parameter_set.native(moved)
             a = polynomial_60(**{n: native[n] for n in NATIVE})
             rises.append(float(abscissa_60(a)) - solution.abscissa)
     return min(rises)

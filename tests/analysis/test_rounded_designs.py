@@ -70,11 +70,11 @@ def roots_of(problem, design):
 
 def one_by_one(solution, row):
     """Abscissa, damping ratio and violations of a rounded design."""
-    problem = solution.problem
+    problem = solution.problem.posed
     with flint.ctx.workdps(140):
         design = exact(solution, row.written)
         plain = {n: float(x) for n, x in design.items()}
-        listed = [case for case in problem.posed.cases if not case.direction]
+        listed = [case for case in problem.cases if not case.direction]
         cases = [*listed, solution.worst, *(w.case for w in worst_cases(problem, plain).values())]
         each = [case.applied(design) for case in cases] if listed else [design]
         motion = [roots_of(problem, one) for one in each]

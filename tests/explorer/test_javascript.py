@@ -167,17 +167,17 @@ def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
         for row, r, y in zip(x, motion, found, strict=True):
             of_roots = dict(zip(("abscissa", "damping_ratio", "angular_frequency"), r, strict=True))
             values = balls(problem, row, of_roots.items())
-            parameters = dict(zip(problem.parameter_set.names, row.tolist(), strict=True))
-            numbers = problem.values(parameters).knowing(of_roots)
+            parameters = dict(zip(problem.posed.parameter_set.names, row.tolist(), strict=True))
+            numbers = problem.posed.values(parameters).knowing(of_roots)
             for k, n in enumerate(script.quantities):
-                expected = problem.read(n).of(values, BALLS)
+                expected = problem.posed.read(n).of(values, BALLS)
                 known += bool(flint.arb(expected).is_finite())
                 assert agree(y[k], expected), n
-                plain = problem.read(n)(numbers)
+                plain = problem.posed.read(n)(numbers)
                 assert math.isnan(y[k]) == math.isnan(plain), n
                 assert math.isinf(y[k]) == math.isinf(plain), n
             for k, n in enumerate(script.constraints, start=len(script.quantities)):
-                condition = problem.conditions[n]
+                condition = problem.posed.conditions[n]
                 sign = -1 if condition.comparison == "<=" else 1  # the margin is what is left of a limit
                 assert agree(sign * y[k], condition.of(values, BALLS)), n
     assert known >= 0.5 * FEW * len(script.quantities)
@@ -508,10 +508,10 @@ def test_random_expressions_have_the_values_that_python_computes():
     answer = DERIVED.replace("100", str(FEW))
     found = np.array(run([page_script(problem)], answer, [[row, [0, 0, 0]] for row in x.tolist()]), dtype=float)
     with np.errstate(all="ignore"):
-        values = dict(zip(problem.parameter_set.names, x.T, strict=True))
+        values = dict(zip(problem.posed.parameter_set.names, x.T, strict=True))
         moved = {n: c * (1 + 2.0**-50) for n, c in values.items()}
         expected, near = (
-            np.stack(np.broadcast_arrays(*(problem.read(t)(v) for t in texts.values())), axis=1)
+            np.stack(np.broadcast_arrays(*(problem.posed.read(t)(v) for t in texts.values())), axis=1)
             for v in (values, moved)
         )
     found, expected, near = (np.where(np.isfinite(y), y, np.nan) for y in (found, expected, near))

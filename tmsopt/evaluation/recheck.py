@@ -143,7 +143,7 @@ def judged_exactly(
 def _is_near(condition: Expression, values: Values) -> bool:
     """Whether numeric roots leave it open that a condition is missed."""
     left, right = condition.sides(values)
-    slack = -condition.sign * (left - right)
+    slack = -condition.sign * float(condition(values))
     return condition.equality or not slack > _SCATTER * max(1.0, abs(left), abs(right))
 
 
@@ -196,7 +196,7 @@ def excesses(problem: Posed, parameters: Mapping[str, float], cases: Sequence[Ca
     looked = _look(problem, parameters, cases)
     found = {}
     for name, condition in problem.conditions.items():
-        differences = [left - right for left, right in (condition.sides(v) for v in looked.at(problem, condition))]
+        differences = [float(condition(v)) for v in looked.at(problem, condition)]
         if condition.equality:
             found[name] = differences[0]
         else:

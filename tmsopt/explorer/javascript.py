@@ -75,7 +75,7 @@ def model_script(problem: Posed) -> Script:
     limits = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
     asked = list(nodes_of(problem, {**{n: n for n in quantities}, **limits}).values())
     margins = [
-        -x if c.comparison == "<=" else x for c, x in zip(limits.values(), asked[len(quantities) :], strict=True)
+        x if c.sign < 0 or c.equality else -x for c, x in zip(limits.values(), asked[len(quantities) :], strict=True)
     ]
     entries = {n: f"x[{k}]" for k, n in enumerate(of.names)}
     every = entries | {n: f"r[{k}]" for k, n in enumerate(q.name for q in ROOT_QUANTITIES)}

@@ -101,7 +101,7 @@ def _words(model: Model, of: ParameterSet, problem: Posed | None, typed: Typed) 
 
 def _gains(model: Model) -> Iterator[Words]:
     """What [feedback] adds to the sets of a bicycle."""
-    if model.name not in MODELS:
+    if not gain_names(model.name):
         return
     for of, more in zip(model.sets, controlled(model, gain_names(model.name)).sets, strict=True):
         added = [_parameter(p, None, False) for p in more.parameters if p not in of.parameters]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.guide.text import matrix, table, wrapped
+from tmsopt.problem.expression import COMPARISONS
 from tmsopt.records import Printable, Table, plain
 from tmsopt.versions import SCHEMA
 
@@ -108,7 +109,11 @@ def description_text(found: Description) -> str:
         parts.append("\n".join([f"[feedback], {of.name}", *_words((*of.parameters, *of.quantities))]))
     roots = "eigenfrequencies" if "H" in found.matrices else "roots"
     parts.append("\n".join([f"patterns of {roots}, for locate", *table(list(found.patterns.items()))]))
-    parts.append("\n".join(["expressions", *wrapped([f"+ - * / **   <= >= ==   {' '.join(found.functions)}"])]))
+    parts.append(
+        "\n".join(
+            ["expressions", *wrapped([f"+ - * / **   {' '.join(COMPARISONS.values())}   {' '.join(found.functions)}"])]
+        )
+    )
     return "\n\n".join(parts)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from tmsopt.models import MODELS, Parameter, ParameterSet, controlled, gain_names
+from tmsopt.problem.expression import SIGN
 from tmsopt.problem.files import SHAPE as PROBLEM
 from tmsopt.problem.model_table import KEYS
 from tmsopt.roots.patterns.composed import pattern_names
@@ -25,7 +26,7 @@ _WITH_UNIT = rf"^\s*{_NUMBER}\s*[^\d\s.+-].*$"
 _NAME = "^[A-Za-z][A-Za-z0-9_]*$"
 _PART = r"(([1-9]\d*)?C?EP([2-9]|1[0-2])|weave|resonance|capsize)"
 _PATTERN = rf"^\s*{_PART}(\s*\+\s*{_PART})*\s*$"
-_COMPARISON = "^[^<>=]+(<=|>=|==)[^<>=]+$"
+_COMPARISON = f"^[^<>=]+({SIGN.pattern})[^<>=]+$"
 _OF_STUDY: Schema = {"anyOf": [{"required": [key]} for key in ("problem", "study", "vary")]}
 
 

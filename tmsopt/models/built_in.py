@@ -38,11 +38,11 @@ def controlled(model: Model, names: Iterable[str]) -> Model:
     More: docs/how_to/feedback.md
     """
     own = MODELS.get(model.name) is model or (model.origin is not None and model.origin[0] is _controlled)
-    return _controlled(model.name, names_of(names)) if own else model
+    return _controlled(model.name, names_of(names)) if own and gain_names(model.name) else model
 
 
 def gain_names(name: str) -> tuple[str, ...]:
-    """What [feedback] may name for a model of that name, in the units of each of its sets.
+    """What [feedback] may name for a model of that name, in the units of each of its sets; nothing for no bicycle.
 
     Example:
         >>> tmsopt.models.gain_names("whipple")[:4]
@@ -50,6 +50,8 @@ def gain_names(name: str) -> tuple[str, ...]:
 
     More: docs/how_to/feedback.md
     """
+    if name not in _STEERED:
+        return ()
     return (*FEEDBACK, *(native_name(n) for n in FEEDBACK if MODELS[name].sets[0].rate is None))
 
 

@@ -27,6 +27,10 @@ _BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.
 _STRICT = {ast.Lt: "<=", ast.Gt: ">="}
 
 _ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
+"""What left minus right may be: ends are 0 or none, which everybody relies on."""
+
+SIGN = re.compile("|".join(COMPARISONS.values()))
+"""A sign of comparison in a text."""
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
 _DEEPEST = 200

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from tmsopt.models.expression import (
     COMPARISONS,
+    SIGN,
     Expression,
     ExpressionError,
     UnknownName,
@@ -15,6 +16,7 @@ from tmsopt.problem.units.dimensions import UNITS, Dimension
 
 __all__ = [
     "COMPARISONS",
+    "SIGN",
     "Expression",
     "ExpressionError",
     "UnknownName",

@@ -219,11 +219,13 @@ def _with_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping
     gains, parameters, model = data.get("feedback", {}), data.get("parameters", {}), data.get("model", "tms")
     if not isinstance(gains, dict) or not isinstance(parameters, dict):
         return [], set(), data
-    if gains and not (isinstance(model, str) and model in MODELS):
+    known = gain_names(model) if isinstance(model, str) and gains else ()
+    if gains and not known:
         message = "is for the bicycles tms and whipple; your own system takes B, C and G in [model]"
-        found = [] if isinstance(model, str) else [Fault(message, ("feedback",))]  # of a misspelt name something else
+        misspelt = isinstance(model, str) and model not in MODELS  # of which something else is said
+        found = [] if misspelt else [Fault(message, ("feedback",))]
         return found, set(), {k: v for k, v in data.items() if k != "feedback"}
-    faults, known = [], gain_names(model) if gains else ()
+    faults = []
     for name in gains:
         if name not in known:
             faults.append(Fault(f"unknown gain {short(name)}; {suggest(name, known)}", ("feedback", name)))

@@ -2,10 +2,9 @@
 
 import re
 
-from tmsopt.problem.expression import written_sides
+from tmsopt.problem.expression import SIGN, written_sides
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_SIGN = re.compile("<=|>=|==")
 
 
 def limit_of(text: str) -> float | None:
@@ -23,7 +22,7 @@ def limit_side(text: str, name: str) -> int:
 
     Its parts alone are read: ``(abscissa) <= -0.3``.
     """
-    sides = [_close(side).strip("()") for side in _SIGN.split(text)]
+    sides = [_close(side).strip("()") for side in SIGN.split(text)]
     if len(sides) != 2 or name not in sides:
         return 0
     left = sides[0] == name

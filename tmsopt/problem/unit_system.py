@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.models import Parameter, Quantity
-from tmsopt.problem.expression import Expression, dimension, parse_comparison, parse_value, written_sides
+from tmsopt.problem.expression import SIGN, Expression, dimension, parse_comparison, parse_value, written_sides
 from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
@@ -167,9 +167,7 @@ def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
 def dimension_of(problem: Posed, text: str, units: Mapping[str, str] | None = None) -> Dimension:
     """Of an expression, or of a constraint, by its name or its text."""
     text = problem.constraints.get(text, text)
-    parse: Callable[..., Expression] = (
-        parse_comparison if any(sign in text for sign in ("<=", ">=", "==")) else parse_value
-    )
+    parse: Callable[..., Expression] = parse_comparison if SIGN.search(text) else parse_value
     try:
         return dimension(parse(text, problem.vocabulary), si_units(problem) if units is None else units)
     except ValueError:  # a pattern, or what else has no unit

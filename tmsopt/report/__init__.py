@@ -1,6 +1,6 @@
 """Results as text for a reader; nothing is computed here.
 
-In: results of any verb. Out: lines of text. Open `design` first: the report of a solution.
+In: results of any verb. Out: lines of text. Open `solution.design` first: the report of a solution.
 """
 
 import lazy_loader

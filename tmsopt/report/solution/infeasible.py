@@ -1,18 +1,17 @@
 """What stands in the way of a problem without an answer, as lines for a reader: first what would help."""
 
 import math
-import re
 from collections.abc import Collection
 
 from tmsopt.evaluation.exclusion import known_bound
 from tmsopt.problem import limit_of, unit_of
 from tmsopt.problem.advice.remedies import Need, Relaxation
+from tmsopt.problem.expression import SIGN
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import dimension_of, limit_text
 from tmsopt.records import Table
 
-_SIGN = re.compile(r"<=|>=|==")
 _AS_WRITTEN = 12  # digits: of a limit as it is, beside one that may differ from it in the sixth
 _OTHER = {"a0": "a mass matrix that is not singular (a0 = 0)", "coefficients": "coefficients that have values"}
 
@@ -125,7 +124,7 @@ def _nearest(solution: Solution, name: str) -> str:
     condition = problem.conditions.get(name)
     if relaxation is None or condition is None:
         return ""
-    sides = _SIGN.split(problem.constraints[name])
+    sides = SIGN.split(problem.constraints[name])
     reached = condition.sides(problem.values(relaxation.parameters))
     amount = relaxation.amounts.get(name, 0.0)
     for side, other, own, sign in zip(sides, reversed(sides), reached, (1, -1), strict=True):
