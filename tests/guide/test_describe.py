@@ -4,12 +4,14 @@ import json
 import math
 import re
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import casadi as ca
 import pytest
 
 import tmsopt
+from tmsopt.guide import schema_text
 from tmsopt.problem import parse_value
 
 PROBLEMS = sorted(Path("problems").glob("*.toml"))
@@ -159,3 +161,19 @@ def test_a_word_that_is_no_file_is_answered_with_the_models(tmp_path):
     (tmp_path / "bad.toml").write_text("[parameters]\nw = 1\n")
     with pytest.raises(tmsopt.InputError, match=r"bad\.toml:1: parameters: missing parameter"):
         tmsopt.describe(tmp_path / "bad.toml")
+
+
+def test_a_model_of_another_kind_may_come_with_the_package(monkeypatch, tmp_path):
+    """Named in the table of models alone, it is described, solved, and in the schema; no controller is for it."""
+    pendulum = replace(tmsopt.models.from_coefficients([1, "c", "k - 1"]), name="pendulum", statement=None)
+    monkeypatch.setitem(import_module("tmsopt.models.built_in").MODELS, "pendulum", pendulum)
+    file = tmp_path / "pendulum.toml"
+    asked = 'model = "pendulum"\nparameters = { c = 4, k = { min = 1.5, max = 9 } }\nobjective = { minimize = "abscissa" }\n'
+    file.write_text(asked, encoding="utf-8")
+    assert tmsopt.solve(file).abscissa == pytest.approx(-2, abs=1e-12)  # from k = 1 + c²/4 on
+    assert names(tmsopt.describe(file)) >= {"c", "k", "a0", "abscissa"}
+    assert not any(words.parameters for words in tmsopt.describe("pendulum").feedback)
+    assert "parameters_pendulum" in schema_text()
+    file.write_text(f"{asked}feedback = {{ k_phi = 1 }}\n", encoding="utf-8")
+    with pytest.raises(tmsopt.InputError, match="for the bicycles tms and whipple"):
+        tmsopt.load(file)
