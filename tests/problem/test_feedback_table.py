@@ -275,7 +275,7 @@ def test_results_are_written_for_every_kind(kind, tmp_path):
         si = tmsopt.report.si_parameters(design)
         assert si["k_phi"] == pytest.approx(9.81 * design.parameters["kappa_phi"], rel=1e-14)
         assert si["k_phidot"] == pytest.approx(math.sqrt(9.81) * design.parameters["kappa_phidot"], rel=1e-14)
-    assert set(design.to_json()["parameters"]) == set(problem.parameter_set.names)
+    assert set(design.to_json()["parameters"]) == set(problem.posed.parameter_set.names)
     written = re.search(r"^const DATA = (.*);$", page_of(design), re.MULTILINE)
     assert written is not None
     data = json.loads(written[1])

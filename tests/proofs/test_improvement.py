@@ -70,7 +70,7 @@ def test_a_feasible_design_is_never_called_infeasible(status):
     missed = replace(tmsopt.solve(asked), status=status, value=float("nan"))
     design = tmsopt.certify(missed, seconds=SECONDS)
     assert design.status == "not_converged"
-    assert not recheck(asked, design.parameters).violations
+    assert not recheck(asked.posed, design.parameters).violations
     assert design.value == design.parameters["x"]
     assert [note for note in design.notes if "branch and bound found" in note][-1].startswith(
         "branch and bound found a feasible design"

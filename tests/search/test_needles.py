@@ -68,7 +68,7 @@ def test_a_needle_about_the_least_abscissa_is_not_called_empty(goal):
     found = tmsopt.solve(replace(robot, minimize=goal, constraints=limits), throw=False)
     assert found.status == "optimal"
     assert found.abscissa == pytest.approx(-3.125, abs=1e-8)
-    assert found.value <= robot.values(least.parameters)[goal.strip("-")] * (-1 if goal.startswith("-") else 1)
+    assert found.value <= robot.posed.values(least.parameters)[goal.strip("-")] * (-1 if goal.startswith("-") else 1)
 
 
 @pytest.mark.parametrize(
