@@ -1,9 +1,9 @@
-"""Options of earlier versions that are still accepted and do nothing."""
+"""What earlier versions had: options that do nothing any more, attributes that stand elsewhere."""
 
 import warnings
 from collections.abc import Callable
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -27,3 +27,42 @@ def ignore_option(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 def no_longer_needed(option: str) -> str:
     """What a user reads who gives such an option."""
     return f"{option} is no longer needed: NumPy computes every chart; leave it out"
+
+
+OF_POSED = frozenset(
+    (
+        "asked_of_roots",
+        "asks",
+        "asks_radius",
+        "cases",
+        "conditions",
+        "exactly",
+        "heading",
+        "located",
+        "nominal",
+        "objective",
+        "objectives",
+        "ordered",
+        "parameter_set",
+        "pattern",
+        "read",
+        "sense",
+        "sign",
+        "typed",
+        "values",
+        "vocabulary",
+    )
+)
+"""Attributes of a `Problem` in 1.1 that are those of its `posed`."""
+
+
+def moved_to_posed(problem: Any, name: str) -> Any:
+    """An attribute of a problem that is one of its `posed`.
+
+    Raises:
+        AttributeError: for any other.
+    """
+    if name not in OF_POSED:
+        raise AttributeError(f"'{type(problem).__name__}' object has no attribute '{name}'", name=name, obj=problem)
+    warnings.warn(f"Problem.{name} is moved: write problem.posed.{name}", DeprecationWarning, stacklevel=3)
+    return getattr(problem.posed, name)

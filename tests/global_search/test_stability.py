@@ -42,7 +42,10 @@ def problem(coefficients, free, **asked):
 def test_boxes_without_a_stable_design(coefficients, free, asked):
     stated = problem(coefficients, free, **asked)
     assert any_stable(stated.posed, SECONDS).any is False
-    assert any_stable(stated, SECONDS, known=stated.posed.ordered({n: hi for n, (_, hi) in free.items()})).any is False
+    assert (
+        any_stable(stated.posed, SECONDS, known=stated.posed.ordered({n: hi for n, (_, hi) in free.items()})).any
+        is False
+    )
 
 
 @scip

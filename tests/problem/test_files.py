@@ -198,3 +198,13 @@ def test_a_study_is_told_from_a_problem():
 def test_a_problem_with_a_table_of_studies_has_an_unknown_key(write):
     with pytest.raises(tmsopt.InputError, match="unknown key 'vary'"):
         tmsopt.load(write(GOOD + "[vary]\nmu = [0.1]\n"))
+
+
+def test_what_a_problem_had_still_answers_and_says_where_it_is():
+    problem = tmsopt.load("problems/ep4.toml")
+    with pytest.warns(DeprecationWarning, match="problem.posed.sense"):
+        assert problem.sense == problem.posed.sense == "minimize"
+    with pytest.raises(AttributeError, match="no attribute 'speed'"):
+        problem.speed  # noqa: B018
+    assert problem.posed.problem is problem
+    assert pickle.loads(pickle.dumps(problem)) == problem

@@ -147,7 +147,9 @@ def test_the_benchmark_bicycle():
 
 
 def eigenvalues(problem, parameters):
-    a = problem.model.coefficients({n: parameters[n] for n in problem.posed.parameter_set.names}, problem.parameter_set)
+    a = problem.model.coefficients(
+        {n: parameters[n] for n in problem.posed.parameter_set.names}, problem.posed.parameter_set
+    )
     return np.roots([float(x) for x in a])
 
 

@@ -1,4 +1,4 @@
-"""From starts to the nearest point of one edge, by solvers that serve every design of a model."""
+"""From starts to the nearest point of one edge: IPOPT, with solvers that serve every design of a model."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from tmsopt.algebra.formula import formula, symbol
 from tmsopt.boundaries.boundaries import Edge
 from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.models import Model
-from tmsopt.program.ipopt import Run, ipopt, polisher
+from tmsopt.program.ipopt import ipopt, polisher
 from tmsopt.program.nlp import NLP, name_of
 from tmsopt.records import Array
 
@@ -25,9 +25,6 @@ _SHIFTED = 1e-8  # share by which what is left of a violation shifts the square 
 _KEPT = 64  # programs, of so many edges and models
 _WEIGHT, _SCALE, _SIZE, _SIGN = "weight of ", "scale ", "size ", "sign of a0"
 """What numbers of a program are called beside the parameters, of which none has a blank in its name."""
-
-Solver = Callable[..., Callable[[Array], Run]]
-"""Of an NLP, at most so many iterations: start → run."""
 
 
 @dataclass(frozen=True)
@@ -46,15 +43,12 @@ class Approach:
         return float(np.linalg.norm(self.u)) if self.u.size else math.inf
 
 
-def approach(
-    place: WeightedDesign, edge: Edge, sign: float, size: float, solver: Solver = ipopt
-) -> Callable[[Array, float], Approach | None]:
+def approach(place: WeightedDesign, edge: Edge, sign: float, size: float) -> Callable[[Array, float], Approach | None]:
     """A function from a start, and a distance to beat, to a nearest point of an edge; None where it ends elsewhere.
 
     Args:
         sign: sign of a0 on the side of the edge that is stable or heavily damped.
         size: distance to expect, the unit in which the NLP measures.
-        solver: what goes from a start to a point that Newton's method refines.
     """
     n, own = len(place.weights), {name: place.parameters[name] for name in place.problem.parameter_set.names}
     own |= {_WEIGHT + name: weight for name, weight in place.weights.items()}
@@ -67,7 +61,7 @@ def approach(
         upper=(*(place.space.upper / size).tolist(), *plain.upper[n:]),
         numbers=own,
     )
-    run, polish = solver(nlp, max_iterations=_ITERATIONS), polisher(nlp)
+    run, polish = ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp)
 
     def from_start(u: Array, below: float) -> Approach | None:
         c = sign * place.space.coefficients(u)

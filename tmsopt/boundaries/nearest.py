@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.boundaries.approach import ALIKE, Approach, Solver, approach
+from tmsopt.boundaries.approach import ALIKE, Approach, approach
 from tmsopt.boundaries.boundaries import KINDS, Edge, edges
 from tmsopt.boundaries.rays import RayCrossing, between, elsewhere, most_damped, ray_crossings
 from tmsopt.boundaries.surroundings import WeightedDesign, placed
@@ -17,8 +17,6 @@ from tmsopt.errors import Fault, InputError, suggest, table_faults
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
-from tmsopt.program.ipopt import ipopt
-from tmsopt.program.slsqp import slsqp
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Table, plain
 
@@ -201,35 +199,35 @@ def robustness(
     return _surveyed(place)
 
 
+def robustness_at(problem: Posed, parameters: Mapping[str, float]) -> Robustness:
+    """The same for the boundaries of stability alone, with the weights of the problem; kept for a while."""
+    return _at(problem, Table(parameters), Table(problem.weights))
+
+
 @lru_cache(maxsize=_KEPT)
-def robustness_at(problem: Posed, parameters: Table[float]) -> Robustness:
-    """The same for the boundaries of stability alone, with the weights of the problem, without IPOPT.
-
-    Kept for when a design is looked at in more cases. Of random designs it finds the same points; of the edge of heavy
-    damping it would lose some.
-    """
-    return _surveyed(placed(problem, parameters, problem.weights or None), STABILITY, slsqp)
+def _at(problem: Posed, parameters: Table[float], weights: Table[float]) -> Robustness:
+    return _surveyed(placed(problem, parameters, weights or None), STABILITY)
 
 
-def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS), solver: Solver = ipopt) -> Robustness:
+def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS)) -> Robustness:
     damped = "heavy damping" in kinds
     seen = ray_crossings(place.space, damped=damped)
-    found = _each(place, seen, kinds, solver)
+    found = _each(place, seen, kinds)
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
         seen = sorted([*seen, *between(place.space, u, damped)], key=lambda c: c.distance)
-        found = _each(place, seen, kinds, solver)
+        found = _each(place, seen, kinds)
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
     zeros = _zeros(place) if place.stands_on else ()
     return Robustness(place.problem.problem, stable, place.stands_on, zeros, place.heavily_damped, *own, *found)
 
 
-def _each(place: WeightedDesign, seen: list[RayCrossing], kinds: Sequence[str], solver: Solver) -> list[Nearest]:
+def _each(place: WeightedDesign, seen: list[RayCrossing], kinds: Sequence[str]) -> list[Nearest]:
     """The nearest point of each boundary; eigenfrequencies of a complex system pass the real line alone."""
     real = place.problem.model.carrier is None
-    return [_nearest(place, seen, kind, solver) if real or kind == "weave" else Nearest(kind) for kind in kinds]
+    return [_nearest(place, seen, kind) if real or kind == "weave" else Nearest(kind) for kind in kinds]
 
 
 def _zeros(place: WeightedDesign) -> tuple[str, ...]:
@@ -259,7 +257,7 @@ def _place(
     return placed(problem, problem.ordered(parameters or {}), weights)
 
 
-def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, solver: Solver = ipopt) -> Nearest:
+def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Nearest:
     """The least distance over the pieces of one boundary."""
     if kind in place.stands_on or (kind == "heavy damping" and place.on_edge):
         zero = dict.fromkeys(place.weights, 0.0)
@@ -268,7 +266,7 @@ def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, solver: 
     best = Approach()
     pieces = edges(place.problem.model.degree)
     for edge, sign, starts in _pieces(place, mine, kind):
-        best = min(best, _best(place, pieces[edge], sign, starts, solver), key=lambda found: found.distance)
+        best = min(best, _best(place, pieces[edge], sign, starts), key=lambda found: found.distance)
     if mine and mine[0].distance < best.distance * (1 - ALIKE):
         best = Approach(mine[0].u, False)
     if not best.u.size or not is_boundary(place, best.u, kind == "heavy damping"):
@@ -291,11 +289,11 @@ def _pieces(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Iterat
         yield edge, sign, points
 
 
-def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], solver: Solver) -> Approach:
+def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array]) -> Approach:
     """The nearest of where the starts lead; what is crossed on the way there is started from too, and points as far."""
     best = Approach()
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
-    run = approach(place, edge, sign, size, solver)
+    run = approach(place, edge, sign, size)
     for turn in range(_ROUNDS):
         before = best.distance
         for u in starts:

@@ -254,7 +254,7 @@ def _look(
         fastest = max(near_fastest, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
         worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]
     if around is None and problem.asks_radius and stored is None:
-        around = robustness_at(problem, Table(parameters))
+        around = robustness_at(problem, parameters)
     if around is not None:
         worst[RADIUS] = around.radius
     nominal, *each = (v.knowing({"structure": v["structure"], **worst}) for v in (nominal, *each))

@@ -4,10 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tmsopt.algebra.formula import Node, fold, formula
 from tmsopt.algebra.kinds import BALLS
+from tmsopt.deprecated import moved_to_posed
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.exact import number
 from tmsopt.models.user_spectrum import pattern_of
@@ -106,7 +107,15 @@ class Problem:
     @cached_property
     def posed(self) -> "Posed":
         """The problem as it is solved, found once."""
-        return Posed(**self.__getstate__())
+        found = Posed(**self.__getstate__())
+        vars(found).update(problem=self)
+        return found
+
+    if not TYPE_CHECKING:  # which tells names that are wrong
+
+        def __getattr__(self, name: str) -> Any:
+            """What is not stated was here before, and is one of `posed`."""
+            return moved_to_posed(self, name)
 
     def __getstate__(self) -> dict[str, Any]:
         """What was stated, without what is kept of it."""

@@ -16,7 +16,7 @@ from tmsopt.program.formulate import design_of, formulate
 from tmsopt.program.ipopt import Run
 from tmsopt.program.nlp import NLP
 from tmsopt.program.options import DEFAULTS, Options
-from tmsopt.records import Array, Table
+from tmsopt.records import Array
 from tmsopt.search.sample import Sample, Sampler
 
 _THIN = 1e-9
@@ -114,7 +114,7 @@ class Workspace:
 
     def around(self, parameters: Mapping[str, float]) -> Robustness | None:
         """The boundaries nearest to a design, where the problem asks for the radius."""
-        return robustness_at(self.problem, Table(parameters)) if self.problem.asks_radius else None
+        return robustness_at(self.problem, parameters) if self.problem.asks_radius else None
 
     def design_at(self, x: Array) -> dict[str, float]:
         """The free parameters at a point of an NLP, inside the part of the box."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tmsopt.problem.expression import written_sides
@@ -104,7 +104,7 @@ def with_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
             (low, high), new = ends[parameter], text if unit_of(problem, name).text else float(text)
             ends[parameter] = (low, new) if end == "max" else (new, high)
     kept = {name: written.get(name, text) for name, text in problem.constraints.items()}
-    return problem.derive(constraints=kept, free=ends, start={})
+    return replace(problem.problem, constraints=kept, free=ends, start={}).posed
 
 
 def _moved(problem: Posed, name: str, amount: float, digits: int) -> str:
