@@ -71,7 +71,7 @@ class Formula:
         steps = (
             Step(INPUT, (), str(k))
             if k in known
-            else self.steps[k]._replace(operands=tuple(place[o] for o in self.steps[k].operands))
+            else self.steps[k]._replace(operands=tuple(map(place.__getitem__, self.steps[k].operands)))
             for k in place
         )
         return Formula(self.names, tuple(steps), tuple(place[o] for o in outputs))
@@ -89,7 +89,7 @@ class Formula:
         """The steps that depend on some of the inputs."""
         found: set[int] = set()
         for k, step in enumerate(self.steps):
-            if step.value in names if step.op == INPUT else any(o in found for o in step.operands):
+            if step.value in names if step.op == INPUT else not found.isdisjoint(step.operands):
                 found.add(k)
         return found
 
@@ -162,7 +162,7 @@ def fold(
             if len(operands) == 2:  # by far the most
                 result = operation(found[operands[0]], found[operands[1]])
             else:
-                result = operation(*[found[o] for o in operands])
+                result = operation(*map(found.__getitem__, operands))
             if shared and uses > 1:
                 result = shared(result)
         found.append(result)
@@ -189,8 +189,10 @@ class Node:
 
     def __init__(self, op: str, operands: tuple["Node", ...] = (), value: Any = None) -> None:
         self.op, self.operands, self.value = op, operands, value
-        self.fixed: bool = op != INPUT and all(o.fixed for o in operands)
-        self.total: bool = op in _TOTAL and all(o.total for o in operands)
+        self.fixed: bool = op != INPUT
+        self.total: bool = op in _TOTAL
+        for o in operands:
+            self.fixed, self.total = self.fixed and o.fixed, self.total and o.total
 
     def __bool__(self) -> bool:
         raise TypeError("a formula does not ask what its numbers are; write choose(condition, a, b)")
@@ -307,8 +309,11 @@ def constant(x: Any) -> Node:
 
 def made(op: str, *given: Any) -> Node:
     """An operation on nodes and numbers, in its simplest form."""
-    operands = tuple(constant(x) for x in given)
-    fractions = [None if isinstance(x, float) and x == 0 else o.fraction for x, o in zip(given, operands, strict=True)]
+    operands = tuple(map(constant, given))
+    fractions = []
+    for x, o in zip(given, operands, strict=True):
+        known = o.op == CONSTANT and isinstance(o.value, Fraction) and not (isinstance(x, float) and x == 0)
+        fractions.append(o.value if known else None)
     if op in _EXACT and None not in fractions and (number := _EXACT[op](*fractions)) is not None:
         return Node(CONSTANT, (), number)
     simplest = _simplest(op, operands, fractions) if op in _SIMPLEST else None
@@ -400,7 +405,7 @@ def _listed(outputs: Sequence[Node], names: Iterable[str], alone: Callable[[Node
             waiting += [node, *left[::-1]]
             continue
         else:
-            step = Step(node.op, tuple(known[id(o)] for o in node.operands), node.value)
+            step = Step(node.op, tuple(map(known.__getitem__, map(id, node.operands))), node.value)
         known[id(node)] = places.setdefault(step, len(places))
     met = [step.value for step in places if step.op == INPUT]
     return Formula(tuple(dict.fromkeys((*names, *met))), tuple(places), tuple(known[id(n)] for n in outputs))

@@ -357,6 +357,8 @@ def kind_of(*numbers: Any) -> Kind:
     """The kind that numbers are of; floats among others are taken for those."""
     found = FLOATS
     for x in numbers:
+        if isinstance(x, float):  # by far the most
+            continue
         if isinstance(x, Node):
             return NODES
         if isinstance(x, ca.SX | ca.MX):

@@ -13,7 +13,7 @@ import numpy as np
 
 from tmsopt.algebra.balls import as_ball
 from tmsopt.algebra.formula import Formula, fold, formula, symbol
-from tmsopt.algebra.kinds import kind_of
+from tmsopt.algebra.kinds import BALLS, kind_of
 
 _BITS = 106  # the parameters' own roundings are all that widens a ball
 _EPSILON = 2.0**-53
@@ -222,8 +222,12 @@ class ParameterSet:
         """Names of the parameters, in the order of the documentation."""
         return tuple(p.name for p in self.parameters)
 
+    @cached_property
+    def _by_name(self) -> dict[str, Parameter]:
+        return {p.name: p for p in self.parameters}
+
     def __getitem__(self, name: str) -> Parameter:
-        return next(p for p in self.parameters if p.name == name)
+        return self._by_name[name]
 
 
 @dataclass(frozen=True)
@@ -292,7 +296,7 @@ class Model:
         kind, native = kind_of(*parameters.values()), self.sets[0].names
         with np.errstate(all="ignore"):
             found = fold(self.formulas[of.name], parameters, kind)
-        rounded = any(isinstance(x, flint.arb | flint.arb_series) for x in parameters.values())
+        rounded = kind is BALLS and any(isinstance(x, flint.arb | flint.arb_series) for x in parameters.values())
         coefficients = found[len(native) :]
         return dict(zip(native, found, strict=False)), [*map(as_ball, coefficients)] if rounded else coefficients
 
@@ -321,6 +325,10 @@ class Model:
 
     def coefficient_names(self) -> tuple[str, ...]:
         """``a0 … an``, or ``coefficient0 …`` where a parameter or quantity has one of these names."""
+        return self._coefficient_names
+
+    @cached_property
+    def _coefficient_names(self) -> tuple[str, ...]:
         taken = {n for of in self.sets for n in (*of.names, *(q.name for q in of.quantities))}
         taken |= {q.name for q in self.quantities}
         plain = tuple(f"a{k}" for k in range(self.degree + 1))
