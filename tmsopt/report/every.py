@@ -24,7 +24,7 @@ def every_table(every: Every) -> str:
     many = f"{len(found)} solution{'' if len(found) == 1 else 's'}"
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if not found:
-        none = f"no design in the box has the pattern (proved; {effort})"
+        none = f"no design in the box and within the limits has the pattern (proved; {effort})"
         lines = [none if known else "no single solution was met"]
     else:
         problem = found[0].problem
