@@ -217,7 +217,7 @@ def test_no_limit_is_moved_for_nothing_nor_farther_than_a_known_design_needs(tmp
     asked = written(tmp_path, SLOW_ROBOT)
     changes = [tmsopt.solve(asked, throw=False, seed=seed).relaxation.remedies for seed in range(4)]
     change, _ = [found[0] for found in changes if len(found) == 1 and not set(found[0]) & set(asked.constraints)][:2]
-    moved = with_limits(asked, change)
+    moved = with_limits(asked.posed, change)
     design = tmsopt.solve(moved)
     assert design.stable
     known = {**asked.free, "v": (1 / 3.6, 11.861 / 3.6), "x_B": (0.2, 0.61)}
