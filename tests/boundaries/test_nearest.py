@@ -217,9 +217,14 @@ def test_the_radius_of_a_recheck_has_the_weights_of_its_problem():
 
 
 def test_a_radius_that_is_kept_is_that_of_the_weights():
-    swing = Problem(from_coefficients([1, "c", "k"]), fixed={"c": 1.0, "k": 4.0}, constraints={"far": "radius >= 0.6"})
-    radii = [tmsopt.solve(replace(swing, weights={"c": 1.0, "k": w}), throw=False).quantities["radius"] for w in (1, 8)]
-    assert radii == pytest.approx([1.0, 0.5], abs=1e-12)  # c = 0, k = 0
+    """The same object, its weights changed in place: c = 0 is at 1, and k = 0 then at 4/8."""
+    weights = {"c": 1.0, "k": 1.0}
+    swing = Problem(from_coefficients([1, "c", "k"]), {"c": 1.0, "k": 4.0}, constraints={"far": "radius >= 0.6"})
+    swing = replace(swing, weights=weights)
+    radii = [tmsopt.solve(swing, throw=False).quantities["radius"]]
+    swing.weights.update(k=8.0)
+    radii.append(tmsopt.solve(swing, throw=False).quantities["radius"])
+    assert radii == pytest.approx([1.0, 0.5], abs=1e-12)
 
 
 def test_an_unstable_design_has_no_radius():
