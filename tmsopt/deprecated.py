@@ -56,7 +56,7 @@ OF_POSED = frozenset(
 """Attributes of a `Problem` in 1.1 that are those of its `posed`."""
 
 
-def moved_to_posed(problem: Any, name: str) -> Any:
+def read_from_posed(problem: Any, name: str) -> Any:
     """An attribute of a problem that is one of its `posed`.
 
     Raises:

@@ -76,7 +76,7 @@ class _Stated(dict[str, Any]):
             raise KeyError(name)
         return self.coefficients[self._names.index(name)]
 
-    def knowing(self, known: Mapping[str, Any]) -> "_Stated":
+    def with_known(self, known: Mapping[str, Any]) -> "_Stated":
         other = copy(self)
         other.update(known)
         return other
@@ -144,7 +144,7 @@ class Designs:
                 a = self.coefficients(few, int(held.sum()))
                 exist = np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0)
                 if rooted or self.about_roots:
-                    few = few.knowing(dict(zip(_ROOTS, root_values(eigenvalues(a)), strict=True)))
+                    few = few.with_known(dict(zip(_ROOTS, root_values(eigenvalues(a)), strict=True)))
                 worst = np.where(exist, 0.0, NOWHERE)
                 for row in rooted:
                     worst = np.maximum(worst, row.excess(few))
@@ -190,7 +190,7 @@ def exactly(problem: Problem, design: Mapping[str, float]) -> Iterator[Exactly]:
         for z in near_roots(problem, design):
             with flint.ctx.workdps(DIGITS):
                 known = {n: flint.arb(float(found)) for n, found in zip(_ROOTS, root_values(z), strict=True)}
-                values = stored_values(problem, design).knowing(known)
+                values = stored_values(problem, design).with_known(known)
                 worst = max((float(r.excess(values)) for r in at.rows), default=0.0)
                 value = float(evaluated(at.objective, values))
             yield Exactly(value, max(worst, box) if np.isfinite(value) else NOWHERE, z)

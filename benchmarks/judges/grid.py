@@ -119,7 +119,7 @@ class Judge:
                 scatter = [np.ptp(np.array([m[k] for m in moved]), axis=0) for k in (0, 1)]
                 abscissa, damping = abscissa - shift * scatter[0], damping + shift * scatter[1]
             known = {"abscissa": abscissa[:, None], "damping_ratio": damping[:, None]}
-            each, one = each.knowing(known), one.knowing(known)
+            each, one = each.with_known(known), one.with_known(known)
             violation = np.zeros(x.shape[1])
             for left, comparison, right in self._rows:
                 values = one if comparison == "==" else each

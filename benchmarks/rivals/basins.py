@@ -73,7 +73,9 @@ class _Search:
         values = self.at.values(x)
         if rooted:
             a = self.at.coefficients(values, x.shape[1])
-            values = values.knowing(dict(zip(("abscissa", "damping_ratio"), root_values(eigenvalues(a)), strict=True)))
+            values = values.with_known(
+                dict(zip(("abscissa", "damping_ratio"), root_values(eigenvalues(a)), strict=True))
+            )
         return values
 
     def repaired(self, u: Array, steps: int, every: bool = False) -> Array:

@@ -109,7 +109,7 @@ class Lifted:
             values = at.values(self.x(around[:n]))
             a = at.coefficients(values, count + 1)
             a = a / a[:, :1]
-            values = values.knowing({"abscissa": around[n], "damping_ratio": around[n + 1]})
+            values = values.with_known({"abscissa": around[n], "damping_ratio": around[n + 1]})
             value = at.sign * (np.asarray(evaluated(at.objective, values)) + size)
             below = [-self.margin - r.apart(values) + size for r in at.rows if r.comparison != "=="]
             equal = [np.asarray(r.apart(values)) + size for r in at.rows if r.comparison == "=="]

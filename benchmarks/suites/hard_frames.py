@@ -53,7 +53,7 @@ class Frame:
             values = Values(self.model, problem.posed.parameter_set, {**problem.fixed, **at})
             a = np.stack(np.broadcast_arrays(*values.coefficients, self.designs[0]), axis=-1)[:, :-1]
             abscissa, ratio = root_values(eigenvalues(np.asarray(a, float)))
-        return values.knowing({"abscissa": abscissa, "damping_ratio": ratio})
+        return values.with_known({"abscissa": abscissa, "damping_ratio": ratio})
 
     @cached_property
     def anchor(self) -> int:

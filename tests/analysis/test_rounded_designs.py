@@ -83,7 +83,7 @@ def one_by_one(solution, row):
     known = {"abscissa": realised, "damping_ratio": ratio}
     known["angular_frequency"] = max(abs(r.im) for found in motion for r in found)
     found = [problem.values(plain), *(problem.values({n: float(x) for n, x in one.items()}) for one in each)]
-    found = [values.knowing(known) for values in found]
+    found = [values.with_known(known) for values in found]
     violated = {}
     for name, condition in problem.conditions.items():
         amounts = [(condition.violation(v), float(condition.excess(condition(v)))) for v in found]

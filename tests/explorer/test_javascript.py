@@ -73,7 +73,7 @@ def balls(problem, row, more=()):
     """Everything of a design in balls that allow for the rounding of each parameter, which sizes the terms of a sum."""
     of = problem.posed.parameter_set
     given = {n: flint.arb(float(v), abs(float(v)) * 2.0**-53) for n, v in zip(of.names, row, strict=True)}
-    return Values(problem.model, of, given).knowing({name: exact(float(value)) for name, value in more})
+    return Values(problem.model, of, given).with_known({name: exact(float(value)) for name, value in more})
 
 
 def agree(found, ball, factor=1000):
@@ -168,7 +168,7 @@ def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
             of_roots = dict(zip(("abscissa", "damping_ratio", "angular_frequency"), r, strict=True))
             values = balls(problem, row, of_roots.items())
             parameters = dict(zip(problem.posed.parameter_set.names, row.tolist(), strict=True))
-            numbers = problem.posed.values(parameters).knowing(of_roots)
+            numbers = problem.posed.values(parameters).with_known(of_roots)
             for k, n in enumerate(script.quantities):
                 expected = problem.posed.read(n).of(values, BALLS)
                 known += bool(flint.arb(expected).is_finite())

@@ -16,7 +16,7 @@ LATEX = {
         M=[[1, 0], [0, "mu"]], D=[["c", "-c"], ["-c", "c"]], K=[["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]
     ),
     "every function": from_coefficients(
-        ["1", "-c", "sqrt(2)*k - 3", "abs(c) - 1/3", "-(c - k)**2*exp(-k) - (-k)", "1e-9*pi + k**(-c/2)"]
+        ["1", "-c", "sqrt(2)*k - 3", "abs(c) - 1/3", "-(c - k)**2*exp(-k) - (-k) - (c + k - 3)", "1e-9*pi + k**(-c/2)"]
     ),
     "of angles": from_coefficients(["2", "sin(c)*cos(k)", "tan(c)/(1 - k)", "(c/k)**2", "min(c, k) - max(c, 0.3)"]),
 }

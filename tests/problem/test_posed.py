@@ -62,8 +62,19 @@ def test_what_is_known_otherwise_makes_other_values():
     problem = tmsopt.load("problems/ep4.toml").posed
     values = problem.values(problem.ordered({n: low for n, (low, _) in problem.free.items()}))
     own, trail = values["abscissa"], values["nu_H"]
-    other = values.knowing({"abscissa": own + 1.0})
+    other = values.with_known({"abscissa": own + 1.0})
     assert (other["abscissa"], other["nu_H"], values["abscissa"]) == (own + 1.0, trail, own)
-    assert other.knowing({"nu_H": 7.0})["abscissa"] == own + 1.0
+    assert other.with_known({"nu_H": 7.0})["abscissa"] == own + 1.0
     with pytest.raises(TypeError):
         values["abscissa"] = 0.0
+
+
+def test_what_follows_from_what_is_known_otherwise_follows_anew():
+    """The abscissa of the roots that are told, whatever was asked before."""
+    problem = tmsopt.load("problems/ep4.toml").posed
+    ends = (problem.ordered({n: e[k] for n, e in problem.free.items()}) for k in (0, 1))
+    one, other = map(problem.values, ends)
+    own, told = one["abscissa"], other["abscissa"]
+    assert own != told
+    assert one.with_known({"structure": other["structure"]})["abscissa"] == told
+    assert one["abscissa"] == own

@@ -142,3 +142,12 @@ def test_the_side_with_a_stable_design_is_searched_first(monkeypatch):
     assert searched == [(BACKWARD, True), (FORWARD, False)]
     assert list(design.sides) == [FORWARD, BACKWARD]
     assert design.value == pytest.approx(-(12.5**0.25), abs=1e-11)
+
+
+def test_a_part_is_solved_in_its_own_box():
+    """Its program has the ends of the tilt, as tangents, on one side of 0."""
+    asked = problem(minimize="abscissa").posed
+    for part, ends in zip(workspace(asked).parts(), ((0.0, 1.2), (-1.2, 0.0)), strict=True):
+        program = part.formulate(asked.cases)
+        k = list(asked.free).index("lambda_s")
+        assert (program.lower[k], program.upper[k]) == pytest.approx(np.tan(ends), abs=1e-15)

@@ -150,7 +150,7 @@ def _signature(
     """Monic coefficients, and expressions with the roots held: what they read beside the roots."""
     values = problem.values(problem.ordered(parameters))
     a = np.array([float(c) for c in values.coefficients])
-    values = values.knowing(dict.fromkeys(_ROOTS, 0.5))
+    values = values.with_known(dict.fromkeys(_ROOTS, 0.5))
     with np.errstate(all="ignore"):
         return list(a / a[0]), [float(e(values)) for e in asked]
 

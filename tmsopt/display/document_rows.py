@@ -78,7 +78,7 @@ def _margin(solution: "Solution", name: str) -> str:
     left = math.inf
     radius = {n: x for n, x in solution.quantities.items() if n == NO_RADIUS.name}  # the search for it is over
     for case in cases or [Case()]:
-        values = problem.values(case.applied(solution.parameters)).knowing(radius)
+        values = problem.values(case.applied(solution.parameters)).with_known(radius)
         left = min(left, -condition.sign * float(condition(values)))
     shares = {q.name for q in (*problem.model.quantities, *problem.parameter_set.quantities) if q.share}
     unit = unit_of(problem, name)

@@ -101,10 +101,10 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
 
     known = {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
     doubles = {name: settled(number) for name, number in known.items()}
-    wide = wide.knowing(known)
+    wide = wide.with_known(known)
     objective = np.full(m, np.nan) if problem.objective is None else settled(problem.objective.of(wide, BALLS))
     roots_of = doubles | {ANGULAR_FREQUENCY: found.frequency}
-    plain = problem.columns({n: np.asarray(x) for n, x in given.items()}).knowing(roots_of)
+    plain = problem.columns({n: np.asarray(x) for n, x in given.items()}).with_known(roots_of)
     violations, doubt = _violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
     feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)

@@ -152,8 +152,8 @@ class _Design:
         if of.rate is not None:
             fastest = roots.fastest if asked else roots.ideal
             rates = frequencies(fastest, of.rate(own), flint.arb.pi())
-            nominal = nominal.knowing({"frequency": reduce(greater, rates, flint.arb(0))})
-        nominal = nominal.knowing({"abscissa": known.get("abscissa", math.nan)})
+            nominal = nominal.with_known({"frequency": reduce(greater, rates, flint.arb(0))})
+        nominal = nominal.with_known({"abscissa": known.get("abscissa", math.nan)})
         for name in checked.quantities:
             if name not in _ROOTS:
                 yield ("quantities", name), nominal[name], 0
@@ -211,7 +211,7 @@ class _Design:
         each = self.cases if depends_on_case(self.problem, objective, self.cases) else [Case()]
         found = []
         for case in each:
-            found.append(objective.of(self.values(case).knowing(known), BALLS))
+            found.append(objective.of(self.values(case).with_known(known), BALLS))
         return reduce(lesser if self.problem.sense == "maximize" else greater, found)
 
 

@@ -94,7 +94,7 @@ def recheck(
     if problem.asks(ANGULAR_FREQUENCY):
         names.append(ANGULAR_FREQUENCY)
     if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
-        nominal = nominal.knowing({"abscissa": structure.abscissa, "structure": structure})
+        nominal = nominal.with_known({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
         realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
@@ -187,7 +187,7 @@ def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
 def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
     """A condition and its slopes, as a function of parameters and root quantities."""
     symbols, of = {name: symbol(name) for name in names}, model.parameter_set(set_name)
-    difference = condition(Values(model, of, {n: symbols[n] for n in of.names}).knowing(symbols))
+    difference = condition(Values(model, of, {n: symbols[n] for n in of.names}).with_known(symbols))
     return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
@@ -243,7 +243,7 @@ def _look(
     if stored is not None:
         exact = [case.applied(stored) for case in listed] or [dict(stored)]
         nominal, *each = (
-            values.knowing({"structure": Structure("undecided", realised_roots(problem, design), 0.0)})
+            values.with_known({"structure": Structure("undecided", realised_roots(problem, design), 0.0)})
             for design, values in zip((stored, *exact), (nominal, *each), strict=True)
         )
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
@@ -257,7 +257,7 @@ def _look(
         around = robustness_at(problem, parameters)
     if around is not None:
         worst[RADIUS] = around.radius
-    nominal, *each = (v.knowing({"structure": v["structure"], **worst}) for v in (nominal, *each))
+    nominal, *each = (v.with_known({"structure": v["structure"], **worst}) for v in (nominal, *each))
     return _Look(listed, nominal, each, top, least, fastest, around)
 
 

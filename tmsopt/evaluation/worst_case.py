@@ -98,7 +98,7 @@ def peaks(problem: Posed, designs: Mapping[str, float | Array], count: int) -> l
 
 def _value(values: Values, what: Expression | str, shared: Mapping[str, float | Array]) -> Any:
     """A root quantity, or an expression with the given worst root quantities."""
-    values = values.knowing(shared)
+    values = values.with_known(shared)
     return values[what] if isinstance(what, str) else what(values)
 
 

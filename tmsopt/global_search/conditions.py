@@ -166,7 +166,7 @@ def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple
     u = [at[n] for n in unknowns]
     values = values_at(problem, lifted, at, problem.as_nodes(problem.fixed))
     if (abscissa := _abscissa(problem, pieces, scale, u)) is not None:
-        values = values.knowing({"abscissa": abscissa})
+        values = values.with_known({"abscissa": abscissa})
     lead, unit = Fraction(scale.lead), Fraction(scale.unit)
     a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
     equalities = [c for c in problem.conditions.values() if c.equality]

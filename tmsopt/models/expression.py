@@ -143,7 +143,7 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
 
 
 def _in_names(parse: Callable[..., Expression], text: str, accepted: Iterable[str] | None) -> Expression:
-    """The expression of a text, which is parsed once whatever names are accepted; what is wrong first is said."""
+    """The expression of a text, parsed once for all lists of names; the error is about the first fault of the text."""
     if accepted is None:
         return parse(text)
     known = tuple(accepted)

@@ -31,7 +31,7 @@ def _sum(a: Typeset, b: Typeset) -> Typeset:
 
 def _product(a: Typeset, b: Typeset) -> Typeset:
     dot = r" \cdot " if b.text[:1].isdigit() else r" \, "
-    return Typeset(f"{a.within(_PRODUCT)}{dot}{b.within(_PRODUCT + (b.text.startswith('-')))}", _PRODUCT)
+    return Typeset(f"{a.within(_PRODUCT)}{dot}{b.within(_PRODUCT)}", _PRODUCT)
 
 
 def _fraction(a: Typeset, b: Typeset) -> Typeset:

@@ -433,8 +433,8 @@ class Values(Mapping[str, Any]):
             found = model.coefficients(balls, of)
         return [float(c.rad()) if c.is_finite() else np.inf for c in found]
 
-    def knowing(self, known: Mapping[str, Any]) -> "Values":
-        """The same design where some numbers are known otherwise than by their formulas."""
+    def with_known(self, known: Mapping[str, Any]) -> "Values":
+        """Values of the same design in which some quantities have given numbers in place of their formulas."""
         other = copy(self)
         other._known, other._found = {**self._known, **known}, {}
         return other

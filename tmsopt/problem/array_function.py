@@ -66,7 +66,7 @@ def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dic
     """Expressions as nodes in the parameters and the root quantities; of comparisons left minus right."""
     of = problem.parameter_set
     values = Values(problem.model, of, {n: symbol(n) for n in of.names}, extra=(NO_RADIUS,))
-    values = values.knowing({n: symbol(n) for n in _ROOT})
+    values = values.with_known({n: symbol(n) for n in _ROOT})
     return {n: e(values) for n, e in parse_all(problem, expressions).items()}
 
 

@@ -72,7 +72,7 @@ def stability_wanted(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
         """Whether a limit excludes such roots."""
         found = {"abscissa": abscissa, "damping_ratio": ratio, RADIUS: 0.0, ANGULAR_FREQUENCY: size}
         asked = (c for c in problem.conditions.values() if roots & set(c.names))
-        return any(not c.holds(float(c(values.knowing(found)))) for c in asked)
+        return any(not c.holds(float(c(values.with_known(found)))) for c in asked)
 
     goal = problem.objective is not None and bool(roots & set(problem.objective.names))
     if not goal and not refused(1e-6 * size, -1e-6):
@@ -119,7 +119,7 @@ def _falls(problem: Posed, sign: float, expression: Expression, name: str, worse
         if name not in found:
             found[name] = float(rng.uniform(0.1, 2.0))
         before, after = (
-            float(expression(problem.values(drawn).knowing({**found, name: value})))
+            float(expression(problem.values(drawn).with_known({**found, name: value})))
             for value in (found[name], found[name] + worse * _STEP * min(1.0, abs(found[name])))
         )
         change = sign * (after - before)

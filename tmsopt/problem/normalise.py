@@ -1,4 +1,4 @@
-"""What is stated as what is solved: every number a double in rad and SI, every table complete, all faults at once."""
+"""From a problem as it is stated to one that can be solved: numbers in rad and SI, tables complete, faults at once."""
 
 from collections.abc import Mapping
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ _POINT = 1e-12
 
 
 def normalise(**stated: Any) -> dict[str, Any]:
-    """The fields of a problem, for those that its author stated, of any type.
+    """The fields of a problem, from what its author wrote, which may be of any type.
 
     Raises:
         InputError: listing everything that is wrong.
@@ -53,9 +53,10 @@ def settle(
     start: Mapping[str, float],
     **others: Any,
 ) -> dict[str, Any]:
-    """The fields of a problem for numbers and texts that are right: what follows from the numbers is found anew.
+    """The fields of a problem from valid numbers and texts, with what follows from them.
 
-    A range of one value is fixed, the start is of free parameters, a complex H has a carrier for what they reach.
+    A range of one value becomes a fixed parameter, a start is kept for free parameters alone, and a complex H gets a
+    carrier for the ranges.
     """
     pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
     ends = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tmsopt.algebra.formula import Node, fold, formula
 from tmsopt.algebra.kinds import BALLS
-from tmsopt.deprecated import moved_to_posed
+from tmsopt.deprecated import read_from_posed
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.exact import number
 from tmsopt.models.user_spectrum import pattern_of
@@ -114,8 +114,8 @@ class Problem:
     if not TYPE_CHECKING:  # which tells names that are wrong
 
         def __getattr__(self, name: str) -> Any:
-            """What is not stated was here before, and is one of `posed`."""
-            return moved_to_posed(self, name)
+            """An attribute that a problem had in version 1.1, and that its `posed` has now."""
+            return read_from_posed(self, name)
 
     def __getstate__(self) -> dict[str, Any]:
         """What was stated, without what is kept of it."""
@@ -143,12 +143,15 @@ class Posed:
     written: Mapping[str, Mapping[float, str]] = field(compare=False)
 
     def derive(self, **changes: Any) -> "Posed":
-        """The same problem with other fields, of numbers in rad and SI and texts that are right: nothing is checked."""
+        """The problem with some fields replaced, by numbers in rad and SI and by valid texts: nothing is checked.
+
+        `dataclasses.replace` is not for this class: it leaves out what follows from the fields.
+        """
         return Posed(**settle(**{f.name: getattr(self, f.name) for f in fields(self)} | changes))
 
     @cached_property
     def problem(self) -> Problem:
-        """What asks this question."""
+        """The problem as a user would state it."""
         found = object.__new__(Problem)
         vars(found).update(self.__getstate__(), posed=self)
         return found
@@ -253,7 +256,7 @@ class Posed:
         return Values(self.model, self.parameter_set, parameters, extra=extra, ranges=ranges)
 
     def columns(self, parameters: Mapping[str, Any]) -> Values:
-        """The same of arrays of designs, whose shapes broadcast, by numeric roots."""
+        """Everything derived from arrays of designs, whose shapes broadcast, by numeric roots."""
         return Values(self.model, self.parameter_set, parameters, extra=ARRAY_ROOT_QUANTITIES)
 
     def typed(self, parameters: Mapping[str, float]) -> dict[str, str]:

@@ -192,7 +192,7 @@ def lifted_quantities(
         if quantity.equation is not None:
             found[quantity.name] = quantity
 
-    values = Values(model, of, parameters, lift=note).knowing(dict.fromkeys(ROOT_NAMES, math.nan))
+    values = Values(model, of, parameters, lift=note).with_known(dict.fromkeys(ROOT_NAMES, math.nan))
     for expression in expressions:
         expression(values)
     return tuple(found.values())

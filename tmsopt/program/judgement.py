@@ -57,7 +57,7 @@ def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
         if len(applied) > 1 and any(name in e.names for e in asked):
             found = np.broadcast_to(values[name], every)
             worst_of[name] = found.max(axis=0) if worst > 0 else found.min(axis=0)
-    values = values.knowing({n: np.broadcast_to(worst, every) for n, worst in worst_of.items()})
+    values = values.with_known({n: np.broadcast_to(worst, every) for n, worst in worst_of.items()})
     moves = _moves(values, every).all(axis=0)
     worth = None
     if problem.objective is not None:
@@ -65,7 +65,7 @@ def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
         worth = np.where(moves, goal.max(axis=0), np.nan)
     equal = np.array([c.equality for c in conditions], dtype=bool)
     own = values_of(problem, nominal, shape) if equal.any() else values  # an equality is one of the nominal design
-    own = own.knowing(worst_of) if own is not values else values
+    own = own.with_known(worst_of) if own is not values else values
     beyond = [
         c.sign * _evaluated(c, own, shape) if c.equality else _graded(c, c.sign, values, every).max(axis=0)
         for c in conditions

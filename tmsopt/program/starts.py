@@ -83,7 +83,7 @@ def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: b
     nominal = problem.ordered(design)
     radius = _stable_radius(nlp, problem, nominal)
     varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
-    values = [problem.values(nominal).knowing({RADIUS: radius}), *map(problem.values, varied)]
+    values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, varied)]
     z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
     x = variables_of(problem, design)
     for lift in nlp.lifts:

@@ -129,7 +129,7 @@ def limits(problem: Posed, found: Existing) -> dict[str, str]:
         RADIUS: None,
     }
     values = Values(problem.model, problem.parameter_set, found.parameters)
-    values = values.knowing({n: flint.arb("nan") if value is None else value for n, value in known.items()})
+    values = values.with_known({n: flint.arb("nan") if value is None else value for n, value in known.items()})
     verdicts = {}
     for name, condition in problem.conditions.items():
         difference = flint.arb(condition.of(values, BALLS))

@@ -71,7 +71,7 @@ class Equations:
         a = values.coefficients
         left = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
         if self.equalities:
-            values = values.knowing({"abscissa": abscissa_formula(self.pattern, u)})
+            values = values.with_known({"abscissa": abscissa_formula(self.pattern, u)})
         return left + others(values, self.lifted, self.equalities, at)
 
 
