@@ -42,7 +42,7 @@ def problem(**asked):
 
 
 def judged(stated, drawn):
-    return judgement.evaluate(stated, {n: np.array([d[n] for d in drawn]) for n in stated.free})
+    return judgement.judge(stated, {n: np.array([d[n] for d in drawn]) for n in stated.free})
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_
         minimize="abscissa + x",
         constraints={"decay": "abscissa <= -0.5", "own": "x == 4", "all": "x - y >= 2"},
     ).posed
-    found = judgement.evaluate(stated, {"x": np.array([3.0, 4.0, 6.0])})
+    found = judgement.judge(stated, {"x": np.array([3.0, 4.0, 6.0])})
     # The objective: x is 1 more at worst, beside the worst abscissa.
     assert found.worth == pytest.approx([4.0, 4.0, 4.0], abs=1e-12)
     assert found.excess == pytest.approx(np.array([[0.5, 0, 0], [1.0, 0, 2.0], [2.0, 1.0, 0]]), abs=1e-12)
@@ -97,7 +97,7 @@ def test_a_design_without_motion_is_none():
     stated = tmsopt.Problem(
         model, free={"x": (-1.0, 1.0), "y": (0.0, 1.0)}, minimize="x", constraints={"own": "y <= 2"}
     ).posed
-    found = judgement.evaluate(stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])})
+    found = judgement.judge(stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])})
     assert np.isfinite(found.worth).tolist() == [False, False, True, False]
     assert found.excess.tolist() == [[np.inf, np.inf, 0.0, np.inf]]
     assert set(recheck(stated, {"x": 0.0, "y": 1.0}).violations) == {"a0"}

@@ -61,13 +61,13 @@ def test_ranges_end_exactly_and_are_run_through_in_order():
 
 def test_every_design_that_is_judged_is_counted(monkeypatch):
     seen = []
-    real = sampling.evaluate
+    real = sampling.judge
 
     def counting(stated, columns):
         seen.append(len(columns["x"]))
         return real(stated, columns)
 
-    monkeypatch.setattr(sampling, "evaluate", counting)
+    monkeypatch.setattr(sampling, "judge", counting)
     design = tmsopt.solve(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")))
     starts = design.to_json()["starts"]
     assert set(starts) == {"tried", "converged", "at_best", "expected_unseen"}

@@ -11,14 +11,21 @@ from typing import Any
 import numpy as np
 
 from tmsopt.algebra.formula import INPUT, Formula, fold
-from tmsopt.algebra.kinds import FLOATS
+from tmsopt.algebra.kinds import BALLS, FLOATS
+from tmsopt.algebra.rounding import Bounded, as_bounded
 
 BLOCK = 2**14
 """Elements of a block: 128 kB an array."""
 
 
 def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
-    """The outputs for numbers and arrays, each of the shape that it depends on; nan and inf without a warning."""
+    """The outputs for numbers and arrays, each of the shape that it depends on; nan and inf without a warning.
+
+    With bounds of errors, where a column has them.
+    """
+    if any(isinstance(x, Bounded) for x in given.values()):
+        with np.errstate(all="ignore"):
+            return fold(formula, {n: as_bounded(given[n]) for n in formula.inputs}, BALLS)
     columns = {name: np.asarray(given[name], dtype=float)[()] for name in formula.inputs}
     shape = np.broadcast_shapes(*map(np.shape, columns.values()))
     with np.errstate(all="ignore"):

@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 from tmsopt.charts.tally import Tally, count_tile
 from tmsopt.errors import Fault, InputError, list_faults, refusal, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
-from tmsopt.problem.array_function import ArrayFunction, array_function, parse_all
+from tmsopt.problem.evaluate import ArrayFunction, array_function, parse_all
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from tmsopt import laws
-from tmsopt.algebra.kinds import BALLS
+from tmsopt.algebra.formula import NotAccepted
 from tmsopt.algebra.rounding import Bounded, as_bounded
 from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.evaluation.law_rows import SAME_LAW
 from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.models import Values, tms
+from tmsopt.models import tms
+from tmsopt.problem.evaluate import coefficients_of, evaluate
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
 from tmsopt.problem.validate import SMALLEST
@@ -80,16 +81,16 @@ def verdicts(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str
     try:
         with np.errstate(all="ignore"):
             return _judged(problem, columns, reports)
-    except Exception:  # of a formula that does not take arrays, or has no value: each design will tell by itself
+    except NotAccepted:  # of a formula that does not take bounds of errors
         return None
 
 
 def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
-    model, of = problem.model, problem.parameter_set
-    given = {n: np.float64(v) for n, v in problem.ordered({}).items()} | dict(columns)
+    fixed = {n: np.float64(x) for n, x in problem.ordered({}).items()}  # comparisons of these negate as arrays' do
+    given = fixed | dict(columns)
     m = len(next(iter(columns.values())))
-    wide = Values(model, of, {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()})
-    coefficients = [_spread(c, m) for c in wide.coefficients]
+    wide = {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()}
+    coefficients = [_spread(c, m) for c in coefficients_of(problem, wide)]
     found = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
     certain = found.simple & _possible(problem, given)
 
@@ -99,12 +100,12 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
         certain = certain & (spread.holds(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
         return np.asarray(spread.value)
 
-    known = {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
-    doubles = {name: settled(number) for name, number in known.items()}
-    wide = wide.with_known(known)
-    objective = np.full(m, np.nan) if problem.objective is None else settled(problem.objective.of(wide, BALLS))
-    roots_of = doubles | {ANGULAR_FREQUENCY: found.frequency}
-    plain = problem.columns({n: np.asarray(x) for n, x in given.items()}).with_known(roots_of)
+    wide |= {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
+    objective = (
+        np.full(m, np.nan) if problem.objective is None else settled(*evaluate(problem, [problem.objective], wide))
+    )
+    doubles = {name: settled(wide[name]) for name in ("abscissa", "damping_ratio")}
+    plain = given | doubles | {ANGULAR_FREQUENCY: found.frequency}
     violations, doubt = _violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
     feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)
@@ -113,7 +114,7 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
         bound, related = _bounds(problem, coefficients, settled)
         bound = np.where(feasible, bound, -np.inf)
         certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
-    said = _laws(wide, plain, coefficients, feasible, settled) if model is tms else {}
+    said = _laws(problem, wide, coefficients, feasible, settled) if problem.model is tms else {}
     return Verdicts(
         certain,
         objective,
@@ -125,7 +126,7 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
         np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf),
         related,
         said,
-        {text: _column(problem.read(text)(plain), m) for text in reports},
+        {text: _column(x, m) for text, x in zip(reports, evaluate(problem, reports, plain), strict=True)},
     )
 
 
@@ -153,10 +154,12 @@ def _possible(problem: Posed, given: Mapping[str, Any]) -> Truth:
     return np.asarray(possible)
 
 
-def _violations(problem: Posed, values: Values, found: Motions) -> tuple[dict[str, Array], Truth]:
+def _violations(problem: Posed, given: Mapping[str, Any], found: Motions) -> tuple[dict[str, Array], Truth]:
     """By how much each constraint is violated, and which designs are too close to a limit to be told here."""
     m = len(found.simple)
     amounts, doubt = {}, np.zeros(m, dtype=bool)
+    names = list(dict.fromkeys(n for c in problem.conditions.values() for n in c.names))
+    values = dict(zip(names, evaluate(problem, names, given), strict=True))
     for name, condition in problem.conditions.items():
         left, right = (_column(side, m) for side in condition.sides(values))
         difference = left - right
@@ -195,15 +198,20 @@ def _bounds(problem: Posed, coefficients: Sequence[Bounded], settled: Callable[[
 
 
 def _laws(
-    wide: Values, values: Values, coefficients: Sequence[Bounded], feasible: Truth, settled: Callable[[Any], Array]
+    problem: Posed,
+    wide: Mapping[str, Any],
+    coefficients: Sequence[Bounded],
+    feasible: Truth,
+    settled: Callable[[Any], Array],
 ) -> dict[str, Array]:
     """Relative residual of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
     m = len(feasible)
     names = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
-    p = {n: settled(wide[n]) for n in names}
+    *native, number = evaluate(problem, [*names, "Fr_c"], wide)
+    p = {n: settled(x) for n, x in zip(names, native, strict=True)}
     shape = {n: p[n] for n in names[1:]}
     heights, tilt = {k: p[k] for k in ("zeta_B", "zeta_H")}, {"lambda_s": p["lambda_s"]}
-    number = _spread(wide["Fr_c"], m)
+    number = _spread(number, m)
     exists = np.isfinite(number.value)
     critical = np.where(exists, settled(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)
 

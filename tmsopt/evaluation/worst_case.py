@@ -16,6 +16,7 @@ from tmsopt.algebra.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.problem.cases import Band, Case, Cover
 from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
+from tmsopt.problem.evaluate import evaluate
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Table
@@ -195,10 +196,8 @@ def _evaluated(
     shared: Mapping[str, float | Array],
 ) -> Array:
     varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
-    columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}
-    values = problem.columns(columns)
-    with np.errstate(all="ignore"):
-        return np.broadcast_to(np.asarray(_value(values, what, shared), dtype=float), count)
+    [values] = evaluate(problem, [what], {**varied, **shared})
+    return np.broadcast_to(values, count)
 
 
 def _grid(size: int) -> Array:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from tmsopt.algebra.formula import Formula, Kind, fold, formula, symbol, trace
 from tmsopt.algebra.kinds import ROUNDING, as_double
 from tmsopt.models.bicycles.bicycle import contact_path
-from tmsopt.problem.array_function import array_function, nodes_of
+from tmsopt.problem.evaluate import array_function, nodes_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_QUANTITIES
 

@@ -16,7 +16,6 @@ from tmsopt.problem.cases import Case, Scenario, first_cases
 from tmsopt.problem.expression import Expression, parse_comparison, parse_value
 from tmsopt.problem.normalise import normalise, settle
 from tmsopt.problem.quantities import (
-    ARRAY_ROOT_QUANTITIES,
     NO_RADIUS,
     RADIUS,
     ROOT_NAMES,
@@ -254,10 +253,6 @@ class Posed:
         ranges = {n: hi - lo for n, (lo, hi) in self.free.items()}
         extra = (*ROOT_QUANTITIES, NO_RADIUS, STRUCTURE)
         return Values(self.model, self.parameter_set, parameters, extra=extra, ranges=ranges)
-
-    def columns(self, parameters: Mapping[str, Any]) -> Values:
-        """Everything derived from arrays of designs, whose shapes broadcast, by numeric roots."""
-        return Values(self.model, self.parameter_set, parameters, extra=ARRAY_ROOT_QUANTITIES)
 
     def typed(self, parameters: Mapping[str, float]) -> dict[str, str]:
         """The exact numbers that were typed for some of a design's doubles, such as ``8/3`` or ``20 deg``."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.models import Model, ParameterSet, Quantity, Values
 from tmsopt.records import Array
-from tmsopt.roots import Root, Structure, exact_roots, find_motion, roots, structure
+from tmsopt.roots import Root, Structure, exact_roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
@@ -146,40 +146,6 @@ def regular(coefficients: Array) -> Array:
     a = np.where(exist, coefficients, np.eye(coefficients.shape[-1])[0])
     size = np.abs(a).max(axis=-1, initial=0.0) + 1e-300
     return np.concatenate([np.where(_beyond(a), 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
-
-
-_MOTION = ":motion"  # no name that a text may have
-
-
-def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Abscissa and damping ratio; nan where a coefficient does not exist."""
-    assert isinstance(values, Values)
-    a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
-    exist, a = np.all(np.isfinite(a), axis=-1), regular(a)
-    motion = find_motion(list(np.moveaxis(a, -1, 0)))
-    abscissa, ratio = (np.where(exist, each, np.nan) for each in (motion.abscissa, motion.damping_ratio))
-    return abscissa, ratio
-
-
-def _array_frequency(values: Mapping[str, Any]) -> Array:
-    """Greatest imaginary part; nan likewise."""
-    assert isinstance(values, Values)
-    a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
-    return np.where(np.all(np.isfinite(a), axis=-1), roots(regular(a)).imag.max(axis=-1), np.nan)
-
-
-_ARRAY_FORMULAS = (
-    lambda values: values[_MOTION][0],
-    lambda values: values[_MOTION][1],
-    _array_frequency,
-)
-
-ARRAY_ROOT_QUANTITIES = (
-    *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)),
-    Quantity(_MOTION, "1", "abscissa and damping ratio", "", _array_motion),
-    NO_RADIUS,
-)
-"""The same for arrays of designs, by numeric roots."""
 
 
 def lifted_quantities(

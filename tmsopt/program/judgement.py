@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.models import Values
 from tmsopt.problem.dependence import WORSE_DIRECTION
+from tmsopt.problem.evaluate import coefficients_of, evaluate, roots_of
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
@@ -38,7 +38,7 @@ class Judged:
         return np.where(np.isnan(amount), np.inf, amount)
 
 
-def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
+def judge(problem: Posed, columns: Mapping[str, Array]) -> Judged:
     """Judge designs.
 
     Args:
@@ -46,50 +46,46 @@ def evaluate(problem: Posed, columns: Mapping[str, Array]) -> Judged:
     """
     shape = next(iter(columns.values())).shape
     nominal = problem.ordered(columns)
-    applied = [case.applied(nominal) for case in problem.cases if not case.direction] or [nominal]
-    every = (len(applied), *shape)
+    listed = [case.applied(nominal) for case in problem.cases if not case.direction]
     # All cases at once: one by one takes as often the time of small arrays. What is one number stays one.
-    values = problem.columns({n: _stacked([p[n] for p in applied], len(shape)) for n in nominal})
+    varied = {n: _stacked([p[n] for p in listed or [nominal]], len(shape)) for n in nominal}
+    every = (len(listed) or 1, *shape)
     conditions = list(problem.conditions.values())
     asked = [e for e in (problem.objective, *conditions) if e]
-    worst_of: dict[str, Array] = {}
-    for name, worst in WORSE_DIRECTION.items():
-        if len(applied) > 1 and any(name in e.names for e in asked):
-            found = np.broadcast_to(values[name], every)
-            worst_of[name] = found.max(axis=0) if worst > 0 else found.min(axis=0)
-    values = values.with_known({n: np.broadcast_to(worst, every) for n, worst in worst_of.items()})
-    moves = _moves(values, every).all(axis=0)
-    worth = None
-    if problem.objective is not None:
-        goal = _graded(problem.objective, problem.sign, values, every)
-        worth = np.where(moves, goal.max(axis=0), np.nan)
-    equal = np.array([c.equality for c in conditions], dtype=bool)
-    own = values_of(problem, nominal, shape) if equal.any() else values  # an equality is one of the nominal design
-    own = own.with_known(worst_of) if own is not values else values
-    beyond = [
-        c.sign * _evaluated(c, own, shape) if c.equality else _graded(c, c.sign, values, every).max(axis=0)
-        for c in conditions
-    ]
-    return Judged(worth, np.where(moves, np.stack(beyond), np.nan) if beyond else np.empty((0, *shape)), equal)
+    a, names = coefficients_of(problem, varied), {n for e in asked for n in e.names}
+    # All coefficients exist, and the mass matrix is not singular: the recheck takes no other design.
+    moves = np.logical_and.reduce([np.broadcast_to(x, every) for x in (*map(np.isfinite, a), a[0] != 0)])
+    worst = {}
+    for name, x in roots_of(a, {*names, "abscissa"} if _FLAT in names else names).items():
+        sign = WORSE_DIRECTION[name]
+        worst[name] = sign * np.broadcast_to(sign * x, every).max(axis=0)
+    found = dict(zip(asked, evaluate(problem, asked, varied | worst), strict=True))
+    equal = [c for c in conditions if c.equality]
+    if listed and equal:  # an equality is one of the nominal design
+        found |= zip(equal, evaluate(problem, equal, nominal | worst), strict=True)
+
+    def graded(e: Expression, sign: float) -> Array:
+        return np.asarray(np.where(moves, _graded(e, sign, found[e], worst), np.nan).max(axis=0))
+
+    return Judged(
+        None if problem.objective is None else graded(problem.objective, problem.sign),
+        np.array([graded(c, c.sign) for c in conditions]).reshape(len(conditions), *shape),
+        np.array([c.equality for c in conditions], dtype=bool),
+    )
 
 
-def _graded(asked: Expression, sign: float, values: Values, shape: tuple[int, ...]) -> Array:
+def _graded(asked: Expression, sign: float, value: Array, worst: Mapping[str, Array]) -> Array:
     """What is asked, less is better; of the damping ratio alone, where that is −1, with the abscissa added.
 
     The ratio is −1 wherever a root is real and positive, so that nothing else tells how far a design is from better.
     """
-    found = sign * _evaluated(asked, values, shape)
-    if asked.names != (_FLAT,):
+    found = sign * value
+    if asked.names != (_FLAT,) or asked.equality:
         return found
     at, above = (sign * float(asked({_FLAT: ratio})) for ratio in (-1.0, -0.9))
     if above >= at or (asked.comparison and at <= 0):
         return found
-    return np.where(values[_FLAT] <= -1, found + values["abscissa"], found)
-
-
-def values_of(problem: Posed, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
-    """Everything derived from designs, as arrays of one shape."""
-    return problem.columns({n: np.broadcast_to(np.asarray(x, dtype=float), shape) for n, x in parameters.items()})
+    return np.where(worst[_FLAT] <= -1, found + worst["abscissa"], found)
 
 
 def _stacked(each: Sequence[Any], axes: int) -> Array:
@@ -98,13 +94,3 @@ def _stacked(each: Sequence[Any], axes: int) -> Array:
     if all(x is each[0] for x in each):
         return first.reshape(1, *(first.shape or (1,) * axes))
     return np.stack([x.reshape(x.shape or (1,) * axes) for x in np.broadcast_arrays(first, *each[1:])])
-
-
-def _moves(values: Values, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Whether all coefficients exist, and the mass matrix is not singular: the recheck takes no other design."""
-    a = [np.broadcast_to(np.asarray(c, dtype=float), shape) for c in values.coefficients]
-    return np.asarray(np.isfinite(a).all(axis=0) & (a[0] != 0))
-
-
-def _evaluated(expression: Expression, values: Values, shape: tuple[int, ...]) -> Array:
-    return np.broadcast_to(np.asarray(expression(values), dtype=float), shape)

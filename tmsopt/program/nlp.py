@@ -15,6 +15,7 @@ from tmsopt.algebra.kinds import CASADI, FLOATS, NODES
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.problem.cases import Case
+from tmsopt.problem.evaluate import coefficients_of, evaluate
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import regular
 from tmsopt.records import Array
@@ -336,9 +337,8 @@ def scale_of(problem: Posed) -> Scale:
     """
     if problem.model.natural:
         return Scale()
-    with np.errstate(all="ignore"):
-        found = problem.model.coefficients(problem.ordered(_designs(problem)), problem.parameter_set)
-        a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in found)), axis=-1)
+    found = coefficients_of(problem, problem.ordered(_designs(problem)))
+    a = np.stack(np.broadcast_arrays(*found), axis=-1)
     a = a.reshape(-1, a.shape[-1])
     a = a[np.all(np.isfinite(a), axis=1) & np.any(a != 0, axis=1)]
     if not len(a):
@@ -367,8 +367,8 @@ def objective_unit(problem: Posed) -> float:
     """A power of 2 near the size of a small objective: a solver brings large ones down by itself, but none up."""
     if problem.model.natural or problem.objective is None or not problem.free:
         return 1.0
-    columns = {n: np.broadcast_to(x, _DESIGNS) for n, x in problem.ordered(_designs(problem)).items()}
-    size = np.abs(np.atleast_1d(problem.objective(problem.columns(columns))))
+    [values] = evaluate(problem, [problem.objective], problem.ordered(_designs(problem)))
+    size = np.abs(np.atleast_1d(values))
     size = size[np.isfinite(size) & (size > 0)]
     return _power_of_two(size) if len(size) and np.median(size) < _ORDINARY[0] else 1.0
 

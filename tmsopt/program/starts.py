@@ -6,10 +6,11 @@ from itertools import islice, product
 import numpy as np
 
 from tmsopt.algebra.sequence import golden_steps
+from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, regular
 from tmsopt.program.formulate import middle, variables_of
-from tmsopt.program.judgement import evaluate, values_of
+from tmsopt.program.judgement import judge
 from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, roots
@@ -118,7 +119,7 @@ def spread(problem: Posed, seed: int) -> Iterator[dict[str, float]]:
 
 def start_objective(problem: Posed, design: Mapping[str, float]) -> float:
     """Objective of a design in its worst case, by numeric roots; larger is worse, inf where a limit is violated."""
-    found = evaluate(problem, {n: np.array(x) for n, x in design.items()})
+    found = judge(problem, {n: np.array(x) for n, x in design.items()})
     feasible = found.worth is not None and np.isfinite(found.worth) and np.all(found.excess <= 0)
     return float(found.worth) if feasible and found.worth is not None else np.inf
 
@@ -135,14 +136,14 @@ def opposite(problem: Posed, design: Mapping[str, float]) -> list[dict[str, floa
 
 def _merit(problem: Posed, columns: Mapping[str, Array]) -> tuple[Array, Array]:
     """Objective, and violated constraints, of many designs in their worst cases, each in units of its own spread."""
-    found = evaluate(problem, columns)
+    found = judge(problem, columns)
     shape = next(iter(columns.values())).shape
     objective, violation = np.zeros(shape), np.zeros(shape)
     if found.worth is not None:
         objective += _in_spreads(found.worth)
     if problem.pattern is not None:
-        values = values_of(problem, problem.ordered(columns), shape)
-        a = regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1))
+        each = coefficients_of(problem, problem.ordered(columns))
+        a = regular(np.stack([np.broadcast_to(c, shape) for c in each], axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
         violation += 3 * _in_spreads(np.array(mismatch))
     for excess in found.excess:

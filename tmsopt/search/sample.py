@@ -8,9 +8,10 @@ from itertools import product
 import numpy as np
 
 from tmsopt.algebra.sequence import golden_steps
+from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
 from tmsopt.program.cube import Cube
-from tmsopt.program.judgement import Judged, evaluate
+from tmsopt.program.judgement import Judged, judge
 from tmsopt.records import Array
 from tmsopt.search.basins import REACHES, Looked, apart, basins, scattered
 
@@ -144,7 +145,7 @@ class Sampler:
         u[::_FACES] = np.clip(3 * u[::_FACES] - 1, 0.0, 1.0)
         corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
         u = np.concatenate([np.full((1, size), 0.5), corners, u])
-        return u, evaluate(problem, self.space.designs(u))
+        return u, judge(problem, self.space.designs(u))
 
     def refined(self, start: Looked, reaches: Sequence[float | Array] = REACHES, local: int = _LOCAL) -> Looked:
         """Each design improved by random steps that become shorter, limits first.
@@ -230,14 +231,12 @@ class Sampler:
 
     def _leading(self, u: Array) -> Array:
         """The leading coefficient of designs."""
-        problem = self.problem
-        with np.errstate(all="ignore"):
-            a0 = problem.model.coefficients(problem.ordered(self.space.designs(u)), problem.parameter_set)[0]
-        return np.asarray(np.nan_to_num(np.broadcast_to(np.asarray(a0, dtype=float), len(u))))
+        a0 = coefficients_of(self.problem, self.problem.ordered(self.space.designs(u)))[0]
+        return np.asarray(np.nan_to_num(np.broadcast_to(a0, len(u))))
 
     def _judged(self, u: Array) -> Judged:
         self.count += len(u)
-        return evaluate(self.problem, self.space.designs(u))
+        return judge(self.problem, self.space.designs(u))
 
     def _standing(self, u: Array, found: Judged) -> Looked:
         worth = np.zeros(len(u)) if found.worth is None else found.worth

@@ -1,7 +1,12 @@
-"""Expressions of a problem over arrays of designs, all at once: quantities of charts and studies."""
+"""Many designs at once: what charts, samples, worst cases, Monte Carlo and studies know of them, by arrays of doubles.
 
-from collections.abc import Mapping
+A formula for each set of expressions, folded over the columns; columns with bounds of their errors (`Bounded`) give
+values with such bounds.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,11 +15,11 @@ from tmsopt.algebra.arrays import on_arrays
 from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Values
+from tmsopt.models.model import ROOTS
 from tmsopt.problem.expression import Expression, ExpressionError
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import NO_RADIUS, ROOT_QUANTITIES
-
-_ROOT = tuple(q.name for q in ROOT_QUANTITIES)
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regular
+from tmsopt.roots import find_motion, roots
 
 
 @dataclass(frozen=True)
@@ -40,13 +45,14 @@ class ArrayFunction:
         Returns:
             Name → value, of the shape that the expression depends on, which broadcasts to that of the grid.
         """
-        of, known = self.problem.parameter_set, columns
-        if missing := set(self.formula.inputs) - set(columns):
-            with np.errstate(all="ignore"):
-                given = {n: np.asarray(columns[n], dtype=float)[()] for n in of.names}
-                values = self.problem.columns(given)
-                known = {**columns, **{n: values[n] for n in missing}}
-        return dict(zip(self.names, on_arrays(self.formula, known), strict=True))
+        missing = {n for n in self.formula.inputs if n not in columns}
+        known = roots_of(coefficients_of(self.problem, columns), missing) if missing else {}
+        return dict(zip(self.names, on_arrays(self.formula, {**columns, **known}), strict=True))
+
+
+def evaluate(problem: Posed, expressions: Iterable[str | Expression], columns: Mapping[str, Any]) -> list[Any]:
+    """Values of expressions, in their order, as those of an `ArrayFunction`, which is made once."""
+    return list(_made(problem, tuple(expressions))(columns).values())
 
 
 def array_function(problem: Posed, expressions: Mapping[str, str | Expression]) -> ArrayFunction:
@@ -59,14 +65,38 @@ def array_function(problem: Posed, expressions: Mapping[str, str | Expression]) 
         InputError: for a text that is no expression of this problem.
     """
     nodes = nodes_of(problem, expressions)
-    return ArrayFunction(problem, formula(nodes.values(), (*problem.parameter_set.names, *_ROOT)), tuple(nodes))
+    return ArrayFunction(problem, formula(nodes.values(), (*problem.parameter_set.names, *ROOTS)), tuple(nodes))
+
+
+@lru_cache(maxsize=64)
+def _made(problem: Posed, expressions: tuple[str | Expression, ...]) -> ArrayFunction:
+    return array_function(problem, {f"{k}": e for k, e in enumerate(expressions)})
+
+
+def coefficients_of(problem: Posed, columns: Mapping[str, Any]) -> list[Any]:
+    """Coefficients of designs, each of the shape that it depends on."""
+    return evaluate(problem, problem.model.coefficient_names(), columns)
+
+
+def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> dict[str, Any]:
+    """Quantities of the roots, by numeric ones, so beside multiple roots a hint; nan where a coefficient is none."""
+    if not set(ROOTS) & set(names):
+        return {}
+    a = np.stack(np.broadcast_arrays(*coefficients), axis=-1)
+    exist, a, found = np.isfinite(a).all(axis=-1), regular(a), {}
+    if ANGULAR_FREQUENCY in names:
+        found[ANGULAR_FREQUENCY] = roots(a).imag.max(axis=-1)
+    if {"abscissa", "damping_ratio"} & set(names):
+        motion = find_motion(list(np.moveaxis(a, -1, 0)))
+        found |= {"abscissa": motion.abscissa, "damping_ratio": motion.damping_ratio}
+    return {n: np.where(exist, x, np.nan) for n, x in found.items()}
 
 
 def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dict[str, Any]:
     """Expressions as nodes in the parameters and the root quantities; of comparisons left minus right."""
     of = problem.parameter_set
     values = Values(problem.model, of, {n: symbol(n) for n in of.names}, extra=(NO_RADIUS,))
-    values = values.with_known({n: symbol(n) for n in _ROOT})
+    values = values.with_known({n: symbol(n) for n in ROOTS})
     return {n: e(values) for n, e in parse_all(problem, expressions).items()}
 
 
