@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from tmsopt.algebra.formula import Formula, Kind, fold, formula, symbol, trace
 from tmsopt.algebra.kinds import ROUNDING, as_double
 from tmsopt.models.bicycles.bicycle import contact_path
-from tmsopt.problem.evaluate import array_function, nodes_of
+from tmsopt.problem.evaluate import coefficient_formula, nodes_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_QUANTITIES
 
@@ -70,7 +70,7 @@ def model_script(problem: Posed) -> Script:
     `problem.parameter_set`, in its order, in SI units and radians.
     """
     model, of = problem.model, problem.parameter_set
-    coefficients = array_function(problem, {n: n for n in model.coefficient_names()}).formula
+    coefficients = coefficient_formula(model, of.name)
     quantities = tuple(q.name for q in (*model.quantities, *of.quantities))
     limits = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
     asked = list(nodes_of(problem, {**{n: n for n in quantities}, **limits}).values())

@@ -14,7 +14,7 @@ import numpy as np
 from tmsopt.algebra.arrays import on_arrays
 from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.errors import Fault, InputError
-from tmsopt.models import Values
+from tmsopt.models import Model, Values
 from tmsopt.models.model import ROOTS
 from tmsopt.problem.expression import Expression, ExpressionError
 from tmsopt.problem.problem import Posed
@@ -75,7 +75,14 @@ def _made(problem: Posed, expressions: tuple[str | Expression, ...]) -> ArrayFun
 
 def coefficients_of(problem: Posed, columns: Mapping[str, Any]) -> list[Any]:
     """Coefficients of designs, each of the shape that it depends on."""
-    return evaluate(problem, problem.model.coefficient_names(), columns)
+    return on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
+
+
+@lru_cache(maxsize=64)
+def coefficient_formula(model: Model, set_name: str) -> Formula:
+    """The coefficients of a model in the parameters of a set."""
+    whole = model.formulas[set_name]
+    return whole.part(whole.outputs[len(model.sets[0].names) :])
 
 
 def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> dict[str, Any]:
