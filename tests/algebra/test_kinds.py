@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, NotAccepted, fold, from_casadi, trace, values
+from tmsopt.algebra.intervals import ranges
 from tmsopt.problem import parse_value
 
-as_double = import_module("tmsopt.algebra.kinds").as_double
+as_double, gradients = (getattr(import_module("tmsopt.algebra.kinds"), n) for n in ("as_double", "gradients"))
 formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))
 
 POINTS = [(0.7, 1.3), (2.6, 1.3), (1.3, 1.3), (3.1, 0.4), (0.25, -0.5)]
@@ -154,6 +155,23 @@ def test_equal_parts_are_computed_once():
 def test_a_formula_does_not_ask_for_its_numbers():
     with pytest.raises(TypeError, match="choose"):
         bool(symbol("x") > 0)
+
+
+def test_a_truth_among_numbers_is_1_or_0_of_every_kind():
+    """As in slopes by CasADi: of max(x, y) half of both where x = y."""
+    x, y = symbol("x"), symbol("y")
+    kinks = gradients([made("max", x, y), made("min", x, y), abs(x - y)], [x, y])
+    slopes = formula([*(s for each in kinks for s in each), 2 * (x < y) + (x <= y)], "xy")
+    for at, wanted in {
+        (1.0, 1.0): (0.5, 0.5, 0.5, 0.5, 0, 0, 1),
+        (1.0, 2.0): (0, 1, 1, 0, -1, 1, 3),
+        (2.0, 1.0): (1, 0, 0, 1, 1, -1, 0),
+    }.items():
+        assert fold(slopes, dict(zip("xy", at, strict=True)), FLOATS) == list(wanted)
+        assert fold(slopes, dict(zip("xy", map(np.array, at), strict=True)), FLOATS) == list(wanted)
+        assert [float(c) for c in fold(slopes, dict(zip("xy", map(ca.DM, at), strict=True)), CASADI)] == list(wanted)
+        for (low, high), value in zip(ranges(slopes, [(a, a) for a in at]), wanted, strict=True):
+            assert low <= value <= high <= low + 1e-15
 
 
 def test_functions_of_casadi_are_formulas():

@@ -310,6 +310,9 @@ def constant(x: Any) -> Node:
 def made(op: str, *given: Any) -> Node:
     """An operation on nodes and numbers, in its simplest form."""
     operands = tuple(map(constant, given))
+    if any(o.op in _TRUTHS for o in operands):
+        logical = _LOGICAL.get(op, 0)
+        operands = (*operands[:logical], *map(_as_number, operands[logical:]))
     fractions = []
     for x, o in zip(given, operands, strict=True):
         known = o.op == CONSTANT and isinstance(o.value, Fraction) and not (isinstance(x, float) and x == 0)
@@ -318,6 +321,15 @@ def made(op: str, *given: Any) -> Node:
         return Node(CONSTANT, (), number)
     simplest = _simplest(op, operands, fractions) if op in _SIMPLEST else None
     return Node(op, operands) if simplest is None else simplest
+
+
+_TRUTHS = {"less", "at_most", "equal", "negligible", "both", "either", "not"}
+_LOGICAL = {"choose": 1, "both": 2, "either": 2, "not": 1}  # the first operands, of so many truths are taken
+
+
+def _as_number(x: Node) -> Node:
+    """1 for what is true, 0 for what is false: slopes by CasADi reckon with them."""
+    return made("choose", x, 1, 0) if x.op in _TRUTHS else x
 
 
 def _power(a: Fraction, b: Fraction) -> Fraction | None:
@@ -438,7 +450,7 @@ def nodes_of_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
             case ca.OP_INPUT:
                 held[into[0]] = inputs[firsts[given[0]] + given[1]]
             case ca.OP_OUTPUT:
-                outputs[ends[into[0]] + into[1]] = held[given[0]]
+                outputs[ends[into[0]] + into[1]] = _as_number(held[given[0]])
             case ca.OP_CONST:
                 held[into[0]] = constant(function.instruction_constant(k))
             case _:
@@ -448,21 +460,21 @@ def nodes_of_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
 
 def _translated(operation: int, operands: Sequence[Node]) -> Node:
     """An operation of CasADi; what there is not here keeps its name, and no kind of numbers takes it."""
-    first, last = operands[0], operands[-1]
-    match operation:
-        case ca.OP_ASSIGN:
-            return first
-        case ca.OP_TWICE:
-            return 2 * first
-        case ca.OP_INV:
-            return 1 / first
-        case ca.OP_NE:
-            return first != last
-        case ca.OP_IF_ELSE_ZERO:
-            return made("choose", first, last, 0)
+    if operation in _WRITTEN:
+        return _WRITTEN[operation](operands[0], operands[-1])
     name = _NAMES.get(operation, f"operation {operation}")
     return made(_RENAMED.get(name, name), *operands)
 
+
+_WRITTEN: Mapping[int, Callable[[Node, Node], Node]] = {
+    ca.OP_ASSIGN: lambda a, b: a,
+    ca.OP_TWICE: lambda a, b: 2 * a,
+    ca.OP_INV: lambda a, b: 1 / a,
+    ca.OP_NE: lambda a, b: a != b,
+    ca.OP_SIGN: lambda a, b: made("sub", a > 0, a < 0),
+    ca.OP_IF_ELSE_ZERO: lambda a, b: made("choose", a, b, 0),
+}
+"""In other operations."""
 
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
 
