@@ -13,7 +13,8 @@ from tmsopt.evaluation import recheck
 from tmsopt.models import from_coefficients
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
-multiple_roots_exist = import_module("tmsopt.evaluation.stored").multiple_roots_exist
+STORED = import_module("tmsopt.evaluation.stored")
+held, multiple_roots_exist = STORED.held, STORED.multiple_roots_exist
 KEPT = 1e-9  # relative to the greater of 1 and the limit
 
 
@@ -132,3 +133,26 @@ def test_a_triple_root_that_is_there_for_rounding_alone_does_not_exist(off, ther
     design = {"z": 1 - off**2 / 6 if off < 0.1 else 1.0, "c": 1 + off}
     assert max(r.multiplicity for r in problem.posed.values(design)["structure"].roots) == (2 if off == 1.0 else 3)
     assert multiple_roots_exist(problem.posed, design) is there
+
+
+def test_the_objective_exists_at_the_design_as_stored(monkeypatch):
+    """The weave speed ends at 0: at this design, the optimum but for rounding, its square is -1e-15 by 60 digits."""
+    free = {"x_B": (0.03, 0.4), "x_H": (0.15, 0.36)}
+    fixed = {"w": 0.25, "v": 2.0924341065944914, "g": 9.81, "lambda_s": 0.09586586422163405, "m_B": 9.0, "z_B": -0.153}
+    fixed |= {"m_H": 2.0207325532013756, "z_H": -0.0857}
+    problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="v_c").posed
+    design = problem.ordered({"x_B": 0.30707257323404263, "x_H": 0.30956709128158444})
+    monkeypatch.setattr(tmsopt.laws, "_tan", mp.tan)
+
+    def square(given):
+        p = {n: mp.mpf(x) for n, x in given.items()}
+        heights = [p[n] / p["w"] for n in ("x_B", "x_H", "z_B", "z_H")]
+        return tmsopt.laws.flus.__wrapped__(p["m_H"] / p["m_B"], *heights, p["lambda_s"])
+
+    with mp.workdps(60):
+        assert -1e-14 < square(design) < 0
+        stored, checked, _ = held(problem, design, recheck(problem, design), problem.cases)
+        assert 0 < square(stored) < 1e-12
+        assert checked.objective**2 == pytest.approx(float(square(stored)) * 9.81 * 0.25, rel=0.2)
+    assert {n: stored[n] for n in stored if n not in free} == fixed
+    assert all(stored[n] == pytest.approx(design[n], rel=1e-13) for n in free)

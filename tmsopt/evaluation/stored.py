@@ -20,10 +20,12 @@ from typing import Any
 import flint
 import numpy as np
 
+from tmsopt.algebra.balls import as_ball
 from tmsopt.evaluation.recheck import FEASIBLE, Evaluation, missed, recheck
+from tmsopt.models import Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text, unit_at
 from tmsopt.records import Array
@@ -43,6 +45,7 @@ _FINEST = 1e-20  # relative: steps of a parameter that is 0
 _BITS = 60  # behind the point, of the coordinates of the lattice
 _NOTHING = 1e-14  # of the size of roots: less is rounding
 _APART, _SHOWN = 1e-6, 7  # relative difference of two abscissae from which both are shown; digits, which show it
+_ROUNDINGS = (1, -1, 4, -4, 16, -16, 64, -64, 256, -256)
 _AT_END = 1e-9  # of a range: a parameter so close to an end stays there
 
 
@@ -82,11 +85,16 @@ def held(
 ) -> tuple[Mapping[str, float], Evaluation, Mapping[str, float]]:
     """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
 
-    The structure remains that of the ideal design. Where no such design is found, the one that is given, and what it
-    misses → by how much.
+    And to have its objective, which ends where a square root does. The structure remains that of the ideal design.
+    Where no such design is found, the one that is given, and what it misses → by how much.
     """
     amounts = {} if checked.violations else missed(problem, parameters, cases, checked.around)
     if not amounts:
+        for design in () if checked.violations or _has_objective(problem, parameters) else _beside(problem, parameters):
+            if _has_objective(problem, design):
+                again = recheck(problem, design, cases, checked.around)
+                if not (again.violations or missed(problem, design, cases, checked.around)):
+                    return design, _structured(problem, design, checked, again), {}
         return parameters, checked, amounts
     clusters = _clusters(problem, parameters, checked, cases, list(amounts))
     ends = problem.free.items()
@@ -100,6 +108,23 @@ def held(
                 if set(again.violations) <= set(problem.asked_of_roots):
                     return design, _structured(problem, design, checked, again), {}
     return parameters, checked, amounts
+
+
+def _has_objective(problem: Posed, parameters: Mapping[str, float]) -> bool:
+    """Whether the objective exists at the parameters exactly as stored, as one of the roots does."""
+    asked = problem.objective
+    if asked is None or set(asked.names) & set(ROOT_NAMES):
+        return True
+    with flint.ctx.workdps(_DIGITS):
+        exact = {n: flint.arb(x) for n, x in parameters.items()}
+        return bool(as_ball(asked(Values(problem.model, problem.parameter_set, exact))).is_finite())
+
+
+def _beside(problem: Posed, parameters: Mapping[str, float]) -> Iterator[dict[str, float]]:
+    """Designs some roundings of one free parameter off, inside the box."""
+    for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items()):
+        if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper:
+            yield {**parameters, name: x}
 
 
 def multiple_roots_exist(problem: Posed, parameters: Mapping[str, float]) -> bool:
