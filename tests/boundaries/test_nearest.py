@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from importlib import import_module
 from itertools import islice
 
 import casadi as ca
@@ -15,6 +16,7 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.boundaries import nearest, robustness
 from tmsopt.errors import InputError
+from tmsopt.evaluation import recheck
 from tmsopt.models import from_coefficients, from_matrices, tms, to_si
 from tmsopt.problem import Problem
 from tmsopt.report import robustness_line, robustness_table
@@ -214,6 +216,25 @@ def test_the_radius_of_a_recheck_has_the_weights_of_its_problem():
     one, two = (tmsopt.solve(p).quantities["radius"] for p in (once, twice))
     assert one == pytest.approx(robustness(problem(OFF), weights={"Fr": 0.1, "chi_B": 0.1}).radius, rel=1e-12)
     assert two == pytest.approx(one / 2, rel=1e-9)
+
+
+def test_a_recheck_finds_the_radius_without_ipopt(monkeypatch):
+    """Of 40 random stable designs, by another method: as near as what IPOPT found, or it would be no recheck."""
+    rng, claimed = np.random.default_rng(39), []
+    while len(claimed) < 40:
+        low, high = (0.5, 0.01, 0.2, 0.5, -2, -1.5, -1), (6, 10, 2, 2, -0.05, -0.05, 1.2)
+        design = dict(zip(NAMES, rng.uniform(low, high).tolist(), strict=True))
+        if stable({n: np.array(x) for n, x in design.items()}):
+            claimed.append((design, robustness(problem(design)).radius))
+
+    def nothing(*arguments, **options):
+        raise AssertionError
+
+    for name in ("program.ipopt", "boundaries.nearest"):
+        monkeypatch.setattr(import_module(f"tmsopt.{name}"), "ipopt", nothing)
+    for design, radius in claimed:
+        asked = replace(problem(design), constraints={"far": "radius >= 0"}).posed
+        assert recheck(asked, design).quantities["radius"] == pytest.approx(radius, rel=1e-8)
 
 
 def test_a_radius_that_is_kept_is_that_of_the_weights():

@@ -1,4 +1,4 @@
-"""From starts to the nearest point of one edge: IPOPT, with solvers that serve every design of a model."""
+"""From starts to the nearest point of one edge, by solvers that serve every design of a model."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from tmsopt.algebra.formula import formula, symbol
 from tmsopt.boundaries.boundaries import Edge
 from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.models import Model
-from tmsopt.program.ipopt import ipopt, polisher
+from tmsopt.program.ipopt import Run, polisher
 from tmsopt.program.nlp import NLP, name_of
 from tmsopt.records import Array
 
@@ -43,7 +43,13 @@ class Approach:
         return float(np.linalg.norm(self.u)) if self.u.size else math.inf
 
 
-def approach(place: WeightedDesign, edge: Edge, sign: float, size: float) -> Callable[[Array, float], Approach | None]:
+Method = Callable[..., Callable[[Array], Run]]
+"""`ipopt`, or `sqp`: what solves a program from a start."""
+
+
+def approach(
+    place: WeightedDesign, edge: Edge, sign: float, size: float, method: Method
+) -> Callable[[Array, float], Approach | None]:
     """A function from a start, and a distance to beat, to a nearest point of an edge; None where it ends elsewhere.
 
     Args:
@@ -61,7 +67,7 @@ def approach(place: WeightedDesign, edge: Edge, sign: float, size: float) -> Cal
         upper=(*(place.space.upper / size).tolist(), *plain.upper[n:]),
         numbers=own,
     )
-    run, polish = ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp)
+    run, polish = method(nlp, max_iterations=_ITERATIONS), polisher(nlp)
 
     def from_start(u: Array, below: float) -> Approach | None:
         c = sign * place.space.coefficients(u)

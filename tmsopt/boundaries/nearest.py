@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.boundaries.approach import ALIKE, Approach, approach
+from tmsopt.boundaries.approach import ALIKE, Approach, Method, approach
 from tmsopt.boundaries.boundaries import KINDS, Edge, edges
 from tmsopt.boundaries.rays import RayCrossing, between, elsewhere, most_damped, ray_crossings
 from tmsopt.boundaries.surroundings import WeightedDesign, placed
@@ -17,6 +17,8 @@ from tmsopt.errors import Fault, InputError, suggest, table_faults
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
+from tmsopt.program.ipopt import ipopt
+from tmsopt.program.sqp import sqp
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Table, plain
 
@@ -200,34 +202,37 @@ def robustness(
 
 
 def robustness_at(problem: Posed, parameters: Mapping[str, float]) -> Robustness:
-    """The same for the boundaries of stability alone, with the weights of the problem; kept for a while."""
+    """The same for the boundaries of stability alone, with the weights of the problem; kept for a while.
+
+    IPOPT, which searches for designs, has no part in it.
+    """
     return _at(problem, Table(parameters), Table(problem.weights))
 
 
 @lru_cache(maxsize=_KEPT)
 def _at(problem: Posed, parameters: Table[float], weights: Table[float]) -> Robustness:
-    return _surveyed(placed(problem, parameters, weights or None), STABILITY)
+    return _surveyed(placed(problem, parameters, weights or None), STABILITY, sqp)
 
 
-def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS)) -> Robustness:
+def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS), method: Method = ipopt) -> Robustness:
     damped = "heavy damping" in kinds
     seen = ray_crossings(place.space, damped=damped)
-    found = _each(place, seen, kinds)
+    found = _each(place, seen, kinds, method)
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
         seen = sorted([*seen, *between(place.space, u, damped)], key=lambda c: c.distance)
-        found = _each(place, seen, kinds)
+        found = _each(place, seen, kinds, method)
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
     zeros = _zeros(place) if place.stands_on else ()
     return Robustness(place.problem.problem, stable, place.stands_on, zeros, place.heavily_damped, *own, *found)
 
 
-def _each(place: WeightedDesign, seen: list[RayCrossing], kinds: Sequence[str]) -> list[Nearest]:
+def _each(place: WeightedDesign, seen: list[RayCrossing], kinds: Sequence[str], method: Method) -> list[Nearest]:
     """The nearest point of each boundary; eigenfrequencies of a complex system pass the real line alone."""
     real = place.problem.model.carrier is None
-    return [_nearest(place, seen, kind) if real or kind == "weave" else Nearest(kind) for kind in kinds]
+    return [_nearest(place, seen, kind, method) if real or kind == "weave" else Nearest(kind) for kind in kinds]
 
 
 def _zeros(place: WeightedDesign) -> tuple[str, ...]:
@@ -257,7 +262,7 @@ def _place(
     return placed(problem, problem.ordered(parameters or {}), weights)
 
 
-def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Nearest:
+def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, method: Method = ipopt) -> Nearest:
     """The least distance over the pieces of one boundary."""
     if kind in place.stands_on or (kind == "heavy damping" and place.on_edge):
         zero = dict.fromkeys(place.weights, 0.0)
@@ -266,7 +271,7 @@ def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Neare
     best = Approach()
     pieces = edges(place.problem.model.degree)
     for edge, sign, starts in _pieces(place, mine, kind):
-        best = min(best, _best(place, pieces[edge], sign, starts), key=lambda found: found.distance)
+        best = min(best, _best(place, pieces[edge], sign, starts, method), key=lambda found: found.distance)
     if mine and mine[0].distance < best.distance * (1 - ALIKE):
         best = Approach(mine[0].u, False)
     if not best.u.size or not is_boundary(place, best.u, kind == "heavy damping"):
@@ -289,11 +294,11 @@ def _pieces(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Iterat
         yield edge, sign, points
 
 
-def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array]) -> Approach:
+def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], method: Method) -> Approach:
     """The nearest of where the starts lead; what is crossed on the way there is started from too, and points as far."""
     best = Approach()
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
-    run = approach(place, edge, sign, size)
+    run = approach(place, edge, sign, size, method)
     for turn in range(_ROUNDS):
         before = best.distance
         for u in starts:

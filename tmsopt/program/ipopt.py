@@ -34,7 +34,7 @@ _SETTINGS = {
 }
 
 _SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM") if hasattr(signal, n)]
-_KEPT = 32
+KEPT = 32
 """Programs of which solvers are kept."""
 
 _STEPS = 12
@@ -98,7 +98,7 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
             (column / np.array(unit)).tolist() for column in (x0, lower, upper)
         )  # quicker in CasADi than arrays
         rows = {"lbg": limits.row_lower, "ubg": limits.row_upper}
-        with _interruptible():
+        with interruptible():
             answer = solver(x0=first, p=limits.constants, lbx=ends[0], ubx=ends[1], **rows)
         stats = solver.stats()
         return Run(
@@ -146,8 +146,8 @@ class _Solvers(threading.local):
     """Solvers and conditions of what was compiled; a solver must not be used from two threads."""
 
     def __init__(self) -> None:
-        self.solver = lru_cache(maxsize=3 * _KEPT)(_solver)
-        self.conditions = lru_cache(maxsize=_KEPT)(_conditions)
+        self.solver = lru_cache(maxsize=3 * KEPT)(_solver)
+        self.conditions = lru_cache(maxsize=KEPT)(_conditions)
 
 
 _MADE = _Solvers()
@@ -211,7 +211,7 @@ def gains(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
+def interruptible() -> Iterator[None]:
     """Call handlers of signals once IPOPT is done: CasADi takes what they raise for a failed evaluation and goes on.
 
     Only in the main thread, which alone hears signals.

@@ -1,0 +1,60 @@
+"""CasADi's sequential quadratic programming: for small programs that are to be solved without IPOPT."""
+
+import threading
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.program.ipopt import KEPT, Run, interruptible
+from tmsopt.program.nlp import NLP, Compiled
+from tmsopt.records import Array
+
+_QUIET = ("print_header", "print_iteration", "print_status", "print_time", "show_eval_warnings", "error_on_fail")
+_QUIET_QP = ("print_header", "print_iter", "print_info", "error_on_fail")
+
+
+def sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
+    """A solver of one NLP: start → run; curvature is learnt from gradients.
+
+    Not to be shared between threads.
+    """
+    solver = _MADE.solver(nlp.compiled, max_iterations)
+    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
+    limits = {"lbx": nlp.lower, "ubx": nlp.upper, "lbg": nlp.row_lower, "ubg": nlp.row_upper, "p": nlp.constants}
+
+    def run(x0: Array) -> Run:
+        first = np.clip(x0, lower, upper)
+        with interruptible():
+            answer = solver(x0=first.tolist(), **limits)
+        x, rows, bounds = (np.nan_to_num(answer[name].full().ravel()) for name in ("x", "lam_g", "lam_x"))
+        return Run(np.clip(x, lower, upper), rows, bounds, str(solver.stats()["return_status"]))
+
+    return run
+
+
+def _solver(compiled: Compiled, max_iterations: int) -> ca.Function:
+    x, p, _ = compiled.symbols
+    f, g = compiled.function(x, p)
+    settings: dict[str, Any] = {
+        **dict.fromkeys(_QUIET, False),
+        "qpsol": "qrqp",
+        "qpsol_options": dict.fromkeys(_QUIET_QP, False),
+        "hessian_approximation": "limited-memory",
+        "max_iter": max_iterations,
+        "tol_pr": 1e-11,
+        "tol_du": 1e-9,
+    }
+    return ca.nlpsol("sqp", "sqpmethod", {"x": x, "p": p, "f": f, "g": g}, settings)
+
+
+class _Solvers(threading.local):
+    """Solvers of what was compiled; one must not be used from two threads."""
+
+    def __init__(self) -> None:
+        self.solver = lru_cache(maxsize=KEPT)(_solver)
+
+
+_MADE = _Solvers()
