@@ -198,7 +198,7 @@ def _writes_file(call):
     return (name in WRITERS and isinstance(call.func, ast.Attribute)) or ast.unparse(call.func) == "np.save"
 
 
-def callers_of_ipopt(modules):
+def callers_of_solvers(modules):
     """Modules that build a solver: CasADi's nlpsol, by name or as text, or its Opti stack."""
     return [m for m, source in modules.items() if {"nlpsol", "Opti", "OptiAdvanced"} & set(names_called(source))]
 
@@ -293,8 +293,9 @@ def test_nothing_prints_below_the_command_line():
     assert {m: writes(s) for m, s in SOURCES.items() if stage(m) != "cli" and writes(s)} == {}
 
 
-def test_ipopt_has_one_caller():
-    assert callers_of_ipopt(SOURCES) == ["tmsopt.program.ipopt"]
+def test_solvers_of_programs_have_one_caller_each():
+    """IPOPT, and the SQP method that rechecks a radius without it."""
+    assert callers_of_solvers(SOURCES) == ["tmsopt.program.ipopt", "tmsopt.program.sqp"]
 
 
 def test_no_text_is_run_as_python():
@@ -426,5 +427,5 @@ def test_the_other_checks_see_what_they_look_for():
         assert list(written("m", f"def f():\n    with write_atomic(x) as p:\n        {call}")) == []
     assert list(written("m", "def f():\n    p.open('rb')\n    open(p)\n    write_text(p, t)")) == []
     assert calls("eval('1')\nexec('1')\nmodel.eval()\nbuiltins.eval('1')", "eval", "exec") == [1, 2, 4]
-    assert callers_of_ipopt({"a": "import casadi as ca\nca.nlpsol('s', 'ipopt', {})", "b": "x = 1"}) == ["a"]
-    assert callers_of_ipopt({"a": "from casadi import nlpsol as n", "b": "import casadi\ncasadi.Opti()"}) == ["b"]
+    assert callers_of_solvers({"a": "import casadi as ca\nca.nlpsol('s', 'ipopt', {})", "b": "x = 1"}) == ["a"]
+    assert callers_of_solvers({"a": "from casadi import nlpsol as n", "b": "import casadi\ncasadi.Opti()"}) == ["b"]

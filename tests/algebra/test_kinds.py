@@ -9,8 +9,19 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, NotAccepted, fold, from_casadi, trace, values
-from tmsopt.algebra.intervals import ranges
+from tmsopt.algebra import (
+    BALLS,
+    CASADI,
+    FLOATS,
+    INTERVALS,
+    NODES,
+    NotAccepted,
+    fold,
+    from_casadi,
+    ranges,
+    trace,
+    values,
+)
 from tmsopt.problem import parse_value
 
 as_double, gradients = (getattr(import_module("tmsopt.algebra.kinds"), n) for n in ("as_double", "gradients"))

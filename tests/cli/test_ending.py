@@ -111,7 +111,7 @@ def test_handlers_wait_for_ipopt(number):
     heard = []
     before = signal.signal(number, lambda *_: heard.append("handler"))
     try:
-        with import_module("tmsopt.program.ipopt")._interruptible():
+        with import_module("tmsopt.program.ipopt").interruptible():
             press(number)
             time.sleep(0)
             heard.append("solved")

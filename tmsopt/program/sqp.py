@@ -50,11 +50,11 @@ def _solver(compiled: Compiled, max_iterations: int) -> ca.Function:
     return ca.nlpsol("sqp", "sqpmethod", {"x": x, "p": p, "f": f, "g": g}, settings)
 
 
-class _Solvers(threading.local):
+class _Kept(threading.local):
     """Solvers of what was compiled; one must not be used from two threads."""
 
     def __init__(self) -> None:
         self.solver = lru_cache(maxsize=KEPT)(_solver)
 
 
-_MADE = _Solvers()
+_MADE = _Kept()
