@@ -310,9 +310,9 @@ def constant(x: Any) -> Node:
 def made(op: str, *given: Any) -> Node:
     """An operation on nodes and numbers, in its simplest form."""
     operands = tuple(map(constant, given))
-    if any(o.op in _TRUTHS for o in operands):
-        logical = _LOGICAL.get(op, 0)
-        operands = (*operands[:logical], *map(_as_number, operands[logical:]))
+    truths = _LOGICAL.get(op, 0)
+    if truths or any(o.op in _TRUTHS for o in operands):
+        operands = tuple(_as_truth(o) if k < truths else _as_number(o) for k, o in enumerate(operands))
     fractions = []
     for x, o in zip(given, operands, strict=True):
         known = o.op == CONSTANT and isinstance(o.value, Fraction) and not (isinstance(x, float) and x == 0)
@@ -324,7 +324,12 @@ def made(op: str, *given: Any) -> Node:
 
 
 _TRUTHS = {"less", "at_most", "equal", "negligible", "both", "either", "not"}
-_LOGICAL = {"choose": 1, "both": 2, "either": 2, "not": 1}  # the first operands, of so many truths are taken
+_LOGICAL = {"choose": 1, "both": 2, "either": 2, "not": 1}
+"""How many of its operands, from the first on, an operation takes for true or false; all others are numbers."""
+
+
+def _as_truth(x: Node) -> Node:
+    return x if x.op in _TRUTHS else ~(x == 0)
 
 
 def _as_number(x: Node) -> Node:
@@ -395,7 +400,7 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
 
 def formula(outputs: Iterable[Any], names: Iterable[str] = ()) -> Formula:
     """The formula of nodes and numbers, in inputs of these names and those that appear."""
-    return _listed([constant(x) for x in outputs], names, lambda node: node.fixed and node.op != CONSTANT)
+    return _listed([_as_number(constant(x)) for x in outputs], names, lambda node: node.fixed and node.op != CONSTANT)
 
 
 def _listed(outputs: Sequence[Node], names: Iterable[str], alone: Callable[[Node], bool]) -> Formula:
@@ -450,7 +455,7 @@ def nodes_of_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
             case ca.OP_INPUT:
                 held[into[0]] = inputs[firsts[given[0]] + given[1]]
             case ca.OP_OUTPUT:
-                outputs[ends[into[0]] + into[1]] = _as_number(held[given[0]])
+                outputs[ends[into[0]] + into[1]] = held[given[0]]
             case ca.OP_CONST:
                 held[into[0]] = constant(function.instruction_constant(k))
             case _:

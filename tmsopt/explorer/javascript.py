@@ -22,12 +22,10 @@ class Text(NamedTuple):
 
     Attributes:
         binding: how strongly the text binds, from 1 (a choice) to 9 (a name, a number, a call).
-        truth: whether it is true or false.
     """
 
     text: str
     binding: int = 9
-    truth: bool = False
 
 
 class Spelling(NamedTuple):
@@ -37,15 +35,11 @@ class Spelling(NamedTuple):
         template: with {0}, {1}, … for the operands.
         binding: see `Text`.
         operands: how strongly that of each operand must bind, else it stands in parentheses.
-        truth: whether the result is true or false.
-        truths: operands that are taken as true or false.
     """
 
     template: str
     binding: int = 9
     operands: tuple[int, ...] = (0, 0, 0)
-    truth: bool = False
-    truths: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,11 +104,11 @@ def function(name: str, arguments: Sequence[str], asked: Formula, inputs: Mappin
 
     def named(given: Text) -> Text:
         lines.append(f"const t{len(lines)}={given.text};")
-        return Text(f"t{len(lines) - 1}", truth=given.truth)
+        return Text(f"t{len(lines) - 1}")
 
     operations = {op: partial(_spelled, spelling, named) for op, spelling in _OPERATIONS.items()}
     kind = Kind(operations | {"pow": partial(_power, named)}, lambda x: _number(as_double(x)), Text)
-    texts = [_as_number(x).text for x in fold(asked, inputs, kind, named)]
+    texts = [x.text for x in fold(asked, inputs, kind, named)]
     ends = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {texts[0]};"]
     return "\n".join([f"{name}({', '.join(arguments)}) {{", *lines, *ends, "}"])
 
@@ -149,24 +143,22 @@ _OPERATIONS: Mapping[str, Spelling] = {
     "div": Spelling("{0}/{1}", 7, (7, 8)),
     "neg": Spelling("-{0}", 8, (9,)),
     "square": Spelling("{0}*{0}", 7, (8,)),
-    "less": Spelling("{0}<{1}", 5, (6, 6), truth=True),
-    "at_most": Spelling("{0}<={1}", 5, (6, 6), truth=True),
-    "equal": Spelling("{0}==={1}", 4, (6, 6), truth=True),
-    "both": Spelling("{0}&&{1}", 3, (3, 4), True, (0, 1)),
-    "either": Spelling("{0}||{1}", 2, (2, 3), True, (0, 1)),
-    "not": Spelling("!{0}", 8, (9,), True, (0,)),
-    "choose": Spelling("{0}?{1}:{2}", 1, (2, 1, 1), truths=(0,)),
+    "less": Spelling("{0}<{1}", 5, (6, 6)),
+    "at_most": Spelling("{0}<={1}", 5, (6, 6)),
+    "equal": Spelling("{0}==={1}", 4, (6, 6)),
+    "both": Spelling("{0}&&{1}", 3, (3, 4)),
+    "either": Spelling("{0}||{1}", 2, (2, 3)),
+    "not": Spelling("!{0}", 8, (9,)),
+    "choose": Spelling("{0}?{1}:{2}", 1, (2, 1, 1)),
     "quotient": Spelling(_QUOTIENT, 1, (7, 8)),
     "ratio": Spelling(f"{{0}}===0?0:{_QUOTIENT}", 1, (7, 8)),
     "positive_part": Spelling("({0}+Math.abs({0}))/2", 7, (6,)),
-    "negligible": Spelling(f"Math.abs({{0}})<={ROUNDING!r}*{{1}}", 5, (0, 8), truth=True),
+    "negligible": Spelling(f"Math.abs({{0}})<={ROUNDING!r}*{{1}}", 5, (0, 8)),
     "min": _call("min", 2),  # NaN where either is
     "max": _call("max", 2),
     **{name: _call(name) for name in ("sqrt", "cbrt", "abs", "sign", "exp", "log")},
     **{name: _call(name) for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
 }
-
-_EQUALITY = 4  # how strongly === binds
 
 _LONGEST = 160
 """Characters of a result that stands where it is used."""
@@ -202,7 +194,7 @@ def _spelled(spelling: Spelling, named: Callable[[Text], Text], *given: Text) ->
     twice = [spelling.template.count(f"{{{k}}}") > 1 and _is_result(x.text) for k, x in enumerate(given)]
     operands = [named(x) if often else x for x, often in zip(given, twice, strict=True)]
     text = spelling.template.format(*(_operand(spelling, k, x) for k, x in enumerate(operands)))
-    found = Text(text, spelling.binding, spelling.truth)
+    found = Text(text, spelling.binding)
     return named(found) if len(text) > _LONGEST else found
 
 
@@ -218,15 +210,5 @@ def _is_result(text: str) -> bool:
 
 def _operand(spelling: Spelling, place: int, given: Text) -> str:
     """The text of an operand, in parentheses where it binds less than it must."""
-    taken = _as_truth(given) if place in spelling.truths else _as_number(given)
-    minus_minus = spelling.template == "{0}-{1}" and place == 1 and taken.text.startswith("-")
-    return f"({taken.text})" if taken.binding < spelling.operands[place] or minus_minus else taken.text
-
-
-def _as_truth(given: Text) -> Text:
-    text = given.text if given.binding > _EQUALITY else f"({given.text})"
-    return given if given.truth else Text(f"{text}!==0", _EQUALITY, truth=True)
-
-
-def _as_number(given: Text) -> Text:
-    return Text(f"{given.text}?1:0", 1) if given.truth else given
+    minus_minus = spelling.template == "{0}-{1}" and place == 1 and given.text.startswith("-")
+    return f"({given.text})" if given.binding < spelling.operands[place] or minus_minus else given.text
