@@ -169,20 +169,20 @@ def test_a_formula_does_not_ask_for_its_numbers():
 
 
 def test_a_truth_among_numbers_is_1_or_0_of_every_kind():
-    """As in slopes by CasADi: of max(x, y) half of both where x = y."""
+    """As in slopes by CasADi: of max(x, y) half of both where x = y. And a number is true where it is not 0."""
     x, y = symbol("x"), symbol("y")
     kinks = gradients([made("max", x, y), made("min", x, y), abs(x - y)], [x, y])
-    slopes = formula([*(s for each in kinks for s in each), 2 * (x < y) + (x <= y)], "xy")
+    slopes = formula([*(s for each in kinks for s in each), 2 * (x < y) + (x <= y), made("choose", x - y, 5, 7)], "xy")
     for at, wanted in {
-        (1.0, 1.0): (0.5, 0.5, 0.5, 0.5, 0, 0, 1),
-        (1.0, 2.0): (0, 1, 1, 0, -1, 1, 3),
-        (2.0, 1.0): (1, 0, 0, 1, 1, -1, 0),
+        (1.0, 1.0): (0.5, 0.5, 0.5, 0.5, 0, 0, 1, 7),
+        (1.0, 2.0): (0, 1, 1, 0, -1, 1, 3, 5),
+        (2.0, 1.0): (1, 0, 0, 1, 1, -1, 0, 5),
     }.items():
         assert fold(slopes, dict(zip("xy", at, strict=True)), FLOATS) == list(wanted)
         assert fold(slopes, dict(zip("xy", map(np.array, at), strict=True)), FLOATS) == list(wanted)
         assert [float(c) for c in fold(slopes, dict(zip("xy", map(ca.DM, at), strict=True)), CASADI)] == list(wanted)
         for (low, high), value in zip(ranges(slopes, [(a, a) for a in at]), wanted, strict=True):
-            assert low <= value <= high <= low + 1e-15
+            assert low <= value <= high <= low + 8 * math.ulp(max(1.0, value))
 
 
 def test_functions_of_casadi_are_formulas():

@@ -86,7 +86,7 @@ def verdicts(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str
 
 
 def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
-    fixed = {n: np.float64(x) for n, x in problem.ordered({}).items()}  # comparisons of these negate as arrays' do
+    fixed = {n: np.float64(x) for n, x in problem.ordered({}).items()}  # whose comparisons are arrays' too
     given = fixed | dict(columns)
     m = len(next(iter(columns.values())))
     wide = {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()}

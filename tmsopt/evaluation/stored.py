@@ -15,6 +15,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import flint
@@ -85,17 +86,20 @@ def held(
 ) -> tuple[Mapping[str, float], Evaluation, Mapping[str, float]]:
     """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
 
-    And to have its objective, which ends where a square root does. The structure remains that of the ideal design.
-    Where no such design is found, the one that is given, and what it misses → by how much.
+    It is moved, too, where its objective does not exist as stored: beside the end of a square root. The structure
+    remains that of the ideal design. Where no such design is found, the one that is given, and what it misses → by how
+    much.
     """
-    amounts = {} if checked.violations else missed(problem, parameters, cases, checked.around)
+    if checked.violations:
+        return parameters, checked, {}
+    amounts = missed(problem, parameters, cases, checked.around)
+    if not amounts and not _has_objective(problem, parameters):
+        for design in filter(partial(_has_objective, problem), _beside(problem, parameters)):
+            again = recheck(problem, design, cases, checked.around)
+            if not (again.violations or missed(problem, design, cases, checked.around)):
+                return design, _structured(problem, design, checked, again), {}
     if not amounts:
-        for design in () if checked.violations or _has_objective(problem, parameters) else _beside(problem, parameters):
-            if _has_objective(problem, design):
-                again = recheck(problem, design, cases, checked.around)
-                if not (again.violations or missed(problem, design, cases, checked.around)):
-                    return design, _structured(problem, design, checked, again), {}
-        return parameters, checked, amounts
+        return parameters, checked, {}
     clusters = _clusters(problem, parameters, checked, cases, list(amounts))
     ends = problem.free.items()
     inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
@@ -111,7 +115,7 @@ def held(
 
 
 def _has_objective(problem: Posed, parameters: Mapping[str, float]) -> bool:
-    """Whether the objective exists at the parameters exactly as stored, as one of the roots does."""
+    """Whether the objective exists at the parameters exactly as stored; one of the roots always does."""
     asked = problem.objective
     if asked is None or set(asked.names) & set(ROOT_NAMES):
         return True

@@ -34,9 +34,6 @@ _SETTINGS = {
 }
 
 _SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM") if hasattr(signal, n)]
-KEPT = 32
-"""Programs of which solvers are kept."""
-
 _STEPS = 12
 _STALLED = 1e-14  # relative step of Newton's method, below which it ends once the steps no longer shrink
 _STATIONARY = 1e-9
@@ -90,7 +87,7 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
     """
     unit = (*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units)))
     asked = (("ipopt.linear_solver", options.linear_solver), ("ipopt.max_iter", max_iterations))
-    solver = _MADE.solver(nlp.compiled, unit, 1 / nlp.objective_unit, (*asked, *_SETTINGS[start].items()))
+    solver = _SOLVERS.of(nlp.compiled, unit, 1 / nlp.objective_unit, (*asked, *_SETTINGS[start].items()))
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
@@ -142,27 +139,26 @@ def _conditions(compiled: Compiled) -> ca.Function:
     return ca.Function("kkt", [x, rows, p], [*first, hessian])
 
 
-class _Solvers(threading.local):
-    """Solvers and conditions of what was compiled; a solver must not be used from two threads."""
+class PerThread(threading.local):
+    """What a function makes of the last few arguments, for each thread: a solver must not be used from two."""
 
-    def __init__(self) -> None:
-        self.solver = lru_cache(maxsize=3 * KEPT)(_solver)
-        self.conditions = lru_cache(maxsize=KEPT)(_conditions)
+    def __init__(self, make: Callable[..., ca.Function], most: int = 32) -> None:
+        self.of = lru_cache(maxsize=most)(make)
 
 
-_MADE = _Solvers()
+_SOLVERS, _CONDITIONS = PerThread(_solver, 96), PerThread(_conditions)
 
 
 def forget() -> None:
     """Compile everything anew from now on, in this thread."""
-    for made in (_MADE.solver, _MADE.conditions):
-        made.cache_clear()
+    for made in (_SOLVERS, _CONDITIONS):
+        made.of.cache_clear()
     forget_formulas()
 
 
 def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
     """A function that refines runs of one NLP under given limits; the better of refined and raw point is returned."""
-    expand = _MADE.conditions(nlp.compiled)
+    expand = _CONDITIONS.of(nlp.compiled)
 
     def polish(run: Run, limits: NLP) -> Point:
         ends = (np.array(e) for e in (limits.lower, limits.upper, limits.row_lower, limits.row_upper))

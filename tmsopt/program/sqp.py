@@ -1,14 +1,12 @@
 """CasADi's sequential quadratic programming: for small programs that are to be solved without IPOPT."""
 
-import threading
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from tmsopt.program.ipopt import KEPT, Run, interruptible
+from tmsopt.program.ipopt import PerThread, Run, interruptible
 from tmsopt.program.nlp import NLP, Compiled
 from tmsopt.records import Array
 
@@ -17,11 +15,11 @@ _QUIET_QP = ("print_header", "print_iter", "print_info", "error_on_fail")
 
 
 def sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
-    """A solver of one NLP: start → run; curvature is learnt from gradients.
+    """A solver of one NLP: start → run. It learns the curvature from gradients.
 
     Not to be shared between threads.
     """
-    solver = _MADE.solver(nlp.compiled, max_iterations)
+    solver = _SOLVERS.of(nlp.compiled, max_iterations)
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     limits = {"lbx": nlp.lower, "ubx": nlp.upper, "lbg": nlp.row_lower, "ubg": nlp.row_upper, "p": nlp.constants}
 
@@ -50,11 +48,4 @@ def _solver(compiled: Compiled, max_iterations: int) -> ca.Function:
     return ca.nlpsol("sqp", "sqpmethod", {"x": x, "p": p, "f": f, "g": g}, settings)
 
 
-class _Kept(threading.local):
-    """Solvers of what was compiled; one must not be used from two threads."""
-
-    def __init__(self) -> None:
-        self.solver = lru_cache(maxsize=KEPT)(_solver)
-
-
-_MADE = _Kept()
+_SOLVERS = PerThread(_solver)
