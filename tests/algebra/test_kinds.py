@@ -172,11 +172,12 @@ def test_a_truth_among_numbers_is_1_or_0_of_every_kind():
     """As in slopes by CasADi: of max(x, y) half of both where x = y. And a number is true where it is not 0."""
     x, y = symbol("x"), symbol("y")
     kinks = gradients([made("max", x, y), made("min", x, y), abs(x - y)], [x, y])
-    slopes = formula([*(s for each in kinks for s in each), 2 * (x < y) + (x <= y), made("choose", x - y, 5, 7)], "xy")
+    others = [2 * (x < y) + (x <= y), x < y, made("choose", x - y, 5, 7), made("choose", made("both", x < 2, y), 5, 7)]
+    slopes = formula([*(s for each in kinks for s in each), *others], "xy")
     for at, wanted in {
-        (1.0, 1.0): (0.5, 0.5, 0.5, 0.5, 0, 0, 1, 7),
-        (1.0, 2.0): (0, 1, 1, 0, -1, 1, 3, 5),
-        (2.0, 1.0): (1, 0, 0, 1, 1, -1, 0, 5),
+        (1.0, 1.0): (0.5, 0.5, 0.5, 0.5, 0, 0, 1, 0, 7, 5),
+        (1.0, 2.0): (0, 1, 1, 0, -1, 1, 3, 1, 5, 5),
+        (2.0, 1.0): (1, 0, 0, 1, 1, -1, 0, 0, 5, 7),
     }.items():
         assert fold(slopes, dict(zip("xy", at, strict=True)), FLOATS) == list(wanted)
         assert fold(slopes, dict(zip("xy", map(np.array, at), strict=True)), FLOATS) == list(wanted)

@@ -12,11 +12,11 @@ import pytest
 from benchmarks.suites import TEMPLATES
 from tmsopt.algebra import NotAccepted, from_casadi, on_arrays
 from tmsopt.errors import InputError
-from tmsopt.models import Quantity, Values, tms
+from tmsopt.models import Quantity, Values, from_coefficients, tms
 from tmsopt.problem import NO_RADIUS, Problem, array_function, parse_comparison
 from tmsopt.roots import roots
 
-arrays = import_module("tmsopt.algebra.arrays")
+arrays, Bounded = import_module("tmsopt.algebra.arrays"), import_module("tmsopt.algebra.rounding").Bounded
 
 NATIVE = Problem(
     model=tms,
@@ -158,6 +158,24 @@ def test_root_quantities_are_given_or_computed():
     assert np.array_equal(found(columns | {"abscissa": alpha})["x"], 2 * alpha)
     z = roots(np.stack(np.broadcast_arrays(*tms.coefficients(columns)), axis=-1))
     assert found(columns)["x"] == pytest.approx(2 * z.real.max(axis=-1), abs=1e-9)  # by another way to the roots
+
+
+def test_there_are_no_roots_where_a_coefficient_does_not_exist():
+    lone = Problem(from_coefficients([1, "log(c)", 2]), free={"c": (0.0, 9.0)}).posed
+    found = array_function(lone, {"x": "abscissa"})({"c": np.array([-1.0, 3.0])})["x"]
+    assert np.isnan(found).tolist() == [True, False]
+
+
+def test_bounds_of_errors_hold_what_is_near():
+    """Columns a hundredth off: the values of 200 designs so near are within the bounds."""
+    texts, rng = {"a2": "a2", "Fr_c": "Fr_c", "mixed": "exp(Fr) / (2 + sin(lambda_s))"}, np.random.default_rng(0)
+    columns = {n: np.ravel(x) for n, x in NATIVE.posed.ordered({"Fr": [1.5], "lambda_s": [0.4]}).items()}
+    wide = array_function(NATIVE.posed, texts)({n: Bounded(x, 0.01 * np.abs(x)) for n, x in columns.items()})
+    near = {n: x * (1 + rng.uniform(-0.01, 0.01, 200)) for n, x in columns.items()}
+    for name, values in array_function(NATIVE.posed, texts)(near).items():
+        off = np.abs(values - wide[name].value)
+        assert np.all(off <= wide[name].error), name
+        assert np.max(off) >= 0.01 * np.max(wide[name].error), name  # bounds that say something
 
 
 def test_a_formula_that_asks_for_its_numbers_is_refused_in_words():

@@ -91,6 +91,13 @@ def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_
     assert found.beyond[list(stated.conditions).index("decay")] == pytest.approx([0.5, -0.5, -2.5], abs=1e-12)
 
 
+def test_of_an_equality_the_difference_alone_counts():
+    """Of s² + x s − 1, one root of which is positive, the damping ratio is −1 whatever x is; no abscissa is added."""
+    model = from_coefficients([1, x, -1])
+    stated = tmsopt.Problem(model, free={"x": (0.0, 1.0)}, constraints={"flat": "0.3 == damping_ratio"}).posed
+    assert judgement.judge(stated, {"x": np.array([0.0, 0.5])}).beyond[0] == pytest.approx([1.3, 1.3], abs=1e-12)
+
+
 def test_a_design_without_motion_is_none():
     """A singular mass matrix, or a coefficient that does not exist: neither is a design to the recheck."""
     model = from_coefficients([x, 1 + ca.log(y), 1])
