@@ -19,6 +19,7 @@ from tmsopt.progress import begin
 from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.search.basins.leaders import SAME, led, starting
+from tmsopt.search.rescues import rescued_by
 from tmsopt.search.sample import NARROW
 from tmsopt.search.workspace import LocalEnd, Workspace
 
@@ -67,11 +68,11 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[LocalEnd]
         if options.progress:
             options.progress(len(candidates), starts, _best(work, candidates))
         if not options.exhaustive and _settled(work, candidates, left):
-            if work.sample is None:
+            if work.sample is None and rescued_by("opposite faces"):
                 candidates += _beside(run, candidates, starts - len(candidates))
             break
     lost = part.pattern is not None and most is None and not any(c.feasible for c in candidates)
-    if lost and not work.out_of_reach:
+    if lost and not work.out_of_reach and rescued_by("least abscissa"):
         candidates += _rescued(work, nlp)
     return candidates
 
@@ -87,7 +88,13 @@ def _best(work: Workspace, candidates: Sequence[LocalEnd]) -> str:
 def _otherwise(run: "Runner", design: Mapping[str, float], ended: LocalEnd) -> LocalEnd:
     """Where a start ends that first took a way on which a0 may vanish, if it ended nowhere by the usual one."""
     work, nlp = run.work, run.nlp
-    if ended.feasible or run.hopeless or work.sample is None or not (nlp.products and work.sample.singular):
+    if (
+        ended.feasible
+        or run.hopeless
+        or work.sample is None
+        or not (nlp.products and work.sample.singular)
+        or not rescued_by("through a0")
+    ):
         return ended
     lead = -1 if float(work.problem.values(work.problem.ordered(design)).coefficients[0]) < 0 else 1
     led = Runner(work, work.formulate(nlp.cases, lead=lead)).solve_from(design, near=True, hopeful=False)
@@ -139,7 +146,7 @@ class Runner:
                 break
             if not best.feasible and again >= (_AGAIN if hopeful else 0 if self.hopeless else _AGAIN_HOPELESS):
                 break
-            if not np.all(np.isfinite(best.run.x)):
+            if not np.all(np.isfinite(best.run.x)) or not rescued_by("restarts"):
                 break
             ended = self._once(self.work.design_at(best.run.x), "near" if again % 2 == 0 else "far")
             if best.feasible and (not ended.feasible or ended.objective >= best.objective - SAME):
@@ -164,16 +171,21 @@ class Runner:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
         if self.work.part.pattern is not None or start_objective(self.work.part, design) >= best.objective - SAME:
             return best
+        if not rescued_by("kept start"):
+            return best
         kept = self._once(design, start)
         return kept if kept.feasible and kept.objective < best.objective else best
 
     def _once(self, design: Mapping[str, float], start: str) -> LocalEnd:
         x = initial_point(self.nlp, self.work.part, design, start == "near")
-        return min((self._from(x, way, start) for way in islice(self.nlp.touchings(x), _WAYS)), key=rank)
+        return min(
+            (self._from(x, way, start) for way in islice(self.nlp.touchings(x), _WAYS if rescued_by("ways") else 1)),
+            key=rank,
+        )
 
     def _crossed(self, best: LocalEnd) -> LocalEnd:
         """The best that is reached from an end at which other ways are as close as the one that was held."""
-        for _ in range(_CROSSINGS if self.nlp.touches and best.feasible else 0):
+        for _ in range(_CROSSINGS if self.nlp.touches and best.feasible and rescued_by("exchanges") else 0):
             x, held = best.run.x, _limits(best.nlp)
             others = (way for way in self.nlp.touchings(x, _MEETS) if _limits(way) != held)
             ends = [self._from(x, way, "near") for way in islice(others, 2 * _WAYS)]

@@ -22,6 +22,7 @@ from tmsopt.program.starts import designs, initial_point
 from tmsopt.records import Array, Table
 from tmsopt.search.multistart import optima, same_objective
 from tmsopt.search.newton import solutions
+from tmsopt.search.rescues import rescued_by
 from tmsopt.search.workspace import LocalEnd, Workspace
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
@@ -185,6 +186,8 @@ def attained(work: Workspace, nlp: NLP, candidates: Sequence[LocalEnd], trial: C
     ours = [c for c in candidates if c.feasible and (c.nlp.variables, c.nlp.rows) == (nlp.variables, nlp.rows)]
     worse = [c for c in ours if best < c.objective <= most and not same_objective(c.objective, best, nlp.size)]
     if not worse or nlp.cases or trial.checked.violations or multiple_roots_exist(work.problem, trial.parameters):
+        return trial
+    if not rescued_by("attained"):
         return trial
     other = best_checked(work, nlp, worse)
     fit = other is not None and converged(other) and claim_matches(work, other) and not other.checked.violations

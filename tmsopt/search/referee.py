@@ -25,6 +25,7 @@ from tmsopt.search.outcome import (
     mass_advice,
     unclear,
 )
+from tmsopt.search.rescues import rescued_by
 from tmsopt.search.sample import Sample, Sampler
 from tmsopt.search.workspace import LocalEnd, Workspace
 
@@ -106,7 +107,7 @@ def ideal(work: Workspace) -> Outcome | None:
     for k in np.flatnonzero((sample.refined.violation == 0) & (sample.refined.worth <= -1))[:_APPEALED].tolist():
         parameters = problem.ordered(work.sampler.design(sample.refined, k))
         checked = work.recheck(parameters, ())
-        if not checked.violations and checked.objective == 1:
+        if not checked.violations and checked.objective == 1 and rescued_by("ideal"):
             return Outcome(parameters, checked, "optimal", {}, Starts(), "abscissa")
     return None
 
@@ -118,7 +119,7 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
         if trial is not None:
             rivals = rivals.joined(sampler.around({name: trial.parameters[name] for name in work.problem.free}))
         rivals = _better(rivals, _least(work, trial))
-        if not len(rivals):
+        if not len(rivals) or not rescued_by("appeals"):
             break
         ended = [run.solve_from(sampler.design(rivals, k), near=True) for k in range(min(len(rivals), _APPEALED))]
         candidates = [*candidates, *ended]
@@ -135,7 +136,7 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
         if opened is not None:
             return replace(opened, candidates=[*candidates, *opened.candidates])
     kept = sampler.refined(rivals.take(np.arange(min(len(rivals), 1))), _FINEST).joined(rivals)
-    for k in range(min(len(kept), _KEPT_AT_MOST)):
+    for k in range(min(len(kept), _KEPT_AT_MOST) if rescued_by("kept design") else 0):
         free = sampler.design(kept, k)
         checked = work.recheck(work.problem.ordered(free), nlp.cases)
         if not checked.violations and work.problem.sign * checked.objective < _least(work, trial):
@@ -146,7 +147,8 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
 
 def _endless(work: Workspace, sample: Sample, value: float) -> bool:
     """Whether an objective that no solver stopped at is far below what it is elsewhere in the box."""
-    return math.isfinite(value) and work.problem.sign * value < -_ENDLESS * sample.spread < 0
+    far = math.isfinite(value) and work.problem.sign * value < -_ENDLESS * sample.spread < 0
+    return far and rescued_by("unbounded")
 
 
 def keep_sampled(work: Workspace, standing: Standing, starts: Starts, cases: Sequence[Case]) -> Outcome:
@@ -163,7 +165,7 @@ def endless(work: Workspace, finding: Outcome) -> Outcome:
 
     The root that is far away would go on to infinity.
     """
-    if finding.status != "optimal" or not runs_away(finding):
+    if finding.status != "optimal" or not runs_away(finding) or not rescued_by("runaway"):
         return finding
     if work.problem.objective is None or _held_off(work.problem, finding):
         return finding
@@ -210,7 +212,7 @@ def demote_if_beaten(work: Workspace, finding: Outcome) -> Outcome:
         checked = work.recheck(parameters, cases)
         told = not checked.violations and not unclear(work.problem, checked)
         merged = abs(checked.structure.abscissa - checked.realised)  # what merging roots may gain
-        if told and work.problem.sign * checked.objective < least - merged:
+        if told and work.problem.sign * checked.objective < least - merged and rescued_by("outdone"):
             doubted = replace(finding, parameters=parameters, checked=checked, cases=cases, status="not_converged")
             return replace(doubted, active={}, branches=(), notes=(_PASSED,))
     return finding
@@ -235,10 +237,12 @@ def _nudged(
 ) -> CheckedEnd | None:
     """An end that meets all limits a hair's breadth aside: at itself a root at 0, say, has no sign."""
     least, best = _least(work, trial), min((c.objective for c in candidates if c.feasible), default=math.inf)
+    if not rescued_by("nudge"):
+        return None
     ends = [c for c in candidates if c.feasible and c.objective < least and same_objective(c.objective, best, nlp.size)]
     for end in ends[:_APPEALED]:
         own = sampler.space.points(work.design_at(end.run.x))
-        towards = np.concatenate([near.u[:_APPEALED], sampler.rng.random((_TOWARDS, sampler.space.size))])
+        towards = np.concatenate([near.u[:_APPEALED], sampler.stream("nudge").random((_TOWARDS, sampler.space.size))])
         seen = sampler.look((own + _HAIRS[:, None, None] * (towards - own)).reshape(-1, sampler.space.size))
         for k in np.flatnonzero((seen.violation == 0) & (seen.worth < least))[:_APPEALED].tolist():
             parameters = work.problem.ordered(sampler.design(seen, k))
@@ -256,8 +260,10 @@ def _off_the_edge(work: Workspace, sampler: Sampler, trial: CheckedEnd) -> Check
     goal, roots = problem.objective, [math.hypot(r.re, r.im) for r in trial.checked.structure.roots]
     if goal is None or _FLAT not in goal.names or not min(roots, default=1.0) < _AT_ZERO * max(roots, default=0.0):
         return trial
+    if not rescued_by("off the edge"):
+        return trial
     own, claimed = sampler.space.points(trial.parameters), problem.sign * trial.checked.objective
-    towards = sampler.rng.random((_TOWARDS, sampler.space.size))
+    towards = sampler.stream("off the edge").random((_TOWARDS, sampler.space.size))
     seen = sampler.look((own + _HAIRS[::-1, None, None] * (towards - own)).reshape(-1, sampler.space.size))
     close = (seen.violation == 0) & (np.abs(seen.worth - claimed) <= _EDGE * (1 + abs(claimed)))
     for k in (-1, *np.flatnonzero(close)[:_KEPT_AT_MOST].tolist()):
@@ -280,7 +286,7 @@ def _troubled(work: Workspace, candidates: Sequence[LocalEnd], trial: CheckedEnd
 
 def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: CheckedEnd | None, rivals: Looked) -> Standing | None:
     """A better design where the search may go as far as a0 = 0; None where it finds none."""
-    if not nlp.products:
+    if not nlp.products or not rescued_by("infinity"):
         return None
     rows = [*range(len(rivals))][:_OPEN] + [*range(len(rivals))][_OPEN:][-_OPEN:]
     origins = [(sampler.design(rivals, k), True) for k in rows]

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from itertools import product
+from zlib import crc32
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from tmsopt.program.cube import Cube
 from tmsopt.program.judgement import Judged, judge
 from tmsopt.records import Array
 from tmsopt.search.basins import REACHES, Looked, apart, basins, scattered
+from tmsopt.search.rescues import rescued_by
 
 _MOST, _LEAST = 3 * 2**12, 2**11
 """Designs of a sample: at most, and at least where each costs much."""
@@ -84,10 +86,14 @@ class Sampler:
     """
 
     def __init__(self, problem: Posed, seed: int) -> None:
-        self.space, self.rng = Cube(problem), np.random.default_rng([seed, 16])
+        self.space, self.seed = Cube(problem), seed
         self.count = 0
         self.scales = np.ones(len(problem.conditions))
         self._offset = np.random.default_rng(seed).random(self.space.size)
+
+    def stream(self, stage: str) -> np.random.Generator:
+        """Random numbers of one stage, whatever others draw."""
+        return np.random.default_rng([self.seed, crc32(stage.encode())])
 
     @property
     def problem(self) -> Posed:
@@ -104,11 +110,12 @@ class Sampler:
         ranked = drawn.take(drawn.ranked[:_RANKED])
         leaders = ranked.take(apart(ranked, _LEADERS))
         met = int(np.sum(drawn.violation == 0))
-        if met < NARROW * len(drawn):
+        if met < NARROW * len(drawn) and rescued_by("sought"):
             sought = self.nearer(ranked.take(scattered(ranked, _SOUGHT)))
             sought = sought.take(sought.ranked)
             leaders = sought.take(apart(sought, 2 * _LEADERS))
-        refined = self._with_basins(leaders, drawn) if met >= NARROW * len(drawn) else self.refined(leaders)
+        wide = met >= NARROW * len(drawn) and rescued_by("basins")
+        refined = self._with_basins(leaders, drawn) if wide else self.refined(leaders)
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
         known = drawn.worth[np.isfinite(drawn.worth)]
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
@@ -154,11 +161,11 @@ class Sampler:
             reaches: of the box, round after round, or of each design in each direction, shape (designs, 1, size).
             local: designs looked at around each, in each round.
         """
-        kept = start
+        kept, rng = start, self.stream("refined")
         rows = np.arange(len(kept))
         for reach in reaches if len(kept) else ():
-            steps = self.rng.standard_normal((len(kept), local, self.space.size))
-            steps[:, ::2] *= self.rng.random((len(kept), local // 2, self.space.size)) < 0.5  # not in all directions
+            steps = rng.standard_normal((len(kept), local, self.space.size))
+            steps[:, ::2] *= rng.random((len(kept), local // 2, self.space.size)) < 0.5  # not in all directions
             near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, self.space.size))
             both = kept.joined(near)
             of = np.concatenate([rows, np.repeat(rows, local)])
@@ -204,10 +211,10 @@ class Sampler:
 
     def around(self, design: Mapping[str, float]) -> Looked:
         """The best of the designs about one: near it at all distances, and with parameters at other ends of the box."""
-        u = self.space.points(design)
+        u, rng = self.space.points(design), self.stream("around")
         reach = np.repeat(np.geomspace(0.5, 1e-5, _SHELLS), _SHELL)[:, None]
-        steps = self.rng.standard_normal((len(reach), self.space.size))
-        steps[::2] *= self.rng.random((len(reach[::2]), self.space.size)) < 0.5
+        steps = rng.standard_normal((len(reach), self.space.size))
+        steps[::2] *= rng.random((len(reach[::2]), self.space.size)) < 0.5
         ends = np.repeat(u[None], 2 * self.space.size, axis=0)
         ends[np.arange(len(ends)), np.repeat(np.arange(self.space.size), 2)] = np.tile([0.0, 1.0], self.space.size)
         seen = self.look(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))

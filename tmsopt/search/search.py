@@ -39,6 +39,7 @@ from tmsopt.search.outcome import (
 from tmsopt.search.referee import demote_if_beaten, endless, ideal, improve_from_sample, keep_sampled, runs_away
 from tmsopt.search.remedies.changes import relax
 from tmsopt.search.remedies.needs import irreducible, steady
+from tmsopt.search.rescues import rescued_by
 from tmsopt.search.sample import NARROW, Sampler
 from tmsopt.search.tolerant import maximise_radius, promising
 from tmsopt.search.workspace import LocalEnd, Workspace, workspace
@@ -85,12 +86,17 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     mixed = {"abscissa", "damping_ratio"} <= set(nlp.variables)
     thin = work.problem.model.feedback is not None or (work.sample and work.sample.singular) or rarely_stable(work)
     needles = bool(work.sample and thin and "abscissa" in nlp.variables)
-    leads = exceptional(work) if (mixed or needles) and not work.options.near else []
+    asked = (mixed or needles) and not work.options.near and rescued_by("multiple roots")
+    leads = exceptional(work) if asked else []
     candidates = [*search(work, nlp, _FEWER if mixed and leads else None), *_from(work, nlp, leads)]
     trial = best_checked(work, nlp, candidates)
-    if any(c.crossing for c in candidates) and (trial is None or trial.checked.violations):
+    if (
+        any(c.crossing for c in candidates)
+        and (trial is None or trial.checked.violations)
+        and rescued_by("other chains")
+    ):
         nlp, candidates, trial = search_elsewhere(work, nlp, candidates)
-    if trial is None and on_plateau(work.problem):
+    if trial is None and on_plateau(work.problem) and rescued_by("off plateau"):
         candidates += _from(work, nlp, off_plateau(work, nlp, _FEWER))
         trial = best_checked(work, nlp, candidates)
     for ratio, most in _ratios(work, nlp, trial):
@@ -101,7 +107,13 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
             nlp, candidates, trial = fixed, others, other
     standing = improve_from_sample(work, nlp, candidates, trial)
     wanting = insist and standing.trial is not None and _wants_stability(work.problem, standing.trial)
-    if standing.trial is not None and work.sampler and wanting and not work.never_stable:
+    if (
+        standing.trial is not None
+        and work.sampler
+        and wanting
+        and not work.never_stable
+        and rescued_by("left of the axis")
+    ):
         others = _left_of_the_axis(work, nlp, len({id(c) for c in candidates}))
         other, every = best_checked(work, nlp, others), [*standing.candidates, *others]
         ahead_of = other is not None and is_better(work, other, standing.trial)
@@ -231,9 +243,13 @@ def _reached(work: Workspace, names: Sequence[str]) -> tuple[Mapping[str, float]
 
 def _ratios(work: Workspace, nlp: NLP, trial: CheckedEnd | None) -> Iterator[tuple[float, int]]:
     """Damping ratios at which to search again, and from how many starts."""
-    if {"abscissa", "damping_ratio"} <= set(nlp.variables):
+    if {"abscissa", "damping_ratio"} <= set(nlp.variables) and rescued_by("real roots"):
         yield 1.0, _FEWER  # where real roots meet, sectors and half-planes are singular together
-    if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, nlp, trial)):
+    if (
+        "damping_ratio" in nlp.variables
+        and (trial is None or _unstable(work.problem, nlp, trial))
+        and rescued_by("positive roots")
+    ):
         # A positive real root has −1, and no sector of its own.
         yield -1.0, _FEWER if (trial and nlp.touches) or on_plateau(work.problem) else work.options.starts
 

@@ -42,6 +42,7 @@ from tmsopt.search.outcome import (
     mass_advice,
 )
 from tmsopt.search.remedies.needs import add_required_speed
+from tmsopt.search.rescues import rescued_by
 from tmsopt.search.search import Explored, answered, explore, without_any
 from tmsopt.search.workspace import Workspace, check_near, workspace
 
@@ -210,7 +211,12 @@ def _order(problem: Posed, finding: Outcome) -> tuple[float, float]:
 def _with_stability(solution: Solution, options: Options, began: float) -> Solution:
     """Of a search for stability that found none: whether there is any, and the design that one leads to."""
     problem = solution.problem.posed
-    if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
+    if (
+        solution.stable is not False
+        or solution.any_stable is False
+        or not solution.stability_sought
+        or not rescued_by("branch and bound")
+    ):
         return solution
     from tmsopt.global_search.stability import any_stable  # a tenth of all imports, which few problems need
 

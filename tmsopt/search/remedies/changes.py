@@ -27,6 +27,7 @@ from tmsopt.search.remedies.relaxation import (
     total,
     widened,
 )
+from tmsopt.search.rescues import rescued_by
 from tmsopt.search.workspace import Workspace, workspace
 
 _ROOM = ((1.0, DIGITS), (1.2, 2))
@@ -90,7 +91,7 @@ def _tried(
             if text := _less(work, box, limits, text, design, amounts, answered) if text and together else text:
                 remedies[Table(text)] = None
                 enough |= {n: relaxation.alone[n] for n in text if len(text) == 1 and n in relaxation.alone}
-        if not remedies:
+        if not remedies and rescued_by("steadied"):
             remedies |= dict.fromkeys(_steadied(work, wide, answered))
     return replace(relaxation, alone=Table(enough), remedies=tuple(remedies))
 

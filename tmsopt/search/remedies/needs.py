@@ -19,6 +19,7 @@ from tmsopt.records import Table
 from tmsopt.search.multistart import search
 from tmsopt.search.outcome import CheckedEnd, best_checked
 from tmsopt.search.remedies.allowance import Spent, within
+from tmsopt.search.rescues import rescued_by
 from tmsopt.search.workspace import Workspace, workspace
 
 _FASTEST, _TIMES = 10.0, 4.0  # speeds looked through, in √(g w); in the problem's own speed, where that is more
@@ -45,7 +46,7 @@ def add_required_speed(
     The problem is solved again at the speed that is shown. A design that was missed in the box comes with it.
     """
     name, problem = _speed(solution.problem.posed), solution.problem
-    if not name or problem.posed.cases or not problem.free or not _asked(solution):
+    if not name or problem.posed.cases or not problem.free or not _asked(solution) or not rescued_by("required speed"):
         return solution, None
     limits = {} if set(problem.posed.asked_of_roots) or problem.posed.pattern else {STABLE: "abscissa <= 0"}
     few = replace(options, starts=_STARTS, stability=0.0, alone=False, progress=None, near=None)
@@ -111,7 +112,7 @@ def irreducible(
         wide: the problem in the box as far as its ends may give way.
         reached: the whole search, for the constraints of these names.
     """
-    if not relaxation.amounts:
+    if not relaxation.amounts or not rescued_by("irreducible"):
         return relaxation
     found = _Found(problem, replace(options, starts=_STARTS, progress=None))
     designs: list[Mapping[str, float]] = [relaxation.parameters]
