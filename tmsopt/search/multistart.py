@@ -171,15 +171,17 @@ class Runner:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
         if self.work.part.pattern is not None or start_objective(self.work.part, design) >= best.objective - SAME:
             return best
-        if not rescued_by("kept start"):
-            return best
         kept = self._once(design, start)
-        return kept if kept.feasible and kept.objective < best.objective else best
+        ahead = kept.feasible and kept.objective < best.objective
+        return kept if ahead and rescued_by("kept start") else best
 
     def _once(self, design: Mapping[str, float], start: str) -> LocalEnd:
         x = initial_point(self.nlp, self.work.part, design, start == "near")
         return min(
-            (self._from(x, way, start) for way in islice(self.nlp.touchings(x), _WAYS if rescued_by("ways") else 1)),
+            (
+                self._from(x, way, start)
+                for way in islice(self.nlp.touchings(x), _WAYS if self.nlp.touches and rescued_by("ways") else 1)
+            ),
             key=rank,
         )
 

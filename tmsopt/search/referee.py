@@ -136,10 +136,11 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
         if opened is not None:
             return replace(opened, candidates=[*candidates, *opened.candidates])
     kept = sampler.refined(rivals.take(np.arange(min(len(rivals), 1))), _FINEST).joined(rivals)
-    for k in range(min(len(kept), _KEPT_AT_MOST) if rescued_by("kept design") else 0):
+    for k in range(min(len(kept), _KEPT_AT_MOST)):
         free = sampler.design(kept, k)
         checked = work.recheck(work.problem.ordered(free), nlp.cases)
-        if not checked.violations and work.problem.sign * checked.objective < _least(work, trial):
+        better = not checked.violations and work.problem.sign * checked.objective < _least(work, trial)
+        if better and rescued_by("kept design"):
             endless = _endless(work, sample, checked.objective)
             return Standing(nlp, candidates, trial, free, _UNBOUNDED if endless else _KEPT)
     return Standing(nlp, candidates, trial)
@@ -237,8 +238,6 @@ def _nudged(
 ) -> CheckedEnd | None:
     """An end that meets all limits a hair's breadth aside: at itself a root at 0, say, has no sign."""
     least, best = _least(work, trial), min((c.objective for c in candidates if c.feasible), default=math.inf)
-    if not rescued_by("nudge"):
-        return None
     ends = [c for c in candidates if c.feasible and c.objective < least and same_objective(c.objective, best, nlp.size)]
     for end in ends[:_APPEALED]:
         own = sampler.space.points(work.design_at(end.run.x))
@@ -249,7 +248,7 @@ def _nudged(
             whole = best_checked(work, nlp, [end])
             assert whole is not None
             moved = replace(whole, parameters=parameters, checked=work.recheck(parameters, nlp.cases))
-            if not moved.checked.violations and claim_matches(work, moved):
+            if not moved.checked.violations and claim_matches(work, moved) and rescued_by("nudge"):
                 return moved
     return None
 
