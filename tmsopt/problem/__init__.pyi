@@ -10,7 +10,7 @@ from .freedom import degrees_of_freedom as degrees_of_freedom
 from .limit import limit_of as limit_of, with_limit as with_limit
 from .problem import Posed as Posed, Problem as Problem
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
-from .searches import Starts as Starts, expected_unseen as expected_unseen, is_enough as is_enough
+from .searches import Starts as Starts, expected_unseen as expected_unseen, expects_few_better as expects_few_better
 from .solution import Bound as Bound, Solution as Solution
 from .unit_system import (
     Unit as Unit, amounts_text as amounts_text, rate_of as rate_of, show_at as show_at, unit_at as unit_at,

@@ -1,4 +1,6 @@
 from .all_designs import Every as Every, coverage_of as coverage_of, solve_all as solve_all
-from .multistart import same_objective as same_objective
-from .solve import solve as solve, solve_any_status as solve_any_status, evaluate_design as evaluate_design
-from .workspace import Workspace as Workspace, workspace as workspace
+from .policy import Policy as Policy, Rescue as Rescue
+from .search import POLICY as POLICY
+from .solve import evaluate_design as evaluate_design, solve as solve, solve_any_status as solve_any_status
+from .state import SearchState as SearchState, Start as Start, same_objective as same_objective
+from .tuning import TUNING as TUNING, Tuning as Tuning

@@ -22,10 +22,10 @@ from tmsopt.program.options import Asked, Options, documents_options, options_of
 from tmsopt.program.starts import completions, spread
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain
-from tmsopt.search.multistart import Runner
+from tmsopt.search.local import run_from
 from tmsopt.search.newton import error, newton, newton_step, square_system
 from tmsopt.search.solve import solve_any_status
-from tmsopt.search.workspace import Workspace, workspace
+from tmsopt.search.state import SearchState, Start
 
 MOST = 1024
 """Starts at most."""
@@ -148,12 +148,12 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
     if not is_number(seconds):
         raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
     nlp = _posed(problem)
-    work = workspace(problem, options_of(options, defaults=_DEFAULTS))
-    begin(work.options.progress, "proving that no design is missed", "s")
-    proof = completeness(problem, seconds, work.options.progress) if seconds > 0 else None
+    state = SearchState(problem, problem, nlp, options_of(options, defaults=_DEFAULTS))
+    begin(state.options.progress, "proving that no design is missed", "s")
+    proof = completeness(problem, seconds, state.options.progress) if seconds > 0 else None
     proved = [] if proof is None else [_clipped(problem, design) for design in proof.designs]
     known = proof is not None and (proof.complete or proof.stopped)
-    found, errors, coverage = ([], [], None) if known else _search(problem, nlp, work)
+    found, errors, coverage = ([], [], None) if known else _search(problem, nlp, state)
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     new = [x for x in proved if not any(_same(x, y, width) for y in found)]
     if coverage:
@@ -174,24 +174,23 @@ def _errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, f
     return Table({n: max(known.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
 
 
-def _search(problem: Posed, nlp: NLP, work: Workspace) -> tuple[list[Array], list[dict[str, float]], Coverage]:
+def _search(problem: Posed, nlp: NLP, state: SearchState) -> tuple[list[Array], list[dict[str, float]], Coverage]:
     """Solutions that many starts lead to, those met most often first, and their errors."""
-    starts, progress = work.options.starts, work.options.progress
+    starts, progress = state.options.starts, state.options.progress
     begin(progress, "searching", "start")
     system = square_system(nlp)
     assert system is not None  # as many conditions as parameters
-    runner = Runner(work, nlp)
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     found: list[Array] = []
     errors: list[dict[str, float]] = []
     hits: list[int] = []
     done = singular = crossings = 0
-    for design in spread(problem, work.options.seed):
+    for design in spread(problem, state.options.seed):
         if done >= starts or _covered(done, hits):
             break
         ends = [newton(system, x) for x in completions(nlp, problem, design)]
         if done % _BY_IPOPT == 0:
-            ended = runner.solve_from(design)
+            ended = run_from(state, Start(design, near=False))
             ends.append((newton(system, ended.run.x) or newton_step(system, ended.run.x)) if ended.feasible else None)
         met: set[int] = set()
         doubtful = crossed = False

@@ -1,46 +1,43 @@
-"""From where the starts ended to one design with its standing: polished, rechecked, ranked."""
+"""From the best end of a search to a design with its status."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tmsopt.evaluation.bound import bounded, instant_bound
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.evaluation.stored import multiple_roots_exist
 from tmsopt.evaluation.worst_case import Worst, worst_cases
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
+from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import OtherBranch
-from tmsopt.program.formulate import abscissa, design_of, matching
-from tmsopt.program.ipopt import Point, gains, polisher
+from tmsopt.program.formulate import abscissa, matching
+from tmsopt.program.ipopt import Point, gains
 from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import designs, initial_point
 from tmsopt.records import Array, Table
-from tmsopt.search.multistart import optima, same_objective
+from tmsopt.roots import Root
+from tmsopt.search.accept import claim_matches, has_converged
 from tmsopt.search.newton import solutions
-from tmsopt.search.rescues import rescued_by
-from tmsopt.search.workspace import LocalEnd, Workspace
+from tmsopt.search.state import CheckedEnd, SearchState
+from tmsopt.search.tuning import TUNING
 
-_STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
-_MERGED = 1e-3  # of the objective: what a multiple root that is there for rounding alone may seem to gain
-_ALIKE = 3  # candidates of one objective looked at closely
-_EXACT, _POLISHED = 1e-8, 1e-9  # violation of rows and gradient, one of which a polished end is below
-_CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
-_SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met only because all coefficients vanish
 _MULTIPLIER = 1e-9  # below it a limit does not bind
 _TOUCHES = 1e-10  # of a range: distance that IPOPT may leave to an end that binds
 _BRANCH_STARTS = 12
 _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
-_DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
 _STORED = 1e-8  # relative: what rounding of steep parameters may leave of a coefficient, and so of an m-fold root
 _ZERO = 1e-14  # of the largest root: below it one is 0 but for rounding
+_SHARE = 1e-3  # of a range, by which a parameter is moved to see whether a0 depends on it
+
 UNCLEAR = "rounding leaves too little of the coefficients to tell the roots apart; keep a0 and the roots away from 0"
-_CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
+UNBOUNDED = "unbounded, as far as was looked: what this design reaches is far below all else; limit what it divides by"
+KEPT = "the best design that was looked at; no start of the solver ended as good"
 
 
 @dataclass(frozen=True)
@@ -65,16 +62,6 @@ class Outcome:
     without_best: bool = False
 
 
-@dataclass(frozen=True)
-class CheckedEnd:
-    """A candidate, polished and rechecked."""
-
-    candidate: LocalEnd
-    point: Point
-    parameters: Mapping[str, float]
-    checked: Evaluation
-
-
 def evaluated(problem: Posed, cases: Sequence[Case]) -> Outcome:
     """Nothing is free: the design is what it is."""
     parameters = problem.ordered({})
@@ -83,31 +70,20 @@ def evaluated(problem: Posed, cases: Sequence[Case]) -> Outcome:
     return Outcome(parameters, checked, status, {}, Starts(), "none", tuple(cases))
 
 
-def found(
-    work: Workspace, nlp: NLP, trial: CheckedEnd | None, starts: Starts, cases: Sequence[Case] | None = None
-) -> Outcome | None:
-    """A trial as a finding, in the given cases, by default those of the NLP; None where it is not feasible at all."""
-    if trial is None:
+def found(state: SearchState, starts: Starts, cases: Sequence[Case] | None = None) -> Outcome | None:
+    """The best of a search with its status, in the given cases or those of its program; None without a feasible one."""
+    if state.best is None:
         return None
-    problem, point, parameters = work.problem, trial.point, trial.parameters
-    checked = trial.checked if cases is None else work.recheck(parameters, cases)
-    counted = work.freedom
-    if sum(checked.violations.values()) > _SPURIOUS and counted.count >= 0:
+    problem, trial = state.problem, state.best
+    parameters, nlp = trial.parameters, trial.end.nlp
+    checked = trial.checked if cases is None else recheck(problem, parameters, cases)
+    counted = degrees_of_freedom(problem)
+    if sum(checked.violations.values()) > state.tuning.spurious and counted.count >= 0:
         return None
-    ended = converged(trial)
-    notes: tuple[str, ...] = ()
-    if not claim_matches(work, trial):
-        ended = False
-        claimed = problem.sign * trial.candidate.objective
-        notes = (f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}",)
-    if problem.objective is not None and not math.isfinite(checked.objective):
-        ended = False
-        notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
-    if unclear(problem, checked):
-        ended = False
-        notes = (UNCLEAR,)
-    flat = not ended and not notes and not checked.violations and bounded(problem)  # a flat stretch has no gradient
-    ended = ended or (flat and instant_bound(problem, checked.objective).proven)
+    notes = _doubts(problem, trial, checked)
+    ended = has_converged(trial) and not notes
+    if not (ended or notes or checked.violations) and bounded(problem):  # a flat stretch has no gradient
+        ended = instant_bound(problem, checked.objective).proven
     status = "optimal" if ended and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
         notes = ("feasible, but the solver did not converge here: a better design may be close",)
@@ -115,19 +91,33 @@ def found(
         status = "infeasible"
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
         notes += (f"{surplus}, and they are not consistent{_fewer_conditions(problem, -counted.count)}",)
-    active, looked = _active(problem, nlp, point), tuple(nlp.cases if cases is None else cases)
     branches: tuple[OtherBranch, ...] = ()
     if counted.kind == "square":
         equations = nlp if not nlp.kinks else matching(problem) if problem.pattern else abscissa(problem)
         branches = _other_branches(problem, equations, parameters)
+    active, looked = _active(problem, nlp, trial.point), tuple(nlp.cases if cases is None else cases)
     return Outcome(parameters, checked, status, active, starts, nlp.formulation, looked, branches, notes)
 
 
-def converged(trial: CheckedEnd) -> bool:
-    """Whether the solver stopped at an optimum of its own, by its word or by the gradient, and on the rows."""
-    ended = trial.candidate.run.status in _CONVERGED or trial.point.stationarity <= _STATIONARY
-    exact = trial.point.violation <= _EXACT or trial.point.stationarity <= _POLISHED
-    return ended and exact  # its word is one on rows as it scales them
+def _doubts(problem: Posed, trial: CheckedEnd, checked: Evaluation) -> tuple[str, ...]:
+    """Why a design is no optimum, whatever the solver says of it."""
+    if unclear(problem, checked):
+        return (UNCLEAR,)
+    if problem.objective is not None and not math.isfinite(checked.objective):
+        return ("the objective does not exist at the design where the search ended; constrain what it divides by",)
+    if claim_matches(problem, trial):
+        return ()
+    claimed = problem.sign * trial.end.objective
+    return (f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}",)
+
+
+def as_it_is(problem: Posed, design: Mapping[str, float], note: str = "") -> Outcome:
+    """A design that is known to be no optimum: ``not_converged``, or ``infeasible`` where it violates something."""
+    parameters = problem.ordered(design)
+    cases = evaluated_cases(problem, parameters)
+    checked = recheck(problem, parameters, cases)
+    status = "infeasible" if checked.violations else "not_converged"
+    return Outcome(parameters, checked, status, {}, Starts(), "none", cases, notes=(note,) if note else ())
 
 
 def _fewer_conditions(problem: Posed, short: int) -> str:
@@ -143,87 +133,15 @@ def mass_advice(problem: Posed) -> str:
     return f"keep {known.get(problem.model.name, 'a0')} away from 0 by a constraint"
 
 
-def counted(candidates: Sequence[LocalEnd], at_best: float) -> Starts:
-    """How the starts of a search ended."""
-    return Starts(
-        tried=len(candidates),
-        converged=sum(c.feasible for c in candidates),
-        at_best=sum(c.feasible and same_objective(c.objective, at_best, c.nlp.size) for c in candidates),
-        optima=optima(candidates),
-    )
-
-
-def best_checked(work: Workspace, nlp: NLP, candidates: Sequence[LocalEnd]) -> CheckedEnd | None:
-    """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
-    polish, problem = polisher(nlp), work.problem
-    kept: CheckedEnd | None = None
-    tried: list[float] = []
-    for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
-        alike = sum(same_objective(candidate.objective, value, nlp.size) for value in tried)
-        if kept and not kept.checked.violations and claim_matches(work, kept) and not _flattered(kept) and not alike:
-            break
-        if alike >= _ALIKE:
-            continue
-        tried.append(candidate.objective)
-        point = polish(candidate.run, candidate.nlp)
-        parameters = problem.ordered(design_of(problem, point.x.tolist()))
-        checked = work.recheck(parameters, nlp.cases)
-        trial = CheckedEnd(candidate, point, parameters, checked)
-        if kept is None or is_better(work, trial, kept):
-            kept = trial
-        if not trial.checked.violations and point.stationarity <= _STATIONARY and claim_matches(work, trial):
-            break
-    return kept
-
-
-def attained(work: Workspace, nlp: NLP, candidates: Sequence[LocalEnd], trial: CheckedEnd) -> CheckedEnd:
-    """A trial, or the next one, where it is ahead of that only by a multiple root that no design near it has.
-
-    Equations that are all but singular hold to rounding far from where they hold exactly.
-    """
-    best = trial.candidate.objective
-    most = best + _MERGED * (nlp.size + abs(best))
-    ours = [c for c in candidates if c.feasible and (c.nlp.variables, c.nlp.rows) == (nlp.variables, nlp.rows)]
-    worse = [c for c in ours if best < c.objective <= most and not same_objective(c.objective, best, nlp.size)]
-    if not worse or nlp.cases or trial.checked.violations or multiple_roots_exist(work.problem, trial.parameters):
-        return trial
-    if not rescued_by("attained"):
-        return trial
-    other = best_checked(work, nlp, worse)
-    fit = other is not None and converged(other) and claim_matches(work, other) and not other.checked.violations
-    return other if other is not None and fit else trial
-
-
-def claim_matches(work: Workspace, trial: CheckedEnd) -> bool:
-    """Whether the objective that the solver claims is the design's own."""
-    if work.problem.objective is None:
-        return True
-    claimed = work.problem.sign * trial.point.objective
-    return math.isclose(claimed, trial.checked.objective, rel_tol=_CLAIMED, abs_tol=_CLAIMED)
-
-
 def better(problem: Posed, one: Outcome, other: Outcome) -> bool:
-    """Whether one finding beats another: feasible before not, then by objective, then optimal before not."""
-    values = [problem.sign * f.checked.objective for f in (one, other)]
-    doubtful = [bool(f.checked.violations) or math.isinf(v) for f, v in zip((one, other), values, strict=True)]
-    if not any(doubtful) and all(map(math.isfinite, values)) and not math.isclose(*values, rel_tol=_CLAIMED):
+    """Whether one outcome beats another: feasible before not, then by objective, then optimal before not."""
+    values = [problem.sign * o.checked.objective for o in (one, other)]
+    doubtful = [bool(o.checked.violations) or math.isinf(v) for o, v in zip((one, other), values, strict=True)]
+    close = math.isclose(*values, rel_tol=TUNING.claimed)
+    if not any(doubtful) and all(map(math.isfinite, values)) and not close:
         return values[0] < values[1]
     finite = [v if math.isfinite(v) else 0.0 for v in values]
     return (doubtful[0], one.status != "optimal", finite[0]) < (doubtful[1], other.status != "optimal", finite[1])
-
-
-def is_better(work: Workspace, one: CheckedEnd, other: CheckedEnd) -> bool:
-    """Whether one trial beats another: by violation first, then by the objective that the recheck found.
-
-    Where that is not the solver's, what lies between them is weighed against it.
-    """
-    ranks = []
-    for trial in (one, other):
-        claimed, own = trial.point.objective, work.problem.sign * trial.checked.objective
-        doubt = 0.0 if claim_matches(work, trial) else _DOUBT * abs(claimed - own)
-        violation = sum(trial.checked.violations.values())
-        ranks.append((violation, _flattered(trial), claimed if math.isnan(own) else own + doubt))
-    return ranks[0] < ranks[1]
 
 
 def unclear(problem: Posed, checked: Evaluation) -> bool:
@@ -241,12 +159,6 @@ def unclear(problem: Posed, checked: Evaluation) -> bool:
     each = (math.hypot(r.re, r.im) * _STORED ** (1 / r.multiplicity) for r in roots)
     scatter = max(each) + _ZERO * sizes[-1]
     return bool(abs(checked.structure.abscissa - checked.realised) > scatter)
-
-
-def _flattered(trial: CheckedEnd) -> bool:
-    """Whether an end that is no optimum owes its standing to a multiple root that it only comes close to."""
-    ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
-    return not converged(trial) and not math.isclose(ideal, stored, rel_tol=_CLAIMED, abs_tol=_CLAIMED)
 
 
 def _active(problem: Posed, nlp: NLP, point: Point) -> dict[str, float]:
@@ -307,6 +219,42 @@ def _excluded(problem: Posed, nlp: NLP, x: Array) -> tuple[str, ...]:
         if below or above:
             names[name if k >= len(problem.free) else f"{name}.{'min' if below else 'max'}"] = None
     return tuple(names)
+
+
+def demote(state: SearchState, outcome: Outcome) -> Outcome:
+    """An optimum, unless it has a root all but at infinity that no active limit holds, or has no lower bound."""
+    problem, value = state.problem, state.problem.sign * outcome.checked.objective
+    words = ""
+    if problem.objective is None or outcome.checked.violations:
+        return outcome
+    if state.sample and math.isfinite(value) and value < -state.tuning.endless * state.sample.spread < 0:
+        words = UNBOUNDED if outcome.status != "optimal" else ""
+    elif outcome.status == "optimal" and runs_away(outcome.checked.structure.roots) and not _held_off(problem, outcome):
+        words = f"no best design: it improves towards a singular mass matrix (a0 = 0); {mass_advice(problem)}"
+    if not words:
+        return outcome
+    return replace(outcome, status="not_converged", without_best=True, notes=(*outcome.notes, words))
+
+
+def runs_away(roots: Sequence[Root], ratio: float = TUNING.runaway) -> bool:
+    """Whether a root is so far away from others that a0 is all but 0; from those that are 0 any other is."""
+    sizes = sorted(size for r in roots if (size := math.hypot(r.re, r.im)))
+    return bool(sizes) and sizes[-1] > ratio * sizes[(len(sizes) - 1) // 2]
+
+
+def _held_off(problem: Posed, outcome: Outcome) -> bool:
+    """Whether no parameter moves a0, or a limit that binds is about one that does."""
+    about: set[str] = set()
+    for name in outcome.active:
+        condition = problem.conditions.get(name)
+        about |= set(condition.names) if condition else {name.rpartition(".")[0]}
+    own = float(problem.values(outcome.parameters).coefficients[0])
+    moving = set[str]()
+    for name, (low, high) in problem.free.items():
+        moved = {**outcome.parameters, name: outcome.parameters[name] + _SHARE * (high - low)}
+        if float(problem.values(moved).coefficients[0]) != own:
+            moving.add(name)
+    return not moving or bool(about & moving or about - set(problem.free))  # of a quantity, which may depend on all
 
 
 def evaluated_cases(problem: Posed, parameters: Mapping[str, float]) -> tuple[Case, ...]:

@@ -1,83 +1,303 @@
-"""Rescues: what a search does beyond its loop, each by a name, so that a benchmark can do without it.
+"""Rescues: what a search does where its loop alone ends wrongly or with nothing, each earned on a benchmark.
 
-In: the name of a rescue. Out: whether the search at hand has it. `python -m benchmarks --without NAME` measures what
-one of them is worth.
+Every one starts from other designs or on another program, and hands what it finds to the same loop.
 """
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+
+from tmsopt.evaluation.bound import bounded
+from tmsopt.global_search.signs import none_stable
+from tmsopt.models.user_spectrum import full_patterns
+from tmsopt.problem.dependence import STABLE, WORSE_DIRECTION
+from tmsopt.problem.freedom import degrees_of_freedom
+from tmsopt.program.formulate import formulate, matching
+from tmsopt.program.starts import designs
+from tmsopt.search.accept import is_sound
+from tmsopt.search.enough import distinct_ends
+from tmsopt.search.outcome import KEPT, mass_advice, runs_away
+from tmsopt.search.policy import Policy, Rescue, search_again, try_all, try_starts
+from tmsopt.search.sample import Looked, draw_box, sample_box
+from tmsopt.search.starts import sample_starts
+from tmsopt.search.state import CheckedEnd, SearchState, Start
+from tmsopt.search.tuning import TUNING
+
+# Roots that meet
 
 
-@dataclass(frozen=True)
-class Rescue:
-    """One way to save a search that its loop alone would lose.
+def wants_multiple_roots(state: SearchState) -> bool:
+    """Whether stability is rare in the sample, or a0 may vanish: optima may stand in needles that no sample sees."""
+    sample = state.sample
+    if sample is None or state.options.near or "abscissa" not in state.nlp.variables:
+        return False
+    rare = bounded(state.part) and np.mean(sample.box.drawn.worth < 0) < state.tuning.narrow
+    mixed = "damping_ratio" in state.nlp.variables
+    return bool(rare or mixed or sample.singular or state.part.model.feedback is not None)
 
-    Attributes:
-        name: to call it by.
-        about: when it steps in, and what it does.
-    """
 
-    name: str
-    about: str
+def start_at_multiple_roots(state: SearchState, policy: Policy) -> SearchState:
+    """Starts at designs of least abscissa with one root, or one pair, of full multiplicity: equations lead there."""
+    part, tuning, leads = state.part, state.tuning, list[Start]()
+    limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
+    assert state.sample is not None
+    few = replace(policy, enough=lambda own: len(own.ends) >= tuning.leadless or bool(own.feasible))
+    for pattern in full_patterns(part.model):
+        asked = part.derive(
+            locate=pattern, minimize="abscissa", maximize=None, constraints=limits, scenarios={}, tolerances={}
+        )
+        if degrees_of_freedom(asked).count >= 0:
+            own = replace(state.with_program(matching(asked)), problem=asked, part=asked)
+            own = try_starts(own, sample_starts(state.sample), few)
+            leads += [Start(state.design_at(end)) for end in distinct_ends(own.ends)[: tuning.leads]]
+    return search_again(state, try_all(policy), leads)
+
+
+# Other programs
+
+
+def is_mixed(state: SearchState) -> bool:
+    """Whether sectors and half-planes are asked for together, which are singular where real roots meet."""
+    return {"abscissa", "damping_ratio"} <= set(state.nlp.variables)
+
+
+def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
+    """The search where all roots are real."""
+    nlp = formulate(state.part, state.problem.cases, damping_ratio=1.0)
+    return search_again(state, policy, nlp=nlp, most=state.tuning.fewer)
+
+
+def may_have_positive_roots(state: SearchState) -> bool:
+    """Whether the best design may have a positive real root, which has a damping ratio of −1 and no sector."""
+    if "damping_ratio" not in state.nlp.variables:
+        return False
+    if state.best is None or "damping_ratio" in state.nlp.touches:  # the less of it the better, somewhere
+        return True
+    goal = state.problem.objective
+    return not (goal and "damping_ratio" in goal.names) and state.best.checked.structure.abscissa > 0
+
+
+def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
+    """The search without a sector, where the damping ratio is −1."""
+    nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
+    most = state.tuning.fewer if (state.best and state.nlp.touches) or maximises_damping(state) else 0
+    return search_again(state, policy, nlp=nlp, most=most)
+
+
+def maximises_damping(state: SearchState) -> bool:
+    """Whether the goal is the damping ratio alone."""
+    return (state.problem.maximize or "").strip() == "damping_ratio"
+
+
+def leave_plateau(state: SearchState, policy: Policy) -> SearchState:
+    """Starts at designs of least abscissa: the damping ratio is −1 until no root is positive."""
+    problem, part = (p.derive(minimize="abscissa", maximize=None) for p in (state.problem, state.part))
+    other = replace(state.with_program(formulate(part, state.nlp.cases)), problem=problem, part=part)
+    other = try_starts(other, policy.starts(other), policy, state.tuning.fewer)
+    leads = [Start(state.design_at(end)) for end in distinct_ends(other.ends)]
+    return search_again(state, try_all(policy), leads)
+
+
+def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
+    """Exceptional points nearest to other starts, where roots only cross nearest to the first."""
+    part = state.part
+    for design in designs(part, state.options.seed, state.tuning.chains):
+        nlp = matching(part.derive(minimize=None, maximize=None, start=design))
+        state = search_again(state, policy, [Start(design)], nlp)
+        if state.best and is_sound(state.problem, state.best):
+            break
+    return state
+
+
+# The sample contradicts
+
+
+def rivals_of(state: SearchState) -> Looked | None:
+    """Designs of the sample, and about the best end, that are better than that, the best first."""
+    if state.sample is None:
+        return None
+    rivals = state.sample.refined
+    if state.best:
+        rivals = rivals.joined(state.sample.box.around(state.best.parameters))
+    return rivals.better(least_worth(state))
+
+
+def least_worth(state: SearchState) -> float:
+    """What a design must be worth less than to be better than the best end."""
+    best = state.best
+    if best is None or best.checked.violations:
+        return math.inf
+    worth = state.problem.sign * best.checked.objective
+    return worth - state.tuning.lost * (best.end.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
+
+
+def appeal(state: SearchState, policy: Policy) -> SearchState:
+    """Starts from designs that are better than the best end, as long as that helps."""
+    for _ in range(state.tuning.appeals):
+        rivals = rivals_of(state)
+        if not rivals or not state.sample:
+            break
+        before = state.best
+        starts = (Start(design) for design in state.sample.box.designs(rivals.best(state.tuning.appealed)))
+        state = search_again(state, try_all(policy), starts)
+        if state.best is before:
+            break
+    return state
+
+
+def keep_rival(state: SearchState, policy: Policy) -> SearchState:
+    """A design of the sample that is still better than all ends is given as it is."""
+    rivals = rivals_of(state)
+    if not rivals or not state.sample:
+        return state
+    box = state.sample.box
+    finest = box.refine(rivals.take(np.arange(1)), state.tuning.finest).joined(rivals)
+    for design in box.designs(finest.take(np.arange(min(len(finest), state.tuning.kept)))):
+        checked = state.recheck(design)
+        if not checked.violations and state.problem.sign * checked.objective < least_worth(state):
+            return replace(state, kept=design, words=KEPT)
+    return state
+
+
+# a0 = 0
+
+
+def is_open(state: SearchState) -> bool:
+    """Whether designs may improve towards a0 = 0, where a root leaves for infinity."""
+    sample, best = state.sample, state.best
+    if sample is None or not sample.singular or not state.nlp.products:
+        return False
+    failed = bool(np.any(sample.refined.violation == 0)) and not all(end.feasible for end in state.ends)
+    return (
+        failed
+        or best is None
+        or runs_away(best.checked.structure.roots, state.tuning.far_root)
+        or bool(rivals_of(state) or singular_rivals(state))
+    )
+
+
+def singular_rivals(state: SearchState) -> Looked:
+    """Designs with a singular mass matrix that are better than the best end, their roots at infinity left aside."""
+    a0 = state.part.model.coefficient_names()[0]
+    limits = {**state.part.constraints, "a singular mass matrix": f"{a0} == 0"}
+    return sample_box(state.part.derive(constraints=limits), state.options.seed).refined.better(least_worth(state))
+
+
+def search_singular(state: SearchState, policy: Policy) -> SearchState:
+    """The search where a0 may come to 0, from either side: an optimum that no end reached, or none but an infimum."""
+    assert state.sample is not None
+    tuning, box, best = state.tuning, state.sample.box, state.best
+    rivals = (rivals_of(state) or state.sample.refined).joined(singular_rivals(state))
+    few = np.unique([*range(len(rivals))][: tuning.open] + [*range(len(rivals))][-tuning.open :])
+    starts = [Start(design) for design in box.designs(rivals.take(few))]
+    starts += [Start({n: best.parameters[n] for n in state.problem.free})] if best else []
+    starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take(np.arange(tuning.open)))]
+    for sign in (1, -1):
+        ours = [s for s in starts if sign * leading_of(state, s.design) > -tuning.singular]
+        nlp = formulate(state.part, state.nlp.cases, lead=sign)
+        own = try_starts(state.with_program(nlp), ours, try_all(policy))
+        reached = min(own.feasible, key=lambda end: end.objective, default=None)
+        if reached is None or not reached.objective < least_worth(state):
+            continue
+        rows = [k for k, name in enumerate(nlp.rows) if name == "a0"]
+        singular = bool(nlp.at(reached.run.x)[1][rows].min() < tuning.singular)
+        if singular:
+            lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
+            inside = replace(nlp, row_lower=lower)
+            own = try_starts(state.with_program(inside), [Start(state.design_at(reached))], try_all(policy))
+        own = policy.accept(own)
+        if (
+            own.best is None
+            or own.best.checked.violations
+            or is_merged(own.best)
+            or state.problem.sign * own.best.checked.objective >= least_worth(state)
+        ):
+            continue
+        ends = (*state.ends, *own.ends)
+        state = replace(own, ends=ends, accepted=len(ends))
+        if singular:
+            goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * reached.objective:.9g}"
+            words = f"no best design: it improves {goal}; {mass_advice(state.problem)}"
+            state = replace(state, kept={n: own.best.parameters[n] for n in state.problem.free}, words=words)
+    return state
+
+
+def leading_of(state: SearchState, design: Mapping[str, float]) -> float:
+    """a0 relative to the other coefficients."""
+    a = [float(c) for c in state.problem.values(state.problem.ordered(design)).coefficients]
+    return a[0] / (max(map(abs, a)) or 1.0)
+
+
+def is_merged(trial: CheckedEnd) -> bool:
+    """Whether roots that are far apart count as one: next to a0 = 0 rounding leaves little of the coefficients."""
+    ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
+    return abs(ideal - stored) > TUNING.merged * abs(ideal)
+
+
+# Stability
+
+
+def wants_stability(state: SearchState) -> bool:
+    """Whether no stable design was found though the objective or a constraint is about the roots."""
+    problem, best = state.problem, state.best
+    if best is None or state.sample is None or state.stable_elsewhere or best.checked.structure.abscissa < 0:
+        return False
+    asked = (problem.objective, *problem.conditions.values())
+    return any(set(WORSE_DIRECTION) & set(e.names) for e in asked if e) and not none_stable(state.part)
+
+
+def search_stable(state: SearchState, policy: Policy) -> SearchState:
+    """Starts from designs sought for their stability alone; and all the others, where there is any such."""
+    assert state.sample is not None
+    part, tuning, seed = state.part, state.tuning, state.options.seed + 1
+    limits = {**part.constraints, STABLE: "abscissa <= 0"}
+    asked = part.derive(minimize="abscissa", maximize=None, constraints=limits)
+    if bounded(part):  # without limits the boldest designs show whether any is near the axis
+        box = draw_box(asked.derive(constraints={}), seed, tuning)
+        if not np.any(box.refine(box.look(state.sample.boldest.u)).worth < 0):
+            return state
+    sample = sample_box(asked, seed, tuning)
+    found = [(sample.refined, True), (sample.boldest, False)]
+    stable = [(seen.take(np.flatnonzero(seen.worth < 0)[: tuning.stable]), near) for seen, near in found]
+    starts = [Start(design, near) for seen, near in stable for design in sample.box.designs(seen)]
+    if not starts:
+        return state
+    state = search_again(state, try_all(policy), starts)
+    if state.best and state.best.checked.structure.abscissa < 0:
+        return state
+    more = replace(policy, enough=_is_stable_or_hopeless)
+    others = islice(policy.starts(state), len(state.ends), None)
+    return search_again(state, more, others)
+
+
+def _is_stable_or_hopeless(state: SearchState) -> bool:
+    """Whether a start ended left of the axis, where that is the goal, or too many ended nowhere."""
+    last = state.ends[-1]
+    left = bounded(state.part) and last.feasible and last.objective < 0
+    return left or len(state.ends) - len(state.feasible) >= 2 * state.tuning.hopeless
 
 
 RESCUES = (
-    Rescue("sought", "few designs of the sample meet all limits: some are moved towards these by Newton's method"),
-    Rescue("basins", "many meet them: the best design of each basin that the sample shows is refined too"),
-    Rescue("multiple roots", "stable designs are rare, or a0 may vanish: starts at roots of full multiplicity"),
-    Rescue("real roots", "abscissa and damping ratio at once: searched again where all roots are real"),
-    Rescue("positive roots", "the best design may have a positive real root: searched again without a sector"),
-    Rescue("other chains", "roots only cross at the nearest point: other starts for an exceptional point"),
-    Rescue("off plateau", "the damping ratio is -1 everywhere: starts of least abscissa"),
-    Rescue("restarts", "a start that ended badly is taken up again from where it ended"),
-    Rescue("kept start", "a start that was better than its end is run again, keeping to it"),
-    Rescue("ways", "root quantities and kinks are held in other ways from one start"),
-    Rescue("exchanges", "an end at which another way is as close is left by that way"),
-    Rescue("through a0", "a start of the sample ended nowhere: once more with a0 = 0 allowed"),
-    Rescue("opposite faces", "without a sample: starts at the other end of each range of the best end"),
-    Rescue("least abscissa", "no start met a pattern: starts where the abscissa is least"),
-    Rescue("appeals", "a design of the sample is better than the best end: started from again"),
-    Rescue("nudge", "an end meets all limits a hair's breadth aside"),
-    Rescue("infinity", "designs improve towards a0 = 0: searched there too"),
-    Rescue("off the edge", "a root at 0, where the damping ratio jumps: moved a hair"),
-    Rescue("attained", "the next end, where the best owes its standing to a multiple root that is not there"),
-    Rescue("kept design", "a design of the sample is better than all ends: given as it is"),
-    Rescue("left of the axis", "no stable design was found though one is wanted: starts sought for stability alone"),
-    Rescue("outdone", "an optimum that another end beats is none"),
-    Rescue("unbounded", "an objective far below all else has no optimum"),
-    Rescue("runaway", "a root all but at infinity: no optimum"),
-    Rescue("ideal", "a design of the sample that no other can beat ends the search at once"),
-    Rescue("branch and bound", "no stable design was found: SCIP looks for one"),
-    Rescue("required speed", "no design was found: the least speed that one takes"),
-    Rescue("steadied", "no remedy was answered: a relaxation after which a design is stable"),
-    Rescue("irreducible", "which limits exclude each other"),
+    Rescue("multiple roots", "", wants_multiple_roots, start_at_multiple_roots),
+    Rescue(
+        "other chains",
+        "",
+        lambda s: (
+            any(end.crossing for end in s.ends)
+            and (s.best is None or bool(s.best.checked.violations))
+            and degrees_of_freedom(s.problem).count > 0
+        ),
+        search_other_chains,
+    ),
+    Rescue("off plateau", "", lambda s: s.best is None and maximises_damping(s), leave_plateau),
+    Rescue("real roots", "", is_mixed, search_real_roots),
+    Rescue("positive roots", "", may_have_positive_roots, search_positive_roots),
+    Rescue("appeals", "", lambda s: rivals_of(s) is not None, appeal),
+    Rescue("infinity", "", is_open, search_singular),
+    Rescue("stability", "", wants_stability, search_stable),
+    Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.kept is None, keep_rival),
 )
-"""As they are; the order means nothing."""
-
-
-@dataclass(frozen=True)
-class Policy:
-    """Which rescues a search has."""
-
-    rescues: frozenset[str] = field(default_factory=lambda: frozenset(r.name for r in RESCUES))
-
-    def has(self, name: str) -> bool:
-        """Whether the search has this rescue."""
-        return name in self.rescues
-
-    def without(self, name: str) -> "Policy":
-        """The same without one.
-
-        Raises:
-            KeyError: when there is none of this name.
-        """
-        if name not in {r.name for r in RESCUES}:
-            raise KeyError(name)
-        return Policy(self.rescues - {name})
-
-
-POLICY = Policy()
-
-
-def rescued_by(name: str) -> bool:
-    """Whether searches have this rescue."""
-    return POLICY.has(name)
+"""In the order in which they are asked."""

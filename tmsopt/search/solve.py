@@ -10,7 +10,7 @@ from typing import Unpack
 from tmsopt.boundaries import is_exactly_multiple, stands_on
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import known_bound
-from tmsopt.evaluation.recheck import Evaluation, recheck
+from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.evaluation.stored import held, missed_note
 from tmsopt.evaluation.worst_case import cover
 from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, user_structure_name, without_rounding
@@ -19,45 +19,36 @@ from tmsopt.problem.files import Given, as_solvable
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.problem.unit_system import unit_at, unit_of
 from tmsopt.problem.verdict.meetings import every_meeting
 from tmsopt.problem.verdict.stability import stability
 from tmsopt.problem.verdict.status import NotSolved
-from tmsopt.program.formulate import design_of
 from tmsopt.program.nlp import objective_size
 from tmsopt.program.options import DEFAULTS, AskedOfSolve, Options, documents_options, options_of
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.records import Table
-from tmsopt.search.multistart import rank, same_objective
-from tmsopt.search.outcome import (
-    UNCLEAR,
-    Outcome,
-    best_checked,
-    better,
-    counted,
-    evaluated,
-    evaluated_cases,
-    mass_advice,
-)
+from tmsopt.search.enough import count_starts
+from tmsopt.search.outcome import UNCLEAR, Outcome, as_it_is, better, evaluated, evaluated_cases, mass_advice
+from tmsopt.search.policy import Policy
 from tmsopt.search.remedies.needs import add_required_speed
-from tmsopt.search.rescues import rescued_by
-from tmsopt.search.search import Explored, answered, explore, without_any
-from tmsopt.search.workspace import Workspace, check_near, workspace
+from tmsopt.search.remedies.none import answered, explain_none
+from tmsopt.search.search import POLICY, search_part
+from tmsopt.search.state import SearchState, begin_search, check_near, same_objective
 
 UNSTABLE = "no stable design was found that meets the other limits"
 """Of a design that is not stable though a limit asks for it."""
 
 _ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
-_WAIT = 1.0  # seconds after an interrupt in which the best of where starts ended is looked for
-_SEEN, _SAME = 3, 1e-9  # designs of a sample that may be the best then; what an end must promise more than the best has
 _TOLD = 1e-6  # relative and absolute: difference of a value in doubles from the exact one, above which rounding decided
+Found = tuple[SearchState, Outcome | None]
+"""The search of a part of the box at its end, and its best design."""
+
 _NEAR = 4  # starts where branch and bound found a stable design, that design the first of them
 
 
 @documents_options(AskedOfSolve, _ASKING)
-def solve(problem: Given, *, throw: bool = True, **options: Unpack[AskedOfSolve]) -> Solution:
+def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[AskedOfSolve]) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
     Ctrl-C ends the search with the best design so far, ``not_converged`` and `interrupted`; a second one ends that too.
@@ -65,6 +56,7 @@ def solve(problem: Given, *, throw: bool = True, **options: Unpack[AskedOfSolve]
     Args:
         problem: or the path of its file.
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
+        policy: how each part of the box is searched; see `tmsopt.Policy`.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
             ``stability`` and ``interruptible``; see `tmsopt.Options`.
 
@@ -81,7 +73,7 @@ def solve(problem: Given, *, throw: bool = True, **options: Unpack[AskedOfSolve]
     More: docs/tutorials/first_bicycle.md
     """
     problem = as_solvable(problem)
-    solution = solve_any_status(problem, options_of(options, AskedOfSolve, _ASKING))
+    solution = solve_any_status(problem, options_of(options, AskedOfSolve, _ASKING), policy=policy)
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
@@ -94,6 +86,7 @@ def solve_any_status(
     without_sample: bool = False,
     without: Collection[str] = (),
     bound: bool = True,
+    policy: Policy = POLICY,
 ) -> Solution:
     """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status.
 
@@ -107,36 +100,33 @@ def solve_any_status(
         return design
     problem = as_solvable(design)
     began = time.perf_counter()
-    notes: tuple[str, ...] = ()
-    values: dict[str, float] = {}
-    interrupted = False
-    if problem.free:
-        if options.near:
-            check_near(problem, options.near)
-            near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
-            options = replace(options, near=near)
-        work = workspace(problem, options, extra_starts, without_sample)
-        parts = [part for part in work.parts(options.near) if part.name not in without]
-        explored: list[Explored] = []
-        try:
-            for part in _promising(parts, options):
-                met = [e.finding.checked for e in explored if e.finding and not e.finding.checked.violations]
-                stable = any(checked.structure.abscissa < 0 for checked in met)
-                explored.append(explore(part, insist=not stable))
-            explored.sort(key=lambda e: [part.name for part in parts].index(e.name))
-            finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
-        except KeyboardInterrupt:
-            so_far = _so_far(parts) if options.interruptible else None
-            if so_far is None:
-                raise
-            finding, interrupted = so_far, True
-        looked = sum(part.sampler.count for part in parts if part.sampler)
-        finding = replace(finding, starts=replace(finding.starts, looked=looked))
-        notes = (*_sides_note(problem, explored, finding), *sense_notes(problem))
-        values = _side_values(explored)
-    else:
-        finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
-    solution = replace(_assembled(problem, finding, notes, values, began, bound), interrupted=interrupted)
+    if not problem.free:
+        outcome = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
+        return covered(_assembled(problem, outcome, (), {}, began, bound))
+    if options.near:
+        check_near(problem, options.near)
+        near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
+        options = replace(options, near=near)
+    policy = replace(policy, sample=lambda _: None) if without_sample else policy
+    states = [s for s in begin_search(problem, options, tuple(extra_starts)) if s.side not in without]
+    found = _search_sides(states, policy)
+    best = _winner(problem, found)
+    interrupted = any(state.interrupted for state, _ in found)
+    if interrupted:
+        if not options.interruptible:
+            raise KeyboardInterrupt
+        best = _so_far(problem, found, best)
+    try:
+        outcome = best or explain_none(problem, [state for state, _ in found], policy)
+    except KeyboardInterrupt:
+        if not options.interruptible:
+            raise
+        interrupted, outcome = True, _so_far(problem, found, None)
+    looked = sum(len(state.sample.box.drawn) for state, _ in found if state.sample)
+    outcome = replace(outcome, starts=replace(outcome.starts, looked=looked))
+    notes = (*_sides_note(problem, found, outcome), *sense_notes(problem))
+    solution = _assembled(problem, outcome, notes, _side_values(found), began, bound)
+    solution = replace(solution, interrupted=interrupted)
     solution = solution if without_sample else covered(solution)
     if interrupted or not options.stability or options.near:  # which keeps to its side of the box
         return solution
@@ -150,6 +140,23 @@ def solve_any_status(
             raise
         words = "the user stopped the question whether any design is stable"
         return replace(solution, interrupted=True, notes=(*solution.notes, words))
+
+
+def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[Found]:
+    """The search of each part of the box, in the order of these; a part of which more was seen comes first."""
+    if len(states) > 1:
+        begin(states[0].options.progress, "looking at designs")
+        states = [replace(state, sample=policy.sample(state)) for state in states]
+    found: dict[str, Found] = {}
+    stable = False
+    for state in sorted(states, key=lambda state: state.sample.first if state.sample else (0.0, 0.0)):
+        end, outcome = search_part(replace(state, stable_elsewhere=stable), policy)
+        found[state.side] = end, outcome
+        checked = outcome.checked if outcome else None
+        stable |= checked is not None and not checked.violations and checked.structure.abscissa < 0
+        if end.interrupted:
+            break
+    return [found[state.side] for state in states if state.side in found]
 
 
 def covered(solution: Solution) -> Solution:
@@ -167,56 +174,41 @@ def solved_first(design: Given, progress: Listener | None) -> Solution:
 
 def evaluate_design(problem: Posed, design: Mapping[str, float], note: str) -> Solution:
     """A design as it is, whoever found it: ``not_converged``, or ``infeasible`` where it violates something."""
-    began = time.perf_counter()
-    return _assembled(problem, replace(_as_it_is(problem, design), notes=(note,)), (), {}, began)
+    return _assembled(problem, as_it_is(problem, design, note), (), {}, time.perf_counter())
 
 
-def _as_it_is(problem: Posed, design: Mapping[str, float]) -> Outcome:
-    parameters = problem.ordered(design)
-    cases = evaluated_cases(problem, parameters)
-    checked = recheck(problem, parameters, cases)
-    status = "infeasible" if checked.violations else "not_converged"
-    return Outcome(parameters, checked, status, {}, Starts(), "none", cases)
+def _so_far(problem: Posed, found: Sequence[Found], outcome: Outcome | None) -> Outcome:
+    """The best design that an interrupted search has met: where starts ended, or of those looked at before.
+
+    Raises:
+        KeyboardInterrupt: where there is none.
+    """
+    designs = [outcome.parameters] if outcome else []
+    for state, _ in found:
+        designs += [state.design_at(end) for end in sorted(state.ends, key=lambda end: end.rank)[:1]]
+        designs += [state.sample.box.design(state.sample.refined)] if state.sample else []
+    known = [as_it_is(problem, {n: design[n] for n in problem.free}) for design in designs]
+    if not known:
+        raise KeyboardInterrupt
+    best = min(known, key=partial(_order, problem))
+    ends = [end for state, _ in found for end in state.ends]
+    words = f"the user stopped the search after {len(ends)} starts; this is the best design so far"
+    formulation = found[0][0].nlp.formulation if ends else "none"
+    starts = count_starts(ends, problem.sign * best.checked.objective)
+    return replace(best, starts=starts, formulation=formulation, notes=(words,))
 
 
-def _so_far(parts: Sequence[Workspace]) -> Outcome | None:
-    """The best design that an interrupted search has met: of those looked at before, and where starts ended."""
-    problem, met, end = parts[0].problem, parts[0].met, time.perf_counter() + _WAIT
-    looked = [(part.sampler, vars(part).get("sample")) for part in parts]  # not to be made for this
-    seen = [(of, s.refined, row) for of, s in looked if of and s for row in range(min(len(s.refined), _SEEN))]
-    found = [_as_it_is(problem, of.design(refined, row)) for of, refined, row in seen]
-    best = min(found, key=partial(_order, problem), default=None)
-    for nlp, candidate in sorted((m for m in met if math.isfinite(m[1].objective)), key=lambda m: rank(m[1])):
-        if best and candidate.feasible and _order(problem, best) <= (0.0, candidate.objective + _SAME):
-            continue
-        if best and time.perf_counter() > end:
-            break
-        trial = best_checked(parts[0], nlp, [candidate])
-        own = _as_it_is(problem, design_of(problem, (trial.point if trial else candidate.run).x.tolist()))
-        best = min([*([best] if best else []), own], key=partial(_order, problem))
-    if best is None:
-        return None
-    starts = counted([end for _, end in met], problem.sign * best.checked.objective)
-    words = f"the user stopped the search after {len(met)} starts; this is the best design so far"
-    return replace(best, starts=starts, formulation=met[0][0].formulation if met else "none", notes=(words,))
-
-
-def _order(problem: Posed, finding: Outcome) -> tuple[float, float]:
+def _order(problem: Posed, outcome: Outcome) -> tuple[float, float]:
     """Of two designs as they are, the better one comes first: by violation, then by objective."""
-    value = problem.sign * finding.checked.objective
+    value = problem.sign * outcome.checked.objective
     worth = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
-    return sum(finding.checked.violations.values()), worth
+    return sum(outcome.checked.violations.values()), worth
 
 
 def _with_stability(solution: Solution, options: Options, began: float) -> Solution:
     """Of a search for stability that found none: whether there is any, and the design that one leads to."""
     problem = solution.problem.posed
-    if (
-        solution.stable is not False
-        or solution.any_stable is False
-        or not solution.stability_sought
-        or not rescued_by("branch and bound")
-    ):
+    if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
     from tmsopt.global_search.stability import any_stable  # a tenth of all imports, which few problems need
 
@@ -243,106 +235,97 @@ def _led(solution: Solution, design: Mapping[str, float], words: str, options: O
     return replace(found, notes=(*found.notes, words)) if better else solution
 
 
-def _promising(parts: Sequence[Workspace], options: Options) -> Sequence[Workspace]:
-    """Parts of the box by what was seen of them: where one has a stable design, none need be insisted on in others."""
-    if len(parts) == 1:
-        return parts
-    begin(options.progress, "looking at designs")
-    seen = [part.sample.refined if part.sample else None for part in parts]
-    ranks = [(s.violation[0], s.worth[0]) if s else (0.0, 0.0) for s in seen]
-    return [parts[k] for k in sorted(range(len(parts)), key=ranks.__getitem__)]
-
-
-def _winner(problem: Posed, explored: Sequence[Explored]) -> Outcome | None:
-    """The best of the findings of all parts of the box, with the starts of all of them."""
+def _winner(problem: Posed, found: Sequence[Found]) -> Outcome | None:
+    """The best design of all parts of the box, with the starts of all of them."""
     best: Outcome | None = None
-    for part in explored:
-        if part.finding is not None and (best is None or better(problem, part.finding, best)):
-            best = part.finding
-    if best is None or len(explored) == 1:
+    for _, outcome in found:
+        if outcome is not None and (best is None or better(problem, outcome, best)):
+            best = outcome
+    if best is None or len(found) == 1:
         return best
-    every = [c for part in explored for c in part.candidates]
-    return replace(best, starts=replace(counted(every, math.nan), at_best=best.starts.at_best))
+    starts = count_starts([end for state, _ in found for end in state.ends], math.nan)
+    return replace(best, starts=replace(starts, at_best=best.starts.at_best))
 
 
-def _side_values(explored: Sequence[Explored]) -> dict[str, float]:
+def _side_values(found: Sequence[Found]) -> dict[str, float]:
     """The best objective of each part of the box; nan where it has no optimal design."""
-    found = {part.name: part.finding for part in explored if part.name}
-    return {n: f.checked.objective if f and f.status == "optimal" else math.nan for n, f in found.items()}
+    named = {state.side: outcome for state, outcome in found if state.side}
+    return {n: o.checked.objective if o and o.status == "optimal" else math.nan for n, o in named.items()}
 
 
-def _sides_note(problem: Posed, explored: Sequence[Explored], finding: Outcome) -> tuple[str, ...]:
+def _sides_note(problem: Posed, found: Sequence[Found], best: Outcome) -> tuple[str, ...]:
     """Which part of the box the best design is in, and what the other one offers."""
-    won = next((part for part in explored if part.finding and part.finding.parameters == finding.parameters), None)
-    if len(explored) == 1 or won is None or finding.status != "optimal":
+    won = next((state.side for state, o in found if o and o.parameters == best.parameters), None)
+    if len(found) == 1 or won is None or best.status != "optimal":
         return ()
-    sentences = [f"both signs were searched: {won.name} wins"]
-    for part in explored:
-        if part is not won:
-            if part.finding is None or part.finding.checked.violations:
-                stable = "stable and " if problem.asks_radius else ""
-                sentences.append(f"with {part.name} nothing {stable}feasible was found")
-            elif problem.objective is None:
-                sentences.append(f"there is one with {part.name} too")
-            elif same_objective(part.finding.checked.objective, finding.checked.objective, objective_size(problem)):
-                return (f"both signs were searched: {part.name} is as good as {won.name}",)
-            else:
-                found = "the best" if part.finding.status == "optimal" else "what was found"
-                asked = unit_at(problem, problem.minimize or problem.maximize or "", part.finding.parameters)
-                sentences.append(f"{found} with {part.name} is {asked.show(part.finding.checked.objective, 6)}")
+    sentences = [f"both signs were searched: {won} wins"]
+    for state, outcome in found:
+        if state.side == won:
+            continue
+        if outcome is None or outcome.checked.violations:
+            stable = "stable and " if problem.asks_radius else ""
+            sentences.append(f"with {state.side} nothing {stable}feasible was found")
+        elif problem.objective is None:
+            sentences.append(f"there is one with {state.side} too")
+        elif same_objective(outcome.checked.objective, best.checked.objective, objective_size(problem)):
+            return (f"both signs were searched: {state.side} is as good as {won}",)
+        else:
+            which = "the best" if outcome.status == "optimal" else "what was found"
+            asked = unit_at(problem, problem.minimize or problem.maximize or "", outcome.parameters)
+            sentences.append(f"{which} with {state.side} is {asked.show(outcome.checked.objective, 6)}")
     return ("; ".join(sentences),)
 
 
 def _assembled(
     problem: Posed,
-    finding: Outcome,
+    outcome: Outcome,
     notes: tuple[str, ...],
     sides: dict[str, float],
     began: float,
     bound: bool = True,
 ) -> Solution:
-    parameters, checked, lost = held(problem, finding.parameters, finding.checked, finding.cases)
-    finding = replace(finding, parameters=parameters, checked=checked)
-    numbers = certified_numbers(problem, finding.parameters, checked, finding.cases)
+    parameters, checked, lost = held(problem, outcome.parameters, outcome.checked, outcome.cases)
+    outcome = replace(outcome, parameters=parameters, checked=checked)
+    numbers = certified_numbers(problem, outcome.parameters, checked, outcome.cases)
     told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
-    if finding.status == "optimal" and problem.free and problem.objective is not None and not told:
-        finding = replace(finding, status="not_converged", notes=(*finding.notes, UNCLEAR))
-    optimal, listed = finding.status == "optimal", bool(problem.scenarios or problem.tolerances)
+    if outcome.status == "optimal" and problem.free and problem.objective is not None and not told:
+        outcome = replace(outcome, status="not_converged", notes=(*outcome.notes, UNCLEAR))
+    optimal, listed = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
     name, worst = user_structure_name(problem.model, checked.structure.name), checked.worst.applied(parameters)
     whole = polynomial_structure(problem.model, name, numbers.roots).roots
     met = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
     edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, met)
     return Solution(
         problem=problem.problem,
-        status=finding.status,
+        status=outcome.status,
         value=numbers.value,
-        parameters=Table(finding.parameters),
+        parameters=Table(outcome.parameters),
         abscissa=numbers.abscissa,
         abscissa_realised=numbers.realised,
         roots=without_rounding(problem.model, numbers.roots),
         structure=name,
-        active=Table(finding.active),
+        active=Table(outcome.active),
         violations=checked.amounts,
         missed=Table(lost),
-        bound=known_bound(problem, finding.status, numbers.value) if bound else Bound(),
-        starts=finding.starts,
+        bound=known_bound(problem, outcome.status, numbers.value) if bound else Bound(),
+        starts=outcome.starts,
         seconds=time.perf_counter() - began,
         quantities=numbers.quantities,
         dimensionless=numbers.dimensionless,
-        formulation=finding.formulation,
+        formulation=outcome.formulation,
         freedom=degrees_of_freedom(problem),
-        branches=finding.branches,
-        notes=(*finding.notes, *missed_note(problem, lost), *notes, *_stability_note(problem, checked, edges, optimal)),
+        branches=outcome.branches,
+        notes=(*outcome.notes, *missed_note(problem, lost), *notes, *_stability_note(problem, checked, edges, optimal)),
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
         sides=Table(sides),
-        relaxation=finding.relaxation,
+        relaxation=outcome.relaxation,
         meetings=met,
         edges=edges,
         edge_is_exact=certain,
         multiple_as_rounded=bool(met) and not problem.free and not is_exactly_multiple(problem, worst, whole),
-        without_best=finding.without_best,
+        without_best=outcome.without_best,
         si=numbers.si,
     )
 

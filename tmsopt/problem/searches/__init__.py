@@ -3,6 +3,6 @@
 In: numbers of searches, and of the different optima that they ended in. Out: estimates with a theory. Open `starts`.
 """
 
-from tmsopt.problem.searches.starts import Starts, expected_unseen, is_enough
+from tmsopt.problem.searches.starts import Starts, expected_unseen, expects_few_better
 
-__all__ = ["Starts", "expected_unseen", "is_enough"]
+__all__ = ["Starts", "expected_unseen", "expects_few_better"]

@@ -17,7 +17,7 @@ def expected_unseen(searches: int, optima: int) -> float:
     return optima * (optima + 1) / rest if rest > 0 else math.inf
 
 
-def is_enough(searches: int, optima: int, most: float = _BETTER) -> bool:
+def expects_few_better(searches: int, optima: int, most: float = _BETTER) -> bool:
     """Whether few enough optima are expected that no search met and that are better than all w that were.
 
     Where each rank is as likely as another, one of w + 1 is the best.
@@ -67,7 +67,7 @@ class Starts:
         if not self.tried:
             return ()
         by = f"found by {self.at_best} of {self.tried} start{'' if self.tried == 1 else 's'}"
-        if self.at_best and is_enough(self.converged, self.optima):
+        if self.at_best and expects_few_better(self.converged, self.optima):
             return (by,)
-        likely = self.at_best == 1 and not is_enough(self.converged, self.optima, _LIKELY)
+        likely = self.at_best == 1 and not expects_few_better(self.converged, self.optima, _LIKELY)
         return by, f"a better one is {'likely' if likely else 'possible'}"

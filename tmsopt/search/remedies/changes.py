@@ -27,8 +27,6 @@ from tmsopt.search.remedies.relaxation import (
     total,
     widened,
 )
-from tmsopt.search.rescues import rescued_by
-from tmsopt.search.workspace import Workspace, workspace
 
 _ROOM = ((1.0, DIGITS), (1.2, 2))
 """Times an amount, and digits of what is written: where the design is a needle, room shows it to a search."""
@@ -43,7 +41,9 @@ Named = Callable[[Posed, Relaxation, Sequence[str], Posed, Options], Relaxation]
 """A relaxation with the limits that exclude each other; see `needs.irreducible`."""
 
 
-def relax(work: Workspace, named: Named, answered: Answered) -> Relaxation | None:
+def relax(
+    problem: Posed, options: Options, designs: Sequence[Mapping[str, float]], named: Named, answered: Answered
+) -> Relaxation | None:
     """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
 
     Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
@@ -52,10 +52,10 @@ def relax(work: Workspace, named: Named, answered: Answered) -> Relaxation | Non
     and answered; where none of these is, a design is sought that is stable too, with the ends of the box as free to
     move as constraints.
     """
-    options, began = work.options, time.process_time()
-    problem = work.problem.derive(**_NO_GOAL)  # what else is asked plays no part
+    began, asked = time.process_time(), problem
+    problem = problem.derive(**_NO_GOAL)  # what else is asked plays no part
     for wide, limits in stages(problem):
-        relaxation, trial, nlp = least_relaxation(work, wide, limits)
+        relaxation, trial, nlp = least_relaxation(problem, options, wide, limits, designs)
         if relaxation is None:
             continue
         held = holding(nlp, limits, trial) if trial and nlp else []
@@ -65,39 +65,44 @@ def relax(work: Workspace, named: Named, answered: Answered) -> Relaxation | Non
             return relaxation
         single: dict[str, float] = {}
         if trial and nlp and len(relaxation.conflict) > 1:
-            single = alone(workspace(problem, options), relaxation.conflict, trial, nlp.cases)
+            single = alone(problem, options, relaxation.conflict, trial, nlp.cases)
         short = within(options, time.process_time() - began)
-        return _tried(replace(work, options=short), replace(relaxation, alone=Table(single)), wide, limits, answered)
+        return _tried(asked, short, replace(relaxation, alone=Table(single)), wide, limits, answered)
     return None
 
 
 def _tried(
-    work: Workspace, relaxation: Relaxation, wide: Posed, limits: Sequence[Limit], answered: Answered
+    problem: Posed, options: Options, relaxation: Relaxation, wide: Posed, limits: Sequence[Limit], answered: Answered
 ) -> Relaxation:
     """A relaxation with remedies, as long as there is time to try them; alone are limits that were tried.
 
     Where the relaxed design is not stable though that is wanted, so is none of the few that are left beside it.
     """
     remedies, enough = dict[Table[str], None](), dict[str, float]()
-    wanted = stability_wanted(work.problem)
-    stable = work.problem.derive(constraints=wanted, **_NO_GOAL)
+    wanted = stability_wanted(problem)
+    stable = problem.derive(constraints=wanted, **_NO_GOAL)
     box = wide.derive(constraints={**wide.constraints, **wanted})
     joint = [] if recheck(stable, relaxation.parameters).violations else [relaxation.amounts]
     choices = {tuple(each): each for each in (*joint, *({n: a} for n, a in relaxation.alone.items()))}
     with suppress(Spent):
         for names, amounts in choices.items():
             together = bool(joint) and names == tuple(relaxation.amounts)
-            text, design = _written(work, amounts, answered)
-            if text := _less(work, box, limits, text, design, amounts, answered) if text and together else text:
+            text, design = _written(problem, options, amounts, answered)
+            if (
+                text := _less(problem, options, box, limits, text, design, amounts, answered)
+                if text and together
+                else text
+            ):
                 remedies[Table(text)] = None
                 enough |= {n: relaxation.alone[n] for n in text if len(text) == 1 and n in relaxation.alone}
-        if not remedies and rescued_by("steadied"):
-            remedies |= dict.fromkeys(_steadied(work, wide, answered))
+        if not remedies:
+            remedies |= dict.fromkeys(_steadied(problem, options, wide, answered))
     return replace(relaxation, alone=Table(enough), remedies=tuple(remedies))
 
 
 def _less(
-    work: Workspace,
+    problem: Posed,
+    options: Options,
     box: Posed,
     limits: Sequence[Limit],
     text: dict[str, str],
@@ -107,26 +112,32 @@ def _less(
 ) -> dict[str, str]:
     """What is written, or less where the design that answers shows that limits are moved too far, or for nothing."""
     with suppress(Spent):
-        less = least_near(work, box, limits, design)
+        less = least_near(options, box, limits, design)
         share = total(limits, less) / total(limits, amounts)
-        return _written(work, less, answered, [room for room in _ROOM if share * room[0] < _LESS])[0] or text
+        return (
+            _written(problem, options, less, answered, [room for room in _ROOM if share * room[0] < _LESS])[0] or text
+        )
     return text
 
 
 def _written(
-    work: Workspace, amounts: Mapping[str, float], answered: Answered, rooms: Sequence[tuple[float, int]] = _ROOM
+    problem: Posed,
+    options: Options,
+    amounts: Mapping[str, float],
+    answered: Answered,
+    rooms: Sequence[tuple[float, int]] = _ROOM,
 ) -> tuple[dict[str, str], Mapping[str, float]]:
     """Limits moved by amounts, or a little further, as they may be written, and the design that then answers; or {}.
 
     None that moves limits on the roots as far as to let in what is not stable.
     """
-    problem, tried = work.problem, list[dict[str, str]]()
+    tried = list[dict[str, str]]()
     for more, digits in rooms if amounts and all(map(np.isfinite, amounts.values())) else ():
         text = moved_limits(problem, {n: more * amount for n, amount in amounts.items()}, digits)
         with suppress(InputError):  # no end of a range is beyond what is physical
             moved = with_limits(problem, text)
             fresh = text not in tried and not _unsettled(problem, moved, text)
-            design = answered(moved, work.options) if fresh else None
+            design = answered(moved, options) if fresh else None
             if design:
                 return text, design
             if design is not None:  # found, but not stable: room shows a search nothing that it did not see
@@ -145,22 +156,22 @@ def _unsettled(problem: Posed, moved: Posed, names: Collection[str]) -> bool:
     return any(settles(problem.constraints[n]) and not settles(moved.constraints[n]) for n in about)
 
 
-def _steadied(work: Workspace, wide: Posed, answered: Answered) -> tuple[Table[str], ...]:
+def _steadied(problem: Posed, options: Options, wide: Posed, answered: Answered) -> tuple[Table[str], ...]:
     """The least relaxation after which a design is stable, of constraints and ends of the box alike, if it is answered.
 
     Args:
         wide: in whose box no relaxation of the problem was answered.
     """
-    stable = stability_wanted(work.problem)
-    limits = {**work.problem.constraints, **stable}
-    asked = work.problem.derive(constraints=limits, **_NO_GOAL)
+    stable = stability_wanted(problem)
+    limits = {**problem.constraints, **stable}
+    asked = problem.derive(constraints=limits, **_NO_GOAL)
     *_, (box, movable) = stages(asked)
     if not stable and box.free == wide.free:
         return ()
     moved = [limit for limit in movable if limit.name != STABLE]
-    few = replace(work, problem=asked, options=replace(work.options, starts=_FEW))
-    relaxation, *_ = least_relaxation(few, box, moved)
+    few = replace(options, starts=_FEW)
+    relaxation, *_ = least_relaxation(asked, few, box, moved)
     if relaxation is None:
         return ()
-    text, design = _written(work, relaxation.amounts, answered)
-    return (Table(_less(work, box, moved, text, design, relaxation.amounts, answered)),) if text else ()
+    text, design = _written(asked, options, relaxation.amounts, answered)
+    return (Table(_less(asked, options, box, moved, text, design, relaxation.amounts, answered)),) if text else ()

@@ -16,11 +16,11 @@ from tmsopt.problem.unit_system import unit_of
 from tmsopt.program.options import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
-from tmsopt.search.multistart import search
-from tmsopt.search.outcome import CheckedEnd, best_checked
+from tmsopt.search.accept import accept_best
+from tmsopt.search.policy import try_starts
 from tmsopt.search.remedies.allowance import Spent, within
-from tmsopt.search.rescues import rescued_by
-from tmsopt.search.workspace import Workspace, workspace
+from tmsopt.search.search import POLICY
+from tmsopt.search.state import CheckedEnd, SearchState, begin_search
 
 _FASTEST, _TIMES = 10.0, 4.0  # speeds looked through, in √(g w); in the problem's own speed, where that is more
 _STARTS, _SECONDS = 6, 0.5  # what a search for it may cost; after which no other is begun
@@ -46,7 +46,7 @@ def add_required_speed(
     The problem is solved again at the speed that is shown. A design that was missed in the box comes with it.
     """
     name, problem = _speed(solution.problem.posed), solution.problem
-    if not name or problem.posed.cases or not problem.free or not _asked(solution) or not rescued_by("required speed"):
+    if not name or problem.posed.cases or not problem.free or not _asked(solution):
         return solution, None
     limits = {} if set(problem.posed.asked_of_roots) or problem.posed.pattern else {STABLE: "abscissa <= 0"}
     few = replace(options, starts=_STARTS, stability=0.0, alone=False, progress=None, near=None)
@@ -59,7 +59,7 @@ def add_required_speed(
             maximize=name if most else None,
         )
         looked += ends
-        trials = [_best(part) for part in workspace(asked, few).parts()]
+        trials = [_best(state) for state in begin_search(asked, few)]
         found = [t.parameters for t in trials if t and not t.checked.violations]
         if found:
             design = (max if most else min)(found, key=lambda p: p[name])
@@ -112,7 +112,7 @@ def irreducible(
         wide: the problem in the box as far as its ends may give way.
         reached: the whole search, for the constraints of these names.
     """
-    if not relaxation.amounts or not rescued_by("irreducible"):
+    if not relaxation.amounts:
         return relaxation
     found = _Found(problem, replace(options, starts=_STARTS, progress=None))
     designs: list[Mapping[str, float]] = [relaxation.parameters]
@@ -203,13 +203,13 @@ def _met(problem: Posed, known: Sequence[Mapping[str, float]], options: Options,
 
     `quick`: where no design of the sample comes near, none is looked for; of what is only not named then.
     """
-    parts = workspace(problem, options, extra_starts=known).parts()
-    seen = [p.sampler.design(p.sample.refined, 0) for p in parts if p.sampler and p.sample]
-    if any(_holds(problem, problem.ordered(d)) for d in seen):
+    states = [replace(s, sample=POLICY.sample(s)) for s in begin_search(problem, options, tuple(known))]
+    samples = [state.sample for state in states if state.sample]
+    if any(_holds(problem, problem.ordered(sample.box.design(sample.refined))) for sample in samples):
         return True
-    if quick and all(p.sample and p.sample.far_off for p in parts):
+    if quick and len(samples) == len(states) and all(sample.far_off for sample in samples):
         return False
-    ended = [t for t in map(_best, parts) if t and not t.checked.violations]
+    ended = [t for t in map(_best, states) if t and not t.checked.violations]
     return any(_holds(problem, t.parameters) for t in ended) or (None if ended else False)
 
 
@@ -226,11 +226,14 @@ def _holds(problem: Posed, design: Mapping[str, float]) -> bool:
     return not between or not recheck(problem, design, (*problem.cases, *between)).violations
 
 
-def _best(work: Workspace) -> CheckedEnd | None:
-    if work.out_of_reach:
+def _best(state: SearchState) -> CheckedEnd | None:
+    state = replace(state, sample=state.sample or POLICY.sample(state))
+    if state.out_of_reach:
         return None
-    nlp = work.formulate(work.problem.cases)
-    return best_checked(work, nlp, search(work, nlp, _STARTS))
+    state = try_starts(state, POLICY.starts(state), POLICY, _STARTS)
+    if state.interrupted:
+        raise KeyboardInterrupt
+    return accept_best(state).best
 
 
 def _asked(solution: Solution) -> bool:

@@ -10,20 +10,21 @@ import numpy as np
 
 from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import NODES, atan
-from tmsopt.evaluation.recheck import FEASIBLE, excesses
+from tmsopt.evaluation.recheck import FEASIBLE, excesses, recheck
 from tmsopt.evaluation.worst_case import worst_cases
 from tmsopt.models import Values
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
-from tmsopt.program.formulate import design_of, formulate
+from tmsopt.program.formulate import formulate
 from tmsopt.program.nlp import NLP, AddedVariable, name_of
+from tmsopt.program.options import Options
 from tmsopt.records import Table
-from tmsopt.search.basins.leaders import starting
-from tmsopt.search.multistart import Runner, same_objective
-from tmsopt.search.outcome import CheckedEnd, best_checked
-from tmsopt.search.sample import Sampler
-from tmsopt.search.workspace import LocalEnd, Workspace, workspace
+from tmsopt.search.accept import accept_best
+from tmsopt.search.policy import try_all, try_starts
+from tmsopt.search.sample import Box, draw_box
+from tmsopt.search.search import POLICY
+from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, same_objective
 
 _ROUNDS = 12  # times that cases are added
 _TRIED = 8  # starts of a relaxation at most
@@ -61,15 +62,19 @@ class Limit:
 
 
 def least_relaxation(
-    work: Workspace, wide: Posed, limits: Sequence[Limit]
+    problem: Posed,
+    options: Options,
+    wide: Posed,
+    limits: Sequence[Limit],
+    designs: Sequence[Mapping[str, float]] = (),
 ) -> tuple[Relaxation, CheckedEnd | None, NLP | None] | tuple[None, None, None]:
     """The least relaxation in a box, with where it ended; without, for a design that was met on the way."""
-    options, listed = work.options, work.problem.cases
-    sides = [workspace(part.part, options) for part in workspace(wide, options).parts()]
+    listed = problem.cases
+    sides = begin_search(wide, options)
     ended = [_least_covered(side, limits, listed) for side in sides]
     reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
     trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
-    met = [] if listed else [found for side in sides for found in islice(_met(work, side, limits), 1)]
+    met = [] if listed else [found for side in sides for found in islice(_met(side, limits, designs), 1)]
     least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
     amounts = _amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
     if seen and (trial is None or least < total(limits, amounts) * (1 - _TIE)):
@@ -79,31 +84,24 @@ def least_relaxation(
     return Relaxation(Table(trial.parameters), Table(amounts)), trial, nlp
 
 
-def least_near(work: Workspace, box: Posed, limits: Sequence[Limit], design: Mapping[str, float]) -> dict[str, float]:
+def least_near(options: Options, box: Posed, limits: Sequence[Limit], design: Mapping[str, float]) -> dict[str, float]:
     """How far limits must be moved for the nearest design that this one leads to; {} where it leads to none."""
-    side, nlp = workspace(box, work.options), _elastic(box, box.cases, limits)
-    trial = best_checked(
-        _unlimited(side, limits), nlp, [Runner(side, nlp).solve_from(design, near=True, hopeful=False)]
-    )
-    met = trial is not None and not trial.checked.violations
-    return _amounts(box, limits, trial.parameters, nlp.cases) if trial and met else {}
+    trial = _relaxed(box, options, _elastic(box, box.cases, limits), limits, [design])
+    return _amounts(box, limits, trial.parameters, trial.end.nlp.cases) if trial else {}
 
 
-def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[tuple[float, Relaxation]]:
-    """What designs need that were met on the way: the least violating one looked at, and where starts ended.
-
-    Those that need least come first.
-    """
-    designs = [design_of(work.problem, end.run.x.tolist()) for _, end in work.met if np.all(np.isfinite(end.run.x))]
-    unlimited = _unlimited(side, limits)
-    if side.sampler and side.sample:
-        refined = side.sampler.refined(side.sample.refined.take(np.arange(1)), _FINEST)
-        designs.append(side.sampler.design(refined, 0))
-    needs = [(p, _amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, designs)]
+def _met(
+    side: SearchState, limits: Sequence[Limit], designs: Sequence[Mapping[str, float]]
+) -> Iterator[tuple[float, Relaxation]]:
+    """What designs met on the way need, and the least violating one of a sample; those least in need first."""
+    known, unlimited = list(designs), _unlimited(side.problem, limits)
+    if sample := POLICY.sample(side):
+        known += [*sample.box.designs(sample.box.refine(sample.refined.take(np.arange(1)), _FINEST))]
+    needs = [(p, _amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, known)]
     totals = [total(limits, amounts) for _, amounts in needs]
     for row in np.argsort(totals, kind="stable").tolist():
         parameters, amounts = needs[row]
-        if not unlimited.recheck(parameters, ()).violations:
+        if not recheck(unlimited, parameters).violations:
             yield totals[row], Relaxation(Table(parameters), Table(amounts))
 
 
@@ -154,81 +152,86 @@ def widened(problem: Posed, names: Collection[str]) -> Posed:
     return problem.derive(free=free)
 
 
-def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Case]) -> tuple[CheckedEnd | None, NLP]:
+def _least_covered(side: SearchState, limits: Sequence[Limit], listed: Sequence[Case]) -> tuple[CheckedEnd | None, NLP]:
     """The least relaxation of one part of the box, with cases added until none between them needs more."""
-    trial, nlp = _least(work, limits, listed)
+    trial, nlp = _least(side, limits, listed)
     movable = [limit for limit in limits if not limit.parameter]
-    thorough = work.options.starts >= _TRIED
+    thorough = side.options.starts >= _TRIED
     if thorough and trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
-        run, sampler = Runner(work, nlp), _sampler(work)
-        leads = {tuple(d.values()): d for limit in movable for d in _leads(work, sampler, limit.name)}
-        ended = [run.solve_from(design, near=True, hopeful=False) for design in leads.values()]
-        again = best_checked(_unlimited(work, limits), nlp, ended)
-        less = again is not None and again.point.objective < trial.point.objective * (1 - _TIE)
-        if again is not None and less and not again.checked.violations:
+        box = _box(side.part, side.options)
+        leads = {tuple(d.values()): d for limit in movable for d in _leads(box, limit.name)}
+        again = _relaxed(side.part, side.options, nlp, limits, list(leads.values()))
+        if again is not None and again.point.objective < trial.point.objective * (1 - _TIE):
             trial = again
     for _ in range(_ROUNDS if listed else 0):
-        if trial is None or not (more := _beyond(work.problem, limits, trial, nlp.cases)):
+        if trial is None or not (more := _beyond(side.problem, limits, trial, nlp.cases)):
             break
-        trial, nlp = _least(work, limits, (*nlp.cases, *more), trial)
+        trial, nlp = _least(side, limits, (*nlp.cases, *more), trial)
     return trial, nlp
 
 
 def _least(
-    work: Workspace, limits: Sequence[Limit], cases: Sequence[Case], before: CheckedEnd | None = None
+    side: SearchState, limits: Sequence[Limit], cases: Sequence[Case], before: CheckedEnd | None = None
 ) -> tuple[CheckedEnd | None, NLP]:
     """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
-    nlp = _elastic(work.problem, cases, limits)
-    run = Runner(work, nlp)
-    candidates = [] if before is None else [run.solve_from(before.parameters, near=True)]
-    if not any(c.feasible for c in candidates):
-        candidates = _ends(run, min(_TRIED, work.options.starts))
-    trial = best_checked(_unlimited(work, limits), nlp, candidates)
-    return (trial if trial is not None and not trial.checked.violations else None), nlp
+    nlp = _elastic(side.part, cases, limits)
+    trial = _relaxed(side.part, side.options, nlp, limits, [before.parameters]) if before else None
+    return trial or _relaxed(side.part, side.options, nlp, limits), nlp
 
 
-def _sampler(work: Workspace, extended: Limit | None = None) -> Sampler:
-    """Looks at designs for their limits alone, and for how far one end of the box must be moved."""
-    asked = work.part.derive(locate=None)
+def _relaxed(
+    problem: Posed,
+    options: Options,
+    nlp: NLP,
+    limits: Sequence[Limit],
+    designs: Sequence[Mapping[str, float]] | None = None,
+) -> CheckedEnd | None:
+    """The least relaxation that these designs lead to, or a few of the sample, if all that may not move is met."""
+    state = SearchState(_unlimited(problem, limits), problem, nlp, options)
+    if designs is None:
+        state = replace(state, sample=POLICY.sample(state))
+        state = try_starts(state, POLICY.starts(state), _RELAXING, min(_TRIED, options.starts))
+    else:
+        state = try_starts(state, map(Start, designs), try_all(_RELAXING))
+    if state.interrupted:
+        raise KeyboardInterrupt
+    trial = accept_best(state).best
+    return trial if trial is not None and not trial.checked.violations else None
+
+
+def _is_least(state: SearchState) -> bool:
+    """Whether nothing has to give, or enough starts agree on what has."""
+    objectives = [end.objective for end in state.feasible]
+    best = min(objectives, default=np.inf)
+    agreed = sum(same_objective(value, best) for value in objectives) >= _AGREE and len(state.ends) >= 2 * _AGREE
+    return best <= _NOTHING or agreed
+
+
+_RELAXING = replace(POLICY, enough=_is_least)
+
+
+def _box(problem: Posed, options: Options, extended: Limit | None = None) -> Box:
+    """A place to look at designs for their limits alone, and for how far one end of the box must be moved."""
+    asked = problem.derive(locate=None)
     if extended and extended.parameter and extended.name.endswith(".max"):
         asked = asked.derive(minimize=extended.parameter)
     elif extended and extended.parameter:
         asked = asked.derive(maximize=extended.parameter)
-    sampler = Sampler(asked, work.options.seed)
-    sampler.draw()
-    return sampler
+    return draw_box(asked, options.seed)
 
 
-def _leads(work: Workspace, sampler: Sampler, name: str) -> list[dict[str, float]]:
+def _leads(box: Box, name: str) -> list[dict[str, float]]:
     """Designs that may do with one limit moved, as far as it takes; none where the others exclude each other."""
-    found = sampler.without(name)
-    excluded = found.out_of_reach(work.problem.model.degree) if work.problem.pattern else found.far_off
-    return [] if excluded else [sampler.design(found, k) for k in range(min(len(found), _LED))]
+    found = box.without(name)
+    excluded = found.misses_by(box.unreachable if box.problem.pattern else box.tuning.far_off)
+    return [] if excluded else [*box.designs(found.take(np.arange(min(len(found), _LED))))]
 
 
-def _ends(run: Runner, most: int) -> list[LocalEnd]:
-    candidates: list[LocalEnd] = []
-    for design, near in islice(starting(run.work), most):
-        candidates.append(run.solve_from(design, near, hopeful=False))
-        if run.work.options.progress:
-            run.work.options.progress(len(candidates), most)
-        feasible = [c.objective for c in candidates if c.feasible]
-        if feasible and min(feasible) <= _NOTHING:
-            break
-        if (
-            feasible
-            and sum(same_objective(f, min(feasible)) for f in feasible) >= _AGREE
-            and len(candidates) >= 2 * _AGREE
-        ):
-            break
-    return candidates
-
-
-def _unlimited(work: Workspace, limits: Sequence[Limit]) -> Workspace:
+def _unlimited(problem: Posed, limits: Sequence[Limit]) -> Posed:
     """The same without the constraints that may move, whose violation is the point of it."""
     moved = {limit.name for limit in limits}
-    kept = {n: c for n, c in work.problem.constraints.items() if n not in moved}
-    return replace(work, problem=work.problem.derive(constraints=kept, minimize=None, maximize=None))
+    kept = {n: c for n, c in problem.constraints.items() if n not in moved}
+    return problem.derive(constraints=kept, minimize=None, maximize=None)
 
 
 def _beyond(wide: Posed, limits: Sequence[Limit], trial: CheckedEnd, cases: Sequence[Case]) -> list[Case]:
@@ -255,33 +258,29 @@ def holding(nlp: NLP, limits: Sequence[Limit], trial: CheckedEnd) -> list[str]:
     scales = {limit.name: limit.scale for limit in limits}
     rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
     names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _HOLDS]
-    for k, name in enumerate(trial.candidate.nlp.variables):
+    for k, name in enumerate(trial.end.nlp.variables):
         multiplier = float(trial.point.bound_multipliers[k])
         parameter = name.removeprefix("tan(").removesuffix(")")
-        width = trial.candidate.nlp.upper[k] - trial.candidate.nlp.lower[k]
+        width = trial.end.nlp.upper[k] - trial.end.nlp.lower[k]
         if parameter in trial.parameters and abs(multiplier) * width > _HOLDS:
             names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
     return names
 
 
-def alone(work: Workspace, conflict: Sequence[str], trial: CheckedEnd, cases: Sequence[Case]) -> dict[str, float]:
+def alone(
+    problem: Posed, options: Options, conflict: Sequence[str], trial: CheckedEnd, cases: Sequence[Case]
+) -> dict[str, float]:
     """How far each limit of a conflict must be moved if nothing else is; those that cannot do it alone are left out."""
-    problem = work.problem
     limits = {limit.name: limit for limit in (*_constraint_limits(problem), *_bound_limits(problem))}
     found: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
         wide = widened(problem, [limit.parameter] if limit.parameter else [])
-        side = workspace(wide, work.options)
-        sampler = _sampler(side, limit)
-        if not (led := _leads(side, sampler, limit.name)):
+        if not (leads := _leads(_box(wide, options, limit), limit.name)):
             continue
-        nlp = _elastic(wide, cases, [limit])
-        run = Runner(side, nlp)
         here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
-        candidates = [run.solve_from(design, near=True, hopeful=False) for design in (here, *led)]
-        ended = best_checked(_unlimited(side, [limit]), nlp, candidates)
-        if ended is not None and not ended.checked.violations:
-            found |= _amounts(wide, [limit], ended.parameters, nlp.cases)
+        ended = _relaxed(wide, options, _elastic(wide, cases, [limit]), [limit], [here, *leads])
+        if ended is not None:
+            found |= _amounts(wide, [limit], ended.parameters, ended.end.nlp.cases)
     return found
 
 

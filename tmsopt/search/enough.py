@@ -1,0 +1,80 @@
+"""When a search ends: the one rule, from which the words of certainty follow too."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from tmsopt.evaluation.bound import bounded, closed, instant_bound
+from tmsopt.problem.freedom import degrees_of_freedom
+from tmsopt.problem.searches import Starts, expects_few_better
+from tmsopt.search.state import End, SearchState, coefficients_at, same_objective
+
+
+def is_enough(state: SearchState) -> bool:
+    """Whether more starts would be waste.
+
+    Enough are starts that leave few better optima to be expected (`expects_few_better`), one that reaches a proven
+    bound, one for a pattern without freedom or an objective, or so many that end nowhere.
+    """
+    tuning, feasible, sample = state.tuning, state.feasible, state.sample
+    if state.options.exhaustive:
+        return False
+    if not feasible:
+        return is_hopeless(state)
+    best, count = min(end.objective for end in feasible), len(state.ends)
+    starts = count_starts(state.ends, best)
+    if state.problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
+        freedom = degrees_of_freedom(state.part).count
+        met = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
+        return starts.at_best >= (1 if met else tuning.agree)
+    if state.ends[-1].objective == best and is_proven(state, state.ends[-1]):
+        return True
+    if sample is None:
+        agreed = count >= tuning.enough_blind and starts.at_best >= tuning.agree
+        return agreed and expects_few_better(starts.converged, starts.optima)
+    alone = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
+    few = tuning.enough_narrow if sample.box.narrow else tuning.enough
+    enough = count >= few and expects_few_better(starts.converged + alone, starts.optima + alone)
+    return enough or count - len(feasible) >= 2 * tuning.hopeless  # which takes long; the sample is the judge
+
+
+def is_hopeless(state: SearchState) -> bool:
+    """Whether so many starts ended nowhere that more would too."""
+    tuning, sample, failed = state.tuning, state.sample, len(state.ends) - len(state.feasible)
+    if failed >= tuning.hopeless_afar and (sample.far_off if sample else state.out_of_reach):
+        return True
+    return failed >= (tuning.hopeless if sample else 2 * tuning.hopeless)
+
+
+def is_proven(state: SearchState, end: End) -> bool:
+    """Whether an end reaches a bound; this is looked at only where the design has all roots of one modulus."""
+    problem = state.part
+    if not (end.feasible and bounded(problem)):
+        return False
+    a = coefficients_at(problem, end.nlp, end.run)[0]
+    own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
+    near = closed(end.objective - own, own, end.nlp.size)
+    return near and instant_bound(problem, end.objective).proven
+
+
+def count_starts(ends: Sequence[End], best: float) -> Starts:
+    """How starts ended; a design of the sample from which a way falls to an end counts as a start that led there."""
+    weights = [(end, 1 + len(end.led)) for end in ends]
+    feasible = [(end, weight) for end, weight in weights if end.feasible]
+    objectives = sorted(end.objective for end, _ in feasible)
+    size = ends[0].nlp.size if ends else 1.0
+    return Starts(
+        tried=sum(weight for _, weight in weights),
+        converged=sum(weight for _, weight in feasible),
+        at_best=sum(weight for end, weight in feasible if same_objective(end.objective, best, end.nlp.size)),
+        optima=bool(objectives) + sum(not same_objective(a, b, size) for a, b in pairwise(objectives)),
+    )
+
+
+def distinct_ends(ends: Sequence[End]) -> list[End]:
+    """The best end of each optimum, the best first."""
+    kept: list[End] = []
+    for end in sorted((e for e in ends if e.feasible), key=lambda e: e.objective):
+        if not any(same_objective(end.objective, other.objective, end.nlp.size) for other in kept):
+            kept.append(end)
+    return kept

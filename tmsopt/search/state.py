@@ -1,0 +1,231 @@
+"""What a search knows: one frozen record, which every stage returns anew."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
+from tmsopt.evaluation.recheck import Evaluation, recheck
+from tmsopt.problem.problem import Posed
+from tmsopt.program.formulate import design_of, formulate
+from tmsopt.program.ipopt import Point, Run
+from tmsopt.program.nlp import NLP
+from tmsopt.program.options import DEFAULTS, Options
+from tmsopt.records import Array
+from tmsopt.search.sample import Sample, sample_box
+from tmsopt.search.tuning import TUNING, Tuning
+
+
+@dataclass(frozen=True)
+class Start:
+    """A design to start from.
+
+    Attributes:
+        near: whether it may be close to an optimum.
+        row: of the sample's designs; -1 for another one.
+    """
+
+    design: Mapping[str, float]
+    near: bool = True
+    row: int = -1
+
+
+@dataclass(frozen=True)
+class End:
+    """Where one start ended.
+
+    Attributes:
+        start: from which.
+        nlp: with the limits that held.
+        objective: of the NLP; inf unless finite.
+        feasible: whether rows and bounds hold as IPOPT left them, and located roots have Jordan chains.
+        crossing: whether these chains alone are missing.
+        led: rows of the sample's designs from which a straight way falls to this end.
+    """
+
+    start: Start
+    nlp: NLP
+    run: Run
+    objective: float
+    feasible: bool
+    crossing: bool = False
+    led: frozenset[int] = frozenset()
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """Of two ends, the better one has the lower rank."""
+        return not self.feasible, self.objective
+
+
+def no_end(start: Start, nlp: NLP) -> End:
+    """The end of a start that leads nowhere."""
+    return End(start, nlp, Run(np.full(len(nlp.variables), np.nan), np.empty(0), np.empty(0), ""), math.inf, False)
+
+
+@dataclass(frozen=True)
+class CheckedEnd:
+    """An end, polished and rechecked."""
+
+    end: End
+    point: Point
+    parameters: Mapping[str, float]
+    checked: Evaluation
+
+
+@dataclass(frozen=True)
+class SearchState:
+    """A search of one part of the box.
+
+    Attributes:
+        problem: as it was asked.
+        part: the same on the part of the box that is searched, e.g. one sign of one parameter.
+        side: name of the part, e.g. ``normal rake``; empty for the whole box.
+        nlp: the program that starts are run on.
+        extra: designs that may be close to the optimum.
+        sample: of the part; None where arrays cannot judge what is asked, or none was asked for.
+        ends: where starts ended, in order.
+        accepted: how many of these were considered for `best`.
+        best: the best of these that passed the recheck, or that fails it least.
+        stable_elsewhere: whether another part of the box is known to have a stable design.
+        kept: free parameters of a design that is better than all ends, though known to be no optimum.
+        words: why that is none.
+        interrupted: whether the user ended the search.
+    """
+
+    problem: Posed
+    part: Posed
+    nlp: NLP
+    options: Options = DEFAULTS
+    tuning: Tuning = TUNING
+    side: str = ""
+    extra: tuple[Mapping[str, float], ...] = ()
+    sample: Sample | None = None
+    ends: tuple[End, ...] = ()
+    accepted: int = 0
+    best: CheckedEnd | None = None
+    stable_elsewhere: bool = False
+    kept: Mapping[str, float] | None = None
+    words: str = ""
+    interrupted: bool = False
+
+    @property
+    def feasible(self) -> list[End]:
+        """Ends that meet all rows."""
+        return [end for end in self.ends if end.feasible]
+
+    @property
+    def left(self) -> list[int]:
+        """Rows of the sample's designs that no start began at and that no way leads from to where one ended."""
+        done = {end.start.row for end in self.ends}.union(*(end.led for end in self.ends))
+        return [row for row in range(len(self.sample.leaders) if self.sample else 0) if row not in done]
+
+    @property
+    def out_of_reach(self) -> bool:
+        """Whether all designs of a sample are far from what the limits allow, even without the pattern asked for."""
+        sample = self.limits_sample
+        return sample is not None and sample.out_of_reach
+
+    @property
+    def limits_sample(self) -> Sample | None:
+        """The sample; for a pattern that of the limits alone."""
+        if self.sample or not (self.part.pattern and self.part.conditions) or self.part.asks_radius:
+            return self.sample
+        return sample_limits(self.part, self.options.seed, self.tuning)
+
+    @property
+    def so_far(self) -> str:
+        """How good the best is so far, in words."""
+        best = min((end.objective for end in self.feasible), default=math.inf)
+        known = self.problem.objective is not None and math.isfinite(best)
+        return ", ".join(
+            [*([f"best {self.problem.sign * best:.6g}"] if known else []), *([self.side] if self.side else [])]
+        )
+
+    @property
+    def designs(self) -> list[dict[str, float]]:
+        """The designs at which starts ended."""
+        return [self.design_at(end) for end in self.ends if np.all(np.isfinite(end.run.x))]
+
+    def design_at(self, end: End) -> dict[str, float]:
+        """The free parameters at an end, inside the part of the box."""
+        return design_of(self.part, end.run.x.tolist())
+
+    def holds(self, design: Mapping[str, float]) -> bool:
+        """Whether a design, as far as it is given, is on this part."""
+        return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in self.part.free.items())
+
+    def recheck(self, design: Mapping[str, float]) -> Evaluation:
+        """What a design is, in the cases of the program."""
+        return recheck(self.problem, self.problem.ordered(design), self.nlp.cases)
+
+    def with_program(self, nlp: NLP) -> "SearchState":
+        """The same search on another program, of which nothing is known yet."""
+        return replace(self, nlp=nlp, ends=(), accepted=0, best=None)
+
+
+def split_sides(problem: Posed, near: Mapping[str, float] | None = None) -> dict[str, Posed]:
+    """The parts into which a parameter with two sides divides the box, by name, positive values first.
+
+    Args:
+        near: a design; only the parts that it is on.
+    """
+    for name, (lower, upper) in problem.free.items():
+        names = problem.parameter_set[name].sides
+        if names is not None and lower < -TUNING.thin and upper > TUNING.thin:
+            halves = {names[1]: (0.0, upper), names[0]: (lower, 0.0)}
+            at = (near or {}).get(name)
+            kept = {side: ends for side, ends in halves.items() if at is None or ends[0] <= at <= ends[1]}
+            return {side: _on(problem, name, ends) for side, ends in kept.items()}
+    return {"": problem}
+
+
+def begin_search(
+    problem: Posed, options: Options = DEFAULTS, extra: tuple[Mapping[str, float], ...] = ()
+) -> list[SearchState]:
+    """The searches of a problem, one for each part of its box."""
+    parts = split_sides(problem, options.near)
+    return [
+        SearchState(problem, part, formulate(part, problem.cases), options, side=side, extra=extra)
+        for side, part in parts.items()
+    ]
+
+
+def check_near(problem: Posed, near: Mapping[str, float]) -> None:
+    """Refuse a design to start near that names no parameters, or has no numbers.
+
+    Raises:
+        InputError: with everything that is wrong.
+    """
+    names = problem.parameter_set.names
+    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
+    wrong = (n for n, value in near.items() if not is_number(value))
+    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
+    if faults:
+        raise InputError(faults)
+
+
+def _on(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
+    """The problem with a smaller range of one parameter, and its start where that fits."""
+    inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
+    return problem.derive(free={**problem.free, name: ends}, start=problem.start if inside else {})
+
+
+def same_objective(a: float, b: float, size: float = 1.0) -> bool:
+    """Whether two objectives, of this size or larger, count as the same optimum."""
+    return abs(a - b) <= TUNING.same * (size + abs(b))
+
+
+def coefficients_at(problem: Posed, nlp: NLP, run: Run) -> Array:
+    """Coefficients in every case at the end of a run, shape (cases, n + 1)."""
+    nominal = problem.ordered(design_of(problem, run.x.tolist()))
+    varied = [c.applied(nominal) for c in nlp.cases if not c.direction] or [nominal]
+    return np.array([[float(c) for c in problem.model.coefficients(p, problem.parameter_set)] for p in varied])
+
+
+@lru_cache(maxsize=8)
+def sample_limits(problem: Posed, seed: int, tuning: Tuning) -> Sample:
+    """The sample of a problem for its limits alone, whatever pattern it asks for."""
+    return sample_box(problem.derive(locate=None), seed, tuning)
