@@ -22,7 +22,10 @@ from .dynamics import Simulation as Simulation, simulate as simulate
 from .paper import Comparison as Comparison, Ledger as Ledger, compare as compare, verify as verify
 from .progress import Progress as Progress
 from .proofs import Proof as Proof, prove as prove
-from .search import Every as Every, solve as solve, solve_all as solve_all
+from .search import (
+    POLICY as POLICY, TUNING as TUNING, Every as Every, Policy as Policy, Rescue as Rescue, SearchState as SearchState,
+    Start as Start, Tuning as Tuning, solve as solve, solve_all as solve_all,
+)
 from .studies import (
     Results as Results, Row as Row, Sampling as Sampling, Span as Span, Study as Study,
     latin_hypercube as latin_hypercube, load_study as load_study, monte_carlo as monte_carlo, over_grid as over_grid,

@@ -13,7 +13,6 @@ from helpers.oracles import routh_exact
 import tmsopt
 from tmsopt.records import Table
 from tmsopt.report import infeasible_lines
-from tmsopt.search import workspace
 
 FOLD = 8
 NAMES = [f"x{k}" for k in range(1, FOLD + 1)]
@@ -56,15 +55,15 @@ def test_a_limit_that_a_needle_meets_is_not_out_of_reach():
 
 def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish():
     """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
-    search = import_module("tmsopt.search.search")
-    found, told = search._reached(workspace(FAST.posed), ["far"])
+    reach, options = import_module("tmsopt.search.remedies.none")._reached, tmsopt.Options()
+    found, told = reach(FAST.posed, options, ["far"])
     assert told
     shifted = [Fraction(float(c)) for c in FAST.posed.values(found).coefficients]
     for end in range(len(shifted), 1, -1):
         for k in range(1, end):
             shifted[k] -= Fraction(98, 100) * shifted[k - 1]
     assert routh_exact(shifted)
-    assert search._reached(workspace(DAMPED.posed), ["damped"]) == (None, False)
+    assert reach(DAMPED.posed, options, ["damped"]) == (None, False)
 
 
 def test_where_a0_may_vanish_a_search_is_not_said_to_tell():

@@ -15,7 +15,6 @@ from tmsopt.models import from_coefficients
 from tmsopt.studies import Sampling, planned
 
 solving = import_module("tmsopt.search.solve")
-sampling = import_module("tmsopt.search.sample")
 asking = import_module("tmsopt.global_search.stability")
 
 x = ca.SX.sym("x")
@@ -75,10 +74,9 @@ def test_it_is_raised_like_any_design_that_is_no_optimum():
     assert raised.value.solution.interrupted
 
 
-def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left(monkeypatch):
+def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left():
     """Its sample was refined to 4e-4 of the box, where the well has the curvature 3 x² − 1 = 2.3."""
-    monkeypatch.setattr(import_module("tmsopt.search.multistart").Runner, "solve_from", stop)
-    found = tmsopt.solve(problem(), throw=False)
+    found = tmsopt.solve(problem(), throw=False, policy=replace(tmsopt.POLICY, local=stop))
     assert (found.status, found.interrupted, found.starts.tried) == ("not_converged", True, 0)
     assert depth(LEAST) <= found.value <= depth(LEAST) + 2.3 / 2 * (4 * 4e-4) ** 2
 
@@ -132,14 +130,13 @@ def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatc
         tmsopt.solve(asked, progress=meanwhile, interruptible=False)
 
 
-def test_with_nothing_in_hand_there_is_nothing_to_leave(monkeypatch):
-    monkeypatch.setattr(sampling.Sampler, "sample", stop)
+def test_with_nothing_in_hand_there_is_nothing_to_leave():
     with pytest.raises(KeyboardInterrupt):
-        tmsopt.solve(problem())
+        tmsopt.solve(problem(), policy=replace(tmsopt.POLICY, sample=stop))
 
 
 def test_a_second_one_ends_that_too(monkeypatch):
-    monkeypatch.setattr(solving, "_as_it_is", stop)
+    monkeypatch.setattr(solving, "as_it_is", stop)
     with pytest.raises(KeyboardInterrupt):
         tmsopt.solve(problem(), exhaustive=True, progress=when(third))
 

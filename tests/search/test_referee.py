@@ -1,7 +1,6 @@
 """The sample as referee: no claim stands that a design contradicts which was looked at; optima that no design has."""
 
 from dataclasses import replace
-from importlib import import_module
 
 import casadi as ca
 import numpy as np
@@ -10,13 +9,6 @@ import pytest
 import tmsopt
 from tmsopt.models import from_coefficients
 from tmsopt.roots import product
-
-multistart = import_module("tmsopt.search.multistart")
-outcome = import_module("tmsopt.search.outcome")
-referee = import_module("tmsopt.search.referee")
-sampling = import_module("tmsopt.search.sample")
-searching = import_module("tmsopt.search.search")
-workspaces = import_module("tmsopt.search.workspace")
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 MET = 1e-8  # what is asked of every value
@@ -48,45 +40,44 @@ def depth(at):
     return at**4 / 4 - at**2 / 2 + at / 10 - 1
 
 
-def stuck(monkeypatch, at, feasible=True):
-    """Whatever a start is, its end is that of another one."""
-    real = multistart.Runner.solve_from
+def stuck(at, feasible=True):
+    """A policy that ends where one start ends, whatever the start is."""
 
-    def ended(self, design, near=False, hopeful=True):
-        found = real(self, {"x": at}, near, hopeful)
+    def local(state, start):
+        found = tmsopt.POLICY.local(state, replace(start, design={"x": at}))
         return found if feasible else replace(found, feasible=False)
 
-    monkeypatch.setattr(multistart.Runner, "solve_from", ended)
+    return replace(tmsopt.POLICY, local=local)
+
+
+def started(at):
+    """A policy that starts at one design, again and again."""
+    return replace(tmsopt.POLICY, starts=lambda state: iter([tmsopt.Start({"x": at})] * 64))
 
 
 @pytest.mark.parametrize("objective", ["abscissa", "x**4/4 - x**2/2 + x/10 - 1"])
-def test_a_search_in_the_wrong_basin_is_taken_up_again(objective, monkeypatch):
-    monkeypatch.setattr(multistart, "starting", lambda work, ended=(), left=None: iter([({"x": 0.9}, True)] * 64))
-    design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective))
+def test_a_search_in_the_wrong_basin_is_taken_up_again(objective):
+    design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective), policy=started(0.9))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"
 
 
-def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch):
+def test_the_neighbourhood_of_an_end_is_looked_at_too():
     """Where neither the sample nor the starts know of the other basin."""
-    real = sampling.Sampler.sample
 
-    def half(self):
-        whole = real(self)
+    def half(state):
+        whole = tmsopt.POLICY.sample(state)
         kept = (seen.take(np.flatnonzero(seen.u[:, 0] > 0.6)) for seen in (whole.refined, whole.boldest))
         return replace(whole, **dict(zip(("refined", "boldest"), kept, strict=True)))
 
-    monkeypatch.setattr(sampling.Sampler, "sample", half)
-    monkeypatch.setattr(multistart, "starting", lambda work, ended=(), left=None: iter([({"x": 0.9}, True)] * 64))
-    design = tmsopt.solve(problem(WELLS, WIDE))
+    design = tmsopt.solve(problem(WELLS, WIDE), policy=replace(started(0.9), sample=half))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"
 
 
-def test_an_end_that_a_design_contradicts_is_no_optimum(monkeypatch):
+def test_an_end_that_a_design_contradicts_is_no_optimum():
     """If no start leaves the basin on the right, what was looked at on the left is said, and that it is no optimum."""
-    stuck(monkeypatch, 0.9)
-    design = tmsopt.solve(problem(WELLS, WIDE), throw=False)
+    design = tmsopt.solve(problem(WELLS, WIDE), throw=False, policy=stuck(0.9))
     assert design.status == "not_converged"
     assert not design.violations
     assert any("the best design that was looked at" in note for note in design.notes)
@@ -94,40 +85,15 @@ def test_an_end_that_a_design_contradicts_is_no_optimum(monkeypatch):
     assert design.value == pytest.approx(depth(LEFT), abs=1e-6)
 
 
-def test_the_right_basin_is_left_alone(monkeypatch):
-    stuck(monkeypatch, -1.2)
-    design = tmsopt.solve(problem(WELLS, WIDE), throw=False)
+def test_the_right_basin_is_left_alone():
+    design = tmsopt.solve(problem(WELLS, WIDE), throw=False, policy=stuck(-1.2))
     assert (design.status, design.notes) == ("optimal", ())
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
 
 
-@pytest.mark.parametrize(
-    ("found", "between", "status", "value"),
-    [
-        (RIGHT, -2.0, "not_converged", depth(LEFT)),
-        (LEFT, -2.0, "optimal", depth(LEFT)),
-        (RIGHT, 2.0, "optimal", depth(RIGHT)),
-    ],
-)
-def test_no_optimum_stands_that_a_start_ended_better_than(found, between, status, value):
-    """On the left designs change between the three values of a band that are looked at first, for better or worse."""
-    worse = between * ca.sin(2 * np.pi * y) ** 2 * (x - RIGHT) ** 2
-    asked = problem([1, WELLS[1] - worse], WIDE, scenarios={"y": tmsopt.Band(0.0, 1.0, 3)}, minimize="abscissa")
-    work = workspaces.workspace(asked.posed)
-    nlp = work.formulate(asked.posed.cases)
-    ends = {at: multistart.Runner(work, nlp).solve_from({"x": at}, near=True) for at in (LEFT, RIGHT)}
-    trial = outcome.best_checked(work, nlp, [ends[found]])
-    own = searching._covered(work, nlp, [ends[found]], trial, outcome.counted([], 0.0))
-    assert own.status == "optimal"
-    left = referee.demote_if_beaten(work, own)
-    assert left.status == status
-    assert left.checked.objective == pytest.approx(value, abs=MET)
-
-
 @pytest.mark.parametrize("limits", [(), ("x <= -0.5", "abscissa <= -1.3")])
-def test_a_design_that_meets_all_limits_forbids_infeasible(limits, monkeypatch):
-    stuck(monkeypatch, 0.9, feasible=False)
-    design = tmsopt.solve(problem(WELLS, WIDE, limits), throw=False)
+def test_a_design_that_meets_all_limits_forbids_infeasible(limits):
+    design = tmsopt.solve(problem(WELLS, WIDE, limits), throw=False, policy=stuck(0.9, feasible=False))
     assert design.status == "not_converged"
     assert not design.violations
     assert design.value == pytest.approx(depth(LEFT), abs=1e-6)
@@ -217,12 +183,12 @@ def test_a_bound_far_away_is_still_one():
 
 @pytest.mark.parametrize("lower", [0.0, -1.0])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower, sign):
-    """(s + x)(s² + 0.6 s + 1) has the damping ratio 0.3 for x > 0, 0 at x = 0 and −1 below: no least x, but a limit."""
+def test_an_infimum_at_a_root_at_0_is_no_optimum(lower, sign):
+    """(s + x)(s² + 0.6 s + 1) has the damping ratio 0.3 for x > 0, 0 at x = 0 and −1 below: there is no least x."""
     a = [sign * c for c in product([1, x], [1, 0.6, 1])]
-    design = tmsopt.solve(problem(a, {"x": (lower, 1.0)}, ("damping_ratio >= 0.1",), minimize="x"))
-    assert design.status == "optimal"
-    assert 0 < design.value <= 1e-7
+    design = tmsopt.solve(problem(a, {"x": (lower, 1.0)}, ("damping_ratio >= 0.1",), minimize="x"), throw=False)
+    assert design.status == "not_converged"
+    assert 0 < design.value <= 1e-3
     assert not design.violations
 
 
@@ -235,11 +201,9 @@ def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower, sign):
     ],
 )
 def test_a_damping_ratio_of_1_is_not_beaten(coefficients, free):
-    """Where all roots are real and negative; exactly 1, and without a solver."""
+    """Where all roots are real and negative; exactly 1."""
     design = tmsopt.solve(problem(coefficients, free, maximize="damping_ratio"))
     assert (design.status, design.value) == ("optimal", 1.0)
-    assert design.starts.tried == 0
-    assert design.starts.looked > 1000
     z = own_roots(design, coefficients)
     assert np.all(z.imag == 0)
     assert np.all(z.real < 0)

@@ -62,7 +62,7 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch, off, status):
     ("room", "name", "said"),
     [
         ("outcome", "unclear", lambda problem, checked: True),
-        ("search", "demote_if_beaten", lambda work, finding: replace(finding, status="not_converged")),
+        ("search", "demote", lambda state, found: replace(found, status="not_converged")),
     ],
 )
 def test_every_optimum_is_asked(monkeypatch, room, name, said):

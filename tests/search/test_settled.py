@@ -1,6 +1,6 @@
 """When a search ends: by the optima that are expected still, from how many starts ended in how many different ones."""
 
-from importlib import import_module
+from dataclasses import replace
 from types import SimpleNamespace
 
 import casadi as ca
@@ -9,7 +9,9 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients
-from tmsopt.problem import expected_unseen, is_enough
+from tmsopt.problem import expected_unseen, expects_few_better
+from tmsopt.search import SearchState, no_end
+from tmsopt.search.sample import Looked
 
 x = ca.SX.sym("x")
 PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x").posed
@@ -17,12 +19,13 @@ PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, mi
 
 def settled(ends, share, far_off=False, left=0):
     """Of starts that ended at these objectives, None where at nothing feasible; so many refined designs are left."""
-    nlp = SimpleNamespace(size=1.0)
-    candidates = [SimpleNamespace(objective=1.0 if e is None else e, feasible=e is not None, nlp=nlp) for e in ends]
-    refined = SimpleNamespace(violation=np.zeros(left))
-    sample = SimpleNamespace(met=round(share * 1000), size=1000, far_off=far_off, refined=refined)
-    work = SimpleNamespace(part=PLAIN, sample=sample)
-    return bool(import_module("tmsopt.search.multistart")._settled(work, candidates, range(left)))
+    nlp, start = SimpleNamespace(size=1.0, variables=()), tmsopt.Start({})
+    ended = [no_end(start, nlp) if e is None else replace(no_end(start, nlp), objective=e, feasible=True) for e in ends]
+    refined = Looked(np.zeros((left, 1)), np.zeros(left), np.zeros(left))
+    box = SimpleNamespace(narrow=share < tmsopt.TUNING.narrow)
+    sample = SimpleNamespace(box=box, far_off=far_off, refined=refined, leaders=refined)
+    state = SearchState(PLAIN, PLAIN, nlp, sample=sample, ends=tuple(ended))
+    return bool(tmsopt.POLICY.enough(state))
 
 
 @pytest.mark.parametrize(
@@ -79,5 +82,5 @@ def test_the_words_follow_from_the_numbers():
     assert words(64, 40, 3) == "found by 40 of 64 starts"
     assert words(3, 3, 1) == "found by 3 of 3 starts, a better one is possible"
     assert words(0, 0, 0) == ""
-    assert not is_enough(4, 1)
+    assert not expects_few_better(4, 1)
     assert tmsopt.Starts(3, 3, 3, optima=1).expected_unseen == float("inf")

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from importlib import import_module
 from math import isnan
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.search import workspace
+from tmsopt.search import begin_search
 
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
@@ -100,7 +99,7 @@ def test_a_start_on_the_losing_side_does_not_decide():
 @pytest.mark.parametrize("tilt", [(0.0, 1.2), (0.05, 1.2), (-1.2, 0.0), (-1.2, -0.05)])
 def test_one_sign_has_no_sides(tilt):
     stated = problem(free={**BOX, "lambda_s": tilt}, minimize="Fr - lambda_s**2")
-    assert [part.name for part in workspace(stated.posed).parts()] == [""]
+    assert [state.side for state in begin_search(stated.posed)] == [""]
     design = tmsopt.solve(stated)
     assert design.sides == {}
     assert "sides" not in design.to_json()
@@ -128,18 +127,17 @@ def test_sides_that_are_equally_good_are_said_to_be():
     assert "wins" not in note
 
 
-def test_the_side_with_a_stable_design_is_searched_first(monkeypatch):
+def test_the_side_with_a_stable_design_is_searched_first():
     """On the other side stability need not be insisted on; sides are told in their order all the same."""
-    rooms, searched = import_module("tmsopt.search.solve"), []
-    explore = rooms.explore
+    searched = []
 
-    def told(part, insist):
-        searched.append((part.name, insist))
-        return explore(part, insist=insist)
+    def told(state):
+        if not searched or searched[-1][0] != state.side:
+            searched.append((state.side, state.stable_elsewhere))
+        return tmsopt.POLICY.starts(state)
 
-    monkeypatch.setattr(rooms, "explore", told)
-    design = tmsopt.solve(problem(SWAPPED, minimize="abscissa"))
-    assert searched == [(BACKWARD, True), (FORWARD, False)]
+    design = tmsopt.solve(problem(SWAPPED, minimize="abscissa"), policy=replace(tmsopt.POLICY, starts=told))
+    assert searched == [(BACKWARD, False), (FORWARD, True)]
     assert list(design.sides) == [FORWARD, BACKWARD]
     assert design.value == pytest.approx(-(12.5**0.25), abs=1e-11)
 
@@ -147,7 +145,7 @@ def test_the_side_with_a_stable_design_is_searched_first(monkeypatch):
 def test_a_part_is_solved_in_its_own_box():
     """Its program has the ends of the tilt, as tangents, on one side of 0."""
     asked = problem(minimize="abscissa").posed
-    for part, ends in zip(workspace(asked).parts(), ((0.0, 1.2), (-1.2, 0.0)), strict=True):
-        program = part.formulate(asked.cases)
+    for state, ends in zip(begin_search(asked), ((0.0, 1.2), (-1.2, 0.0)), strict=True):
+        program = state.nlp
         k = list(asked.free).index("lambda_s")
         assert (program.lower[k], program.upper[k]) == pytest.approx(np.tan(ends), abs=1e-15)

@@ -125,13 +125,13 @@ def rivals_of(state: SearchState) -> Looked | None:
     return rivals.better(least_worth(state))
 
 
-def least_worth(state: SearchState) -> float:
+def least_worth(state: SearchState, lost: float | None = None) -> float:
     """What a design must be worth less than to be better than the best end."""
-    best = state.best
+    best, lost = state.best, state.tuning.lost if lost is None else lost
     if best is None or best.checked.violations:
         return math.inf
     worth = state.problem.sign * best.checked.objective
-    return worth - state.tuning.lost * (best.end.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
+    return worth - lost * (best.end.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
 
 
 def appeal(state: SearchState, policy: Policy) -> SearchState:
@@ -195,28 +195,27 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     starts = [Start(design) for design in box.designs(rivals.take(few))]
     starts += [Start({n: best.parameters[n] for n in state.problem.free})] if best else []
     starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take(np.arange(tuning.open)))]
+    there = best is not None and abs(leading_of(state, best.parameters)) < tuning.singular  # all but there already
+    least = least_worth(state, -tuning.lost if there else tuning.finer)
     for sign in (1, -1):
         ours = [s for s in starts if sign * leading_of(state, s.design) > -tuning.singular]
         nlp = formulate(state.part, state.nlp.cases, lead=sign)
         own = try_starts(state.with_program(nlp), ours, try_all(policy))
         reached = min(own.feasible, key=lambda end: end.objective, default=None)
-        if reached is None or not reached.objective < least_worth(state):
+        if reached is None or not reached.objective < least:
             continue
         rows = [k for k, name in enumerate(nlp.rows) if name == "a0"]
         singular = bool(nlp.at(reached.run.x)[1][rows].min() < tuning.singular)
         if singular:
             lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
-            inside = replace(nlp, row_lower=lower)
-            own = try_starts(state.with_program(inside), [Start(state.design_at(reached))], try_all(policy))
+            own = state.with_program(replace(nlp, row_lower=lower))
+            own = try_starts(own, [Start(state.design_at(reached))], try_all(policy))
         own = policy.accept(own)
-        if (
-            own.best is None
-            or own.best.checked.violations
-            or is_merged(own.best)
-            or state.problem.sign * own.best.checked.objective >= least_worth(state)
-        ):
+        if own.best is None or own.best.checked.violations or is_merged(own.best):
             continue
-        ends = (*state.ends, *own.ends)
+        if not state.problem.sign * own.best.checked.objective < least:
+            continue
+        ends, least = (*state.ends, *own.ends), least_worth(own, tuning.finer)
         state = replace(own, ends=ends, accepted=len(ends))
         if singular:
             goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * reached.objective:.9g}"
@@ -295,7 +294,7 @@ RESCUES = (
     Rescue("off plateau", "", lambda s: s.best is None and maximises_damping(s), leave_plateau),
     Rescue("real roots", "", is_mixed, search_real_roots),
     Rescue("positive roots", "", may_have_positive_roots, search_positive_roots),
-    Rescue("appeals", "", lambda s: rivals_of(s) is not None, appeal),
+    Rescue("appeals", "", lambda s: bool(rivals_of(s)), appeal),
     Rescue("infinity", "", is_open, search_singular),
     Rescue("stability", "", wants_stability, search_stable),
     Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.kept is None, keep_rival),

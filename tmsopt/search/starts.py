@@ -7,6 +7,7 @@ import numpy as np
 
 from tmsopt.program.formulate import middle
 from tmsopt.program.starts import designs
+from tmsopt.search.enough import is_proven
 from tmsopt.search.sample import Sample, sample_box
 from tmsopt.search.state import End, SearchState, Start
 
@@ -38,15 +39,17 @@ def sample_starts(sample: Sample) -> Iterator[Start]:
 
 def is_led(state: SearchState, start: Start) -> bool:
     """Whether a straight way falls from a design of the sample to where a start ended: it would end there too."""
-    return any(start.row in end.led for end in state.ends) and not state.options.exhaustive
+    return any(start.row in end.led for end in state.ends)
 
 
 def with_led(state: SearchState, end: End) -> End:
     """An end with the designs of the sample, not led before, from which a straight way falls to it."""
-    if not (state.sample and end.feasible and state.part.objective):
+    if not (state.sample and end.feasible and state.part.objective) or state.options.exhaustive:
+        return end
+    if is_proven(state, end):
         return end
     tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
-    left = sorted(set(range(len(leaders))).difference(*(other.led for other in state.ends)))
+    left = [row for row in state.left if row != end.start.row]
     seen, near = leaders.take(np.array(left, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
     if not left:
         return end

@@ -100,6 +100,7 @@ class Tuning:
     appeals: int = number(8, "times", "that better designs are started from", "hard")
     appealed: int = number(2, "designs", "that are started from each time", "hard")
     lost: float = number(1e-7, "relative", "difference of the objective that makes a design better", "hard")
+    finer: float = number(1e-11, "relative", "the same where both were polished", "hard")
     finest: tuple[float, ...] = number(
         tuple(10.0 ** -(4 + k / 3) for k in range(19)),
         "of the box",

@@ -21,8 +21,8 @@ from tmsopt.models import tms
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text
 from tmsopt.records import Array, Table
-from tmsopt.search.state import same_objective
 from tmsopt.search.solve import solve
+from tmsopt.search.state import same_objective
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.rows import PREFIXES, Part, Row, blank, column_of, header
 from tmsopt.studies.study import Study
