@@ -14,6 +14,7 @@ from typing import Any, cast
 
 import click
 
+from benchmarks import leave_out
 from benchmarks.reports.tables import RESULTS, Asked, keep
 
 
@@ -63,6 +64,7 @@ SECTIONS = (
     Section("n", "remedies", f"{_DESIGNS}.remedies", "what is advised for infeasible problems, obeyed", long=True),
     Section("o", "certificates", f"{_DESIGNS}.certificates", "random designs proved globally best", long=True),
     Section("p", "proofs", "benchmarks.reports.proofs", "exceptional points of the paper, proved", long=True),
+    Section("p", "rescues", f"{_DESIGNS}.rescues", "problems that need each rescue of the search", long=True),
     Section("q", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),
     Section("r", "known", f"{_SYSTEMS}.known", "the best values of the random systems, kept", long=True),
     Section("s", "hard", f"{_DESIGNS}.hard_designs", "hard problems: is optimal the best known", long=True),
@@ -118,6 +120,7 @@ Examples:
   python -m benchmarks --quick             small sizes, a few minutes, kept nowhere
   python -m benchmarks --only a,growth     two of them
   python -m benchmarks --only solve        a long one: 200 random designs beside SciPy
+  python -m benchmarks --only hard --without appeals
   python -m benchmarks --output mine.md    kept in another file
 
 Every ratio compares times of the same run. Other load on the machine spoils them: each section says how much there was.
@@ -130,12 +133,13 @@ Every ratio compares times of the same run. Other load on the machine spoils the
 @click.option("--seconds", type=float, default=None, help="limit for each problem: solving, certificates")
 @click.option("--seed", default=Asked.seed, show_default=True, help="of random problems")
 @click.option("--workers", default=Asked.workers, show_default=True, help="processes for what is not timed")
+@click.option("--without", default="", metavar="NAME", help="a rescue of the search to do without; kept nowhere")
 @click.option(
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     help=f"file that keeps the tables; by default {RESULTS}, and with --quick none",
 )
-def main(only: str, listed: bool, output: Path | None, **sizes: Any) -> None:
+def main(only: str, listed: bool, without: str, output: Path | None, **sizes: Any) -> None:
     """Measure tmsopt beside what one would use without it, print the tables and keep them.
 
     Sections that fail say so and the others go on; the exit status is then 1.
@@ -145,7 +149,13 @@ def main(only: str, listed: bool, output: Path | None, **sizes: Any) -> None:
         shown = sections if only else SECTIONS
         click.echo("\n".join(f"{s.letter}  {s.name:12}  {s.about}{', when named' * s.long}" for s in shown))
         return
-    path = output or (None if sizes["quick"] else RESULTS)
+    if without:
+        try:
+            leave_out(without)
+        except KeyError as error:
+            message = f"found {without!r}; accepted: {error.args[0]}"
+            raise click.BadParameter(message, param_hint="--without") from error
+    path = output or (None if sizes["quick"] or without else RESULTS)
     failed = []
     for section in sections:
         click.echo(f"{section.letter}  {section.name}: {section.about}", err=True)
