@@ -23,8 +23,6 @@ _RADII = tuple(float(r) for r in np.geomspace(0.5, 1e-3, 28))
 
 _CORNERS = 10  # free parameters up to which all corners of the box are looked at
 
-_AT_END = 1e-4  # of a range: distance at which a parameter is at an end of it
-
 _BATCH = 16  # starts whose candidates are looked at together
 
 
@@ -115,23 +113,6 @@ def spread(problem: Posed, seed: int) -> Iterator[dict[str, float]]:
         point = lower + (upper - lower) * ((offset + k * steps) % 1.0)
         yield dict(zip(names, point.tolist(), strict=True))
         k += 1
-
-
-def start_objective(problem: Posed, design: Mapping[str, float]) -> float:
-    """Objective of a design in its worst case, by numeric roots; larger is worse, inf where a limit is violated."""
-    found = judge(problem, {n: np.array(x) for n, x in design.items()})
-    feasible = found.worth is not None and np.isfinite(found.worth) and np.all(found.excess <= 0)
-    return float(found.worth) if feasible and found.worth is not None else np.inf
-
-
-def opposite(problem: Posed, design: Mapping[str, float]) -> list[dict[str, float]]:
-    """Designs with one parameter at the other end of its range, for each that is at an end of it."""
-    found = []
-    for name, (lower, upper) in problem.free.items():
-        share = (design[name] - lower) / (upper - lower)
-        if min(share, 1 - share) <= _AT_END:
-            found.append({**design, name: upper if share < 1 / 2 else lower})
-    return found
 
 
 def _merit(problem: Posed, columns: Mapping[str, Array]) -> tuple[Array, Array]:

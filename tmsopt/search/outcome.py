@@ -228,7 +228,8 @@ def demote(state: SearchState, outcome: Outcome) -> Outcome:
     if problem.objective is None or outcome.checked.violations:
         return outcome
     if state.sample and math.isfinite(value) and value < -state.tuning.endless * state.sample.spread < 0:
-        words = UNBOUNDED if outcome.status != "optimal" else ""
+        if outcome.status != "optimal":
+            return replace(outcome, without_best=True, notes=(UNBOUNDED,))
     elif outcome.status == "optimal" and runs_away(outcome.checked.structure.roots) and not _held_off(problem, outcome):
         words = f"no best design: it improves towards a singular mass matrix (a0 = 0); {mass_advice(problem)}"
     if not words:

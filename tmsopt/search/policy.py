@@ -13,6 +13,7 @@ from tmsopt.search.accept import is_better
 from tmsopt.search.sample import Sample
 from tmsopt.search.starts import is_led
 from tmsopt.search.state import End, SearchState, Start
+from tmsopt.search.tuning import TUNING, Tuning
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Policy:
         accept: the state with the best of its ends, polished and rechecked.
         enough: whether more starts would be waste.
         rescues: in the order in which they are asked.
+        tuning: the numbers that all these depend on.
 
     Example:
         >>> hasty = replace(tmsopt.POLICY, enough=lambda state: len(state.feasible) > 0)
@@ -56,6 +58,7 @@ class Policy:
     accept: Callable[[SearchState], SearchState]
     enough: Callable[[SearchState], bool]
     rescues: tuple[Rescue, ...] = ()
+    tuning: Tuning = TUNING
 
     def without(self, name: str) -> "Policy":
         """The same without one rescue.
@@ -71,6 +74,7 @@ class Policy:
 def search(state: SearchState, policy: Policy) -> SearchState:
     """Search one part of the box."""
     begin(state.options.progress, "looking at designs")
+    state = replace(state, tuning=policy.tuning)
     state = replace(state, sample=state.sample or policy.sample(state))
     begin(state.options.progress, "searching", "start")
     state = policy.accept(try_starts(state, policy.starts(state), policy))

@@ -4,7 +4,7 @@ Every one starts from other designs or on another program, and hands what it fin
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -19,6 +19,7 @@ from tmsopt.program.formulate import formulate, matching
 from tmsopt.program.starts import designs
 from tmsopt.search.accept import is_sound
 from tmsopt.search.enough import distinct_ends
+from tmsopt.search.local import run_once
 from tmsopt.search.outcome import KEPT, mass_advice, runs_away
 from tmsopt.search.policy import Policy, Rescue, search_again, try_all, try_starts
 from tmsopt.search.sample import Looked, draw_box, sample_box
@@ -44,7 +45,11 @@ def start_at_multiple_roots(state: SearchState, policy: Policy) -> SearchState:
     part, tuning, leads = state.part, state.tuning, list[Start]()
     limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
     assert state.sample is not None
-    few = replace(policy, enough=lambda own: len(own.ends) >= tuning.leadless or bool(own.feasible))
+    few = replace(
+        policy,
+        local=lambda own, start: run_once(own, start, "far"),
+        enough=lambda own: len(own.ends) >= tuning.leadless or bool(own.feasible),
+    )
     for pattern in full_patterns(part.model):
         asked = part.derive(
             locate=pattern, minimize="abscissa", maximize=None, constraints=limits, scenarios={}, tolerances={}
@@ -53,7 +58,8 @@ def start_at_multiple_roots(state: SearchState, policy: Policy) -> SearchState:
             own = replace(state.with_program(matching(asked)), problem=asked, part=asked)
             own = try_starts(own, sample_starts(state.sample), few)
             leads += [Start(state.design_at(end)) for end in distinct_ends(own.ends)[: tuning.leads]]
-    return search_again(state, try_all(policy), leads)
+    state = search_again(state, try_all(policy), leads)
+    return search_real_roots(state, policy, leads) if is_mixed(state) else state
 
 
 # Other programs
@@ -64,9 +70,11 @@ def is_mixed(state: SearchState) -> bool:
     return {"abscissa", "damping_ratio"} <= set(state.nlp.variables)
 
 
-def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
-    """The search where all roots are real."""
+def search_real_roots(state: SearchState, policy: Policy, leads: Sequence[Start] = ()) -> SearchState:
+    """The search where all roots are real, from designs that lead there, if there are any."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=1.0)
+    if leads:
+        return search_again(state, try_all(policy), leads, nlp)
     return search_again(state, policy, nlp=nlp, most=state.tuning.fewer)
 
 
@@ -292,7 +300,7 @@ RESCUES = (
         search_other_chains,
     ),
     Rescue("off plateau", "", lambda s: s.best is None and maximises_damping(s), leave_plateau),
-    Rescue("real roots", "", is_mixed, search_real_roots),
+    Rescue("real roots", "", lambda s: is_mixed(s) and not wants_multiple_roots(s), search_real_roots),
     Rescue("positive roots", "", may_have_positive_roots, search_positive_roots),
     Rescue("appeals", "", lambda s: bool(rivals_of(s)), appeal),
     Rescue("infinity", "", is_open, search_singular),

@@ -34,7 +34,7 @@ def outcome_of(state: SearchState, policy: Policy) -> Outcome | None:
     starts = count_starts(state.ends, best.end.objective if best else float("nan"))
     if state.kept is not None:
         kept = replace(as_it_is(problem, state.kept, state.words), status="not_converged", starts=starts)
-        return replace(kept, formulation=state.nlp.formulation, without_best=state.words != KEPT)
+        return demote(state, replace(kept, formulation=state.nlp.formulation, without_best=state.words != KEPT))
     outcome = cover_cases(state, policy) if problem.cases else found(state, starts)
     return demote(state, outcome) if outcome else None
 

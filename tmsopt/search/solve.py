@@ -146,6 +146,7 @@ def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[Found]:
     """The search of each part of the box, in the order of these; a part of which more was seen comes first."""
     if len(states) > 1:
         begin(states[0].options.progress, "looking at designs")
+        states = [replace(state, tuning=policy.tuning) for state in states]
         states = [replace(state, sample=policy.sample(state)) for state in states]
     found: dict[str, Found] = {}
     stable = False
