@@ -7,7 +7,7 @@ from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import design_of
 from tmsopt.program.ipopt import polisher
-from tmsopt.search.state import CheckedEnd, End, SearchState, same_objective
+from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, same_objective
 from tmsopt.search.tuning import TUNING
 
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
@@ -31,7 +31,7 @@ def accept_best(state: SearchState) -> SearchState:
     return replace(state, best=best, accepted=len(state.ends))
 
 
-def check_end(state: SearchState, end: End) -> CheckedEnd:
+def check_end(state: SearchState, end: LocalEnd) -> CheckedEnd:
     """An end polished under the limits that held there, and rechecked in its cases."""
     point = polisher(end.nlp)(end.run, end.nlp)
     parameters = state.problem.ordered(design_of(state.problem, point.x.tolist()))

@@ -7,7 +7,7 @@ from itertools import pairwise
 from tmsopt.evaluation.bound import bounded, closed, instant_bound
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.searches import Starts, expects_few_better
-from tmsopt.search.state import End, SearchState, coefficients_at, same_objective
+from tmsopt.search.state import LocalEnd, SearchState, coefficients_at, same_objective
 
 
 def is_enough(state: SearchState) -> bool:
@@ -46,7 +46,7 @@ def is_hopeless(state: SearchState) -> bool:
     return failed >= (tuning.hopeless if sample else 2 * tuning.hopeless)
 
 
-def is_proven(state: SearchState, end: End) -> bool:
+def is_proven(state: SearchState, end: LocalEnd) -> bool:
     """Whether an end reaches a bound; this is looked at only where the design has all roots of one modulus."""
     problem = state.part
     if not (end.feasible and bounded(problem)):
@@ -57,7 +57,7 @@ def is_proven(state: SearchState, end: End) -> bool:
     return near and instant_bound(problem, end.objective).proven
 
 
-def count_starts(ends: Sequence[End], best: float) -> Starts:
+def count_starts(ends: Sequence[LocalEnd], best: float) -> Starts:
     """How starts ended; a design of the sample from which a way falls to an end counts as a start that led there."""
     weights = [(end, 1 + len(end.led)) for end in ends]
     feasible = [(end, weight) for end, weight in weights if end.feasible]
@@ -71,9 +71,9 @@ def count_starts(ends: Sequence[End], best: float) -> Starts:
     )
 
 
-def distinct_ends(ends: Sequence[End]) -> list[End]:
+def distinct_ends(ends: Sequence[LocalEnd]) -> list[LocalEnd]:
     """The best end of each optimum, the best first."""
-    kept: list[End] = []
+    kept: list[LocalEnd] = []
     for end in sorted((e for e in ends if e.feasible), key=lambda e: e.objective):
         if not any(same_objective(end.objective, other.objective, end.nlp.size) for other in kept):
             kept.append(end)

@@ -14,10 +14,10 @@ from tmsopt.program.starts import initial_point
 from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.search.starts import with_led
-from tmsopt.search.state import End, SearchState, Start, coefficients_at
+from tmsopt.search.state import LocalEnd, SearchState, Start, coefficients_at
 
 
-def run_from(state: SearchState, start: Start) -> End:
+def run_from(state: SearchState, start: Start) -> LocalEnd:
     """The best end of a start: its factors are shared out anew where IPOPT did not converge, as long as that helps."""
     tuning, nlp = state.tuning, state.nlp
     exact = bool(nlp.cases) and nlp.exact
@@ -42,14 +42,14 @@ def count_restarts(state: SearchState) -> int:
     return 0 if blind or (state.nlp.formulation != "elastic" and state.out_of_reach) else 1
 
 
-def run_once(state: SearchState, start: Start, settings: str) -> End:
+def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
     """Where IPOPT ends, in the best of the ways in which root quantities and kinks are held at the start."""
     x = initial_point(state.nlp, state.part, start.design, settings == "near")
     ways = islice(state.nlp.touchings(x), state.tuning.ways)
     return min((_ended(state, start, x, way, settings) for way in ways), key=lambda end: end.rank)
 
 
-def exchange_contacts(state: SearchState, best: End) -> End:
+def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
     """The best that is reached from an end at which other ways are as close as the one that was held."""
     for _ in range(state.tuning.exchanges if state.nlp.touches and best.feasible else 0):
         x, held = best.run.x, _limits(best.nlp)
@@ -62,21 +62,21 @@ def exchange_contacts(state: SearchState, best: End) -> End:
     return best
 
 
-def _ended(state: SearchState, start: Start, x: Array, limits: NLP, settings: str) -> End:
+def _ended(state: SearchState, start: Start, x: Array, limits: NLP, settings: str) -> LocalEnd:
     """What one run of IPOPT came to."""
     run = ipopt(state.nlp, state.options, settings)(x, limits)
     f, rows = limits.at(run.x)
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(f)):
-        return End(start, limits, run, math.inf, False)
+        return LocalEnd(start, limits, run, math.inf, False)
     outside = np.maximum(np.array(limits.row_lower) - rows, rows - np.array(limits.row_upper)).clip(0)
     feasible = outside.max(initial=0.0) <= state.tuning.feasible and run.status != "Infeasible_Problem_Detected"
     # What rows, met to 1e-12, may give where they are singular: a double root off by 1e-6, as its square is by that.
     claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if limits.touches else 0.0
     if not feasible or _is_spurious(state, limits, run):
-        return End(start, limits, run, f + claim, False)
+        return LocalEnd(start, limits, run, f + claim, False)
     design = state.part.ordered(design_of(state.part, run.x.tolist()))
     crossing = state.part.pattern is not None and is_crossing(state.part, state.part.pattern, design)
-    return End(start, limits, run, f + claim, not crossing, crossing)
+    return LocalEnd(start, limits, run, f + claim, not crossing, crossing)
 
 
 def _is_spurious(state: SearchState, nlp: NLP, run: Run) -> bool:

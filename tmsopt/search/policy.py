@@ -12,7 +12,7 @@ from tmsopt.progress import begin
 from tmsopt.search.accept import is_better
 from tmsopt.search.sample import Sample
 from tmsopt.search.starts import is_led
-from tmsopt.search.state import End, SearchState, Start
+from tmsopt.search.state import LocalEnd, SearchState, Start
 from tmsopt.search.tuning import TUNING, Tuning
 
 
@@ -25,6 +25,12 @@ class Rescue:
         evidence: suites whose verdicts get worse without it, with the number of problems.
         applies: whether it steps in.
         run: the search taken up again; gets the policy to run starts with.
+
+    Example:
+        >>> [rescue.name for rescue in tmsopt.POLICY.rescues][-1]
+        'kept design'
+
+    More: docs/explanation/search.md
     """
 
     name: str
@@ -47,14 +53,17 @@ class Policy:
         tuning: the numbers that all these depend on.
 
     Example:
+        >>> from dataclasses import replace
         >>> hasty = replace(tmsopt.POLICY, enough=lambda state: len(state.feasible) > 0)
-        >>> tmsopt.solve("problems/ep4.toml", policy=hasty).starts.tried
-        1
+        >>> tmsopt.solve("problems/ep4.toml", policy=hasty).structure
+        'EP4'
+
+    More: docs/explanation/search.md
     """
 
     sample: Callable[[SearchState], Sample | None]
     starts: Callable[[SearchState], Iterator[Start]]
-    local: Callable[[SearchState, Start], End]
+    local: Callable[[SearchState, Start], LocalEnd]
     accept: Callable[[SearchState], SearchState]
     enough: Callable[[SearchState], bool]
     rescues: tuple[Rescue, ...] = ()

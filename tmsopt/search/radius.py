@@ -17,11 +17,11 @@ from tmsopt.search.enough import count_starts
 from tmsopt.search.local import run_from
 from tmsopt.search.policy import Policy
 from tmsopt.search.sample import draw_box, stream
-from tmsopt.search.state import CheckedEnd, End, SearchState, Start, no_end
+from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, Start, no_end
 from tmsopt.search.tuning import Tuning
 
 
-def climb(state: SearchState, start: Start) -> End:
+def climb(state: SearchState, start: Start) -> LocalEnd:
     """Where the nearest boundary points of one design, and those met on the way, lead; not feasible where nowhere."""
     problem, design, points = state.problem, start.design, list[Case]()
     listed = tuple(case for case in problem.cases if not case.direction)

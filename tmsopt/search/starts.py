@@ -9,7 +9,7 @@ from tmsopt.program.formulate import middle
 from tmsopt.program.starts import designs
 from tmsopt.search.enough import is_proven
 from tmsopt.search.sample import Sample, sample_box
-from tmsopt.search.state import End, SearchState, Start
+from tmsopt.search.state import LocalEnd, SearchState, Start
 
 
 def sample_part(state: SearchState) -> Sample | None:
@@ -42,7 +42,7 @@ def is_led(state: SearchState, start: Start) -> bool:
     return any(start.row in end.led for end in state.ends)
 
 
-def with_led(state: SearchState, end: End) -> End:
+def with_led(state: SearchState, end: LocalEnd) -> LocalEnd:
     """An end with the designs of the sample, not led before, from which a straight way falls to it."""
     if not (state.sample and end.feasible and state.part.objective) or state.options.exhaustive:
         return end

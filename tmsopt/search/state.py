@@ -26,6 +26,12 @@ class Start:
     Attributes:
         near: whether it may be close to an optimum.
         row: of the sample's designs; -1 for another one.
+
+    Example:
+        >>> tmsopt.Start({"Fr": 2.0, "chi_B": 1.4}).near
+        True
+
+    More: docs/explanation/search.md
     """
 
     design: Mapping[str, float]
@@ -34,7 +40,7 @@ class Start:
 
 
 @dataclass(frozen=True)
-class End:
+class LocalEnd:
     """Where one start ended.
 
     Attributes:
@@ -60,16 +66,16 @@ class End:
         return not self.feasible, self.objective
 
 
-def no_end(start: Start, nlp: NLP) -> End:
+def no_end(start: Start, nlp: NLP) -> LocalEnd:
     """The end of a start that leads nowhere."""
-    return End(start, nlp, Run(np.full(len(nlp.variables), np.nan), np.empty(0), np.empty(0), ""), math.inf, False)
+    return LocalEnd(start, nlp, Run(np.full(len(nlp.variables), np.nan), np.empty(0), np.empty(0), ""), math.inf, False)
 
 
 @dataclass(frozen=True)
 class CheckedEnd:
     """An end, polished and rechecked."""
 
-    end: End
+    end: LocalEnd
     point: Point
     parameters: Mapping[str, float]
     checked: Evaluation
@@ -93,6 +99,18 @@ class SearchState:
         kept: free parameters of a design that is better than all ends, though known to be no optimum.
         words: why that is none.
         interrupted: whether the user ended the search.
+
+    Example:
+        >>> counts = []
+        >>> def enough(state):
+        ...     counts.append(len(state.ends))
+        ...     return tmsopt.POLICY.enough(state)
+        >>> from dataclasses import replace
+        >>> design = tmsopt.solve("problems/ep4.toml", policy=replace(tmsopt.POLICY, enough=enough))
+        >>> counts  # the first end reaches a proven bound
+        [1]
+
+    More: docs/explanation/search.md
     """
 
     problem: Posed
@@ -103,7 +121,7 @@ class SearchState:
     side: str = ""
     extra: tuple[Mapping[str, float], ...] = ()
     sample: Sample | None = None
-    ends: tuple[End, ...] = ()
+    ends: tuple[LocalEnd, ...] = ()
     accepted: int = 0
     best: CheckedEnd | None = None
     stable_elsewhere: bool = False
@@ -112,7 +130,7 @@ class SearchState:
     interrupted: bool = False
 
     @property
-    def feasible(self) -> list[End]:
+    def feasible(self) -> list[LocalEnd]:
         """Ends that meet all rows."""
         return [end for end in self.ends if end.feasible]
 
@@ -149,7 +167,7 @@ class SearchState:
         """The designs at which starts ended."""
         return [self.design_at(end) for end in self.ends if np.all(np.isfinite(end.run.x))]
 
-    def design_at(self, end: End) -> dict[str, float]:
+    def design_at(self, end: LocalEnd) -> dict[str, float]:
         """The free parameters at an end, inside the part of the box."""
         return design_of(self.part, end.run.x.tolist())
 

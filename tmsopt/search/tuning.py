@@ -16,6 +16,8 @@ class Tuning:
     Example:
         >>> tmsopt.TUNING.unit("narrow"), tmsopt.TUNING.narrow
         ('share of the designs drawn', 0.02)
+
+    More: docs/explanation/search.md
     """
 
     # The sample
