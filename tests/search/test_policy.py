@@ -124,7 +124,8 @@ def test_starts_that_lead_to_the_same_end_are_not_run():
         return POLICY.local(state, start)
 
     design = tmsopt.solve(problem(), policy=replace(POLICY, local=local))
-    assert len(tried) == len(set(tried))
+    rows = [row for row in tried if row >= 0]
+    assert len(rows) == len(set(rows))
     assert design.starts.tried > len(tried)  # led ones count
 
 

@@ -20,7 +20,7 @@ def unclear(roots, stored, asked="abscissa"):
     structure = SimpleNamespace(roots=listed, abscissa=max(re for re, _ in roots))
     checked = SimpleNamespace(structure=structure, realised=stored)
     problem = replace(PLAIN, minimize=None, maximize=asked) if asked == "damping_ratio" else PLAIN
-    return bool(import_module("tmsopt.search.outcome").unclear(problem.posed, checked))
+    return bool(import_module("tmsopt.search.outcome").is_unclear(problem.posed, checked))
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch, off, status):
 @pytest.mark.parametrize(
     ("room", "name", "said"),
     [
-        ("outcome", "unclear", lambda problem, checked: True),
+        ("outcome", "is_unclear", lambda problem, checked: True),
         ("search", "demote", lambda state, found: replace(found, status="not_converged")),
     ],
 )

@@ -33,7 +33,7 @@ def is_enough(state: SearchState) -> bool:
         agreed = count >= tuning.enough_blind and starts.at_best >= tuning.agree
         return agreed and expects_few_better(starts.converged, starts.optima)
     alone = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
-    few = tuning.enough_narrow if sample.box.narrow else tuning.enough
+    few = max(tuning.enough_narrow if sample.box.narrow else tuning.enough, starts.optima + tuning.enough - 1)
     enough = count >= few and expects_few_better(starts.converged + alone, starts.optima + alone)
     return enough or count - len(feasible) >= 2 * tuning.hopeless  # which takes long; the sample is the judge
 

@@ -31,7 +31,7 @@ def run_from(state: SearchState, start: Start) -> LocalEnd:
         if best.feasible and (not ended.feasible or ended.objective >= best.objective - tuning.same):
             break
         best = ended
-    return with_led(state, exchange_contacts(state, best))
+    return with_led(state, keep_to_start(state, start, exchange_contacts(state, best)))
 
 
 def count_restarts(state: SearchState) -> int:
@@ -47,6 +47,18 @@ def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
     x = initial_point(state.nlp, state.part, start.design, settings == "near")
     ways = islice(state.nlp.touchings(x), state.tuning.ways)
     return min((_ended(state, start, x, way, settings) for way in ways), key=lambda end: end.rank)
+
+
+def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
+    """The end, or that of a run which keeps to the start, or does not, where the start was better than the end."""
+    if state.sample is None or not best.feasible or (start.near and not state.nlp.touches):
+        return best
+    box = state.sample.box
+    seen = box.look(box.space.points(start.design)[None])
+    if seen.violation[0] > 0 or seen.worth[0] >= best.objective - state.tuning.same:
+        return best
+    kept = run_once(state, start, "far" if start.near else "near")
+    return kept if kept.feasible and kept.objective < best.objective else best
 
 
 def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:

@@ -101,7 +101,7 @@ def found(state: SearchState, starts: Starts, cases: Sequence[Case] | None = Non
 
 def _doubts(problem: Posed, trial: CheckedEnd, checked: Evaluation) -> tuple[str, ...]:
     """Why a design is no optimum, whatever the solver says of it."""
-    if unclear(problem, checked):
+    if is_unclear(problem, checked):
         return (UNCLEAR,)
     if problem.objective is not None and not math.isfinite(checked.objective):
         return ("the objective does not exist at the design where the search ended; constrain what it divides by",)
@@ -144,7 +144,7 @@ def better(problem: Posed, one: Outcome, other: Outcome) -> bool:
     return (doubtful[0], one.status != "optimal", finite[0]) < (doubtful[1], other.status != "optimal", finite[1])
 
 
-def unclear(problem: Posed, checked: Evaluation) -> bool:
+def is_unclear(problem: Posed, checked: Evaluation) -> bool:
     """Whether the roots as stored are farther from the multiple ones that they count as than an m-th root explains.
 
     Several that are 0 but for rounding have no damping ratio to speak of.

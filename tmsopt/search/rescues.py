@@ -4,20 +4,21 @@ Every one starts from other designs or on another program, and hands what it fin
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
 from tmsopt.evaluation.bound import bounded
+from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.global_search.signs import none_stable
 from tmsopt.models.user_spectrum import full_patterns
 from tmsopt.problem.dependence import STABLE, WORSE_DIRECTION
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.program.formulate import formulate, matching
 from tmsopt.program.starts import designs
-from tmsopt.search.accept import is_sound
+from tmsopt.search.accept import check_end, claim_matches, is_sound
 from tmsopt.search.enough import distinct_ends
 from tmsopt.search.local import run_once
 from tmsopt.search.outcome import KEPT, mass_advice, runs_away
@@ -30,52 +31,36 @@ from tmsopt.search.tuning import TUNING
 # Roots that meet
 
 
-def wants_multiple_roots(state: SearchState) -> bool:
-    """Whether stability is rare in the sample, or a0 may vanish: optima may stand in needles that no sample sees."""
-    sample = state.sample
-    if sample is None or state.options.near or "abscissa" not in state.nlp.variables:
-        return False
-    rare = bounded(state.part) and np.mean(sample.box.drawn.worth < 0) < state.tuning.narrow
-    mixed = "damping_ratio" in state.nlp.variables
-    return bool(rare or mixed or sample.singular or state.part.model.feedback is not None)
-
-
-def start_at_multiple_roots(state: SearchState, policy: Policy) -> SearchState:
-    """Starts at designs of least abscissa with one root, or one pair, of full multiplicity: equations lead there."""
-    part, tuning, leads = state.part, state.tuning, list[Start]()
-    limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
-    assert state.sample is not None
-    few = replace(
-        policy,
-        local=lambda own, start: run_once(own, start, "far"),
-        enough=lambda own: len(own.ends) >= tuning.leadless or bool(own.feasible),
-    )
-    for pattern in full_patterns(part.model):
-        asked = part.derive(
-            locate=pattern, minimize="abscissa", maximize=None, constraints=limits, scenarios={}, tolerances={}
-        )
-        if degrees_of_freedom(asked).count >= 0:
-            own = replace(state.with_program(matching(asked)), problem=asked, part=asked)
-            own = try_starts(own, sample_starts(state.sample), few)
-            leads += [Start(state.design_at(end)) for end in distinct_ends(own.ends)[: tuning.leads]]
-    state = search_again(state, try_all(policy), leads)
-    return search_real_roots(state, policy, leads) if is_mixed(state) else state
-
-
-# Other programs
-
-
 def is_mixed(state: SearchState) -> bool:
     """Whether sectors and half-planes are asked for together, which are singular where real roots meet."""
     return {"abscissa", "damping_ratio"} <= set(state.nlp.variables)
 
 
-def search_real_roots(state: SearchState, policy: Policy, leads: Sequence[Start] = ()) -> SearchState:
-    """The search where all roots are real, from designs that lead there, if there are any."""
+def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
+    """The search where all roots are real; from designs of least abscissa with all roots in one, if there are any."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=1.0)
-    if leads:
-        return search_again(state, try_all(policy), leads, nlp)
+    if leads := find_multiple_roots(state, policy):
+        return search_again(search_again(state, try_all(policy), leads), try_all(policy), leads, nlp)
     return search_again(state, policy, nlp=nlp, most=state.tuning.fewer)
+
+
+def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
+    """Designs of least abscissa with one root, or one pair, of full multiplicity: equations lead there."""
+    part, tuning, leads = state.part, state.tuning, list[Start]()
+    limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
+    free = {"minimize": "abscissa", "maximize": None, "constraints": limits, "scenarios": {}, "tolerances": {}}
+    few = replace(
+        policy,
+        local=lambda own, start: run_once(own, start, "far"),
+        enough=lambda own: len(own.ends) >= tuning.leadless or bool(own.feasible),
+    )
+    for pattern in full_patterns(part.model) if state.sample and not state.options.near else ():
+        asked = part.derive(locate=pattern, **free)
+        if degrees_of_freedom(asked).count >= 0 and state.sample:
+            own = replace(state.with_program(matching(asked)), problem=asked, part=asked)
+            own = try_starts(own, sample_starts(state.sample), few)
+            leads += [Start(state.design_at(end)) for end in distinct_ends(own.ends)[: tuning.leads]]
+    return leads
 
 
 def may_have_positive_roots(state: SearchState) -> bool:
@@ -156,6 +141,39 @@ def appeal(state: SearchState, policy: Policy) -> SearchState:
     return state
 
 
+def claims_more(state: SearchState) -> bool:
+    """Whether an end claims to be better than its design is, or a root of it is 0, whose damping ratio may jump."""
+    goal, best, least = state.problem.objective, state.best, least_worth(state)
+    if state.sample is None:
+        return False
+    if best is not None and goal is not None and "damping_ratio" in goal.names:
+        sizes = sorted(math.hypot(root.re, root.im) for root in best.checked.structure.roots)
+        if sizes and sizes[0] < state.tuning.zero_root * sizes[-1]:
+            return True
+    return any(end.objective < least for end in state.feasible)
+
+
+def move_aside(state: SearchState, policy: Policy) -> SearchState:
+    """A design a hair's breadth from the best end that is what that end claims."""
+    assert state.sample is not None
+    box, tuning = state.sample.box, state.tuning
+    end = min(state.feasible, key=lambda end: end.objective)
+    own, size = box.space.points(state.design_at(end)), box.space.size
+    random = box.stream("aside").random((tuning.towards, size))
+    towards = np.concatenate([state.sample.refined.u[: tuning.appealed], random])
+    seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, size))
+    close = (seen.violation == 0) & (np.abs(seen.worth - end.objective) <= tuning.edge * (1 + abs(end.objective)))
+    whole = check_end(state, end)
+    for design in box.designs(seen.take(np.flatnonzero(close)[: tuning.kept])):
+        checked = state.recheck(design)
+        moved = replace(whole, parameters=state.problem.ordered(design), checked=checked)
+        exact = certified_numbers(state.problem, moved.parameters, checked, state.nlp.cases).value
+        told = math.isclose(exact, state.problem.sign * end.objective, rel_tol=tuning.lost, abs_tol=tuning.lost)
+        if told and not checked.violations and claim_matches(state.problem, moved):
+            return replace(state, best=moved)
+    return state
+
+
 def keep_rival(state: SearchState, policy: Policy) -> SearchState:
     """A design of the sample that is still better than all ends is given as it is."""
     rivals = rivals_of(state)
@@ -176,19 +194,26 @@ def keep_rival(state: SearchState, policy: Policy) -> SearchState:
 def is_open(state: SearchState) -> bool:
     """Whether designs may improve towards a0 = 0, where a root leaves for infinity."""
     sample, best = state.sample, state.best
-    if sample is None or not sample.singular or not state.nlp.products:
+    if sample is None or not state.nlp.products:
+        return False
+    if rivals_of(state):
+        return True
+    if not sample.singular:
         return False
     failed = bool(np.any(sample.refined.violation == 0)) and not all(end.feasible for end in state.ends)
     return (
         failed
         or best is None
         or runs_away(best.checked.structure.roots, state.tuning.far_root)
-        or bool(rivals_of(state) or singular_rivals(state))
+        or bool(singular_rivals(state))
     )
 
 
 def singular_rivals(state: SearchState) -> Looked:
     """Designs with a singular mass matrix that are better than the best end, their roots at infinity left aside."""
+    assert state.sample is not None
+    if not state.sample.singular:
+        return state.sample.refined.take(np.arange(0))
     a0 = state.part.model.coefficient_names()[0]
     limits = {**state.part.constraints, "a singular mass matrix": f"{a0} == 0"}
     return sample_box(state.part.derive(constraints=limits), state.options.seed).refined.better(least_worth(state))
@@ -288,7 +313,6 @@ def _is_stable_or_hopeless(state: SearchState) -> bool:
 
 
 RESCUES = (
-    Rescue("multiple roots", "", wants_multiple_roots, start_at_multiple_roots),
     Rescue(
         "other chains",
         "",
@@ -300,9 +324,10 @@ RESCUES = (
         search_other_chains,
     ),
     Rescue("off plateau", "", lambda s: s.best is None and maximises_damping(s), leave_plateau),
-    Rescue("real roots", "", lambda s: is_mixed(s) and not wants_multiple_roots(s), search_real_roots),
+    Rescue("real roots", "", is_mixed, search_real_roots),
     Rescue("positive roots", "", may_have_positive_roots, search_positive_roots),
     Rescue("appeals", "", lambda s: bool(rivals_of(s)), appeal),
+    Rescue("aside", "", claims_more, move_aside),
     Rescue("infinity", "", is_open, search_singular),
     Rescue("stability", "", wants_stability, search_stable),
     Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.kept is None, keep_rival),

@@ -45,7 +45,7 @@ class Tuning:
     basin_reaches: tuple[float, ...] = number(
         (0.6, 0.3, 0.15, 0.07, 0.03, 0.01), "of a cell", "steps by which basins are refined", "narrow"
     )
-    basin_local: int = number(16, "designs", "looked at about each basin, in each round", "narrow")
+    basin_local: int = number(24, "designs", "looked at about each basin, in each round", "narrow")
     shells: int = number(12, "distances", "about a design at which others are looked at", "hard")
     shell: int = number(64, "designs", "at each of them", "hard")
     newton_steps: int = number(12, "steps", "towards what violated limits allow", "hard")
@@ -102,6 +102,15 @@ class Tuning:
     appeals: int = number(8, "times", "that better designs are started from", "hard")
     appealed: int = number(2, "designs", "that are started from each time", "hard")
     lost: float = number(1e-7, "relative", "difference of the objective that makes a design better", "hard")
+    hairs: tuple[float, ...] = number(
+        tuple(10.0 ** -(7 + k / 4) for k in range(33)),
+        "of the way to another design",
+        "by which an end is moved",
+        "hard",
+    )
+    zero_root: float = number(1e-9, "of the largest root", "size of one that rounding may put on either side", "narrow")
+    towards: int = number(30, "designs", "random ones, in whose direction it is", "hard")
+    edge: float = number(1e-9, "relative", "difference of the objective that this may cost", "hard")
     finer: float = number(1e-11, "relative", "the same where both were polished", "hard")
     finest: tuple[float, ...] = number(
         tuple(10.0 ** -(4 + k / 3) for k in range(19)),
