@@ -1,44 +1,38 @@
-"""Branch and prune by interval contractors of codac, in a process of its own.
+"""Branch and prune by interval arithmetic: many boxes at once, as arrays of doubles rounded outward.
 
-From its import on, codac has doubles rounded upwards, all that a process computes: so it is imported in workers alone,
-and whoever reads their answers must allow for nothing.
+An interval is an array whose first axis has the lower and the upper end. Ends that are no numbers, as of 0 times
+infinity, become infinite: an interval may be too wide, never too narrow.
 """
 
-import math
-import operator
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import flint
 import numpy as np
 
-from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, Kind, NotAccepted, fold
-from tmsopt.algebra.intervals import interval
-from tmsopt.algebra.kinds import as_exact
+from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, NotAccepted, Step
+from tmsopt.algebra.intervals import ball, interval
+from tmsopt.algebra.kinds import INTERVALS, as_exact
+from tmsopt.algebra.rounding import UNIT
+from tmsopt.records import Array, Truth
 
 Box = tuple[tuple[float, float], ...]
 """Least and greatest value of each variable."""
 
-PARTIAL = {"div": 1, "quotient": 1, "ratio": 1, "pow": 0, "sqrt": 0, "asin": 0, "acos": 0}
-"""Operations that do not exist, or have no slope, somewhere, and which operand decides on that."""
-
-_POLES = {"div", "quotient", "ratio", "pow"}  # where it is 0; of powers with a negative exponent
-
-FUNCTIONS = ("sqrt", "abs", "exp", "sin", "cos", "asin", "acos", "atan")
-
-_TINY = 1e-300
-_GAIN = 0.9  # of a width: contracting goes on where one shrinks below
-_ROUNDS = 8
+_TINY = 1e-300  # more than what underflow loses
+_GAIN = 0.5  # of a width: a box is contracted again, not split, where a side shrinks below
+_FEW = 64  # boxes, which take hardly longer than one
 _WIDER = 0.1  # of a width: the box in which a zero is looked for is so much wider at each end
+_NARROW = 1e-12  # of the first box: and at least so much
+_ROOT = 1e-9  # relative error of a root of NumPy, generously
 
 
 @dataclass(frozen=True)
 class Puzzle:
-    """What is to hold in a box; plain data.
+    """What is to hold in a box.
 
     Attributes:
         equations: what must be 0, as many as variables.
@@ -52,255 +46,440 @@ class Puzzle:
     widths: tuple[float, ...]
     more: Formula
 
-    @property
-    def guarded(self) -> list[tuple[str, Formula]]:
-        """Operations with their arguments that must exist for the equations to have slopes."""
-        steps, names = self.equations.steps, self.equations.names
-        smooth = {k for k, s in enumerate(steps) if s.op == "pow" and steps[s.operands[1]].value >= 0}
-        taken = dict.fromkeys(
-            (s.op, s.operands[PARTIAL[s.op]]) for k, s in enumerate(steps) if s.op in PARTIAL and k not in smooth
-        )
-        return [(op, Formula(names, steps, (k,))) for op, k in taken if steps[k].op != CONSTANT]
-
 
 @dataclass(frozen=True)
 class Pruned:
-    """What became of boxes.
+    """What became of boxes, arrays of shape (2, variables, boxes).
 
     Attributes:
-        boxes: how many were looked at.
-        left: those that were not.
-        met: with a zero that Newton's operator shows, or seems to, beside it.
-        small: those that could neither be emptied nor be split.
+        left: parts that may hold zeros.
+        shown: pairs of a box that holds exactly one zero and the part of it in which that is, along a first axis.
+        small: parts that may hold zeros and are too small to be split.
     """
 
-    boxes: int
-    left: tuple[Box, ...]
-    met: tuple[Box, ...]
-    small: tuple[Box, ...]
+    left: Array
+    shown: Array
+    small: Array
 
 
-def prune(
-    puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], seconds: float, most: int, least: float
-) -> Pruned:
-    """Contract, drop and split boxes, the last one first, until time is over or a new zero was met.
+def prune(puzzle: Puzzle, x: Array, least: float) -> Pruned:
+    """Contract boxes once, drop those without a zero, and split those that hardly shrink.
 
     Args:
-        proved: boxes with one zero each, which is known: nothing more is to be found in these.
-        most: boxes at most that can neither be emptied nor be split.
+        x: boxes, of shape (2, variables, boxes).
         least: share of the first box: what is smaller is not split.
     """
-    import codac
-
-    if not _upwards(codac):
-        raise RuntimeError("doubles are not rounded upwards, as codac needs it")
-    contractors = _contractors(puzzle)
-    known = [_vector(codac, box) for box in proved]
-    left = list(boxes)
-    met: list[Box] = []
-    small: list[Box] = []
-    end, count = time.perf_counter() + seconds, 0
-    while left and not met and len(small) < most and (count == 0 or time.perf_counter() < end):
-        x = _vector(codac, left.pop())
-        count += 1
-        zero = contractors.contract(x)
-        if x.is_empty() or any(x.is_subset(k) for k in known):
-            continue
-        if zero:
-            met.append(_box(x))
-        elif parts := halves(_box(x), puzzle.widths, least, contractors.weights(x)):
-            left += parts
-        else:
-            small.append(_box(x))
-    if not _upwards(codac):
-        raise RuntimeError("doubles were not rounded upwards all the time, as codac needs it")
-    return Pruned(count, tuple(left), tuple(met), tuple(small))
+    with np.errstate(all="ignore"):
+        before = x[1] - x[0]
+        for asked, target in ((puzzle.equations, 0.0), (puzzle.more, 0.0), (puzzle.limits, np.inf)):
+            x, kept = _narrowed(asked, x, target)
+            x, before = x[..., kept], before[:, kept]
+        newton = _newton(puzzle, x)
+        x = _meet(x, newton.image)
+        keep = (x[0] <= x[1]).all(axis=0)
+        shown = keep & newton.shown
+        keep &= ~shown
+        again = keep & (x[1] - x[0] < _GAIN * before).any(axis=0)
+        cut = keep & ~again
+        parts, small = _split(x[..., cut], newton.weights[:, cut], least * _column(puzzle.widths))
+        left = np.concatenate([x[..., again], parts], axis=-1)
+        return Pruned(left, np.stack([newton.wide, newton.image])[..., shown], small)
 
 
-def _upwards(codac: Any) -> bool:
-    """Whether the rounding mode of this thread is what codac's intervals rely on."""
-    third, sum = codac.Interval(1.0) / codac.Interval(3.0), codac.Interval(0.1) + codac.Interval(0.2)
-    return bool(third.lb() < third.ub() and sum.lb() < sum.ub())
+def _split(x: Array, weights: Array, least: Array) -> tuple[Array, Array]:
+    """Boxes cut across the side of the greatest weight, few boxes more than once; and those that are small."""
+    parts, small = x, x[..., :0]
+    while True:
+        width = parts[1] - parts[0]
+        middle = parts[0] + width / 2
+        across = (width > least) & (width < np.inf) & (parts[0] < middle) & (middle < parts[1])
+        cut = across.any(axis=0)
+        small = np.concatenate([small, parts[..., ~cut]], axis=-1)
+        at = np.where(across, weights, -1.0).argmax(axis=0)[cut], np.arange(np.count_nonzero(cut))
+        lower, weights = parts[..., cut], weights[:, cut]
+        upper = lower.copy()
+        lower[1][at] = upper[0][at] = middle[:, cut][at]
+        weights[at] /= 2
+        parts, weights = np.concatenate([lower, upper], axis=-1), np.concatenate([weights, weights], axis=-1)
+        if not 0 < parts.shape[-1] < _FEW:
+            return parts, small
 
 
-def halves(box: Box, widths: Sequence[float], least: float, weights: Sequence[float]) -> list[Box]:
-    """A box cut across the side of the greatest weight; none for one that is small."""
-    middles = [lo + (hi - lo) / 2 for lo, hi in box]
-    each = enumerate(zip(box, middles, widths, strict=True))
-    wide = [k for k, ((lo, hi), m, w) in each if least * w < hi - lo < math.inf and lo < m < hi]
-    if not wide:
-        return []
-    k = max(wide, key=weights.__getitem__)
-    return [(*box[:k], part, *box[k + 1 :]) for part in ((box[k][0], middles[k]), (middles[k], box[k][1]))]
+@dataclass(frozen=True)
+class _Newton:
+    """What Newton's operator makes of boxes.
 
-
-class _Contractors:
-    """The contractors of a puzzle."""
-
-    def __init__(self, puzzle: Puzzle) -> None:
-        import codac
-
-        guarded = puzzle.guarded
-        self.codac, self.widths, self.guarded = codac, puzzle.widths, [op for op, _ in guarded]
-        n = len(puzzle.equations.outputs)
-        x = codac.VectorVar(n)
-        self.system = codac.AnalyticFunction([x], _expressions(codac, puzzle.equations, x))
-        zero = codac.IntervalVector([[0.0, 0.0]] * n)
-        self.rows = [codac.CtcInverse(self.system, zero, not guarded)]
-        allowed = [(codac.Interval(0.0, math.inf), puzzle.limits), (codac.Interval(0.0), puzzle.more)]
-        for over, asked in allowed:
-            self.rows += [
-                codac.CtcInverse(codac.AnalyticFunction([x], e), over, False) for e in _expressions(codac, asked, x)
-            ]
-        self.arguments = [codac.AnalyticFunction([x], *_expressions(codac, argument, x)) for _, argument in guarded]
-
-    def contract(self, x: Any) -> bool:
-        """Shrink a box around its zeros; whether Newton's operator shows one in it, or just beside."""
-        zero, self.slopes = False, None
-        for turn in range(_ROUNDS):
-            before = x.diam()
-            for row in self.rows:
-                row.contract(x)
-                if x.is_empty():
-                    return False
-            if _shrunk(x, before) and turn < _ROUNDS - 1:
-                continue
-            zero = self.newton(x) or zero
-            if x.is_empty() or not _shrunk(x, before):
-                break
-        return zero
-
-    def newton(self, x: Any) -> bool:
-        """Newton's operator on a somewhat wider box: zeros of x are in what it leaves; whether it has one for sure."""
-        codac, n = self.codac, x.size()
-        if x.is_unbounded() or not self.regular(x):
-            return False
-        room = [_WIDER * x[k].diam() + 1e-12 * self.widths[k] for k in range(n)]
-        wide = codac.IntervalVector([[x[k].lb() - room[k], x[k].ub() + room[k]] for k in range(n)])
-        if not self.regular(wide):
-            wide = x
-        middle = codac.IntervalVector([[m, m] for m in (wide[k].mid() for k in range(n))])
-        slopes, value = self.system.diff(wide), self.system.eval(codac.EvalMode.NATURAL, middle)
-        if slopes.is_empty() or value.is_empty() or slopes.is_unbounded() or value.is_unbounded():
-            return False
-        self.slopes = slopes
-        try:
-            inverse = np.linalg.inv([[slopes[i, k].mid() for k in range(n)] for i in range(n)])
-        except np.linalg.LinAlgError:
-            return False
-        if not np.all(np.isfinite(inverse)):
-            return False
-        matrix = codac.IntervalMatrix(codac.Matrix(inverse))
-        slopes, value = matrix * slopes, matrix * -value
-        around = [wide[k] - middle[k] for k in range(n)]
-        shown = True
-        for k in range(n):  # Gauss and Seidel; codac's own takes a coefficient that may be 0 for one that is not
-            if slopes[k, k].contains(0.0):
-                shown = False
-                continue
-            rest = sum((slopes[k, j] * around[j] for j in range(n) if j != k), codac.Interval(0.0))
-            step = (value[k] - rest) / slopes[k, k]
-            shown = shown and around[k].lb() < step.lb() and step.ub() < around[k].ub()
-            around[k] &= step
-            if around[k].is_empty():
-                x.set_empty()
-                return False
-        for k in range(n):
-            x[k] &= middle[k] + around[k]
-        return shown
-
-    def regular(self, x: Any) -> bool:
-        """Whether every function that the equations use has a slope all over a box."""
-        for name, argument in zip(self.guarded, self.arguments, strict=True):
-            over = argument.eval(self.codac.EvalMode.NATURAL, x)
-            if name in _POLES:
-                if over.contains(0.0):
-                    return False
-            elif name in ("asin", "acos"):
-                if not (over.lb() > -1.0 and over.ub() < 1.0):
-                    return False
-            elif not over.lb() > 0.0:
-                return False
-        return True
-
-    def weights(self, x: Any) -> list[float]:
-        """How much each variable's width adds to those of the equations, at most 1 each; or its share of the first."""
-        n = x.size()
-        own = [min(x[k].diam() / self.widths[k], 1.0) if self.widths[k] > 0 else 0.0 for k in range(n)]
-        if (slopes := self.slopes) is None:
-            return own
-        total = [0.0] * n
-        for i in range(n):
-            parts = [slopes[i, k].mag() * x[k].diam() for k in range(n)]
-            whole = sum(parts)
-            if whole > 0:
-                total = [t + p / whole for t, p in zip(total, parts, strict=True)]
-        return [t + 1e-3 * s for t, s in zip(total, own, strict=True)]
-
-
-def _shrunk(x: Any, before: Any) -> bool:
-    """Whether a side of a box is now notably shorter."""
-    return any(x[k].diam() < _GAIN * before[k] for k in range(x.size()))
-
-
-@cache
-def _contractors(puzzle: Puzzle) -> _Contractors:
-    return _Contractors(puzzle)
-
-
-def _expressions(codac: Any, asked: Formula, x: Any) -> list[Any]:
-    """The outputs of a formula as expressions of codac.
-
-    Raises:
-        NotAccepted: for an operation that it lacks, or at which it ends its process, as log of codac 2.1.2.
+    Attributes:
+        wide: the boxes that it was applied to, somewhat wider.
+        image: where all zeros of these are; without ends where it cannot be applied.
+        shown: whether there is exactly one.
+        weights: how much the width of each variable adds to those of the equations, at most 1 each.
     """
-    inputs = {name: codac.ScalarExpr(x[k]) for k, name in enumerate(asked.names)}
-    return [codac.ScalarExpr(x) if isinstance(x, codac.Interval) else x for x in fold(asked, inputs, _kind(codac))]
+
+    wide: Array
+    image: Array
+    shown: Truth
+    weights: Array
 
 
-def _kind(codac: Any) -> Kind:
-    return Kind(
-        {
-            **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg")},
-            **dict.fromkeys(("div", "quotient"), operator.truediv),
-            "ratio": lambda a, b: a * b / (codac.sqr(b) + codac.Interval(0.0, _TINY)),  # anything where b is 0
-            "square": codac.sqr,
-            "pow": lambda a, b: _power(codac, a, b) if b.lb() >= 0 else codac.Interval(1.0) / _power(codac, a, -b),
-            **{name: getattr(codac, name) for name in FUNCTIONS},
-        },
-        lambda value: codac.Interval(*ends(as_exact(value))),  # an expression of its own wherever it is used
-    )
+def _newton(puzzle: Puzzle, x: Array) -> _Newton:
+    """Newton's operator, as it is and preconditioned.
+
+    With the Jacobian J of a wider box around m, zeros have A (x − m) = −f(m) for a matrix A of J, and with Y near the
+    inverse of its middle C (x − m) = −Y f(m) for a matrix C of Y J. Each row bounds each variable. Where the diagonal
+    of C prevails there is one zero at most, and where its bounds are in the interior of the wider box there is one
+    (Neumaier 1990, theorem 5.1.7).
+    """
+    first = _column(puzzle.widths)
+    room = _WIDER * (x[1] - x[0]) + _NARROW * first
+    wide = np.stack([x[0] - room, x[1] + room])
+    middle = (wide[0] + wide[1]) / 2
+    reach = np.maximum(wide[1] - middle, middle - wide[0]) * (1 + UNIT) + _TINY
+    values = _results(puzzle.equations, np.stack([middle, middle]))
+    _, slopes = _slopes(puzzle.equations, wide)
+    usable = np.isfinite(values).all(axis=(0, 1)) & np.isfinite(slopes).all(axis=(0, 1, 2)) & np.isfinite(reach).all(0)
+    share = np.where(first > 0, np.minimum((x[1] - x[0]) / np.where(first > 0, first, 1.0), 1.0), 0.0)
+    parts = np.abs(slopes).max(axis=0) * reach
+    total = parts.sum(axis=1, keepdims=True)
+    weights = np.where(usable, (parts / np.maximum(total, _TINY)).sum(axis=0) + 1e-3 * share, share)
+    growth = 1 + (x.shape[1] + 4) * UNIT
+    rest = total * growth - parts / growth + _TINY  # of an equation, what all variables but one add to it at most
+    left = -values[::-1][:, :, None]
+    move = _over(_outward(np.stack([left[0] - rest, left[1] + rest])), slopes)
+    image = _outward(middle + np.stack([move[0].max(axis=0), move[1].min(axis=0)]))
+    shown = np.zeros(x.shape[-1], dtype=bool)
+    centre = np.moveaxis((slopes[0] + slopes[1]) / 2, -1, 0)
+    determinants = np.linalg.det(np.where(usable[:, None, None], centre, 0.0))
+    usable &= np.isfinite(determinants) & (determinants != 0)
+    inverse = np.linalg.inv(centre[usable])
+    fine = np.isfinite(inverse).all(axis=(1, 2))
+    (at,) = np.nonzero(usable)
+    at, inverse = at[fine], inverse[fine]
+    matrix, matrix_error = _product(inverse, np.moveaxis(slopes[..., at], -1, 1))
+    step, step_error = _product(inverse, np.moveaxis(values[..., at], -1, 1)[..., None])
+    reach, middle = reach[:, at].T, middle[:, at].T
+    own = np.arange(x.shape[1])
+    diagonal, diagonal_error = matrix[:, own, own], matrix_error[:, own, own]
+    others = np.abs(matrix) + matrix_error
+    others[:, own, own] = 0.0
+    off = (step_error[..., 0] + (others @ reach[..., None])[..., 0]) * growth + _TINY
+    least = (np.abs(diagonal) - diagonal_error) * (1 - UNIT)  # of the diagonal; what is not positive says nothing
+    regular = least > 0
+    move = _outward(np.stack([-step[..., 0] - off, -step[..., 0] + off]))
+    move = _times(move, _inverse(_outward(np.stack([diagonal - diagonal_error, diagonal + diagonal_error]))))
+    found = _outward(middle + move)
+    image[..., at] = np.where(regular.T, _meet(np.moveaxis(found, 1, -1), image[..., at]), image[..., at])
+    inside = (np.abs(move).max(axis=0) < reach * (1 - 4 * UNIT) - 4 * _TINY) & regular
+    inside &= (found[0] > wide[0][:, at].T) & (found[1] < wide[1][:, at].T)
+    shown[at] = inside.all(axis=1)
+    return _Newton(wide, image, shown, weights)
 
 
-def _power(codac: Any, base: Any, exponent: Any) -> Any:
-    """Not for negative exponents: of these codac 2.1.2 loses zeros, as x⁻³ = −1."""
-    return codac.pow(base, codac.ScalarExpr(exponent))
+def _product(exact: Array, intervals: Array) -> tuple[Array, Array]:
+    """Products of matrices of doubles and of intervals, as middles and bounds of the error."""
+    middle, radius = (intervals[0] + intervals[1]) / 2, (intervals[1] - intervals[0]) / 2
+    size = np.abs(exact)
+    rounded = (exact.shape[-1] + 4) * UNIT
+    error = size @ (radius * (1 + 2 * UNIT) + rounded * np.abs(middle) + _TINY)
+    return exact @ middle, error * (1 + rounded) + _TINY
 
 
-def _vector(codac: Any, box: Box) -> Any:
-    return codac.IntervalVector([list(ends) for ends in box])
+def _column(numbers: Sequence[float]) -> Array:
+    return np.array(numbers)[:, None]
 
 
-def _box(x: Any) -> Box:
-    return tuple((x[k].lb(), x[k].ub()) for k in range(x.size()))
+# Interval arithmetic.
+
+
+def _outward(x: Array) -> Array:
+    """The same array with its ends moved outward by more than one rounding."""
+    room = np.abs(x) * UNIT + _TINY
+    x[0] -= room[0]
+    x[1] += room[1]
+    unknown = np.isnan(x)
+    if unknown.any():
+        x[0][unknown[0]], x[1][unknown[1]] = -np.inf, np.inf
+    return x
+
+
+def _meet(a: Array, b: Array) -> Array:
+    return np.stack([np.maximum(a[0], b[0]), np.minimum(a[1], b[1])])
+
+
+def _plus(a: Array, b: Array) -> Array:
+    return _outward(a + b)
+
+
+def _minus(a: Array, b: Array) -> Array:
+    return _outward(a - b[::-1])
+
+
+def _negative(a: Array) -> Array:
+    return -a[::-1]
+
+
+def _times(a: Array, b: Array) -> Array:
+    each = np.stack([a * b, a * b[::-1]])
+    unknown = np.isnan(each)
+    if unknown.any():
+        each[unknown] = 0.0
+    found = np.empty(each.shape[1:])
+    each.min(axis=(0, 1), out=found[0])
+    each.max(axis=(0, 1), out=found[1])
+    return _outward(found)
+
+
+def _inverse(a: Array) -> Array:
+    """1/a of those of one sign or 0; without ends where both signs are met."""
+    single = (a[0] >= 0) | (a[1] <= 0)
+    low = np.where(single & (a[1] != 0), 1 / a[1], -np.inf)
+    high = np.where(single & (a[0] != 0), 1 / a[0], np.inf)
+    return _outward(np.stack([low, high]))
+
+
+def _over(a: Array, b: Array) -> Array:
+    return _times(a, _inverse(b))
+
+
+def _holds_zero(a: Array) -> Truth:
+    return np.asarray((a[0] <= 0) & (a[1] >= 0))
+
+
+def _magnitude(a: Array) -> Array:
+    ends = np.abs(a)
+    return np.stack([np.where(_holds_zero(a), 0.0, ends.min(axis=0)), ends.max(axis=0)])
+
+
+def _square(a: Array) -> Array:
+    size = _magnitude(a)
+    return np.maximum(_outward(size * size), 0.0)
+
+
+def _power(a: Array, exponent: int) -> Array:
+    if exponent < 0:
+        return _inverse(_power(a, -exponent))
+    if exponent == 0:
+        return np.ones_like(a)
+    if exponent % 2 == 0:
+        return _square(_power(a, exponent // 2))
+    low, high = (_times(end, _square(_power(end, exponent // 2))) for end in (a[[0, 0]], a[[1, 1]]))
+    return np.stack([low[0], high[1]])
+
+
+def _square_root(a: Array) -> Array:
+    return np.maximum(_outward(np.sqrt(np.maximum(a, 0.0))), 0.0)
+
+
+def _function(name: str) -> Callable[[Array], Array]:
+    """A function by balls, one interval at a time."""
+    operation = INTERVALS.operations[name]
+
+    def applied(a: Array) -> Array:
+        ends = [interval(operation(ball((low, high)))) for low, high in a.reshape(2, -1).T.tolist()]
+        return np.array(ends).T.reshape(a.shape)
+
+    return applied
+
+
+_FUNCTIONS = {name: _function(name) for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")}
+_QUOTIENTS = dict.fromkeys(("div", "quotient", "ratio"), _over)
+_ONE = np.ones((2, 1))
+_SIGNS = np.array([[-1.0], [1.0]])
+
+_VALUES: Mapping[str, Callable[..., Array]] = {
+    "add": _plus,
+    "sub": _minus,
+    "mul": _times,
+    "neg": _negative,
+    "square": _square,
+    "sqrt": _square_root,
+    "abs": _magnitude,
+    **_QUOTIENTS,
+    **_FUNCTIONS,
+}
+
+_SLOPES: Mapping[str, Callable[[Array, Array], Array]] = {
+    "square": lambda a, _: _plus(a, a),
+    "sqrt": lambda _, r: _inverse(_plus(r, r)),
+    "abs": lambda a, _: np.where(_holds_zero(a), _SIGNS, np.sign(a)),
+    "exp": lambda _, r: r,
+    "log": lambda a, _: np.where(a[0] > 0, _inverse(a), _SIGNS * np.inf),
+    "sin": lambda a, _: _FUNCTIONS["cos"](a),
+    "cos": lambda a, _: _negative(_FUNCTIONS["sin"](a)),
+    "tan": lambda _, r: _plus(_ONE, _square(r)),
+    "atan": lambda a, _: _inverse(_plus(_ONE, _square(a))),
+    "asin": lambda a, _: _inverse(_square_root(_minus(_ONE, _square(a)))),
+    "acos": lambda a, _: _negative(_inverse(_square_root(_minus(_ONE, _square(a))))),
+}
+"""Of functions of one operand, from it and the result; infinite where there is none somewhere."""
+
+
+def _results(asked: Formula, x: Array) -> Array:
+    """Ranges of the outputs of a formula over boxes."""
+    found = _forward(asked, x)
+    return np.array([np.broadcast_to(found[o], x[:, 0].shape) for o in asked.outputs]).swapaxes(0, 1)
+
+
+def _forward(asked: Formula, x: Array) -> list[Array]:
+    """Ranges of all steps."""
+    found: list[Array] = []
+    for step in asked.steps:
+        found.append(_value(asked, step, found, x))
+    return found
+
+
+def _value(asked: Formula, step: Step, found: Sequence[Array], x: Array) -> Array:
+    if step.op == INPUT:
+        return x[:, asked.names.index(step.value)]
+    if step.op == CONSTANT:
+        return _constant(step.value)
+    if step.op == "pow":
+        return _power(found[step.operands[0]], int(asked.steps[step.operands[1]].value))
+    return _VALUES[step.op](*(found[o] for o in step.operands))
+
+
+@lru_cache(maxsize=4096)
+def _constant(value: Constant) -> Array:
+    return np.array(ends(as_exact(value)))[:, None]
+
+
+def _slopes(asked: Formula, x: Array) -> tuple[list[Array], Array]:
+    """Ranges of all steps, and of the slopes of the outputs: shape (2, outputs, variables, boxes)."""
+    found: list[Array] = []
+    slopes: list[Array | None] = []
+    for step in asked.steps:
+        found.append(_value(asked, step, found, x))
+        slopes.append(_slope(asked, step, found, slopes, x))
+    nothing = np.zeros((2, *x.shape[1:]))
+    each = [nothing if (own := slopes[o]) is None else np.broadcast_to(own, nothing.shape) for o in asked.outputs]
+    return found, np.array(each).swapaxes(0, 1)
+
+
+def _slope(  # noqa: PLR0911
+    asked: Formula, step: Step, found: Sequence[Array], slopes: Sequence[Array | None], x: Array
+) -> Array | None:
+    """Slopes of one step with respect to all variables; None for a constant."""
+    if step.op == INPUT:
+        own = np.zeros((2, x.shape[1], 1))
+        own[:, asked.names.index(step.value)] = 1.0
+        return own
+    known = [slopes[o] for o in step.operands]
+    if all(own is None for own in known):
+        return None
+    a, b = known if len(known) == 2 else (known[0], None)
+    values = [found[o][:, None] for o in step.operands]
+    match step.op:
+        case "add" | "sub":
+            if a is None or b is None:
+                return b if step.op == "add" and a is None else a if b is None else _negative(b)
+            return _VALUES[step.op](a, b)
+        case "neg":
+            return None if a is None else _negative(a)
+        case "mul":
+            parts = [_times(own, v) for own, v in zip(known, reversed(values), strict=True) if own is not None]
+            return parts[0] if len(parts) == 1 else _plus(*parts)
+        case "div" | "quotient" | "ratio":
+            less = None if b is None else _negative(_times(found[-1][:, None], b))
+            parts = [own for own in (a, less) if own is not None]
+            return _over(parts[0] if len(parts) == 1 else _plus(*parts), values[1])
+        case "pow":
+            n = int(asked.steps[step.operands[1]].value)
+            return None if a is None else _times(a, _times(n * _ONE[:, None], _power(values[0], n - 1)))
+    return None if a is None else _times(a, _SLOPES[step.op](found[step.operands[0]], found[-1])[:, None])
+
+
+# Contraction.
+
+
+def _narrowed(asked: Formula, x: Array, most: float) -> tuple[Array, Truth]:
+    """Boxes around the points at which all outputs are from 0 to `most`, and which of them may have any.
+
+    Forward through the steps and backward, each operand from the result and the other one (Benhamou et al. 1999).
+    """
+    found = _forward(asked, x)
+    kept = np.ones(x.shape[-1], dtype=bool)
+
+    def meet(k: int, own: Array) -> None:
+        found[k] = _meet(found[k], own)
+        np.logical_and(kept, found[k][0] <= found[k][1], out=kept)
+
+    target = np.array([[0.0], [most]])
+    for o in asked.outputs:
+        meet(o, target)
+    own = x.copy()
+    for k in range(len(asked.steps) - 1, -1, -1):
+        step = asked.steps[k]
+        if step.op == INPUT:
+            own[:, asked.names.index(step.value)] = found[k]
+        elif step.op == "pow":
+            meet(step.operands[0], _root(found[k], int(asked.steps[step.operands[1]].value)))
+        elif step.op in _BACKWARD:
+            operands = [found[o] for o in step.operands]
+            for o, part in zip(step.operands, _BACKWARD[step.op](found[k], *operands), strict=True):
+                meet(o, part)
+    return own, kept
+
+
+def _factor(result: Array, other: Array) -> Array:
+    """What times another is a result: anything where both may be 0."""
+    return np.where(_holds_zero(result) & _holds_zero(other), _SIGNS * np.inf, _over(result, other))
+
+
+def _root(result: Array, exponent: int) -> Array:
+    """What a power is of."""
+    if exponent <= 0:
+        return _SIGNS * np.inf
+    size = np.abs(result) ** (1 / exponent)
+    room = _ROOT * size + _TINY
+    if exponent % 2 == 0:
+        return _SIGNS * (size + room).max(axis=0)
+    return np.asarray(np.sign(result) * size + _SIGNS * room)
+
+
+def _of_square(result: Array, a: Array) -> tuple[Array]:
+    """The operand of a square, or of a magnitude, by the root."""
+    low, high = _square_root(result)
+    return (_of_magnitude(np.stack([low, high]), a)[0],)
+
+
+def _of_magnitude(result: Array, a: Array) -> tuple[Array]:
+    low, high = np.maximum(result, 0.0)
+    return (np.stack([np.where(a[0] > -low, low, -high), np.where(a[1] < low, -low, high)]),)
+
+
+_BACKWARD: Mapping[str, Callable[..., tuple[Array, ...]]] = {
+    "add": lambda r, a, b: (_minus(r, b), _minus(r, a)),
+    "sub": lambda r, a, b: (_plus(r, b), _minus(a, r)),
+    "mul": lambda r, a, b: (_factor(r, b), _factor(r, a)),
+    "neg": lambda r, _: (_negative(r),),
+    "square": _of_square,
+    "abs": _of_magnitude,
+    "sqrt": lambda r, _: (_square(np.maximum(r, 0.0)),),
+    "asin": lambda _, a: (_SIGNS + 0 * a,),
+    "acos": lambda _, a: (_SIGNS + 0 * a,),
+    **dict.fromkeys(_QUOTIENTS, lambda r, a, b: (_times(r, b), _factor(a, r))),
+}
 
 
 def check(asked: Formula) -> None:
-    """Refuse a formula that codac cannot take.
+    """Refuse a formula that branch and prune cannot take.
 
     Raises:
         NotAccepted: with the name of an operation.
     """
-    known = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "div", "quotient", "ratio", "square", "pow", *FUNCTIONS}
     for step in asked.steps:
         exponent = asked.steps[step.operands[1]].value if step.op == "pow" else 1
-        if step.op not in known or not isinstance(exponent, int | Fraction) or exponent % 1:
+        if (
+            step.op not in {INPUT, CONSTANT, "pow", *_VALUES}
+            or not isinstance(exponent, int | Fraction)
+            or exponent % 1
+        ):
             raise NotAccepted(step.op)
 
 
 def ends(number: Any) -> tuple[float, float]:
     """Doubles below and above a number, or twice the double that it is."""
-    ball = flint.arb(number)
-    if ball.is_finite() and ball.is_exact() and flint.arb(float(ball)) == ball:
-        return float(ball), float(ball)
-    return interval(ball)
+    exact = flint.arb(number)
+    if exact.is_finite() and exact.is_exact() and flint.arb(float(exact)) == exact:
+        return float(exact), float(exact)
+    return interval(exact)
