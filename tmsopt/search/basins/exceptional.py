@@ -11,7 +11,7 @@ from tmsopt.search.multistart import HOPELESS_AFAR, candidate_of, distinct
 from tmsopt.search.workspace import LocalEnd, Workspace
 
 _LEADS = 3  # designs with one root, and with one pair, that are started from
-_LEADLESS = 8  # starts that led to none, after which no more are tried
+_LEADLESS = 8  # starts in a row that led to no other, after which no more are tried
 
 
 def exceptional(work: Workspace) -> list[dict[str, float]]:
@@ -32,13 +32,14 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         if degrees_of_freedom(asked).count < 0:
             continue
         leading = matching(asked)
-        lead, ended = ipopt(leading, work.options), list[LocalEnd]()
+        lead, leads, last = ipopt(leading, work.options), list[LocalEnd](), 0
         turns = zip_longest(*([(seen, k) for k in range(len(seen))] for seen in (sample.boldest, sample.refined)))
         starts = (sampler.design(seen, k) for seen, k in (turn for pair in turns for turn in pair if turn))
         for count, design in enumerate(starts, 1):
-            ended.append(candidate_of(asked, leading, lead(initial_point(leading, asked, design))))
-            led = any(c.feasible for c in ended)
-            if count >= most and (sample.refined.out_of_reach(degree) or not led):
+            if new := distinct([candidate_of(asked, leading, lead(initial_point(leading, asked, design)))], leads):
+                leads, last = leads + new, count
+            idle = count - last >= (_LEADLESS if leads else most)
+            if idle or (count >= most and sample.refined.out_of_reach(degree)):
                 break
-        found += distinct(ended, found)[:_LEADS]
+        found += distinct(leads, found)[:_LEADS]
     return [work.design_at(c.run.x) for c in found]
