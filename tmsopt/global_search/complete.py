@@ -16,7 +16,7 @@ from tmsopt.algebra.identity import multiplied_out
 from tmsopt.algebra.intervals import interval
 from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
-from tmsopt.global_search.conditions import Ends, Sheet, complex_pieces, frame, sheet, sheets
+from tmsopt.global_search.conditions import Ends, Sheet, complex_pieces, rotating_frame, sheet, sheets
 from tmsopt.global_search.pruning import Box, Puzzle, check, ends, prune
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
@@ -200,7 +200,7 @@ def _sheets(problem: Posed) -> Iterator[Sheet]:
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
     lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
-    if problem.model.double is not None and (found := frame(problem)) is not None:
+    if problem.model.double is not None and (found := rotating_frame(problem)) is not None:
         yield sheet(problem, complex_pieces(problem.pattern.form), found, lifted)
         return
     scale = scale_of(problem)

@@ -130,14 +130,14 @@ def complex_pieces(name: str) -> tuple[Piece, ...]:
 
 
 @dataclass(frozen=True)
-class Frame:
+class RotatingFrame:
     """Where eigenfrequencies of a complex H are unknown: as (ω − centre)/unit, which none has larger than 1."""
 
     centre: Fraction
     unit: Fraction
 
 
-def frame(problem: Posed) -> Frame | None:
+def rotating_frame(problem: Posed) -> RotatingFrame | None:
     """The frame of a complex H, by Gershgorin's discs over the box; None where these have no bound.
 
     Raises:
@@ -154,7 +154,7 @@ def frame(problem: Posed) -> Frame | None:
     centre = float(-own[range(n), range(n), 1].mean())
     own[range(n), range(n), 1] += centre
     reach = np.hypot(*np.moveaxis(np.abs(own).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDED * abs(centre)
-    return Frame(Fraction(centre), Fraction(reach * (1 + _ROUNDED) or 1.0))
+    return RotatingFrame(Fraction(centre), Fraction(reach * (1 + _ROUNDED) or 1.0))
 
 
 def _complex_matrix(problem: Posed, own: Mapping[str, Any]) -> list[list[Pair]]:
@@ -165,7 +165,7 @@ def _complex_matrix(problem: Posed, own: Mapping[str, Any]) -> list[list[Pair]]:
     return [[Pair(-row[j], row[n + j]) for j in range(n)] for row in rows[:n]]
 
 
-def _complex_coefficients(problem: Posed, own: Mapping[str, Any], frame: Frame) -> list[Any]:
+def _complex_coefficients(problem: Posed, own: Mapping[str, Any], frame: RotatingFrame) -> list[Any]:
     """The polynomial of −i H in a frame."""
     rows = _complex_matrix(problem, own)
     moved = [[x + Pair(0, frame.centre) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(rows)]
@@ -217,7 +217,9 @@ class Sheet:
     limits: Mapping[str, Formula]
 
 
-def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale | Frame, lifted: tuple[Quantity, ...]) -> Sheet:
+def sheet(
+    problem: Posed, pieces: tuple[Piece, ...], scale: Scale | RotatingFrame, lifted: tuple[Quantity, ...]
+) -> Sheet:
     """The sheet of some factors.
 
     Args:
@@ -231,7 +233,7 @@ def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale | Frame, lifte
     values = values_at(problem, lifted, at, problem.as_nodes(problem.fixed))
     if (abscissa := _abscissa(problem, pieces, scale, u)) is not None:
         values = values.with_known({"abscissa": abscissa})
-    if isinstance(scale, Frame):
+    if isinstance(scale, RotatingFrame):
         a = _complex_coefficients(problem, values.given[2], scale)
     else:
         lead, unit = Fraction(scale.lead), Fraction(scale.unit)
@@ -260,7 +262,7 @@ def _real(left: Iterable[Any]) -> Iterator[Any]:
         yield from (x.re, x.im) if isinstance(x, Pair) else (x,)
 
 
-def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | Frame, u: Sequence[Any]) -> Any:
+def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | RotatingFrame, u: Sequence[Any]) -> Any:
     """Largest real part where the pattern makes up all roots; None elsewhere."""
     if problem.pattern is None or problem.pattern.abscissa is None:
         return None

@@ -432,7 +432,7 @@ def _root(result: Array, exponent: int) -> Array:
     size = np.abs(result) ** (1 / exponent)
     room = _ROOT * size + _TINY
     if exponent % 2 == 0:
-        return _SIGNS * (size + room).max(axis=0)
+        return np.asarray(_SIGNS * (size + room).max(axis=0))
     return np.asarray(np.sign(result) * size + _SIGNS * room)
 
 
