@@ -39,7 +39,10 @@ def drawn(rng, depth):
 def pruned(equations, box, least=1e-7, turns=60, limits=nothing):
     """Arrays that hold what is left of a box."""
     names = equations.names
-    puzzle = Puzzle(equations, formula(limits or [], names), tuple(hi - lo for lo, hi in box), formula([], names))
+    equations = pruning.prepared(equations)
+    puzzle = Puzzle(
+        equations, pruning.prepared(formula(limits or [], names)), tuple(hi - lo for lo, hi in box), formula([], names)
+    )
     waiting, kept = np.array(box).T[..., None], []
     for _ in range(turns):
         found = prune(puzzle, waiting[..., -512:], least)
@@ -90,9 +93,10 @@ def test_no_operation_loses_a_point_or_a_slope(name):
     else:
         asked, function = formula([made(name, x)], ("x", "y")), lambda a, _: FUNCTIONS[name](a)
     ends = np.sort(rng.choice([-2.0, -0.7, 0.0, 0.3, 0.9, 2.5], (2, 2, 400)), axis=0)
+    asked = pruning.prepared(asked)
     with np.errstate(all="ignore"):
-        low, high = pruning._results(asked, ends)[:, 0]
-        slopes = pruning._slopes(asked, ends)[1][:, 0]
+        low, high = pruning._forward(asked, ends)[asked.outputs[0]]
+        slopes = pruning._slopes(asked, ends)[:, 0]
     for share in (0.0, 0.25, 1.0):
         points = np.minimum(ends[0] + share * (ends[1] - ends[0]), ends[1])
         for k, (a, b) in enumerate(points.T.tolist()):
@@ -111,7 +115,7 @@ def test_no_operation_loses_a_point_or_a_slope(name):
             box = tuple(zip(*ends[:, :, k].tolist(), strict=True))
             level = formula([fold_minus(asked, value), y - Fraction(b)], ("x", "y"))
             with np.errstate(all="ignore"):
-                own, kept = pruning._narrowed(level, ends[..., k : k + 1], 0.0)
+                own, kept = pruning._narrowed(pruning.prepared(level), ends[..., k : k + 1], 0.0)
             assert kept[0], (box, a, b)
             assert np.all((own[0, :, 0] <= [a + 1e-9, b + 1e-9]) & (own[1, :, 0] >= [a - 1e-9, b - 1e-9]))
 

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -17,7 +18,7 @@ from tmsopt.algebra.intervals import interval
 from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.global_search.conditions import Ends, Sheet, complex_pieces, rotating_frame, sheet, sheets
-from tmsopt.global_search.pruning import Box, Puzzle, check, ends, prune
+from tmsopt.global_search.pruning import Box, Puzzle, ends, prepared, prune
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
@@ -219,16 +220,13 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     names = {n: symbol(n) for n in sheet.names}
     limits = [*fold(sheet.nonnegative, names, NODES), *fold(sheet.ascending, names, NODES)]
     for name, limit in sheet.limits.items():
-        try:
-            check(limit)
-        except NotAccepted:
-            continue  # it takes no part, and is asked of every design that is found
-        limits.append(-sheet.problem.conditions[name].sign * fold(limit, names, NODES)[0])
-    equations, more = multiplied_out(sheet.equations), multiplied_out(sheet.shared)
-    for asked in (equations, more):
-        check(asked)
+        with suppress(NotAccepted):  # it takes no part, and is asked of every design that is found
+            limits.append(-sheet.problem.conditions[name].sign * fold(prepared(limit), names, NODES)[0])
+    equations, more, limited = (
+        prepared(multiplied_out(asked)) for asked in (sheet.equations, sheet.shared, formula(limits, sheet.names))
+    )
     widths = tuple(_width(*ends) for ends in box)
-    return Puzzle(equations, multiplied_out(formula(limits, sheet.names)), widths, more), box
+    return Puzzle(equations, limited, widths, more), box
 
 
 def _width(lo: float, hi: float) -> float:

@@ -4,18 +4,30 @@ An interval is an array whose first axis has the lower and the upper end. Ends t
 infinity, become infinite: an interval may be too wide, never too narrow.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 import flint
 import numpy as np
 
-from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, NotAccepted, Step
+from tmsopt.algebra.formula import (
+    CONSTANT,
+    INPUT,
+    Constant,
+    Formula,
+    Kind,
+    Node,
+    NotAccepted,
+    constant,
+    fold,
+    formula,
+    made,
+    symbol,
+)
 from tmsopt.algebra.intervals import ball, interval
-from tmsopt.algebra.kinds import INTERVALS, as_exact
+from tmsopt.algebra.kinds import INTERVALS, NODES, as_exact
 from tmsopt.algebra.rounding import UNIT
 from tmsopt.records import Array, Truth
 
@@ -27,7 +39,6 @@ _GAIN = 0.5  # of a width: a box is contracted again, not split, where a side sh
 _FEW = 64  # boxes, which take hardly longer than one
 _WIDER = 0.1  # of a width: the box in which a zero is looked for is so much wider at each end
 _NARROW = 1e-12  # of the first box: and at least so much
-_ROOT = 1e-9  # relative error of a root of NumPy, generously
 
 
 @dataclass(frozen=True)
@@ -74,16 +85,14 @@ def prune(puzzle: Puzzle, x: Array, least: float) -> Pruned:
         for asked, target in ((puzzle.equations, 0.0), (puzzle.more, 0.0), (puzzle.limits, np.inf)):
             x, kept = _narrowed(asked, x, target)
             x, before = x[..., kept], before[:, kept]
-        newton = _newton(puzzle, x)
-        x = _meet(x, newton.image)
-        keep = (x[0] <= x[1]).all(axis=0)
-        shown = keep & newton.shown
-        keep &= ~shown
+        wide, image, single, weights = _newton(puzzle, x)
+        x = _meet(x, image)
+        kept = (x[0] <= x[1]).all(axis=0)
+        shown, keep = kept & single, kept & ~single
         again = keep & (x[1] - x[0] < _GAIN * before).any(axis=0)
         cut = keep & ~again
-        parts, small = _split(x[..., cut], newton.weights[:, cut], least * _column(puzzle.widths))
-        left = np.concatenate([x[..., again], parts], axis=-1)
-        return Pruned(left, np.stack([newton.wide, newton.image])[..., shown], small)
+        parts, small = _split(x[..., cut], weights[:, cut], least * _column(puzzle.widths))
+        return Pruned(np.concatenate([x[..., again], parts], axis=-1), np.stack([wide, image])[..., shown], small)
 
 
 def _split(x: Array, weights: Array, least: Array) -> tuple[Array, Array]:
@@ -105,83 +114,57 @@ def _split(x: Array, weights: Array, least: Array) -> tuple[Array, Array]:
             return parts, small
 
 
-@dataclass(frozen=True)
-class _Newton:
-    """What Newton's operator makes of boxes.
-
-    Attributes:
-        wide: the boxes that it was applied to, somewhat wider.
-        image: where all zeros of these are; without ends where it cannot be applied.
-        shown: whether there is exactly one.
-        weights: how much the width of each variable adds to those of the equations, at most 1 each.
-    """
-
-    wide: Array
-    image: Array
-    shown: Truth
-    weights: Array
-
-
-def _newton(puzzle: Puzzle, x: Array) -> _Newton:
+def _newton(puzzle: Puzzle, x: Array) -> tuple[Array, Array, Truth, Array]:
     """Newton's operator, as it is and preconditioned.
 
     With the Jacobian J of a wider box around m, zeros have A (x − m) = −f(m) for a matrix A of J, and with Y near the
     inverse of its middle C (x − m) = −Y f(m) for a matrix C of Y J. Each row bounds each variable. Where the diagonal
     of C prevails there is one zero at most, and where its bounds are in the interior of the wider box there is one
     (Neumaier 1990, theorem 5.1.7).
+
+    Returns:
+        The wider boxes; where all their zeros are; whether there is exactly one; and for each variable how much its
+        width adds to those of the equations, at most 1 each.
     """
     first = _column(puzzle.widths)
     room = _WIDER * (x[1] - x[0]) + _NARROW * first
     wide = np.stack([x[0] - room, x[1] + room])
     middle = (wide[0] + wide[1]) / 2
     reach = np.maximum(wide[1] - middle, middle - wide[0]) * (1 + UNIT) + _TINY
-    values = _results(puzzle.equations, np.stack([middle, middle]))
-    _, slopes = _slopes(puzzle.equations, wide)
-    usable = np.isfinite(values).all(axis=(0, 1)) & np.isfinite(slopes).all(axis=(0, 1, 2)) & np.isfinite(reach).all(0)
-    share = np.where(first > 0, np.minimum((x[1] - x[0]) / np.where(first > 0, first, 1.0), 1.0), 0.0)
-    parts = np.abs(slopes).max(axis=0) * reach
-    total = parts.sum(axis=1, keepdims=True)
-    weights = np.where(usable, (parts / np.maximum(total, _TINY)).sum(axis=0) + 1e-3 * share, share)
-    growth = 1 + (x.shape[1] + 4) * UNIT
-    rest = total * growth - parts / growth + _TINY  # of an equation, what all variables but one add to it at most
-    left = -values[::-1][:, :, None]
-    move = _over(_outward(np.stack([left[0] - rest, left[1] + rest])), slopes)
-    image = _outward(middle + np.stack([move[0].max(axis=0), move[1].min(axis=0)]))
-    shown = np.zeros(x.shape[-1], dtype=bool)
+    values = _outputs(puzzle.equations, _forward(puzzle.equations, np.stack([middle, middle])), middle)[:, :, None]
+    slopes = _slopes(puzzle.equations, wide)
     centre = np.moveaxis((slopes[0] + slopes[1]) / 2, -1, 0)
-    determinants = np.linalg.det(np.where(usable[:, None, None], centre, 0.0))
-    usable &= np.isfinite(determinants) & (determinants != 0)
-    inverse = np.linalg.inv(centre[usable])
-    fine = np.isfinite(inverse).all(axis=(1, 2))
-    (at,) = np.nonzero(usable)
-    at, inverse = at[fine], inverse[fine]
-    matrix, matrix_error = _product(inverse, np.moveaxis(slopes[..., at], -1, 1))
-    step, step_error = _product(inverse, np.moveaxis(values[..., at], -1, 1)[..., None])
-    reach, middle = reach[:, at].T, middle[:, at].T
-    own = np.arange(x.shape[1])
-    diagonal, diagonal_error = matrix[:, own, own], matrix_error[:, own, own]
-    others = np.abs(matrix) + matrix_error
-    others[:, own, own] = 0.0
-    off = (step_error[..., 0] + (others @ reach[..., None])[..., 0]) * growth + _TINY
-    least = (np.abs(diagonal) - diagonal_error) * (1 - UNIT)  # of the diagonal; what is not positive says nothing
-    regular = least > 0
-    move = _outward(np.stack([-step[..., 0] - off, -step[..., 0] + off]))
-    move = _times(move, _inverse(_outward(np.stack([diagonal - diagonal_error, diagonal + diagonal_error]))))
-    found = _outward(middle + move)
-    image[..., at] = np.where(regular.T, _meet(np.moveaxis(found, 1, -1), image[..., at]), image[..., at])
-    inside = (np.abs(move).max(axis=0) < reach * (1 - 4 * UNIT) - 4 * _TINY) & regular
-    inside &= (found[0] > wide[0][:, at].T) & (found[1] < wide[1][:, at].T)
-    shown[at] = inside.all(axis=1)
-    return _Newton(wide, image, shown, weights)
+    size = np.linalg.det(centre)
+    centre[~np.isfinite(size) | (size == 0)] = np.eye(len(first))  # any matrix will do
+    inverse = np.moveaxis(np.linalg.inv(centre), 0, -1)
+    preconditioned = _moves(_product(inverse, slopes), _product(inverse, values), reach)
+    moves = np.concatenate([_moves(slopes, values, reach), preconditioned], axis=1)
+    image = _outward(middle + np.stack([moves[0].max(axis=0), moves[1].min(axis=0)]))
+    own = np.einsum("ekkm->ekm", preconditioned)
+    around = _outward(middle + own)
+    single = (np.abs(own).max(axis=0) < reach * (1 - 4 * UNIT)) & (around[0] > wide[0]) & (around[1] < wide[1])
+    parts = np.abs(slopes).max(axis=0) * reach
+    smear = (parts / np.maximum(parts.sum(axis=1, keepdims=True), _TINY)).sum(axis=0)
+    share = np.minimum((x[1] - x[0]) / np.maximum(first, _TINY), 1.0)
+    weights = np.where(np.isfinite(smear), smear + 1e-3 * share, share)
+    return wide, image, single.all(axis=0), weights
 
 
-def _product(exact: Array, intervals: Array) -> tuple[Array, Array]:
-    """Products of matrices of doubles and of intervals, as middles and bounds of the error."""
-    middle, radius = (intervals[0] + intervals[1]) / 2, (intervals[1] - intervals[0]) / 2
-    size = np.abs(exact)
-    rounded = (exact.shape[-1] + 4) * UNIT
-    error = size @ (radius * (1 + 2 * UNIT) + rounded * np.abs(middle) + _TINY)
-    return exact @ middle, error * (1 + rounded) + _TINY
+def _moves(matrix: Array, values: Array, reach: Array) -> Array:
+    """Where each equation, matrix · move + value = 0, leaves each variable that moves no farther than its reach."""
+    parts = np.abs(matrix).max(axis=0) * reach
+    growth = 1 + (len(reach) + 4) * UNIT
+    rest = parts.sum(axis=1, keepdims=True) * growth - parts / growth + _TINY  # of all variables but one
+    return _over(_outward(np.stack([-values[1] - rest, -values[0] + rest])), matrix)
+
+
+def _product(exact: Array, x: Array) -> Array:
+    """Products of matrices of doubles and of intervals, with a bound of the rounding of sums in any order."""
+    middle, rounding = (x[0] + x[1]) / 2, (len(exact) + 4) * UNIT
+    reach = (x[1] - x[0]) * (0.5 + UNIT) + rounding * np.abs(middle) + _TINY
+    centre, error = (np.einsum("ijm,jkm->ikm", *own) for own in ((exact, middle), (np.abs(exact), reach)))
+    error = error * (1 + rounding) + _TINY
+    return _outward(np.stack([centre - error, centre + error]))
 
 
 def _column(numbers: Sequence[float]) -> Array:
@@ -255,191 +238,45 @@ def _square(a: Array) -> Array:
     return np.maximum(_outward(size * size), 0.0)
 
 
-def _power(a: Array, exponent: int) -> Array:
-    if exponent < 0:
-        return _inverse(_power(a, -exponent))
-    if exponent == 0:
-        return np.ones_like(a)
-    if exponent % 2 == 0:
-        return _square(_power(a, exponent // 2))
-    low, high = (_times(end, _square(_power(end, exponent // 2))) for end in (a[[0, 0]], a[[1, 1]]))
-    return np.stack([low[0], high[1]])
-
-
 def _square_root(a: Array) -> Array:
     return np.maximum(_outward(np.sqrt(np.maximum(a, 0.0))), 0.0)
 
 
-def _function(name: str) -> Callable[[Array], Array]:
-    """A function by balls, one interval at a time."""
-    operation = INTERVALS.operations[name]
+def _by_balls(function: Callable[[Any], Any]) -> Callable[[Array], Array]:
+    """A function of balls, one interval at a time."""
 
     def applied(a: Array) -> Array:
-        ends = [interval(operation(ball((low, high)))) for low, high in a.reshape(2, -1).T.tolist()]
+        ends = [interval(function(ball((low, high)))) for low, high in a.reshape(2, -1).T.tolist()]
         return np.array(ends).T.reshape(a.shape)
 
     return applied
 
 
-_FUNCTIONS = {name: _function(name) for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")}
-_QUOTIENTS = dict.fromkeys(("div", "quotient", "ratio"), _over)
-_ONE = np.ones((2, 1))
-_SIGNS = np.array([[-1.0], [1.0]])
-
-_VALUES: Mapping[str, Callable[..., Array]] = {
-    "add": _plus,
-    "sub": _minus,
-    "mul": _times,
-    "neg": _negative,
-    "square": _square,
-    "sqrt": _square_root,
-    "abs": _magnitude,
-    **_QUOTIENTS,
-    **_FUNCTIONS,
-}
-
-_SLOPES: Mapping[str, Callable[[Array, Array], Array]] = {
-    "square": lambda a, _: _plus(a, a),
-    "sqrt": lambda _, r: _inverse(_plus(r, r)),
-    "abs": lambda a, _: np.where(_holds_zero(a), _SIGNS, np.sign(a)),
-    "exp": lambda _, r: r,
-    "log": lambda a, _: np.where(a[0] > 0, _inverse(a), _SIGNS * np.inf),
-    "sin": lambda a, _: _FUNCTIONS["cos"](a),
-    "cos": lambda a, _: _negative(_FUNCTIONS["sin"](a)),
-    "tan": lambda _, r: _plus(_ONE, _square(r)),
-    "atan": lambda a, _: _inverse(_plus(_ONE, _square(a))),
-    "asin": lambda a, _: _inverse(_square_root(_minus(_ONE, _square(a)))),
-    "acos": lambda a, _: _negative(_inverse(_square_root(_minus(_ONE, _square(a))))),
-}
-"""Of functions of one operand, from it and the result; infinite where there is none somewhere."""
+# Operations.
 
 
-def _results(asked: Formula, x: Array) -> Array:
-    """Ranges of the outputs of a formula over boxes."""
-    found = _forward(asked, x)
-    return np.array([np.broadcast_to(found[o], x[:, 0].shape) for o in asked.outputs]).swapaxes(0, 1)
+@dataclass(frozen=True)
+class _Operation:
+    """An operation on intervals.
 
-
-def _forward(asked: Formula, x: Array) -> list[Array]:
-    """Ranges of all steps."""
-    found: list[Array] = []
-    for step in asked.steps:
-        found.append(_value(asked, step, found, x))
-    return found
-
-
-def _value(asked: Formula, step: Step, found: Sequence[Array], x: Array) -> Array:
-    if step.op == INPUT:
-        return x[:, asked.names.index(step.value)]
-    if step.op == CONSTANT:
-        return _constant(step.value)
-    if step.op == "pow":
-        return _power(found[step.operands[0]], int(asked.steps[step.operands[1]].value))
-    return _VALUES[step.op](*(found[o] for o in step.operands))
-
-
-@lru_cache(maxsize=4096)
-def _constant(value: Constant) -> Array:
-    return np.array(ends(as_exact(value)))[:, None]
-
-
-def _slopes(asked: Formula, x: Array) -> tuple[list[Array], Array]:
-    """Ranges of all steps, and of the slopes of the outputs: shape (2, outputs, variables, boxes)."""
-    found: list[Array] = []
-    slopes: list[Array | None] = []
-    for step in asked.steps:
-        found.append(_value(asked, step, found, x))
-        slopes.append(_slope(asked, step, found, slopes, x))
-    nothing = np.zeros((2, *x.shape[1:]))
-    each = [nothing if (own := slopes[o]) is None else np.broadcast_to(own, nothing.shape) for o in asked.outputs]
-    return found, np.array(each).swapaxes(0, 1)
-
-
-def _slope(  # noqa: PLR0911
-    asked: Formula, step: Step, found: Sequence[Array], slopes: Sequence[Array | None], x: Array
-) -> Array | None:
-    """Slopes of one step with respect to all variables; None for a constant."""
-    if step.op == INPUT:
-        own = np.zeros((2, x.shape[1], 1))
-        own[:, asked.names.index(step.value)] = 1.0
-        return own
-    known = [slopes[o] for o in step.operands]
-    if all(own is None for own in known):
-        return None
-    a, b = known if len(known) == 2 else (known[0], None)
-    values = [found[o][:, None] for o in step.operands]
-    match step.op:
-        case "add" | "sub":
-            if a is None or b is None:
-                return b if step.op == "add" and a is None else a if b is None else _negative(b)
-            return _VALUES[step.op](a, b)
-        case "neg":
-            return None if a is None else _negative(a)
-        case "mul":
-            parts = [_times(own, v) for own, v in zip(known, reversed(values), strict=True) if own is not None]
-            return parts[0] if len(parts) == 1 else _plus(*parts)
-        case "div" | "quotient" | "ratio":
-            less = None if b is None else _negative(_times(found[-1][:, None], b))
-            parts = [own for own in (a, less) if own is not None]
-            return _over(parts[0] if len(parts) == 1 else _plus(*parts), values[1])
-        case "pow":
-            n = int(asked.steps[step.operands[1]].value)
-            return None if a is None else _times(a, _times(n * _ONE[:, None], _power(values[0], n - 1)))
-    return None if a is None else _times(a, _SLOPES[step.op](found[step.operands[0]], found[-1])[:, None])
-
-
-# Contraction.
-
-
-def _narrowed(asked: Formula, x: Array, most: float) -> tuple[Array, Truth]:
-    """Boxes around the points at which all outputs are from 0 to `most`, and which of them may have any.
-
-    Forward through the steps and backward, each operand from the result and the other one (Benhamou et al. 1999).
+    Attributes:
+        value: range of the result.
+        slopes: from the operands and the result, slopes with respect to each operand; infinite where there are none.
+        back: from the result and the operands, where each operand is.
     """
-    found = _forward(asked, x)
-    kept = np.ones(x.shape[-1], dtype=bool)
 
-    def meet(k: int, own: Array) -> None:
-        found[k] = _meet(found[k], own)
-        np.logical_and(kept, found[k][0] <= found[k][1], out=kept)
+    value: Callable[..., Array]
+    slopes: Callable[..., tuple[Array, ...]]
+    back: Callable[..., tuple[Array, ...]]
 
-    target = np.array([[0.0], [most]])
-    for o in asked.outputs:
-        meet(o, target)
-    own = x.copy()
-    for k in range(len(asked.steps) - 1, -1, -1):
-        step = asked.steps[k]
-        if step.op == INPUT:
-            own[:, asked.names.index(step.value)] = found[k]
-        elif step.op == "pow":
-            meet(step.operands[0], _root(found[k], int(asked.steps[step.operands[1]].value)))
-        elif step.op in _BACKWARD:
-            operands = [found[o] for o in step.operands]
-            for o, part in zip(step.operands, _BACKWARD[step.op](found[k], *operands), strict=True):
-                meet(o, part)
-    return own, kept
+
+_ONE, _SIGNS = np.ones((2, 1)), np.array([[-1.0], [1.0]])
+_ANYTHING = _SIGNS * np.inf
 
 
 def _factor(result: Array, other: Array) -> Array:
     """What times another is a result: anything where both may be 0."""
-    return np.where(_holds_zero(result) & _holds_zero(other), _SIGNS * np.inf, _over(result, other))
-
-
-def _root(result: Array, exponent: int) -> Array:
-    """What a power is of."""
-    if exponent <= 0:
-        return _SIGNS * np.inf
-    size = np.abs(result) ** (1 / exponent)
-    room = _ROOT * size + _TINY
-    if exponent % 2 == 0:
-        return np.asarray(_SIGNS * (size + room).max(axis=0))
-    return np.asarray(np.sign(result) * size + _SIGNS * room)
-
-
-def _of_square(result: Array, a: Array) -> tuple[Array]:
-    """The operand of a square, or of a magnitude, by the root."""
-    low, high = _square_root(result)
-    return (_of_magnitude(np.stack([low, high]), a)[0],)
+    return np.where(_holds_zero(result) & _holds_zero(other), _ANYTHING, _over(result, other))
 
 
 def _of_magnitude(result: Array, a: Array) -> tuple[Array]:
@@ -447,34 +284,125 @@ def _of_magnitude(result: Array, a: Array) -> tuple[Array]:
     return (np.stack([np.where(a[0] > -low, low, -high), np.where(a[1] < low, -low, high)]),)
 
 
-_BACKWARD: Mapping[str, Callable[..., tuple[Array, ...]]] = {
-    "add": lambda r, a, b: (_minus(r, b), _minus(r, a)),
-    "sub": lambda r, a, b: (_plus(r, b), _minus(a, r)),
-    "mul": lambda r, a, b: (_factor(r, b), _factor(r, a)),
-    "neg": lambda r, _: (_negative(r),),
-    "square": _of_square,
-    "abs": _of_magnitude,
-    "sqrt": lambda r, _: (_square(np.maximum(r, 0.0)),),
-    "asin": lambda _, a: (_SIGNS + 0 * a,),
-    "acos": lambda _, a: (_SIGNS + 0 * a,),
-    **dict.fromkeys(_QUOTIENTS, lambda r, a, b: (_times(r, b), _factor(a, r))),
+def _function(
+    name: str, value: Callable[..., Array] | None = None, back: Any = lambda _, a: (_ANYTHING,)
+) -> _Operation:
+    """A function of one operand, by balls and series of balls."""
+    own = INTERVALS.operations[name]
+    slope = _by_balls(lambda x: own(flint.arb_series([x, 1], prec=2))[1])
+    return _Operation(value or _by_balls(own), lambda a, _: (slope(a),), back)
+
+
+_QUOTIENT = _Operation(
+    _over,
+    lambda a, b, r: (_inverse(b), _negative(_over(r, b))),
+    lambda r, a, b: (_times(r, b), _factor(a, r)),
+)
+_OPERATIONS = {
+    "add": _Operation(_plus, lambda a, b, r: (_ONE, _ONE), lambda r, a, b: (_minus(r, b), _minus(r, a))),
+    "sub": _Operation(_minus, lambda a, b, r: (_ONE, -_ONE), lambda r, a, b: (_plus(r, b), _minus(a, r))),
+    "mul": _Operation(_times, lambda a, b, r: (b, a), lambda r, a, b: (_factor(r, b), _factor(r, a))),
+    "neg": _Operation(_negative, lambda a, r: (-_ONE,), lambda r, a: (_negative(r),)),
+    "square": _Operation(_square, lambda a, r: (_plus(a, a),), lambda r, a: _of_magnitude(_square_root(r), a)),
+    "abs": _function("abs", _magnitude, _of_magnitude),
+    "sqrt": _function("sqrt", _square_root, lambda r, _: (_square(np.maximum(r, 0.0)),)),
+    **dict.fromkeys(("div", "quotient", "ratio"), _QUOTIENT),
+    **{name: _function(name) for name in ("exp", "log", "sin", "cos", "tan", "atan")},
+    **{name: _function(name, back=lambda _, a: (_SIGNS,)) for name in ("asin", "acos")},
 }
 
 
-def check(asked: Formula) -> None:
-    """Refuse a formula that branch and prune cannot take.
+def prepared(asked: Formula) -> Formula:
+    """A formula in operations that branch and prune has.
 
     Raises:
-        NotAccepted: with the name of an operation.
+        NotAccepted: for another one, with its name.
     """
-    for step in asked.steps:
-        exponent = asked.steps[step.operands[1]].value if step.op == "pow" else 1
-        if (
-            step.op not in {INPUT, CONSTANT, "pow", *_VALUES}
-            or not isinstance(exponent, int | Fraction)
-            or exponent % 1
-        ):
-            raise NotAccepted(step.op)
+    known = {name: NODES.operations[name] for name in _OPERATIONS} | {"pow": _power}
+    own = {name: symbol(name) for name in asked.names}
+    return formula(fold(asked, own, Kind(known, NODES.constant)), asked.names)
+
+
+def _power(a: Node, b: Node) -> Node:
+    """A power by squares and products."""
+    n = b.fraction
+    if n is None or n.denominator > 1:
+        raise NotAccepted("pow")
+    if n < 0:
+        return 1 / _power(a, -b)
+    if n == 0:
+        return constant(1)
+    half = made("square", _power(a, constant(n // 2))) if n > 1 else constant(1)
+    return half * a if n % 2 else half
+
+
+def _forward(asked: Formula, x: Array) -> list[Array]:
+    """Ranges of all steps of a formula over boxes."""
+    found: list[Array] = []
+    for op, operands, value in asked.steps:
+        if op == INPUT:
+            found.append(x[:, asked.names.index(value)])
+        elif op == CONSTANT:
+            found.append(_enclosed(value))
+        else:
+            found.append(_OPERATIONS[op].value(*(found[o] for o in operands)))
+    return found
+
+
+@lru_cache(maxsize=4096)
+def _enclosed(value: Constant) -> Array:
+    return np.array(ends(as_exact(value)))[:, None]
+
+
+def _outputs(asked: Formula, found: Sequence[Any], like: Array) -> Array:
+    """Outputs among the steps, of one shape, with the ends first."""
+    each = [
+        np.broadcast_to(found[o], (2, *np.broadcast_shapes(found[o].shape[1:], like.shape[-1:]))) for o in asked.outputs
+    ]
+    return np.stack(each, axis=1)
+
+
+def _slopes(asked: Formula, x: Array) -> Array:
+    """Ranges of the slopes of the outputs over boxes: shape (2, outputs, variables, boxes)."""
+    values, nothing = _forward(asked, x), np.zeros((2, *x.shape[1:]))
+    found: list[Array | None] = []
+    for k, (op, operands, value) in enumerate(asked.steps):
+        own: Array | None = None
+        if op == INPUT:
+            own = nothing.copy()
+            own[:, asked.names.index(value)] = 1.0
+        elif any(found[o] is not None for o in operands):
+            parts = _OPERATIONS[op].slopes(*(values[o] for o in operands), values[k])
+            for o, part in zip(operands, parts, strict=True):
+                if (inner := found[o]) is not None:
+                    outer = inner if part is _ONE else _times(inner, part[:, None])
+                    own = outer if own is None else _plus(own, outer)
+        found.append(own)
+    return np.stack([nothing if (own := found[o]) is None else own for o in asked.outputs], axis=1)
+
+
+def _narrowed(asked: Formula, x: Array, most: float) -> tuple[Array, Truth]:
+    """Boxes around the points at which all outputs are from 0 to `most`, and which of them may have any.
+
+    Forward through the steps and backward, each operand from the result and the other one (Benhamou et al. 1999).
+    """
+    found, narrow = _forward(asked, x), x.copy()
+    kept = np.ones(x.shape[-1], dtype=bool)
+
+    def meet(k: int, own: Array) -> None:
+        found[k] = _meet(found[k], own)
+        np.logical_and(kept, found[k][0] <= found[k][1], out=kept)
+
+    for o in asked.outputs:
+        meet(o, np.array([[0.0], [most]]))
+    for k, (op, operands, value) in reversed([*enumerate(asked.steps)]):
+        if op == INPUT:
+            narrow[:, asked.names.index(value)] = found[k]
+        elif op != CONSTANT:
+            each = _OPERATIONS[op].back(found[k], *(found[o] for o in operands))
+            for o, part in zip(operands, each, strict=True):
+                meet(o, part)
+    return narrow, kept
 
 
 def ends(number: Any) -> tuple[float, float]:
