@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "progress", "files", "deprecated", "executor", "killable", "versions", "laws"),
+    ("errors", "records", "progress", "files", "deprecated", "executor", "killable", "threads", "versions", "laws"),
     ("algebra",),
     ("roots",),
     ("models",),

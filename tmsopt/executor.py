@@ -22,6 +22,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Protocol, Self
 
 from tmsopt.errors import Fault, InputError
+from tmsopt.threads import ONE_THREAD
 
 PATIENCE = 10.0
 """s for a Dask scheduler to answer."""
@@ -35,8 +36,7 @@ _AHEAD = 2  # batches in flight per worker: one is solved while the next is on i
 _LOOK = 1.0  # s between looks at the workers; some systems do not hear Ctrl-C while they wait
 _TRIES = 2  # crashes after which an item is given up that had all workers for itself
 _STILLBORN = 3  # pools in a row whose workers end before they can do anything; then it is not chance
-_THREADS = ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMEXPR", "NUMBA")
-_ENVIRONMENT = {f"{name}_NUM_THREADS".replace("MAXIMUM_NUM", "MAXIMUM"): "1" for name in _THREADS} | {
+_ENVIRONMENT = ONE_THREAD | {
     "PYTHONFAULTHANDLER": "",  # or loky prints a traceback of every crash
     "LOKY_MAX_MEMORY_LEAK_SIZE": "1e15",  # or it replaces workers that have built many solvers, with a warning
 }

@@ -1,4 +1,4 @@
-"""A process for calls that may crash or have to end at a deadline: of SCIP and of codac.
+"""A process for calls that may crash or have to end at a deadline: of SCIP.
 
 It is no child of `multiprocessing`, for workers of Dask may have none of those.
 """

@@ -23,7 +23,7 @@ NEEDED = (
     "loky",
     "filelock",
 )
-EXTRA = ("pyscipopt", "codac", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
+EXTRA = ("pyscipopt", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
 """Distributions that tmsopt needs, and those of its extras certify, cluster and data."""
 
 

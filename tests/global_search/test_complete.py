@@ -1,7 +1,6 @@
 """Designs that are proved to be all: closed forms, counts by elimination, limits, and what cannot be decided."""
 
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 import sympy as sp
 
 import tmsopt
-from tmsopt.global_search import available, completeness
+from tmsopt.global_search import completeness
 from tmsopt.models import from_coefficients
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -20,7 +19,7 @@ DIGITS = mpmath.mpf(10) ** -22  # of 25 that are given
 
 x, y, z = (ca.SX.sym(n) for n in "xyz")
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="codac is not installed")]
+pytestmark = pytest.mark.slow
 
 
 def of_file(name, **changes):
@@ -267,31 +266,15 @@ def test_what_cannot_be_written_is_said():
 
 
 @pytest.mark.parametrize(("most", "ends"), [(2, [-2.0, 2.0]), (1.5, [-2.0])])
-def test_a_limit_that_codac_cannot_take_is_asked_of_every_design(most, ends):
-    """A logarithm, at which codac ends its process: log 7 = 1.946."""
-    found = of_row([1, x, 1 + 0 * x], "EP2", constraints={"most": f"log(x + 5) <= {most}"})
+@pytest.mark.parametrize("text", ["log(x + 5) <= {}", "min(log(x + 5), 3) <= {}"])
+def test_a_limit_is_asked_of_every_design(text, most, ends):
+    """Also where branch and prune cannot take it, as the lesser of two: log 7 = 1.946."""
+    found = of_row([1, x, 1 + 0 * x], "EP2", constraints={"most": text.format(most)})
     assert found.complete
     assert sorted(float(d["x"].value) for d in found.designs) == pytest.approx(ends, abs=1e-12)
 
 
-def test_without_codac(monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    every = tmsopt.solve_all(PROBLEMS / "coupled_pair.toml")
-    assert every.completeness
-    assert every.completeness.reason == "codac is not installed; pip install 'tmsopt[certify]' brings it"
-    assert every.coverage
-    assert len(every.solutions) == 4
-
-
-# The process
-
-
-def test_doubles_are_rounded_here_as_they_were():
-    """Codac has them rounded upwards in a process that imports it."""
-    of_row([1, x, 1], "EP2")
-    assert "codac" not in sys.modules
-    assert 1.0 + 1e-20 == 1.0
-    assert math.nextafter(1.0, 2.0) > 1.0 + 1e-17
+# What is told
 
 
 def test_progress_is_told_in_seconds():

@@ -1,19 +1,21 @@
 """What branch and prune is made of: boxes that never lose a zero, and identities of angles."""
 
+import math
 from fractions import Fraction
 from importlib import import_module
 
 import numpy as np
 import pytest
 
-from tmsopt.global_search import Puzzle, available, prune
-from tmsopt.killable import Killable
+from tmsopt.algebra import NODES, fold
+from tmsopt.global_search import Puzzle, prune
 
+pruning = import_module("tmsopt.global_search.pruning")
 formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))
 multiplied_out = import_module("tmsopt.algebra.identity").multiplied_out
 
 NAMES = ("x", "y", "z")
-nothing = formula([], NAMES)
+nothing = ()
 ROUNDS = 60
 
 
@@ -34,40 +36,111 @@ def drawn(rng, depth):
     return one * other, lambda at: f(at) * g(at)
 
 
-@pytest.mark.skipif(not available(), reason="codac is not installed")
+def pruned(equations, box, least=1e-7, turns=60, limits=nothing):
+    """Arrays that hold what is left of a box."""
+    names = equations.names
+    equations = pruning.prepared(equations)
+    puzzle = Puzzle(
+        equations, pruning.prepared(formula(limits or [], names)), tuple(hi - lo for lo, hi in box), formula([], names)
+    )
+    waiting, kept = np.array(box).T[..., None], []
+    for _ in range(turns):
+        found = prune(puzzle, waiting[..., -512:], least)
+        kept += [found.shown[1], found.small]
+        waiting = np.concatenate([waiting[..., :-512], found.left], axis=-1)
+    return np.concatenate([*kept, waiting], axis=-1)
+
+
+def holds(boxes, at):
+    """Whether some box has a point of fractions."""
+    return any(all(lo <= c <= hi for lo, hi, c in zip(*box, at, strict=True)) for box in np.moveaxis(boxes, -1, 0))
+
+
 def test_no_box_loses_a_zero():
     """Systems with a zero planted at a fraction, mid in the box or on an end of it, singular ones among them."""
-    worker = Killable()
     rng = np.random.default_rng(0)
-    try:
-        for _ in range(ROUNDS):
-            at = [Fraction(int(rng.integers(-4, 5)), 2) for _ in NAMES]
-            equations = []
-            for left, function in (drawn(rng, 3) for _ in NAMES):
-                equations.append(left - function(at))
-            reach = [(float(rng.choice([0, 1, 2.5])), float(rng.choice([0, 0.5, 3]))) for _ in NAMES]
-            box = tuple((float(c) - lo, float(c) + hi) for c, (lo, hi) in zip(at, reach, strict=True))
-            asked = multiplied_out(formula(equations, NAMES))
-            puzzle = Puzzle(asked, nothing, tuple(hi - lo for lo, hi in box), nothing)
-            pruned = worker.call(prune, puzzle, [box], [], 0.2, 50, 1e-7).result(timeout=60)
-            left = [*pruned.left, *pruned.met, *pruned.small]
-            assert any(all(lo <= c <= hi for c, (lo, hi) in zip(at, b, strict=True)) for b in left)
-    finally:
-        worker.end()
+    for _ in range(ROUNDS):
+        at = [Fraction(int(rng.integers(-4, 5)), 2) for _ in NAMES]
+        equations = []
+        for left, function in (drawn(rng, 3) for _ in NAMES):
+            equations.append(left - function(at))
+        reach = [(float(rng.choice([0, 1, 2.5])), float(rng.choice([0, 0.5, 3]))) for _ in NAMES]
+        box = tuple((float(c) - lo, float(c) + hi) for c, (lo, hi) in zip(at, reach, strict=True))
+        assert holds(pruned(multiplied_out(formula(equations, NAMES)), box, turns=12), at)
 
 
-@pytest.mark.skipif(not available(), reason="codac is not installed")
+FUNCTIONS = {
+    **{name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")},
+    "abs": abs,
+    "neg": lambda x: -x,
+    "square": lambda x: x * x,
+}
+POWERS = (-3, -2, -1, 2, 3, 4, 5)
+
+
+@pytest.mark.parametrize("name", [*FUNCTIONS, *POWERS, "div", "sub"])
+def test_no_operation_loses_a_point_or_a_slope(name):
+    """Ranges, slopes and contraction hold what a point of the box has, for boxes with and without their ends in order."""
+    rng = np.random.default_rng(0)
+    x, y = symbol("x"), symbol("y")
+    if name in ("div", "sub"):
+        asked, function = (
+            formula([made(name, x, y)], ("x", "y")),
+            {"div": float.__truediv__, "sub": float.__sub__}[name],
+        )
+    elif name in POWERS:
+        asked, function = formula([x**name], ("x", "y")), lambda a, _: a**name
+    else:
+        asked, function = formula([made(name, x)], ("x", "y")), lambda a, _: FUNCTIONS[name](a)
+    ends = np.sort(rng.choice([-2.0, -0.7, 0.0, 0.3, 0.9, 2.5], (2, 2, 400)), axis=0)
+    asked = pruning.prepared(asked)
+    with np.errstate(all="ignore"):
+        low, high = pruning._forward(asked, ends)[asked.outputs[0]]
+        slopes = pruning._slopes(asked, ends)[:, 0]
+    for share in (0.0, 0.25, 1.0):
+        points = np.minimum(ends[0] + share * (ends[1] - ends[0]), ends[1])
+        for k, (a, b) in enumerate(points.T.tolist()):
+            try:
+                value = function(a, b)
+            except (ValueError, ZeroDivisionError):
+                continue
+            assert low[k] <= value <= high[k]
+            step = 1e-6
+            try:
+                slope = (function(a + step, b) - function(a - step, b)) / (2 * step)
+            except (ValueError, ZeroDivisionError):
+                continue
+            if np.isfinite(slopes[:, :, k]).all() and ends[0, 0, k] + step <= a <= ends[1, 0, k] - step:
+                assert slopes[0, 0, k] - 1e-4 <= slope <= slopes[1, 0, k] + 1e-4
+            box = tuple(zip(*ends[:, :, k].tolist(), strict=True))
+            level = formula([fold_minus(asked, value), y - Fraction(b)], ("x", "y"))
+            with np.errstate(all="ignore"):
+                own, kept = pruning._narrowed(pruning.prepared(level), ends[..., k : k + 1], 0.0)
+            assert kept[0], (box, a, b)
+            assert np.all((own[0, :, 0] <= [a + 1e-9, b + 1e-9]) & (own[1, :, 0] >= [a - 1e-9, b - 1e-9]))
+
+
+def fold_minus(asked, value):
+    """A formula less a number, as a node."""
+    return fold(asked, {n: symbol(n) for n in asked.names}, NODES)[0] - Fraction(value)
+
+
+def test_zeros_without_limits_and_where_functions_end():
+    """A variable without ends, x = y² and y = 3; sqrt(x − 1) = 1; |x| = 2 within what a limit leaves."""
+    x, y = symbol("x"), symbol("y")
+    left = pruned(formula([x - y * y, y - 3], ("x", "y")), ((-np.inf, np.inf), (-10.0, 10.0)))
+    assert np.allclose(left[..., 0].T, [[9, 9], [3, 3]], atol=1e-6)
+    (ends,) = pruned(formula([made("sqrt", x - 1) - 1], ("x",)), ((-5.0, 5.0),)).T[0]
+    assert ends == pytest.approx([2, 2], abs=1e-6)
+    boxes = pruned(formula([made("abs", x) - 2], ("x",)), ((-5.0, 5.0),), limits=[-x])
+    assert holds(boxes, [-2])
+    assert not holds(boxes, [2])
+
+
 @pytest.mark.parametrize("power", [-1, -3])
 def test_a_pole_has_no_slope(power):
     """x⁻¹ + 1 falls on both sides of 0, but not from one to the other: by slopes alone the zero at −1 would be lost."""
-    worker = Killable()
-    asked, box = formula([symbol("x") ** power + 1], ("x",)), ((-2.0, 2.1),)
-    none = formula([], ("x",))
-    try:
-        pruned = worker.call(prune, Puzzle(asked, none, (4.1,), none), [box], [], 1.0, 50, 1e-7).result(timeout=60)
-    finally:
-        worker.end()
-    assert any(lo <= -1 <= hi for ((lo, hi),) in (*pruned.left, *pruned.met, *pruned.small))
+    assert holds(pruned(formula([symbol("x") ** power + 1], ("x",)), ((-2.0, 2.1),)), [-1])
 
 
 def test_identities_of_angles():

@@ -14,14 +14,12 @@ import pytest
 from helpers.javascript import run
 
 from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, Bounded, NotAccepted, fold
-from tmsopt.global_search import available
-from tmsopt.killable import Killable
 from tmsopt.models import Values, controlled, from_coefficients, from_hamiltonian, from_matrices, tms, whipple
 
 formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))
 multiplied_out = import_module("tmsopt.algebra.identity").multiplied_out
 function = import_module("tmsopt.explorer.javascript").function
-translation = import_module("tmsopt.global_search.translation")
+pruning, translation = (import_module(f"tmsopt.global_search.{n}") for n in ("pruning", "translation"))
 
 POINTS, FEW = 1000, 20
 COUNTS = (FEW, pytest.param(POINTS, marks=[pytest.mark.slow, pytest.mark.long]))
@@ -59,7 +57,7 @@ def asked(name, of, tangents=False):
 
 
 def coefficients_of(name, of):
-    """The places of the coefficients among these; none where codac lacks a function that they have."""
+    """The places of the coefficients among these; none where pruning lacks a function that they have."""
     model = MODELS[name]
     names = list(model.quantity_names(model.sets[of]))
     return [names.index(n) for n in model.coefficient_names() if name != "coefficients"]
@@ -172,44 +170,24 @@ _multiplied_out = lru_cache(maxsize=1)(multiplied_out)
 HOLDS = {"intervals": _by_intervals, "scip": _by_scip, "fractions": _by_fractions}
 
 
-@pytest.mark.skipif(not available(), reason="codac is not installed")
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize(("name", "of"), SETS)
-def test_codac_holds_the_ball(name, of, count):
-    """In a process of its own, for codac changes how doubles are rounded; it takes the coefficients at least."""
+def test_intervals_of_branch_and_prune_hold_the_ball(name, of, count):
+    """Many boxes at once, with slopes; they take the coefficients at least."""
     own, columns, needed = asked(name, of, tangents=True), drawn(name, of, count), coefficients_of(name, of)
-    exact, worker = balls(own, columns, count), Killable()
-    parts = [own.part([o]) for o in own.outputs]
-    points = [{n: float(x[j]) for n, x in columns.items()} for j in range(count)]
-    try:
-        found = worker.call(ranges_by_codac, parts, points).result(timeout=1000)
-    finally:
-        worker.end()
-    for k, row in enumerate(found):
-        assert k not in needed or row.count(None) < count, k
-        for j, over in enumerate(row):
-            if over is not None and exact[j][k].is_finite():
-                assert flint.arb(over[0]).union(flint.arb(over[1])).overlaps(exact[j][k]), k
-
-
-def ranges_by_codac(parts, points):
-    """The range of each formula about each point; None of what codac does not take, or where it knows no end."""
-    import codac
-
-    pruning = import_module("tmsopt.global_search.pruning")
-    found = []
-    for part in parts:
+    exact, points = balls(own, columns, count), np.array([columns[n] for n in own.names])
+    for k, output in enumerate(own.outputs):
+        part = own.part([output])
         try:
-            pruning.check(part)
+            part = pruning.prepared(part)
         except NotAccepted:
-            found.append([None] * len(points))
+            assert k not in needed
             continue
-        x = codac.VectorVar(len(part.names))
-        own, row = codac.AnalyticFunction([x], *pruning._expressions(codac, part, x)), []
-        for point in points:
-            box = codac.IntervalVector([[point[n] - 1e-12, point[n] + 1e-12] for n in part.names])
-            over = own.eval(codac.EvalMode.NATURAL, box)
-            known = not over.is_empty() and not over.is_unbounded()
-            row.append((over.lb(), over.ub()) if known else None)
-        found.append(row)
-    return found
+        with np.errstate(all="ignore"):
+            found = pruning._forward(part, np.stack([points - 1e-12, points + 1e-12]))[part.outputs[0]]
+        low, high = np.broadcast_to(found, (2, count))
+        known = [j for j in range(count) if np.isfinite([low[j], high[j]]).all()]
+        assert known or k not in needed
+        for j in known:
+            if exact[j][k].is_finite():
+                assert flint.arb(low[j]).union(flint.arb(high[j])).overlaps(exact[j][k]), k

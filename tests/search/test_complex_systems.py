@@ -6,6 +6,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+import sympy as sp
 from click.testing import CliRunner
 
 import tmsopt
@@ -79,6 +80,62 @@ def test_all_exceptional_points_of_a_dimer_are_counted():
     assert every.complete
     assert sorted(s.parameters["k"] for s in every.solutions) == pytest.approx([-0.4, 0.4], abs=EXACT)
     assert {s.structure for s in every.solutions} == {"EP2"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2018])
+def test_all_exceptional_points_of_a_complex_pencil_are_the_roots_of_the_discriminant(seed):
+    """det(ω − H0 − z H1) has a double root where its discriminant, of degree 6 in z = x + i y, is 0."""
+    rng = np.random.default_rng(seed)
+    one, other = (rng.integers(-200, 201, (2, 3, 3)) for _ in range(2))
+    entries = [
+        [
+            f"{one[0, i, j]}/100 + {one[1, i, j]}/100*1j + (x + 1j*y)*({other[0, i, j]}/100 + {other[1, i, j]}/100*1j)"
+            for j in range(3)
+        ]
+        for i in range(3)
+    ]
+    z, w = sp.symbols("z w")
+    hundredth = sp.Rational(1, 100)
+    own = sp.Matrix(
+        3, 3, lambda i, j: hundredth * sum(s * (m[0, i, j] + sp.I * m[1, i, j]) for s, m in ((1, one), (z, other)))
+    )
+    discriminant = sp.Poly(sp.discriminant(sp.expand(own.charpoly(w).as_expr()), w), z)
+    assert discriminant.degree() == 6
+    inside = [c for c in map(complex, discriminant.nroots(n=30, maxsteps=500)) if max(abs(c.real), abs(c.imag)) < 2]
+    free = {"x": (-2, 2), "y": (-2, 2)}
+    every = tmsopt.solve_all(tmsopt.Problem(from_hamiltonian(entries), free=free, locate="EP2"))
+    assert every.complete
+    assert all(every.proved)
+    found = [complex(s.parameters["x"], s.parameters["y"]) for s in every.solutions]
+    assert len(found) == len(inside)
+    assert all(min(abs(c - d) for d in inside) < EXACT for c in found)
+    for solution in every.solutions:
+        H = (
+            one[0]
+            + 1j * one[1]
+            + complex(solution.parameters["x"], solution.parameters["y"]) * (other[0] + 1j * other[1])
+        )
+        eigenvalues = np.linalg.eigvals(H / 100)
+        gap = min(abs(a - b) for k, a in enumerate(eigenvalues) for b in eigenvalues[:k])
+        assert gap < 1e-5  # the root of the roundings
+        assert [z.multiplicity for z in solution.eigenfrequencies if z.multiplicity > 1] in ([2], [])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("far", [0.0, 1000.0])
+def test_all_real_eigenfrequencies_and_all_triple_ones(far):
+    """Im ω = 0 where g l = k² of a lossy and an amplified mode; three meet at g² = 2 in a chain, whatever its carrier."""
+    dimer = from_hamiltonian([[f"{far} + 1j*g", 1], [1, f"{far} - 2j"]])
+    every = tmsopt.solve_all(tmsopt.Problem(dimer, free={"g": (0.1, 1.5)}, locate="weave"))
+    assert every.complete
+    assert [s.parameters["g"] for s in every.solutions] == [pytest.approx(0.5, abs=1e-9)]
+    rows = [[f"{far} + d + 1j*g", 1, 0], [1, far, 1], [0, 1, f"{far} + e - 1j*l"]]
+    free = {"d": (-1, 1), "e": (-1, 1), "g": (0.5, 2.0), "l": (0.5, 2.0)}
+    every = tmsopt.solve_all(tmsopt.Problem(from_hamiltonian(rows), free=free, locate="EP3"))
+    assert every.complete
+    assert [s.parameters["g"] for s in every.solutions] == [pytest.approx(math.sqrt(2), abs=1e-9)]
+    assert every.solutions[0].structure == "EP3"
 
 
 def test_meetings_along_a_parameter_are_those_of_the_matrix():

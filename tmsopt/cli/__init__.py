@@ -9,6 +9,8 @@ import os
 import signal
 import sys
 
+from tmsopt.threads import ONE_THREAD
+
 TYPE_CHECKING = False  # typing takes as long to load as all else here
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,11 +22,15 @@ if TYPE_CHECKING:
 def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "NoReturn":
     """Run a command and exit with its status, or with 128 and the number of the signal that stopped it.
 
+    A process of its own has one thread for linear algebra, where the environment does not say otherwise.
+
     Args:
         args: words of the command line; by default those of this program, which then ends.
     """
     if args is None:  # figures are drawn into files, whatever windows the user's own have; a notebook keeps its own
         os.environ.pop("MPLBACKEND", None)
+        if not ONE_THREAD.keys() & os.environ:
+            os.environ.update(ONE_THREAD)
     if args is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the rest is loaded, as it is for SIGTERM
     from tmsopt.cli.ending import ended, gone, listening, streams

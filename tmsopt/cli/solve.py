@@ -146,7 +146,7 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
     "every",
     is_flag=True,
     help="Of a pattern that leaves no freedom: all designs in the box that have it, with a proof that they are all "
-    "(codac), or a search.",
+    "or a search.",
 )
 @click.option("--seconds", type=click.FloatRange(0, min_open=True), help="Time for the proof of --all. [default: 60]")
 @click.pass_context

@@ -1,4 +1,4 @@
-"""Questions about whole boxes, asked of global solvers: is any design as good as a limit (SCIP), are these all (codac).
+"""Questions about whole boxes, is any design as good as a limit (SCIP), are these all (intervals).
 
 In: a `Question`, or a problem that leaves no freedom. Out: an `Answer`, no or a design; every design with its proof, as
 `Completeness`. Open `question` first, then `complete`; `race` runs SCIP in a process of its own.

@@ -9,7 +9,5 @@ from .tasks import (
     FOUND as FOUND, INFEASIBLE as INFEASIBLE, UNDECIDED as UNDECIDED, Decision as Decision, Failed as Failed,
     GlobalSolver as GlobalSolver, Task as Task, task as task,
 )
-from .complete import (
-    Completeness as Completeness, Undecided as Undecided, available as available, completeness as completeness,
-)
+from .complete import Completeness as Completeness, Undecided as Undecided, completeness as completeness
 from .pruning import Puzzle as Puzzle, prune as prune

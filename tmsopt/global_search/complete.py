@@ -1,14 +1,15 @@
 """All designs of a box with a pattern: boxes without one dropped, each of the others proved to hold exactly one."""
 
-import importlib.util
 import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import flint
+import numpy as np
 
 from tmsopt.algebra.balls import Number, number
 from tmsopt.algebra.formula import NotAccepted, fold, formula, symbol
@@ -16,26 +17,24 @@ from tmsopt.algebra.identity import multiplied_out
 from tmsopt.algebra.intervals import interval
 from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
-from tmsopt.global_search.conditions import Ends, Sheet, sheet, sheets
-from tmsopt.global_search.pruning import Box, Pruned, Puzzle, check, ends, halves, prune
-from tmsopt.killable import Killable
+from tmsopt.global_search.conditions import Ends, Sheet, complex_pieces, rotating_frame, sheet, sheets
+from tmsopt.global_search.pruning import Box, Puzzle, ends, prepared, prune
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
 from tmsopt.program.nlp import Scale, reaches_of, scale_of
 from tmsopt.progress import Counts
-from tmsopt.records import Table, plain
+from tmsopt.records import Array, Table, plain
 
 SECONDS = 60.0
 """Time for a proof, by default."""
 
-_MISSING = "codac is not installed; pip install 'tmsopt[certify]' brings it"
 _SINGULAR = "the equations are singular there, or nearly so: one of a continuum of designs, or one where two meet"
 _TIME = "time was over"
 _STOPPED = "interrupted"
 _UNITS = 1.375  # of the usual unit: roots are often at 1, where large and small ones meet
 _CARRIED, _DIGITS, _SHOWN = 60, 40, 25  # decimal digits: of arithmetic, of a zero, of a design
-_TURN, _LONGEST = 0.25, 1e6  # seconds
+_AT_ONCE = 1024  # boxes, so that a turn takes a tenth of a second or so
 _SMALL, _COARSE = 1e-7, 1e-2  # of the first box: what is smaller is not split
 _MOST = 400  # boxes so small, and they are no isolated designs: from then on ten times as large ones are small
 _SAID = 12  # places that are named
@@ -83,11 +82,6 @@ class Completeness:
         return plain(self) | {"seconds": round(self.seconds, 4)}
 
 
-def available() -> bool:
-    """Whether codac is there."""
-    return importlib.util.find_spec("codac") is not None
-
-
 def completeness(problem: Posed, seconds: float = SECONDS, progress: Counts | None = None) -> Completeness:
     """Every design in the box of a problem with its pattern, and whether that is proved.
 
@@ -99,8 +93,6 @@ def completeness(problem: Posed, seconds: float = SECONDS, progress: Counts | No
         problem: one with a pattern, and as many conditions as free parameters.
         progress: called with seconds passed and seconds at most.
     """
-    if not available():
-        return Completeness(False, _MISSING)
     began = time.perf_counter()
     with flint.ctx.workdps(_CARRIED):
         try:
@@ -108,13 +100,8 @@ def completeness(problem: Posed, seconds: float = SECONDS, progress: Counts | No
         except (NotAccepted, TypeError, ZeroDivisionError) as error:
             return Completeness(False, f"branch and prune cannot take {error}")
         run = _Run(began + seconds, seconds, progress)
-        try:
-            for sheet, puzzle, box in posed:
-                run.search(sheet, puzzle, box)
-        except KeyboardInterrupt:
-            run.stopped = _STOPPED
-        finally:
-            run.worker.end()
+        for sheet, puzzle, box in posed:
+            run.search(sheet, puzzle, box)
         return run.stated(problem, time.perf_counter() - began)
 
 
@@ -138,62 +125,51 @@ class _Run:
     end: float
     seconds: float
     progress: Counts | None
-    worker: Killable = field(default_factory=Killable)
     boxes: int = 0
     stopped: str = ""
     zeros: list[_Zero] = field(default_factory=list)
-    left: list[tuple[Sheet, Box, str]] = field(default_factory=list)
+    left: list[tuple[Box, str]] = field(default_factory=list)
 
     def search(self, sheet: Sheet, puzzle: Puzzle, first: Box) -> None:
         """All zeros of a sheet in its box."""
         known: list[_Zero] = []
-        waiting: list[Box] = [first]
-        small: list[Box] = []
+        whole = np.array(first).T[..., None]
+        left, small = whole, whole[..., :0]
         most, least = _MOST, _SMALL
         try:
-            while waiting and not self.stopped:
-                proved = [zero.near for zero in known]
-                pruned = self.asked(puzzle, waiting, proved, most - len(small), least)
-                self.boxes += pruned.boxes
-                waiting = list(pruned.left)
-                small += pruned.small
-                for box in pruned.met:
-                    zero = _zero(sheet, box)
-                    if zero and not any(_within(zero.enclosure.balls, sheet.names, other.near) for other in known):
-                        known.append(zero)
-                        waiting.append(box)
-                    elif parts := halves(box, puzzle.widths, least, [hi - lo for lo, hi in box]):
-                        waiting += parts
-                    else:
-                        small.append(box)
-                if len(small) >= most:
-                    if least >= _COARSE:
-                        break
+            while left.shape[-1] and least <= _COARSE and not self.over():
+                self.boxes += left[..., -_AT_ONCE:].shape[-1]
+                pruned = prune(puzzle, left[..., -_AT_ONCE:], least)
+                left = np.concatenate([left[..., :-_AT_ONCE], pruned.left], axis=-1)
+                each = np.moveaxis(pruned.shown, -1, 0)
+                refused = [self.refuses(sheet, known, *map(_box, own)) for own in each]
+                small = np.concatenate([small, pruned.small, pruned.shown[0][..., refused]], axis=-1)
+                if small.shape[-1] >= most:
                     most, least = most + _MOST, 10 * least
         except KeyboardInterrupt:
-            self.stopped, waiting = _STOPPED, [first]  # whatever was in hand
+            self.stopped, left = _STOPPED, whole  # whatever was in hand
         self.zeros += known
-        self.left += [(sheet, box, _SINGULAR) for box in small]
-        self.left += [(sheet, box, self.stopped or _SINGULAR) for box in waiting]
+        self.left += [(_box(own), _SINGULAR) for own in np.moveaxis(small, -1, 0)]
+        self.left += [(_box(own), self.stopped or _SINGULAR) for own in np.moveaxis(left, -1, 0)]
 
-    def _found(self) -> str:
-        return f"{self.boxes:,} boxes" if self.boxes else ""
-
-    def asked(self, puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], most: int, least: float) -> Pruned:
-        """What a worker makes of boxes; these again where time is over."""
+    def over(self) -> bool:
+        """Whether time is over; the reader is told how far it is."""
         left = self.end - time.perf_counter()
         if self.progress:
-            self.progress(min(self.seconds - left, self.seconds), self.seconds, self._found())
-        if left > 0:
-            answer = self.worker.call(prune, puzzle, boxes, proved, min(_TURN, left), most, least)
-            try:
-                return answer.result(min(left, _LONGEST) + _TURN)  # type: ignore[no-any-return]
-            except TimeoutError:
-                pass
-            except Exception:  # of the process, or raised there
-                self.stopped = "branch and prune ended by an error"
-        self.stopped = self.stopped or _TIME
-        return Pruned(0, tuple(boxes), (), ())
+            self.progress(min(self.seconds - left, self.seconds), self.seconds, f"{self.boxes:,} boxes")
+        self.stopped = self.stopped or (_TIME if left <= 0 else "")
+        return bool(self.stopped)
+
+    def refuses(self, sheet: Sheet, known: list[_Zero], wide: Box, image: Box) -> bool:
+        """Whether the only zero of a box is not proved by balls; a new one becomes known."""
+        if any(_inside(image, other.near) for other in known):
+            return False
+        zero = _zero(sheet, image)
+        if zero is None or not _within(zero.enclosure.balls, sheet.names, wide):
+            return True
+        if not any(_within(zero.enclosure.balls, sheet.names, other.near) for other in known):
+            known.append(zero)
+        return False
 
     def stated(self, problem: Posed, seconds: float) -> Completeness:
         """What is proved by now."""
@@ -225,6 +201,9 @@ def _sheets(problem: Posed) -> Iterator[Sheet]:
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
     lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
+    if problem.model.double is not None and (found := rotating_frame(problem)) is not None:
+        yield sheet(problem, complex_pieces(problem.pattern.form), found, lifted)
+        return
     scale = scale_of(problem)
     scale = Scale(_UNITS * scale.unit, scale.lead)
     for pieces in sheets(problem.pattern.form):
@@ -241,16 +220,13 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     names = {n: symbol(n) for n in sheet.names}
     limits = [*fold(sheet.nonnegative, names, NODES), *fold(sheet.ascending, names, NODES)]
     for name, limit in sheet.limits.items():
-        try:
-            check(limit)
-        except NotAccepted:
-            continue  # it takes no part, and is asked of every design that is found
-        limits.append(-sheet.problem.conditions[name].sign * fold(limit, names, NODES)[0])
-    equations, more = multiplied_out(sheet.equations), multiplied_out(sheet.shared)
-    for asked in (equations, more):
-        check(asked)
+        with suppress(NotAccepted):  # it takes no part, and is asked of every design that is found
+            limits.append(-sheet.problem.conditions[name].sign * fold(prepared(limit), names, NODES)[0])
+    equations, more, limited = (
+        prepared(multiplied_out(asked)) for asked in (sheet.equations, sheet.shared, formula(limits, sheet.names))
+    )
     widths = tuple(_width(*ends) for ends in box)
-    return Puzzle(equations, multiplied_out(formula(limits, sheet.names)), widths, more), box
+    return Puzzle(equations, limited, widths, more), box
 
 
 def _width(lo: float, hi: float) -> float:
@@ -291,6 +267,15 @@ def _zero(sheet: Sheet, box: Box) -> _Zero | None:
     return _Zero(sheet, found, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
 
 
+def _box(own: Array) -> Box:
+    """One of many boxes."""
+    return tuple(zip(*own.tolist(), strict=True))
+
+
+def _inside(box: Box, other: Box) -> bool:
+    return all(lo > low and hi < high for (lo, hi), (low, high) in zip(box, other, strict=True))
+
+
 def _within(balls: Mapping[str, Any], names: Sequence[str], box: Box) -> bool:
     return all(balls[n] > lo and balls[n] < hi for n, (lo, hi) in zip(names, box, strict=True))
 
@@ -323,11 +308,11 @@ def _met(problem: Posed, condition: Expression, at: Mapping[str, Any]) -> bool:
     return bool(condition.violation(values) <= 0)
 
 
-def _places(problem: Posed, left: Iterable[tuple[Sheet, Box, str]]) -> list[tuple[Box, str]]:
+def _places(problem: Posed, left: Iterable[tuple[Box, str]]) -> list[tuple[Box, str]]:
     """Hulls in the free parameters of boxes that touch."""
     count = len(problem.free)
     places: list[tuple[Box, str]] = []
-    for _, box, reason in left:
+    for box, reason in left:
         own, rest = box[:count], []
         for other, why in places:
             if why == reason and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(own, other, strict=True)):

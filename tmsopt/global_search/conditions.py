@@ -5,23 +5,29 @@ at most a unit of size are unknown as themselves, larger ones as 1/s in the reve
 range, whatever the leading coefficient does, and no equation has a quotient.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise, product
 from typing import Any
 
+import numpy as np
+
 from tmsopt.algebra.formula import Formula, formula, symbol
+from tmsopt.algebra.intervals import outwards, ranges
 from tmsopt.algebra.kinds import atan, quotient
 from tmsopt.models import Quantity, Values
+from tmsopt.models.stated.pairs import Pair
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.roots import product as multiplied
 from tmsopt.roots.patterns.parts import Part, parts_of
+from tmsopt.roots.polynomial import characteristic_polynomial
 
 Ends = tuple[float, float]
 
+_ROUNDED = 1e-9  # relative: more than the roundings of a few sums
 _AWAY = Fraction(3, 4)  # factors of one kind are told apart by b + 3c/4, which is rarely the same of two
 
 
@@ -30,7 +36,8 @@ class Piece:
     """A factor of a pattern, to a power.
 
     Attributes:
-        kind: ``root``, ``pair``, ``meeting`` (two real roots), ``axis`` or ``zero``.
+        kind: ``root``, ``pair``, ``meeting`` (two real roots), ``axis`` or ``zero``; of a complex H ``point``, or
+            ``line`` for one on the imaginary axis.
         order: the power.
         outer: whether the unknowns are those of 1/s.
         first: number of its first unknown.
@@ -50,6 +57,8 @@ class Piece:
             "meeting": ((-2.0, 2.0), (-1.0, 1.0)),
             "axis": ((0.0, 1.0),),
             "zero": (),
+            "point": ((-1.0, 1.0), (-1.0, 1.0)),
+            "line": ((-1.0, 1.0),),
         }[self.kind]
 
     def own(self, unknowns: Sequence[Any]) -> Sequence[Any]:
@@ -66,6 +75,8 @@ class Piece:
                 return [1, 0, u[0]]
             case "zero":
                 return [1, 0]
+            case "point" | "line":
+                return [1, -Pair(*u) if len(u) == 2 else Pair(0, -u[0])]
         return [1, *u]
 
     def place(self, unknowns: Sequence[Any]) -> Any:
@@ -106,6 +117,59 @@ def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
         kind = "root" if part.kind == "EP" else "pair"
         for inner in range(part.count + 1):
             yield [(kind, part.order, k >= inner) for k in range(part.count)]
+
+
+def complex_pieces(name: str) -> tuple[Piece, ...]:
+    """The eigenvalues of a complex H that are tied by a pattern, named as that of its double."""
+    pieces: list[Piece] = []
+    for part in parts_of(name):
+        kind, order = ("point", part.order) if part.kind == "CEP" else ("line", part.roots // 2)
+        for _ in range(part.count):
+            pieces.append(Piece(kind, order, False, sum(len(p.ranges) for p in pieces)))
+    return tuple(pieces)
+
+
+@dataclass(frozen=True)
+class RotatingFrame:
+    """Where eigenfrequencies of a complex H are unknown: as (ω − centre)/unit, which none has larger than 1."""
+
+    centre: Fraction
+    unit: Fraction
+
+
+def rotating_frame(problem: Posed) -> RotatingFrame | None:
+    """The frame of a complex H, by Gershgorin's discs over the box; None where these have no bound.
+
+    Raises:
+        NotAccepted: for an operation that has no interval arithmetic.
+    """
+    names = tuple(problem.free)
+    rows = _complex_matrix(problem, {**problem.as_nodes(problem.fixed), **{n: symbol(n) for n in names}})
+    asked = formula((part for row in rows for x in row for part in (x.re, x.im)), names)
+    found = np.array(ranges(asked, [outwards(*ends) for ends in problem.free.values()]))
+    if not np.isfinite(found).all():
+        return None
+    n = len(rows)
+    own = found.reshape(n, n, 2, 2)
+    centre = float(-own[range(n), range(n), 1].mean())
+    own[range(n), range(n), 1] += centre
+    reach = np.hypot(*np.moveaxis(np.abs(own).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDED * abs(centre)
+    return RotatingFrame(Fraction(centre), Fraction(reach * (1 + _ROUNDED) or 1.0))
+
+
+def _complex_matrix(problem: Posed, own: Mapping[str, Any]) -> list[list[Pair]]:
+    """−i H of a model of a complex H."""
+    assert problem.model.double is not None
+    _, rows = problem.model.double(problem.parameter_set.native(own))  # [[−J, −R], [R, −J]] of H = R + i J
+    n = len(rows) // 2
+    return [[Pair(-row[j], row[n + j]) for j in range(n)] for row in rows[:n]]
+
+
+def _complex_coefficients(problem: Posed, own: Mapping[str, Any], frame: RotatingFrame) -> list[Any]:
+    """The polynomial of −i H in a frame."""
+    rows = _complex_matrix(problem, own)
+    moved = [[x + Pair(0, frame.centre) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(rows)]
+    return [c / frame.unit**k if k else c for k, c in enumerate(characteristic_polynomial(moved))]
 
 
 def values_at(problem: Posed, lifted: Sequence[Quantity], at: Mapping[str, Any], held: Mapping[str, Any]) -> Values:
@@ -153,11 +217,13 @@ class Sheet:
     limits: Mapping[str, Formula]
 
 
-def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple[Quantity, ...]) -> Sheet:
+def sheet(
+    problem: Posed, pieces: tuple[Piece, ...], scale: Scale | RotatingFrame, lifted: tuple[Quantity, ...]
+) -> Sheet:
     """The sheet of some factors.
 
     Args:
-        scale: of the roots and the coefficients.
+        scale: of the roots and the coefficients; a frame for the polynomial of a complex H itself.
         lifted: quantities in == constraints that are unknowns with an equation.
     """
     unknowns = tuple(f":{k}" for k in range(sum(len(p.ranges) for p in pieces)))
@@ -167,8 +233,11 @@ def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple
     values = values_at(problem, lifted, at, problem.as_nodes(problem.fixed))
     if (abscissa := _abscissa(problem, pieces, scale, u)) is not None:
         values = values.with_known({"abscissa": abscissa})
-    lead, unit = Fraction(scale.lead), Fraction(scale.unit)
-    a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
+    if isinstance(scale, RotatingFrame):
+        a = _complex_coefficients(problem, values.given[2], scale)
+    else:
+        lead, unit = Fraction(scale.lead), Fraction(scale.unit)
+        a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
     equalities = [c for c in problem.conditions.values() if c.equality]
     own = [x for piece in pieces for x in piece.nonnegative(u)]
     alike = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
@@ -178,7 +247,7 @@ def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple
         pieces,
         names,
         lifted,
-        equations=formula([*conditions(a, pieces, u), *others(values, lifted, equalities, at)], names),
+        equations=formula([*_real(conditions(a, pieces, u)), *others(values, lifted, equalities, at)], names),
         shared=formula(shared(a, pieces, u), names),
         nonnegative=formula(own, names),
         ascending=formula((q.place(u) - p.place(u) for p, q in alike), names),
@@ -187,13 +256,19 @@ def sheet(problem: Posed, pieces: tuple[Piece, ...], scale: Scale, lifted: tuple
     )
 
 
-def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale, u: Sequence[Any]) -> Any:
+def _real(left: Iterable[Any]) -> Iterator[Any]:
+    """Left sides, complex ones by their parts."""
+    for x in left:
+        yield from (x.re, x.im) if isinstance(x, Pair) else (x,)
+
+
+def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | RotatingFrame, u: Sequence[Any]) -> Any:
     """Largest real part where the pattern makes up all roots; None elsewhere."""
     if problem.pattern is None or problem.pattern.abscissa is None:
         return None
     (piece,) = pieces
     unit, own = Fraction(scale.unit), piece.own(u)
-    if piece.kind == "root":
+    if piece.kind in ("root", "point"):
         return quotient(unit, own[0]) if piece.outer else unit * own[0]
     return quotient(-unit * own[0], 2 * own[1]) if piece.outer else -unit * own[0] / 2
 

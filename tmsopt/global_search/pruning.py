@@ -1,44 +1,49 @@
-"""Branch and prune by interval contractors of codac, in a process of its own.
+"""Branch and prune by interval arithmetic: many boxes at once, as arrays of doubles rounded outward.
 
-From its import on, codac has doubles rounded upwards, all that a process computes: so it is imported in workers alone,
-and whoever reads their answers must allow for nothing.
+An interval is an array whose first axis has the lower and the upper end. Ends that are no numbers, as of 0 times
+infinity, become infinite: an interval may be too wide, never too narrow.
 """
 
-import math
-import operator
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import flint
 import numpy as np
 
-from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, Kind, NotAccepted, fold
-from tmsopt.algebra.intervals import interval
-from tmsopt.algebra.kinds import as_exact
+from tmsopt.algebra.formula import (
+    CONSTANT,
+    INPUT,
+    Constant,
+    Formula,
+    Kind,
+    Node,
+    NotAccepted,
+    constant,
+    fold,
+    formula,
+    made,
+    symbol,
+)
+from tmsopt.algebra.intervals import ball, interval
+from tmsopt.algebra.kinds import INTERVALS, NODES, as_exact
+from tmsopt.algebra.rounding import UNIT
+from tmsopt.records import Array, Truth
 
 Box = tuple[tuple[float, float], ...]
 """Least and greatest value of each variable."""
 
-PARTIAL = {"div": 1, "quotient": 1, "ratio": 1, "pow": 0, "sqrt": 0, "asin": 0, "acos": 0}
-"""Operations that do not exist, or have no slope, somewhere, and which operand decides on that."""
-
-_POLES = {"div", "quotient", "ratio", "pow"}  # where it is 0; of powers with a negative exponent
-
-FUNCTIONS = ("sqrt", "abs", "exp", "sin", "cos", "asin", "acos", "atan")
-
-_TINY = 1e-300
-_GAIN = 0.9  # of a width: contracting goes on where one shrinks below
-_ROUNDS = 8
+_TINY = 1e-300  # more than what underflow loses
+_GAIN = 0.5  # of a width: a box is contracted again, not split, where a side shrinks below
+_FEW = 64  # boxes, which take hardly longer than one
 _WIDER = 0.1  # of a width: the box in which a zero is looked for is so much wider at each end
+_NARROW = 1e-12  # of the first box: and at least so much
 
 
 @dataclass(frozen=True)
 class Puzzle:
-    """What is to hold in a box; plain data.
+    """What is to hold in a box.
 
     Attributes:
         equations: what must be 0, as many as variables.
@@ -52,255 +57,357 @@ class Puzzle:
     widths: tuple[float, ...]
     more: Formula
 
-    @property
-    def guarded(self) -> list[tuple[str, Formula]]:
-        """Operations with their arguments that must exist for the equations to have slopes."""
-        steps, names = self.equations.steps, self.equations.names
-        smooth = {k for k, s in enumerate(steps) if s.op == "pow" and steps[s.operands[1]].value >= 0}
-        taken = dict.fromkeys(
-            (s.op, s.operands[PARTIAL[s.op]]) for k, s in enumerate(steps) if s.op in PARTIAL and k not in smooth
-        )
-        return [(op, Formula(names, steps, (k,))) for op, k in taken if steps[k].op != CONSTANT]
-
 
 @dataclass(frozen=True)
 class Pruned:
-    """What became of boxes.
+    """What became of boxes, arrays of shape (2, variables, boxes).
 
     Attributes:
-        boxes: how many were looked at.
-        left: those that were not.
-        met: with a zero that Newton's operator shows, or seems to, beside it.
-        small: those that could neither be emptied nor be split.
+        left: parts that may hold zeros.
+        shown: pairs of a box that holds exactly one zero and the part of it in which that is, along a first axis.
+        small: parts that may hold zeros and are too small to be split.
     """
 
-    boxes: int
-    left: tuple[Box, ...]
-    met: tuple[Box, ...]
-    small: tuple[Box, ...]
+    left: Array
+    shown: Array
+    small: Array
 
 
-def prune(
-    puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], seconds: float, most: int, least: float
-) -> Pruned:
-    """Contract, drop and split boxes, the last one first, until time is over or a new zero was met.
+def prune(puzzle: Puzzle, x: Array, least: float) -> Pruned:
+    """Contract boxes once, drop those without a zero, and split those that hardly shrink.
 
     Args:
-        proved: boxes with one zero each, which is known: nothing more is to be found in these.
-        most: boxes at most that can neither be emptied nor be split.
+        x: boxes, of shape (2, variables, boxes).
         least: share of the first box: what is smaller is not split.
     """
-    import codac
+    with np.errstate(all="ignore"):
+        before = x[1] - x[0]
+        for asked, target in ((puzzle.equations, 0.0), (puzzle.more, 0.0), (puzzle.limits, np.inf)):
+            x, kept = _narrowed(asked, x, target)
+            x, before = x[..., kept], before[:, kept]
+        wide, image, single, weights = _newton(puzzle, x)
+        x = _meet(x, image)
+        kept = (x[0] <= x[1]).all(axis=0)
+        shown, keep = kept & single, kept & ~single
+        again = keep & (x[1] - x[0] < _GAIN * before).any(axis=0)
+        cut = keep & ~again
+        parts, small = _split(x[..., cut], weights[:, cut], least * _column(puzzle.widths))
+        return Pruned(np.concatenate([x[..., again], parts], axis=-1), np.stack([wide, image])[..., shown], small)
 
-    if not _upwards(codac):
-        raise RuntimeError("doubles are not rounded upwards, as codac needs it")
-    contractors = _contractors(puzzle)
-    known = [_vector(codac, box) for box in proved]
-    left = list(boxes)
-    met: list[Box] = []
-    small: list[Box] = []
-    end, count = time.perf_counter() + seconds, 0
-    while left and not met and len(small) < most and (count == 0 or time.perf_counter() < end):
-        x = _vector(codac, left.pop())
-        count += 1
-        zero = contractors.contract(x)
-        if x.is_empty() or any(x.is_subset(k) for k in known):
-            continue
-        if zero:
-            met.append(_box(x))
-        elif parts := halves(_box(x), puzzle.widths, least, contractors.weights(x)):
-            left += parts
+
+def _split(x: Array, weights: Array, least: Array) -> tuple[Array, Array]:
+    """Boxes cut across the side of the greatest weight, few boxes more than once; and those that are small."""
+    parts, small = x, x[..., :0]
+    while True:
+        width = parts[1] - parts[0]
+        middle = parts[0] + width / 2
+        across = (width > least) & (width < np.inf) & (parts[0] < middle) & (middle < parts[1])
+        cut = across.any(axis=0)
+        small = np.concatenate([small, parts[..., ~cut]], axis=-1)
+        at = np.where(across, weights, -1.0).argmax(axis=0)[cut], np.arange(np.count_nonzero(cut))
+        lower, weights = parts[..., cut], weights[:, cut]
+        upper = lower.copy()
+        lower[1][at] = upper[0][at] = middle[:, cut][at]
+        weights[at] /= 2
+        parts, weights = np.concatenate([lower, upper], axis=-1), np.concatenate([weights, weights], axis=-1)
+        if not 0 < parts.shape[-1] < _FEW:
+            return parts, small
+
+
+def _newton(puzzle: Puzzle, x: Array) -> tuple[Array, Array, Truth, Array]:
+    """Newton's operator, as it is and preconditioned.
+
+    With the Jacobian J of a wider box around m, zeros have A (x − m) = −f(m) for a matrix A of J, and with Y near the
+    inverse of its middle C (x − m) = −Y f(m) for a matrix C of Y J. Each row bounds each variable. Where the diagonal
+    of C prevails there is one zero at most, and where its bounds are in the interior of the wider box there is one
+    (Neumaier 1990, theorem 5.1.7).
+
+    Returns:
+        The wider boxes; where all their zeros are; whether there is exactly one; and for each variable how much its
+        width adds to those of the equations, at most 1 each.
+    """
+    first = _column(puzzle.widths)
+    room = _WIDER * (x[1] - x[0]) + _NARROW * first
+    wide = np.stack([x[0] - room, x[1] + room])
+    middle = (wide[0] + wide[1]) / 2
+    reach = np.maximum(wide[1] - middle, middle - wide[0]) * (1 + UNIT) + _TINY
+    values = _outputs(puzzle.equations, _forward(puzzle.equations, np.stack([middle, middle])), middle)[:, :, None]
+    slopes = _slopes(puzzle.equations, wide)
+    centre = np.moveaxis((slopes[0] + slopes[1]) / 2, -1, 0)
+    size = np.linalg.det(centre)
+    centre[~np.isfinite(size) | (size == 0)] = np.eye(len(first))  # any matrix will do
+    inverse = np.moveaxis(np.linalg.inv(centre), 0, -1)
+    preconditioned = _moves(_product(inverse, slopes), _product(inverse, values), reach)
+    moves = np.concatenate([_moves(slopes, values, reach), preconditioned], axis=1)
+    image = _outward(middle + np.stack([moves[0].max(axis=0), moves[1].min(axis=0)]))
+    own = np.einsum("ekkm->ekm", preconditioned)
+    around = _outward(middle + own)
+    single = (np.abs(own).max(axis=0) < reach * (1 - 4 * UNIT)) & (around[0] > wide[0]) & (around[1] < wide[1])
+    parts = np.abs(slopes).max(axis=0) * reach
+    smear = (parts / np.maximum(parts.sum(axis=1, keepdims=True), _TINY)).sum(axis=0)
+    share = np.minimum((x[1] - x[0]) / np.maximum(first, _TINY), 1.0)
+    weights = np.where(np.isfinite(smear), smear + 1e-3 * share, share)
+    return wide, image, single.all(axis=0), weights
+
+
+def _moves(matrix: Array, values: Array, reach: Array) -> Array:
+    """Where each equation, matrix · move + value = 0, leaves each variable that moves no farther than its reach."""
+    parts = np.abs(matrix).max(axis=0) * reach
+    growth = 1 + (len(reach) + 4) * UNIT
+    rest = parts.sum(axis=1, keepdims=True) * growth - parts / growth + _TINY  # of all variables but one
+    return _over(_outward(np.stack([-values[1] - rest, -values[0] + rest])), matrix)
+
+
+def _product(exact: Array, x: Array) -> Array:
+    """Products of matrices of doubles and of intervals, with a bound of the rounding of sums in any order."""
+    middle, rounding = (x[0] + x[1]) / 2, (len(exact) + 4) * UNIT
+    reach = (x[1] - x[0]) * (0.5 + UNIT) + rounding * np.abs(middle) + _TINY
+    centre, error = (np.einsum("ijm,jkm->ikm", *own) for own in ((exact, middle), (np.abs(exact), reach)))
+    error = error * (1 + rounding) + _TINY
+    return _outward(np.stack([centre - error, centre + error]))
+
+
+def _column(numbers: Sequence[float]) -> Array:
+    return np.array(numbers)[:, None]
+
+
+# Interval arithmetic.
+
+
+def _outward(x: Array) -> Array:
+    """The same array with its ends moved outward by more than one rounding."""
+    room = np.abs(x) * UNIT + _TINY
+    x[0] -= room[0]
+    x[1] += room[1]
+    unknown = np.isnan(x)
+    if unknown.any():
+        x[0][unknown[0]], x[1][unknown[1]] = -np.inf, np.inf
+    return x
+
+
+def _meet(a: Array, b: Array) -> Array:
+    return np.stack([np.maximum(a[0], b[0]), np.minimum(a[1], b[1])])
+
+
+def _plus(a: Array, b: Array) -> Array:
+    return _outward(a + b)
+
+
+def _minus(a: Array, b: Array) -> Array:
+    return _outward(a - b[::-1])
+
+
+def _negative(a: Array) -> Array:
+    return -a[::-1]
+
+
+def _times(a: Array, b: Array) -> Array:
+    each = np.stack([a * b, a * b[::-1]])
+    unknown = np.isnan(each)
+    if unknown.any():
+        each[unknown] = 0.0
+    found = np.empty(each.shape[1:])
+    each.min(axis=(0, 1), out=found[0])
+    each.max(axis=(0, 1), out=found[1])
+    return _outward(found)
+
+
+def _inverse(a: Array) -> Array:
+    """1/a of those of one sign or 0; without ends where both signs are met."""
+    single = (a[0] >= 0) | (a[1] <= 0)
+    low = np.where(single & (a[1] != 0), 1 / a[1], -np.inf)
+    high = np.where(single & (a[0] != 0), 1 / a[0], np.inf)
+    return _outward(np.stack([low, high]))
+
+
+def _over(a: Array, b: Array) -> Array:
+    return _times(a, _inverse(b))
+
+
+def _holds_zero(a: Array) -> Truth:
+    return np.asarray((a[0] <= 0) & (a[1] >= 0))
+
+
+def _magnitude(a: Array) -> Array:
+    ends = np.abs(a)
+    return np.stack([np.where(_holds_zero(a), 0.0, ends.min(axis=0)), ends.max(axis=0)])
+
+
+def _square(a: Array) -> Array:
+    size = _magnitude(a)
+    return np.maximum(_outward(size * size), 0.0)
+
+
+def _square_root(a: Array) -> Array:
+    return np.maximum(_outward(np.sqrt(np.maximum(a, 0.0))), 0.0)
+
+
+def _by_balls(function: Callable[[Any], Any]) -> Callable[[Array], Array]:
+    """A function of balls, one interval at a time."""
+
+    def applied(a: Array) -> Array:
+        ends = [interval(function(ball((low, high)))) for low, high in a.reshape(2, -1).T.tolist()]
+        return np.array(ends).T.reshape(a.shape)
+
+    return applied
+
+
+# Operations.
+
+
+@dataclass(frozen=True)
+class _Operation:
+    """An operation on intervals.
+
+    Attributes:
+        value: range of the result.
+        slopes: from the operands and the result, slopes with respect to each operand; infinite where there are none.
+        back: from the result and the operands, where each operand is.
+    """
+
+    value: Callable[..., Array]
+    slopes: Callable[..., tuple[Array, ...]]
+    back: Callable[..., tuple[Array, ...]]
+
+
+_ONE, _SIGNS = np.ones((2, 1)), np.array([[-1.0], [1.0]])
+_ANYTHING = _SIGNS * np.inf
+
+
+def _factor(result: Array, other: Array) -> Array:
+    """What times another is a result: anything where both may be 0."""
+    return np.where(_holds_zero(result) & _holds_zero(other), _ANYTHING, _over(result, other))
+
+
+def _of_magnitude(result: Array, a: Array) -> tuple[Array]:
+    low, high = np.maximum(result, 0.0)
+    return (np.stack([np.where(a[0] > -low, low, -high), np.where(a[1] < low, -low, high)]),)
+
+
+def _function(
+    name: str, value: Callable[..., Array] | None = None, back: Any = lambda _, a: (_ANYTHING,)
+) -> _Operation:
+    """A function of one operand, by balls and series of balls."""
+    own = INTERVALS.operations[name]
+    slope = _by_balls(lambda x: own(flint.arb_series([x, 1], prec=2))[1])
+    return _Operation(value or _by_balls(own), lambda a, _: (slope(a),), back)
+
+
+_QUOTIENT = _Operation(
+    _over,
+    lambda a, b, r: (_inverse(b), _negative(_over(r, b))),
+    lambda r, a, b: (_times(r, b), _factor(a, r)),
+)
+_OPERATIONS = {
+    "add": _Operation(_plus, lambda a, b, r: (_ONE, _ONE), lambda r, a, b: (_minus(r, b), _minus(r, a))),
+    "sub": _Operation(_minus, lambda a, b, r: (_ONE, -_ONE), lambda r, a, b: (_plus(r, b), _minus(a, r))),
+    "mul": _Operation(_times, lambda a, b, r: (b, a), lambda r, a, b: (_factor(r, b), _factor(r, a))),
+    "neg": _Operation(_negative, lambda a, r: (-_ONE,), lambda r, a: (_negative(r),)),
+    "square": _Operation(_square, lambda a, r: (_plus(a, a),), lambda r, a: _of_magnitude(_square_root(r), a)),
+    "abs": _function("abs", _magnitude, _of_magnitude),
+    "sqrt": _function("sqrt", _square_root, lambda r, _: (_square(np.maximum(r, 0.0)),)),
+    **dict.fromkeys(("div", "quotient", "ratio"), _QUOTIENT),
+    **{name: _function(name) for name in ("exp", "log", "sin", "cos", "tan", "atan")},
+    **{name: _function(name, back=lambda _, a: (_SIGNS,)) for name in ("asin", "acos")},
+}
+
+
+def prepared(asked: Formula) -> Formula:
+    """A formula in operations that branch and prune has.
+
+    Raises:
+        NotAccepted: for another one, with its name.
+    """
+    known = {name: NODES.operations[name] for name in _OPERATIONS} | {"pow": _power}
+    own = {name: symbol(name) for name in asked.names}
+    return formula(fold(asked, own, Kind(known, NODES.constant)), asked.names)
+
+
+def _power(a: Node, b: Node) -> Node:
+    """A power by squares and products."""
+    n = b.fraction
+    if n is None or n.denominator > 1:
+        raise NotAccepted("pow")
+    if n < 0:
+        return 1 / _power(a, -b)
+    if n == 0:
+        return constant(1)
+    half = made("square", _power(a, constant(n // 2))) if n > 1 else constant(1)
+    return half * a if n % 2 else half
+
+
+def _forward(asked: Formula, x: Array) -> list[Array]:
+    """Ranges of all steps of a formula over boxes."""
+    found: list[Array] = []
+    for op, operands, value in asked.steps:
+        if op == INPUT:
+            found.append(x[:, asked.names.index(value)])
+        elif op == CONSTANT:
+            found.append(_enclosed(value))
         else:
-            small.append(_box(x))
-    if not _upwards(codac):
-        raise RuntimeError("doubles were not rounded upwards all the time, as codac needs it")
-    return Pruned(count, tuple(left), tuple(met), tuple(small))
+            found.append(_OPERATIONS[op].value(*(found[o] for o in operands)))
+    return found
 
 
-def _upwards(codac: Any) -> bool:
-    """Whether the rounding mode of this thread is what codac's intervals rely on."""
-    third, sum = codac.Interval(1.0) / codac.Interval(3.0), codac.Interval(0.1) + codac.Interval(0.2)
-    return bool(third.lb() < third.ub() and sum.lb() < sum.ub())
+@lru_cache(maxsize=4096)
+def _enclosed(value: Constant) -> Array:
+    return np.array(ends(as_exact(value)))[:, None]
 
 
-def halves(box: Box, widths: Sequence[float], least: float, weights: Sequence[float]) -> list[Box]:
-    """A box cut across the side of the greatest weight; none for one that is small."""
-    middles = [lo + (hi - lo) / 2 for lo, hi in box]
-    each = enumerate(zip(box, middles, widths, strict=True))
-    wide = [k for k, ((lo, hi), m, w) in each if least * w < hi - lo < math.inf and lo < m < hi]
-    if not wide:
-        return []
-    k = max(wide, key=weights.__getitem__)
-    return [(*box[:k], part, *box[k + 1 :]) for part in ((box[k][0], middles[k]), (middles[k], box[k][1]))]
+def _outputs(asked: Formula, found: Sequence[Any], like: Array) -> Array:
+    """Outputs among the steps, of one shape, with the ends first."""
+    each = [
+        np.broadcast_to(found[o], (2, *np.broadcast_shapes(found[o].shape[1:], like.shape[-1:]))) for o in asked.outputs
+    ]
+    return np.stack(each, axis=1)
 
 
-class _Contractors:
-    """The contractors of a puzzle."""
-
-    def __init__(self, puzzle: Puzzle) -> None:
-        import codac
-
-        guarded = puzzle.guarded
-        self.codac, self.widths, self.guarded = codac, puzzle.widths, [op for op, _ in guarded]
-        n = len(puzzle.equations.outputs)
-        x = codac.VectorVar(n)
-        self.system = codac.AnalyticFunction([x], _expressions(codac, puzzle.equations, x))
-        zero = codac.IntervalVector([[0.0, 0.0]] * n)
-        self.rows = [codac.CtcInverse(self.system, zero, not guarded)]
-        allowed = [(codac.Interval(0.0, math.inf), puzzle.limits), (codac.Interval(0.0), puzzle.more)]
-        for over, asked in allowed:
-            self.rows += [
-                codac.CtcInverse(codac.AnalyticFunction([x], e), over, False) for e in _expressions(codac, asked, x)
-            ]
-        self.arguments = [codac.AnalyticFunction([x], *_expressions(codac, argument, x)) for _, argument in guarded]
-
-    def contract(self, x: Any) -> bool:
-        """Shrink a box around its zeros; whether Newton's operator shows one in it, or just beside."""
-        zero, self.slopes = False, None
-        for turn in range(_ROUNDS):
-            before = x.diam()
-            for row in self.rows:
-                row.contract(x)
-                if x.is_empty():
-                    return False
-            if _shrunk(x, before) and turn < _ROUNDS - 1:
-                continue
-            zero = self.newton(x) or zero
-            if x.is_empty() or not _shrunk(x, before):
-                break
-        return zero
-
-    def newton(self, x: Any) -> bool:
-        """Newton's operator on a somewhat wider box: zeros of x are in what it leaves; whether it has one for sure."""
-        codac, n = self.codac, x.size()
-        if x.is_unbounded() or not self.regular(x):
-            return False
-        room = [_WIDER * x[k].diam() + 1e-12 * self.widths[k] for k in range(n)]
-        wide = codac.IntervalVector([[x[k].lb() - room[k], x[k].ub() + room[k]] for k in range(n)])
-        if not self.regular(wide):
-            wide = x
-        middle = codac.IntervalVector([[m, m] for m in (wide[k].mid() for k in range(n))])
-        slopes, value = self.system.diff(wide), self.system.eval(codac.EvalMode.NATURAL, middle)
-        if slopes.is_empty() or value.is_empty() or slopes.is_unbounded() or value.is_unbounded():
-            return False
-        self.slopes = slopes
-        try:
-            inverse = np.linalg.inv([[slopes[i, k].mid() for k in range(n)] for i in range(n)])
-        except np.linalg.LinAlgError:
-            return False
-        if not np.all(np.isfinite(inverse)):
-            return False
-        matrix = codac.IntervalMatrix(codac.Matrix(inverse))
-        slopes, value = matrix * slopes, matrix * -value
-        around = [wide[k] - middle[k] for k in range(n)]
-        shown = True
-        for k in range(n):  # Gauss and Seidel; codac's own takes a coefficient that may be 0 for one that is not
-            if slopes[k, k].contains(0.0):
-                shown = False
-                continue
-            rest = sum((slopes[k, j] * around[j] for j in range(n) if j != k), codac.Interval(0.0))
-            step = (value[k] - rest) / slopes[k, k]
-            shown = shown and around[k].lb() < step.lb() and step.ub() < around[k].ub()
-            around[k] &= step
-            if around[k].is_empty():
-                x.set_empty()
-                return False
-        for k in range(n):
-            x[k] &= middle[k] + around[k]
-        return shown
-
-    def regular(self, x: Any) -> bool:
-        """Whether every function that the equations use has a slope all over a box."""
-        for name, argument in zip(self.guarded, self.arguments, strict=True):
-            over = argument.eval(self.codac.EvalMode.NATURAL, x)
-            if name in _POLES:
-                if over.contains(0.0):
-                    return False
-            elif name in ("asin", "acos"):
-                if not (over.lb() > -1.0 and over.ub() < 1.0):
-                    return False
-            elif not over.lb() > 0.0:
-                return False
-        return True
-
-    def weights(self, x: Any) -> list[float]:
-        """How much each variable's width adds to those of the equations, at most 1 each; or its share of the first."""
-        n = x.size()
-        own = [min(x[k].diam() / self.widths[k], 1.0) if self.widths[k] > 0 else 0.0 for k in range(n)]
-        if (slopes := self.slopes) is None:
-            return own
-        total = [0.0] * n
-        for i in range(n):
-            parts = [slopes[i, k].mag() * x[k].diam() for k in range(n)]
-            whole = sum(parts)
-            if whole > 0:
-                total = [t + p / whole for t, p in zip(total, parts, strict=True)]
-        return [t + 1e-3 * s for t, s in zip(total, own, strict=True)]
+def _slopes(asked: Formula, x: Array) -> Array:
+    """Ranges of the slopes of the outputs over boxes: shape (2, outputs, variables, boxes)."""
+    values, nothing = _forward(asked, x), np.zeros((2, *x.shape[1:]))
+    found: list[Array | None] = []
+    for k, (op, operands, value) in enumerate(asked.steps):
+        own: Array | None = None
+        if op == INPUT:
+            own = nothing.copy()
+            own[:, asked.names.index(value)] = 1.0
+        elif any(found[o] is not None for o in operands):
+            parts = _OPERATIONS[op].slopes(*(values[o] for o in operands), values[k])
+            for o, part in zip(operands, parts, strict=True):
+                if (inner := found[o]) is not None:
+                    outer = inner if part is _ONE else _times(inner, part[:, None])
+                    own = outer if own is None else _plus(own, outer)
+        found.append(own)
+    return np.stack([nothing if (own := found[o]) is None else own for o in asked.outputs], axis=1)
 
 
-def _shrunk(x: Any, before: Any) -> bool:
-    """Whether a side of a box is now notably shorter."""
-    return any(x[k].diam() < _GAIN * before[k] for k in range(x.size()))
+def _narrowed(asked: Formula, x: Array, most: float) -> tuple[Array, Truth]:
+    """Boxes around the points at which all outputs are from 0 to `most`, and which of them may have any.
 
-
-@cache
-def _contractors(puzzle: Puzzle) -> _Contractors:
-    return _Contractors(puzzle)
-
-
-def _expressions(codac: Any, asked: Formula, x: Any) -> list[Any]:
-    """The outputs of a formula as expressions of codac.
-
-    Raises:
-        NotAccepted: for an operation that it lacks, or at which it ends its process, as log of codac 2.1.2.
+    Forward through the steps and backward, each operand from the result and the other one (Benhamou et al. 1999).
     """
-    inputs = {name: codac.ScalarExpr(x[k]) for k, name in enumerate(asked.names)}
-    return [codac.ScalarExpr(x) if isinstance(x, codac.Interval) else x for x in fold(asked, inputs, _kind(codac))]
+    found, narrow = _forward(asked, x), x.copy()
+    kept = np.ones(x.shape[-1], dtype=bool)
 
+    def meet(k: int, own: Array) -> None:
+        found[k] = _meet(found[k], own)
+        np.logical_and(kept, found[k][0] <= found[k][1], out=kept)
 
-def _kind(codac: Any) -> Kind:
-    return Kind(
-        {
-            **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg")},
-            **dict.fromkeys(("div", "quotient"), operator.truediv),
-            "ratio": lambda a, b: a * b / (codac.sqr(b) + codac.Interval(0.0, _TINY)),  # anything where b is 0
-            "square": codac.sqr,
-            "pow": lambda a, b: _power(codac, a, b) if b.lb() >= 0 else codac.Interval(1.0) / _power(codac, a, -b),
-            **{name: getattr(codac, name) for name in FUNCTIONS},
-        },
-        lambda value: codac.Interval(*ends(as_exact(value))),  # an expression of its own wherever it is used
-    )
-
-
-def _power(codac: Any, base: Any, exponent: Any) -> Any:
-    """Not for negative exponents: of these codac 2.1.2 loses zeros, as x⁻³ = −1."""
-    return codac.pow(base, codac.ScalarExpr(exponent))
-
-
-def _vector(codac: Any, box: Box) -> Any:
-    return codac.IntervalVector([list(ends) for ends in box])
-
-
-def _box(x: Any) -> Box:
-    return tuple((x[k].lb(), x[k].ub()) for k in range(x.size()))
-
-
-def check(asked: Formula) -> None:
-    """Refuse a formula that codac cannot take.
-
-    Raises:
-        NotAccepted: with the name of an operation.
-    """
-    known = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "div", "quotient", "ratio", "square", "pow", *FUNCTIONS}
-    for step in asked.steps:
-        exponent = asked.steps[step.operands[1]].value if step.op == "pow" else 1
-        if step.op not in known or not isinstance(exponent, int | Fraction) or exponent % 1:
-            raise NotAccepted(step.op)
+    for o in asked.outputs:
+        meet(o, np.array([[0.0], [most]]))
+    for k, (op, operands, value) in reversed([*enumerate(asked.steps)]):
+        if op == INPUT:
+            narrow[:, asked.names.index(value)] = found[k]
+        elif op != CONSTANT:
+            each = _OPERATIONS[op].back(found[k], *(found[o] for o in operands))
+            for o, part in zip(operands, each, strict=True):
+                meet(o, part)
+    return narrow, kept
 
 
 def ends(number: Any) -> tuple[float, float]:
     """Doubles below and above a number, or twice the double that it is."""
-    ball = flint.arb(number)
-    if ball.is_finite() and ball.is_exact() and flint.arb(float(ball)) == ball:
-        return float(ball), float(ball)
-    return interval(ball)
+    exact = flint.arb(number)
+    if exact.is_finite() and exact.is_exact() and flint.arb(float(exact)) == exact:
+        return float(exact), float(exact)
+    return interval(exact)

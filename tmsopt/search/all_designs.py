@@ -122,11 +122,10 @@ class Every(Tabular):
 def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Asked]) -> Every:
     """Every design in the box with the pattern that a problem locates, where that leaves no freedom.
 
-    Interval branch and prune (codac, of the extra ``certify``) shows which designs there are, and that there is no
-    other. Where it does not come to an end in time, or codac is missing, Newton's method runs from designs spread over
-    the box with every way to share out their roots, and IPOPT from some of them, until each solution was met three
-    times and an estimate expects no more, or after `starts`. Solutions are told apart by their parameters, so factors
-    that change places are no other solution.
+    Interval branch and prune shows which designs there are, and that there is no other. Where it does not come to an
+    end in time, Newton's method runs from designs spread over the box with every way to share out their roots, and
+    IPOPT from some of them, until each solution was met three times and an estimate expects no more, or after `starts`.
+    Solutions are told apart by their parameters, so factors that change places are no other solution.
 
     Args:
         seconds: for the proof at most; 0 for the search alone.

@@ -85,7 +85,6 @@ def report(asked: Asked) -> str:
         "Polynomials with stable roots, each coefficient but the first moved by a quadratic form in two parameters, of "
         f"EP4 in three, all in ±{_REACH:g}; seed {asked.seed}. The search is `solve_all(problem, seconds=0)`: Newton's "
         "method and IPOPT until each design was met three times and an estimate expects no more. The proof is interval "
-        "branch and prune (codac), which shows that there is no other design; its time includes the start of a "
-        "process. A homotopy continuation was not run."
+        "branch and prune, which shows that there is no other design. A homotopy continuation was not run."
     )
     return page("All designs", asked, table(header, map(_cells, rows)), about)
