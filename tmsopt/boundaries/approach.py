@@ -63,14 +63,14 @@ def approach(
     plain = _nlp(place.problem.model, place.problem.parameter_set.name, tuple(place.weights), edge)
     nlp = replace(
         plain,
-        lower=(*(place.space.lower / size).tolist(), *plain.lower[n:]),
-        upper=(*(place.space.upper / size).tolist(), *plain.upper[n:]),
+        lower=(*(place.lower / size).tolist(), *plain.lower[n:]),
+        upper=(*(place.upper / size).tolist(), *plain.upper[n:]),
         numbers=own,
     )
     run, polish = method(nlp, max_iterations=_ITERATIONS), polisher(nlp)
 
     def from_start(u: Array, below: float) -> Approach | None:
-        c = sign * place.space.coefficients(u)
+        c = sign * place.coefficients(u)
         if not (np.all(np.isfinite(c)) and c.any()):
             return None
         raw = run(np.concatenate([u / size, edge.guess(c)]))
@@ -81,7 +81,7 @@ def approach(
         point = polish(raw, nlp)
         if not point.violation <= _FEASIBLE:
             return None
-        u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
+        u_found = np.clip(point.x[:n] * size, place.lower, place.upper)
         amiss = point.violation * float(np.abs(point.row_multipliers).max(initial=0.0))
         return Approach(u_found, point.stationarity <= _STATIONARY and amiss <= _SHIFTED * point.objective)
 
@@ -102,8 +102,7 @@ def _nlp(model: Model, set_name: str, weighted: tuple[str, ...], edge: Edge) -> 
     moved = {name: given[name] + given[_WEIGHT + name] * given[_SIZE] * y for name, y in zip(weighted, x, strict=False)}
     a = model.coefficients({name: moved.get(name, given[name]) for name in of.names}, of)
     c = [given[_SIGN] * coefficient / given[f"{_SCALE}{k}"] for k, coefficient in enumerate(a)]
-    found = zip(edge.equations(c, x[n:]), edge.powers, strict=True)
-    equations = [e / given[f"{_SIZE}{k}"] for e, k in found]
+    equations = [e / given[f"{_SIZE}{k}"] for k, e in edge.equations(c, x[n:]).items()]
     others = edge.nonnegative(c, x[n:])
     rows = [*equations, *others]
     return NLP(

@@ -175,7 +175,7 @@ def nearest(
         raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", ("pattern",))])
     place = _place(design, parameters, weights)
     start_steps(progress, f"looking for the nearest {pattern}")
-    return _nearest(place, ray_crossings(place.space), pattern)
+    return _nearest(place, ray_crossings(place), pattern)
 
 
 def robustness(
@@ -216,12 +216,12 @@ def _at(problem: Posed, parameters: Table[float], weights: Table[float]) -> Robu
 
 def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS), method: Method = ipopt) -> Robustness:
     damped = "heavy damping" in kinds
-    seen = ray_crossings(place.space, damped=damped)
+    seen = ray_crossings(place, damped=damped)
     found = _each(place, seen, kinds, method)
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
-        seen = sorted([*seen, *between(place.space, u, damped)], key=lambda c: c.distance)
+        seen = sorted([*seen, *between(place, u, damped)], key=lambda c: c.distance)
         found = _each(place, seen, kinds, method)
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
@@ -276,7 +276,7 @@ def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, method: 
         best = Approach(mine[0].u, False)
     if not best.u.size or not is_boundary(place, best.u, kind == "heavy damping"):
         return Nearest(kind)
-    direct = not between(place.space, best.u, kind == "heavy damping")
+    direct = not between(place, best.u, kind == "heavy damping")
     direction = Table(dict(zip(place.weights, best.u.tolist(), strict=True)))
     there = {n: 0.0 if abs(x) <= _NOTHING * place.weights.get(n, 0.0) else x for n, x in place.design(best.u).items()}
     return Nearest(kind, best.distance, Table(there), direction, best.refined, direct)
@@ -288,8 +288,8 @@ def _pieces(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Iterat
     for crossing in seen:
         starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
     if kind == "heavy damping" and not place.heavily_damped:
-        sign = float(np.sign(place.space.coefficients(np.zeros(len(place.weights)))[0]))
-        starts.setdefault(("real", sign), []).extend(most_damped(place.space, sign))
+        sign = float(np.sign(place.coefficients(np.zeros(len(place.weights)))[0]))
+        starts.setdefault(("real", sign), []).extend(most_damped(place, sign))
     for (edge, sign), points in starts.items():
         yield edge, sign, points
 
@@ -306,10 +306,10 @@ def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], m
             best = found or best
         if not best.u.size:
             break
-        met = between(place.space, best.u, edge.name not in STABILITY)
+        met = between(place, best.u, edge.name not in STABILITY)
         starts = [c.u for c in met if (c.edge, c.sign) == (edge.name, sign)]
         if edge.name == "real" and best.distance < before:  # no rays came there, and starts much alike end alike
-            starts += elsewhere(place.space, best.distance, turn)
+            starts += elsewhere(place, best.distance, turn)
         if not starts:
             break
     return best
