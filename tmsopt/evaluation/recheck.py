@@ -74,12 +74,11 @@ def recheck(
         around: the boundaries nearest to this design, where they are known already.
     """
     looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
-    listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
-    violations, amounts = _violated(problem, looked, problem.conditions)
-    crossing = False
-    structure = each[top]["structure"]
+    violations, amounts = looked.violations(problem.conditions)
+    nominal, worst, crossing = looked.nominal, looked.each[looked.top], False
+    structure = worst["structure"]
     if not math.isfinite(structure.abscissa):
-        exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
+        exist = all(math.isfinite(float(c)) for c in worst.coefficients)
         violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or none
     if problem.pattern is not None:
         a = [float(c) for c in nominal.coefficients]
@@ -89,24 +88,22 @@ def recheck(
             violations[problem.pattern.name] = 1.0 if crossing else distance
     of = problem.parameter_set
     names = [n for n in (*public_names(problem.model, of), "damping_ratio") if n not in problem.model.sets[0].names]
-    if around is not None:
-        names.append(RADIUS)
-    if problem.asks(ANGULAR_FREQUENCY):
-        names.append(ANGULAR_FREQUENCY)
+    names += [RADIUS] if looked.around is not None else []
+    names += [ANGULAR_FREQUENCY] if problem.asks(ANGULAR_FREQUENCY) else []
     if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
         nominal = nominal.with_known({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
-        realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
-        objective=_objective(problem, nominal, each, listed),
+        realised=realised_abscissa(problem, looked.cases[looked.top].applied(parameters)),
+        objective=looked.objective,
         violations=Table(violations),
         amounts=Table(violations | amounts),
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
-        worst=listed[top] if listed else Case(),
-        least_damped=listed[looked.least] if listed else Case(),
-        fastest=listed[looked.fastest] if listed else Case(),
-        around=around,
+        worst=looked.cases[looked.top],
+        least_damped=looked.cases[looked.least],
+        fastest=looked.cases[looked.fastest],
+        around=looked.around,
         crossing=crossing,
     )
 
@@ -123,9 +120,9 @@ def missed(
     if not asked:
         return {}
     looked = _look(problem, parameters, cases, around)
-    near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(problem, c))}
+    near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(c))}
     exactly = _look(problem, parameters, cases, looked.around, parameters) if near else looked
-    return _violated(problem, exactly, near)[1]
+    return exactly.violations(near)[1]
 
 
 def judged_exactly(
@@ -137,7 +134,7 @@ def judged_exactly(
     """
     looked = _look(problem, {n: float(x) for n, x in parameters.items()}, cases, stored=parameters)
     conditions = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
-    return looked.nominal, _violated(problem, looked, conditions)[1]
+    return looked.nominal, looked.violations(conditions)[1]
 
 
 def _is_near(condition: Expression, values: Values) -> bool:
@@ -145,20 +142,6 @@ def _is_near(condition: Expression, values: Values) -> bool:
     left, right = condition.sides(values)
     slack = -condition.sign * float(condition(values))
     return condition.equality or not slack > _SCATTER * max(1.0, abs(left), abs(right))
-
-
-def _violated(
-    problem: Posed, looked: "_Look", conditions: Mapping[str, Expression]
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Violations of conditions beyond tolerance, relative and in the units of the sides."""
-    violations, amounts = {}, {}
-    for name, condition in conditions.items():
-        at = looked.at(problem, condition)
-        violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
-        if not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, worst)):
-            violations[name] = violation
-            amounts[name] = float(condition.excess(float(condition(worst))))
-    return violations, amounts
 
 
 def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
@@ -193,14 +176,11 @@ def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str
 
 def excesses(problem: Posed, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
     """Amount by which each constraint's limit must be moved for a design: 0 or more, signed for an equality."""
-    looked = _look(problem, parameters, cases)
-    found = {}
+    looked, found = _look(problem, parameters, cases), {}
     for name, condition in problem.conditions.items():
-        differences = [float(condition(v)) for v in looked.at(problem, condition)]
-        if condition.equality:
-            found[name] = differences[0]
-        else:
-            found[name] = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
+        differences = [float(condition(v)) for v in looked.at(condition)]
+        beyond = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
+        found[name] = differences[0] if condition.equality else beyond
     return found
 
 
@@ -214,6 +194,7 @@ class _Look:
         fastest: number of the case with the greatest angular frequency, where that is asked for, else `top`.
     """
 
+    problem: Posed
     cases: list[Case]
     nominal: Values
     each: list[Values]
@@ -222,9 +203,28 @@ class _Look:
     fastest: int
     around: Robustness | None
 
-    def at(self, problem: Posed, condition: Expression) -> list[Values]:
-        """The cases that a condition holds in."""
-        return self.each if depends_on_case(problem, condition, self.cases) else [self.nominal]
+    def at(self, expression: Expression) -> list[Values]:
+        """The cases in which a condition must hold, or an objective is the worst."""
+        return self.each if depends_on_case(self.problem, expression, self.cases) else [self.nominal]
+
+    @property
+    def objective(self) -> float:
+        """The objective, the worst over the cases where it differs between them; nan without one."""
+        objective, sign = self.problem.objective, self.problem.sign
+        if objective is None:
+            return math.nan
+        return sign * max((sign * float(objective(values)) for values in self.at(objective)), key=_or_infinite)
+
+    def violations(self, conditions: Mapping[str, Expression]) -> tuple[dict[str, float], dict[str, float]]:
+        """Violations of conditions beyond tolerance, relative and in the units of the sides."""
+        violations, amounts = {}, {}
+        for name, condition in conditions.items():
+            at = self.at(condition)
+            violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
+            if not violation <= FEASIBLE or (violation > 0 and _beyond(self.problem, condition, worst)):
+                violations[name] = violation
+                amounts[name] = float(condition.excess(float(condition(worst))))
+        return violations, amounts
 
 
 def _look(
@@ -235,16 +235,16 @@ def _look(
     stored: Mapping[str, Any] | None = None,
 ) -> _Look:
     """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
-    listed = [case for case in cases if not case.direction]
-    designs = [case.applied(parameters) for case in listed] or [dict(parameters)]
+    listed = [case for case in cases if not case.direction] or [Case()]
     nominal = problem.values(parameters)
-    each = [problem.values(design) for design in designs] if listed else [nominal]
+    each = [nominal if case == Case() else problem.values(case.applied(parameters)) for case in listed]
     near_top, near_least, near_fastest = _candidates(each)
     if stored is not None:
-        exact = [case.applied(stored) for case in listed] or [dict(stored)]
         nominal, *each = (
-            values.with_known({"structure": Structure("undecided", realised_roots(problem, design), 0.0)})
-            for design, values in zip((stored, *exact), (nominal, *each), strict=True)
+            values.with_known(
+                {"structure": Structure("undecided", _realised_roots(problem, case.applied(stored)), 0.0)}
+            )
+            for case, values in zip((Case(), *listed), (nominal, *each), strict=True)
         )
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
@@ -258,7 +258,7 @@ def _look(
     if around is not None:
         worst[RADIUS] = around.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **worst}) for v in (nominal, *each))
-    return _Look(listed, nominal, each, top, least, fastest, around)
+    return _Look(problem, listed, nominal, each, top, least, fastest, around)
 
 
 def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int], list[int]]:
@@ -268,7 +268,8 @@ def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int], list[int]
     """
     a = np.array([[float(c) for c in values.coefficients] for values in each])
     if len(each) == 1 or not np.all(np.isfinite(a)) or np.any(a[:, 0] == 0):
-        return list(range(len(each))), list(range(len(each))), list(range(len(each)))
+        every = list(range(len(each)))
+        return every, every, every
     z = roots(a)
     off = _off(a, z)
     ratio = np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
@@ -291,16 +292,6 @@ def _off(a: Array, z: NDArray[np.complex128]) -> Array:
     return np.asarray(np.minimum(first, _SCATTER * size.max(axis=1, keepdims=True)))
 
 
-def _objective(problem: Posed, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:
-    """The objective, the worst over the cases where it differs between them."""
-    if problem.objective is None:
-        return math.nan
-    if not depends_on_case(problem, problem.objective, cases):
-        return float(problem.objective(nominal))
-    sign = problem.sign
-    return sign * max((sign * float(problem.objective(values)) for values in each), key=_or_infinite)
-
-
 def _or_infinite(value: float) -> float:
     """A number for comparison in which one that does not exist is the worst."""
     return math.inf if math.isnan(value) else value
@@ -308,10 +299,9 @@ def _or_infinite(value: float) -> float:
 
 def realised_abscissa(problem: Posed, parameters: Mapping[str, float]) -> float:
     """Abscissa of the parameters exactly as stored."""
-    found = realised_roots(problem, parameters)
+    found = _realised_roots(problem, parameters)
     return found[0].re if found else math.nan
 
 
-def realised_roots(problem: Posed, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
-    """Roots of the parameters exactly as stored, rightmost first; none where a coefficient does not exist."""
+def _realised_roots(problem: Posed, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
     return roots_at(problem.model, problem.parameter_set, parameters)
