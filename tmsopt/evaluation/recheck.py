@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.algebra.formula import Formula, NotAccepted, formula, symbol
 from tmsopt.algebra.intervals import ranges
@@ -19,10 +18,10 @@ from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE, roots_at
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, roots_at
 from tmsopt.problem.verdict.meetings import is_crossing
-from tmsopt.records import Array, Table
-from tmsopt.roots import Root, Structure, pattern_distance, roots
+from tmsopt.records import Table
+from tmsopt.roots import Root, Structure, pattern_distance
 
 FEASIBLE = 1e-9
 """Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
@@ -31,7 +30,6 @@ MATCHED = 1e-10
 """Relative change of a coefficient up to which a pattern counts as located."""
 
 _SCATTER = 2e-3  # of the largest root: five times what numeric roots beside a 4-fold one are off
-_TAKEN = 10 * STRUCTURE_TOLERANCE  # of the terms of a polynomial, more than those are off that are taken for multiple
 
 
 @dataclass(frozen=True)
@@ -238,7 +236,7 @@ def _look(
     listed = [case for case in cases if not case.direction] or [Case()]
     nominal = problem.values(parameters)
     each = [nominal if case == Case() else problem.values(case.applied(parameters)) for case in listed]
-    near_top, near_least, near_fastest = _candidates(each)
+    numbers = range(len(each))
     if stored is not None:
         nominal, *each = (
             values.with_known(
@@ -246,12 +244,12 @@ def _look(
             )
             for case, values in zip((Case(), *listed), (nominal, *each), strict=True)
         )
-    top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
-    least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
+    top = max(numbers, key=lambda k: _or_infinite(each[k]["abscissa"]))
+    least = min(numbers, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
     fastest = top
     if problem.asks(ANGULAR_FREQUENCY):
-        fastest = max(near_fastest, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
+        fastest = max(numbers, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
         worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]
     if around is None and problem.asks_radius and stored is None:
         around = robustness_at(problem, parameters)
@@ -259,37 +257,6 @@ def _look(
         worst[RADIUS] = around.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **worst}) for v in (nominal, *each))
     return _Look(problem, listed, nominal, each, top, least, fastest, around)
-
-
-def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int], list[int]]:
-    """Cases that may have the largest abscissa, the least damping ratio and the greatest angular frequency.
-
-    Numeric roots are off by 4e-4 at most, simple ones by far less.
-    """
-    a = np.array([[float(c) for c in values.coefficients] for values in each])
-    if len(each) == 1 or not np.all(np.isfinite(a)) or np.any(a[:, 0] == 0):
-        every = list(range(len(each)))
-        return every, every, every
-    z = roots(a)
-    off = _off(a, z)
-    ratio = np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
-    off_ratio = np.minimum(_SCATTER, np.max(off / (np.abs(z) + 1e-300), axis=1))
-    top, fastest = (
-        np.flatnonzero((part + off).max(axis=1) >= (part - off).max(axis=1).max()).tolist() for part in (z.real, z.imag)
-    )
-    least = np.flatnonzero(ratio - 2 * off_ratio <= (ratio + 2 * off_ratio).min()).tolist()
-    return top, least, fastest
-
-
-def _off(a: Array, z: NDArray[np.complex128]) -> Array:
-    """How far numeric roots may be off: by what the polynomial is off over its slope, at most as multiple ones are."""
-    size = np.abs(z)
-    powers = np.arange(a.shape[1] - 1, -1, -1)
-    terms = (np.abs(a)[:, None] * size[..., None] ** powers).sum(axis=-1)
-    slope = np.abs((a[:, None, :-1] * powers[:-1] * z[..., None] ** (powers[:-1] - 1)).sum(axis=-1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first = np.nan_to_num(_TAKEN * terms / slope, nan=np.inf)
-    return np.asarray(np.minimum(first, _SCATTER * size.max(axis=1, keepdims=True)))
 
 
 def _or_infinite(value: float) -> float:

@@ -117,7 +117,7 @@ def least(
     if not few and all(s.status != "optimal" for s in ended):
         ended.append(ask.later(1).solve(asked, _RETRY))
     found = min((s for s in ended if s.status == "optimal"), key=lambda s: s.value, default=None)
-    return found
+    return found if found is None or not ask.ranges else _tightened(ask, k, limits, found)
 
 
 def solvable(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> bool:
@@ -169,6 +169,21 @@ def point(ask: FrontSolver, solution: Solution) -> FrontPoint:
         near = (("min", low), ("max", high))
         active += [f"{name}.{end}" for end, at in near if abs(solution.parameters[name] - at) <= _AT_END * (high - low)]
     return FrontPoint(objectives(ask, solution), solution, tuple(active))
+
+
+def _tightened(ask: FrontSolver, k: int, limits: Mapping[int, float], found: Solution) -> Solution:
+    """A design as good in objective `k` and better in the others, if a limit that does not bind leaves one."""
+    names = eps_names(ask)
+    loose = [j for j in limits if names[j] not in found.active and ask.ranges[j] > 0]
+    if not loose:
+        return found
+    values = objectives(ask, found)
+    held = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
+    rest = " + ".join(f"({ask.texts[j]}) / {ask.ranges[j]!r}" for j in loose)
+    asked = _pinned(ask, subproblem(ask, k, held).derive(minimize=rest), k, found)
+    better = ask.solve(asked, ask.options.starts, [found])
+    gain = sum((values[j] - b) / ask.ranges[j] for j, b in enumerate(objectives(ask, better)) if j in loose)
+    return better if better.status == "optimal" and gain > _WORTH else found
 
 
 def _inside(problem: Posed, near: Solution) -> dict[str, float]:
