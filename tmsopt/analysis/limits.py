@@ -126,9 +126,9 @@ def moved(problem: Posed, name: str, step: float) -> Posed:
             text = with_limit(text, number + step)
         return replace(problem.problem, constraints={**problem.constraints, name: text}).posed
     parameter, end = name.rsplit(".", 1)
-    ends = list(problem.free[parameter])
-    ends[end == "max"] += step
-    return replace(problem.problem, free={**problem.free, parameter: tuple(ends)}).posed
+    lower, upper = problem.free[parameter]
+    ends = (lower, upper + step) if end == "max" else (lower + step, upper)
+    return replace(problem.problem, free={**problem.free, parameter: ends}).posed
 
 
 def _unresolved(solution: Solution, name: str) -> Lever:

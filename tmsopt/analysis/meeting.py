@@ -11,6 +11,7 @@ import numpy as np
 from tmsopt.algebra.balls import exact
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.model import Matrix
+from tmsopt.records import Numbers
 from tmsopt.roots.polynomial import characteristic_polynomial
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
@@ -48,8 +49,8 @@ class Meeting:
 
     polynomial: Polynomial
     values: Mapping[str, Any]
-    doubt: Mapping[str, float]
-    sizes: Mapping[str, float]
+    doubt: Numbers
+    sizes: Numbers
     free: Collection[str]
     s: Any
     multiplicity: int
@@ -119,8 +120,8 @@ def pencil_of(model: Model, of: ParameterSet, values: Mapping[str, Any]) -> tupl
 def met(
     model: Model,
     of: ParameterSet,
-    design: Mapping[str, float],
-    widths: Mapping[str, float],
+    design: Numbers,
+    widths: Numbers,
     s: complex,
     multiplicity: int,
 ) -> Meeting:

@@ -1,7 +1,7 @@
 """The nearest point of a boundary: by how much a design may change before it is unstable, or heavily damped no more."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -20,7 +20,7 @@ from tmsopt.problem.solution import Solution
 from tmsopt.program.ipopt import ipopt
 from tmsopt.program.sqp import sqp
 from tmsopt.progress import Listener, start_steps
-from tmsopt.records import Array, Printable, Table, plain
+from tmsopt.records import Array, Numbers, Printable, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
@@ -142,8 +142,8 @@ def nearest(
     design: Given,
     pattern: str,
     *,
-    parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
+    parameters: Numbers | None = None,
+    weights: Numbers | None = None,
     progress: Listener | None = None,
 ) -> Nearest:
     """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
@@ -181,8 +181,8 @@ def nearest(
 def robustness(
     design: Given,
     *,
-    parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
+    parameters: Numbers | None = None,
+    weights: Numbers | None = None,
     progress: Listener | None = None,
 ) -> Robustness:
     """The nearest points of all boundaries, and the radius within which a design stays stable.
@@ -201,7 +201,7 @@ def robustness(
     return _surveyed(place)
 
 
-def robustness_at(problem: Posed, parameters: Mapping[str, float]) -> Robustness:
+def robustness_at(problem: Posed, parameters: Numbers) -> Robustness:
     """The same for the boundaries of stability alone, with the weights of the problem; kept for a while.
 
     IPOPT, which searches for designs, has no part in it.
@@ -245,9 +245,7 @@ def _zeros(place: WeightedDesign) -> tuple[str, ...]:
     )
 
 
-def _place(
-    design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None
-) -> WeightedDesign:
+def _place(design: Given, parameters: Numbers | None, weights: Numbers | None) -> WeightedDesign:
     problem = pose(design)
     given = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
     if faults := [f for n, (x, example) in given.items() if x is not None for f in table_faults(n, x, example)]:

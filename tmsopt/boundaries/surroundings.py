@@ -12,7 +12,7 @@ from tmsopt.boundaries.boundaries import terms
 from tmsopt.errors import Fault, InputError, is_number, suggest
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
-from tmsopt.records import Array
+from tmsopt.records import Array, Numbers
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
 _NOTHING = 1e-12  # of a free parameter's range: what is smaller is 0 but for rounding
@@ -29,8 +29,8 @@ class WeightedDesign:
     """
 
     problem: Posed
-    parameters: Mapping[str, float]
-    weights: Mapping[str, float]
+    parameters: Numbers
+    weights: Numbers
 
     def displaced(self, u: Any) -> dict[str, Any]:
         """Every parameter for displacements: one number, array or symbol per weight."""
@@ -125,7 +125,7 @@ class WeightedDesign:
         return np.asarray(powers * (float(np.abs(a / powers).max()) or 1.0))
 
 
-def placed(problem: Posed, parameters: Mapping[str, float], weights: Mapping[str, float] | None) -> WeightedDesign:
+def placed(problem: Posed, parameters: Numbers, weights: Numbers | None) -> WeightedDesign:
     """A design with checked parameters and weights.
 
     Raises:
@@ -140,7 +140,7 @@ def placed(problem: Posed, parameters: Mapping[str, float], weights: Mapping[str
     return WeightedDesign(problem, own, {n: float(given[n]) for n in own if given.get(n, 0.0) > 0})
 
 
-def relative(problem: Posed, parameters: Mapping[str, float]) -> dict[str, float]:
+def relative(problem: Posed, parameters: Numbers) -> dict[str, float]:
     """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, 1 without one."""
     of = problem.parameter_set
     weights = {}
@@ -152,7 +152,7 @@ def relative(problem: Posed, parameters: Mapping[str, float]) -> dict[str, float
     return weights
 
 
-def parameter_faults(problem: Posed, parameters: Mapping[str, float]) -> Iterator[Fault]:
+def parameter_faults(problem: Posed, parameters: Numbers) -> Iterator[Fault]:
     """What is wrong with the parameters of a design."""
     of = problem.parameter_set
     for name in parameters:
@@ -168,7 +168,7 @@ def parameter_faults(problem: Posed, parameters: Mapping[str, float]) -> Iterato
             yield Fault(f"found {parameters[name]:.6g}; {of[name].meaning} is {of[name].range}", key)
 
 
-def _weight_faults(problem: Posed, weights: Mapping[str, float]) -> Iterator[Fault]:
+def _weight_faults(problem: Posed, weights: Numbers) -> Iterator[Fault]:
     of = problem.parameter_set
     for name, weight in weights.items():
         key = ("weights", name)

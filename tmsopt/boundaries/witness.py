@@ -4,7 +4,7 @@ Where coefficients are differences of large numbers, or all vanish together, an 
 around which nothing changes.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import flint
 import numpy as np
@@ -13,7 +13,7 @@ from tmsopt.boundaries.boundaries import MATCHED, heavily_damped
 from tmsopt.boundaries.rays import directions
 from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.problem.problem import Posed
-from tmsopt.records import Array
+from tmsopt.records import Array, Numbers
 from tmsopt.roots import exact_roots, is_stable, lienard_chipart, multiple_real_roots, routh, shift
 
 BITS = 400
@@ -73,7 +73,7 @@ def _moved_left(place: WeightedDesign, u: Array, left: float) -> Array:
     return v
 
 
-def exactly_stable(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def exactly_stable(problem: Posed, parameters: Numbers) -> bool:
     """Whether all roots of the design as stored lie left of the imaginary axis, in ball arithmetic."""
     with flint.ctx.workprec(BITS):
         c = _balls(problem, parameters)
@@ -84,7 +84,7 @@ def exactly_stable(problem: Posed, parameters: Mapping[str, float]) -> bool:
         return all(x > 0 for x in tests)
 
 
-def _all_real(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def _all_real(problem: Posed, parameters: Numbers) -> bool:
     with flint.ctx.workprec(BITS):
         c = _balls(problem, parameters)
         if c[0].contains(0):
@@ -92,6 +92,6 @@ def _all_real(problem: Posed, parameters: Mapping[str, float]) -> bool:
     return all(root.im == 0 and root.re < 0 for root in exact_roots(c))
 
 
-def _balls(problem: Posed, parameters: Mapping[str, float]) -> list[flint.arb]:
+def _balls(problem: Posed, parameters: Numbers) -> list[flint.arb]:
     at = {n: flint.arb(float(x)) for n, x in parameters.items()}
     return [flint.arb(c) for c in problem.model.coefficients(at, problem.parameter_set)]

@@ -23,14 +23,14 @@ from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, SIMPLE
 from tmsopt.problem.units import Reading, frequencies, readings
-from tmsopt.records import Table
+from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
 
-_Key = tuple[str | int, ...]
+_Key = tuple[Any, ...]
 _Several = tuple[Enclosed, ...]
 
 
@@ -48,7 +48,7 @@ class Certified:
 
 
 def certified_numbers(
-    problem: Posed, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case] = ()
+    problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case] = ()
 ) -> Certified:
     """The numbers of a design, correctly rounded.
 
@@ -176,7 +176,7 @@ class _Design:
 _ROOTS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY, RADIUS)
 
 
-def _exact(table: Mapping[str, float]) -> dict[str, Any]:
+def _exact(table: Numbers) -> dict[str, Any]:
     return {name: exact(value) for name, value in table.items()}
 
 

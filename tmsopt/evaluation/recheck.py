@@ -20,7 +20,7 @@ from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, roots_at
 from tmsopt.problem.verdict.meetings import is_crossing
-from tmsopt.records import Table
+from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure, pattern_distance
 
 FEASIBLE = 1e-9
@@ -62,7 +62,7 @@ class Evaluation:
 
 def recheck(
     problem: Posed,
-    parameters: Mapping[str, float],
+    parameters: Numbers,
     cases: Sequence[Case] | None = None,
     around: Robustness | None = None,
 ) -> Evaluation:
@@ -107,7 +107,7 @@ def recheck(
 
 
 def missed(
-    problem: Posed, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
+    problem: Posed, parameters: Numbers, cases: Sequence[Case], around: Robustness | None = None
 ) -> dict[str, float]:
     """Limits on the roots that the exact roots of the parameters as stored miss → by how much, in their own units.
 
@@ -172,7 +172,7 @@ def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str
     return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
-def excesses(problem: Posed, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
+def excesses(problem: Posed, parameters: Numbers, cases: Sequence[Case]) -> dict[str, float]:
     """Amount by which each constraint's limit must be moved for a design: 0 or more, signed for an equality."""
     looked, found = _look(problem, parameters, cases), {}
     for name, condition in problem.conditions.items():
@@ -227,7 +227,7 @@ class _Look:
 
 def _look(
     problem: Posed,
-    parameters: Mapping[str, float],
+    parameters: Numbers,
     cases: Sequence[Case],
     around: Robustness | None = None,
     stored: Mapping[str, Any] | None = None,
@@ -264,7 +264,7 @@ def _or_infinite(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 
-def realised_abscissa(problem: Posed, parameters: Mapping[str, float]) -> float:
+def realised_abscissa(problem: Posed, parameters: Numbers) -> float:
     """Abscissa of the parameters exactly as stored."""
     found = _realised_roots(problem, parameters)
     return found[0].re if found else math.nan

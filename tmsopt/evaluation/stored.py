@@ -29,7 +29,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text, unit_at
-from tmsopt.records import Array
+from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.enclosed import nearest_roots
@@ -82,8 +82,8 @@ class _Cluster:
 
 
 def held(
-    problem: Posed, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case]
-) -> tuple[Mapping[str, float], Evaluation, Mapping[str, float]]:
+    problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case]
+) -> tuple[Numbers, Evaluation, Numbers]:
     """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
 
     It is moved, too, where its objective does not exist as stored: beside the end of a square root. The structure
@@ -99,7 +99,7 @@ def held(
         inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
         groups = [names for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if names and clusters]
         ways = (_Spread(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist()))
-        others = (design for way in ways for design in way.designs())
+        others: Iterator[dict[str, float]] = (design for way in ways for design in way.designs())
     else:
         others = filter(partial(_has_objective, problem), _beside(problem, parameters))
     for design in others:
@@ -110,7 +110,7 @@ def held(
     return parameters, checked, amounts
 
 
-def _has_objective(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def _has_objective(problem: Posed, parameters: Numbers) -> bool:
     """Whether the objective exists at the parameters exactly as stored; one of the roots always does."""
     asked = problem.objective
     if asked is None or set(asked.names) & set(ROOT_NAMES):
@@ -120,14 +120,14 @@ def _has_objective(problem: Posed, parameters: Mapping[str, float]) -> bool:
         return bool(as_ball(asked(Values(problem.model, problem.parameter_set, exact))).is_finite())
 
 
-def _beside(problem: Posed, parameters: Mapping[str, float]) -> Iterator[dict[str, float]]:
+def _beside(problem: Posed, parameters: Numbers) -> Iterator[dict[str, float]]:
     """Designs some roundings of one free parameter off, inside the box."""
     for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items()):
         if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper:
             yield {**parameters, name: x}
 
 
-def multiple_roots_exist(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def multiple_roots_exist(problem: Posed, parameters: Numbers) -> bool:
     """Whether a design within rounding of one has exactly the multiple roots that this one has to rounding.
 
     There Newton's method, in 150 digits, gains digits with every step; where equations are all but singular it stalls.
@@ -161,7 +161,7 @@ def abscissa_as_stored(solution: Solution) -> str:
     return f"{first}as stored {unit.number(realised, _SHOWN)}"
 
 
-def missed_note(problem: Posed, amounts: Mapping[str, float]) -> tuple[str, ...]:
+def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
     """What parameters miss as they are stored, as a sentence for the reader."""
     why = "no doubles nearby that meet every limit were found" if problem.free else "the ideal design does not"
     return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
@@ -169,7 +169,7 @@ def missed_note(problem: Posed, amounts: Mapping[str, float]) -> tuple[str, ...]
 
 def _clusters(
     problem: Posed,
-    parameters: Mapping[str, float],
+    parameters: Numbers,
     checked: Evaluation,
     cases: Sequence[Case],
     names: Sequence[str],
@@ -204,7 +204,7 @@ class _Spread:
     """
 
     problem: Posed
-    parameters: Mapping[str, float]
+    parameters: Numbers
     clusters: Sequence[_Cluster]
     names: Sequence[str]
     spread: float
@@ -303,7 +303,7 @@ def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
         yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
 
 
-def _structured(problem: Posed, design: Mapping[str, float], checked: Evaluation, again: Evaluation) -> Evaluation:
+def _structured(problem: Posed, design: Numbers, checked: Evaluation, again: Evaluation) -> Evaluation:
     """The recheck of a design, with the structure of the ideal one that it was moved from."""
     structure = again.structure
     if structure.name != checked.structure.name:

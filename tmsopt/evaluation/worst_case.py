@@ -1,7 +1,7 @@
 """Where, within its scenarios and tolerances, a design does worst, and the proof that it does no worse anywhere."""
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -17,7 +17,7 @@ from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
 from tmsopt.problem.evaluate import evaluate
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
-from tmsopt.records import Array, Table
+from tmsopt.records import Array, Numbers, Table
 from tmsopt.roots import lienard_chipart, shift
 
 SLACK = 1e-6
@@ -62,7 +62,7 @@ def worst_case_targets(problem: Posed, cases: Sequence[Case]) -> dict[str, tuple
     return found
 
 
-def worst_cases(problem: Posed, parameters: Mapping[str, float]) -> dict[str, Worst]:
+def worst_cases(problem: Posed, parameters: Numbers) -> dict[str, Worst]:
     """The worst case of everything that differs between cases, over whole bands and tolerance boxes.
 
     A grid with a closer look at its worst points; the value in the case found is exact, with multiple roots
@@ -79,9 +79,7 @@ def worst_cases(problem: Posed, parameters: Mapping[str, float]) -> dict[str, Wo
     return found
 
 
-def _peaks(
-    problem: Posed, parameters: Mapping[str, float], sign: float, what: Expression | str, shared: Mapping[str, float]
-) -> Iterator[Case]:
+def _peaks(problem: Posed, parameters: Numbers, sign: float, what: Expression | str, shared: Numbers) -> Iterator[Case]:
     """For every choice of separate scenario values, the worst few points of a grid, moved to where it is worst."""
     bands = {n: s for n, s in problem.scenarios.items() if isinstance(s, Band)}
     separate = {n: s for n, s in problem.scenarios.items() if not isinstance(s, Band)}
@@ -159,7 +157,7 @@ def _apart(u: Array, high: Array, distance: float) -> list[int]:
     return chosen
 
 
-def cover(problem: Posed, parameters: Mapping[str, float], worst: float, boxes: int | None = None) -> Cover:
+def cover(problem: Posed, parameters: Numbers, worst: float, boxes: int | None = None) -> Cover:
     """Prove that no case has a root right of `worst` plus SLACK: Liénard–Chipart signs of p(t + limit) in balls.
 
     Boxes whose signs are undecided are halved, widest first, until none is left.
@@ -203,12 +201,12 @@ def _halves(box: _Box) -> list[_Box]:
     return [{**rest, side: half} for half in ((lower, middle), (middle, upper))] if lower < middle < upper else []
 
 
-def _left_of(problem: Posed, parameters: Mapping[str, float], box: _Box, gamma: Any) -> bool:
+def _left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> bool:
     """Whether every design of a box certainly has all roots left of a vertical line."""
 
     def tests(box: _Box, moving: str = "") -> list[Any]:
         """Positive exactly when every root is left of the line; a0 first, by its sign. `moving` is a series."""
-        at = {n: flint.arb(x) for n, x in parameters.items()}
+        at: dict[str, Any] = {n: flint.arb(x) for n, x in parameters.items()}
         for (added, n), ends in sorted(box.items()):  # a parameter may have both: the scenario comes first
             at[n] = ball(ends) + (at[n] if added else 0)
         if moving:
