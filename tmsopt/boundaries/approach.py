@@ -56,16 +56,15 @@ def approach(
         sign: sign of a0 on the side of the edge that is stable or heavily damped.
         size: distance to expect, the unit in which the NLP measures.
     """
-    n, own = len(place.weights), {name: place.parameters[name] for name in place.problem.parameter_set.names}
-    own |= {_WEIGHT + name: weight for name, weight in place.weights.items()}
-    own |= {f"{_SCALE}{k}": x for k, x in enumerate(place.scale.tolist())}
-    own |= {f"{_SIZE}{k}": x for k, x in enumerate(place.sizes.tolist())} | {_SIGN: sign, _SIZE: size}
+    n = len(place.weights)
     plain = _nlp(place.problem.model, place.problem.parameter_set.name, tuple(place.weights), edge)
+    own = [place.parameters[name] for name in place.problem.parameter_set.names]
+    own += [*place.weights.values(), *place.scale.tolist(), *place.sizes.tolist(), sign, size]
     nlp = replace(
         plain,
         lower=(*(place.lower / size).tolist(), *plain.lower[n:]),
         upper=(*(place.upper / size).tolist(), *plain.upper[n:]),
-        numbers=own,
+        numbers=dict(zip(plain.formula.names[len(plain.variables) :], own, strict=True)),
     )
     run, polish = method(nlp, max_iterations=_ITERATIONS), polisher(nlp)
 
