@@ -1,7 +1,7 @@
 """The nearest point of a boundary: by how much a design may change before it is unstable, or heavily damped no more."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -261,35 +261,29 @@ def _place(design: Given, parameters: Numbers | None, weights: Numbers | None) -
 
 
 def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, method: Method = ipopt) -> Nearest:
-    """The least distance over the pieces of one boundary."""
-    if kind in place.stands_on or (kind == "heavy damping" and place.on_edge):
+    """The least distance over the pieces of one boundary; the way into heavy damping is sought without a ray too."""
+    heavy = kind == "heavy damping"
+    if kind in place.stands_on or (heavy and place.on_edge):
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
     mine = [s for s in seen if s.edge in KINDS[kind]]
-    best = Approach()
+    starts: dict[tuple[str, float], list[Array]] = {}
+    for crossing in mine:
+        starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
+    if heavy and not place.heavily_damped:
+        sign = float(np.sign(place.coefficients(np.zeros(len(place.weights)))[0]))
+        starts.setdefault(("real", sign), []).extend(most_damped(place, sign))
     pieces = edges(place.problem.model.degree)
-    for edge, sign, starts in _pieces(place, mine, kind):
-        best = min(best, _best(place, pieces[edge], sign, starts, method), key=lambda found: found.distance)
+    found = [_best(place, pieces[edge], sign, points, method) for (edge, sign), points in starts.items()]
+    best = min([Approach(), *found], key=lambda each: each.distance)
     if mine and mine[0].distance < best.distance * (1 - ALIKE):
         best = Approach(mine[0].u, False)
-    if not best.u.size or not is_boundary(place, best.u, kind == "heavy damping"):
+    if not best.u.size or not is_boundary(place, best.u, heavy):
         return Nearest(kind)
-    direct = not between(place, best.u, kind == "heavy damping")
+    direct = not between(place, best.u, heavy)
     direction = Table(dict(zip(place.weights, best.u.tolist(), strict=True)))
     there = {n: 0.0 if abs(x) <= _NOTHING * place.weights.get(n, 0.0) else x for n, x in place.design(best.u).items()}
     return Nearest(kind, best.distance, Table(there), direction, best.refined, direct)
-
-
-def _pieces(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
-    """Each edge that rays crossed, the sign of a0, and starts; the way into heavy damping is sought without a ray."""
-    starts: dict[tuple[str, float], list[Array]] = {}
-    for crossing in seen:
-        starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
-    if kind == "heavy damping" and not place.heavily_damped:
-        sign = float(np.sign(place.coefficients(np.zeros(len(place.weights)))[0]))
-        starts.setdefault(("real", sign), []).extend(most_damped(place, sign))
-    for (edge, sign), points in starts.items():
-        yield edge, sign, points
 
 
 def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], method: Method) -> Approach:

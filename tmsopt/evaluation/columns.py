@@ -99,14 +99,12 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
         return np.asarray(spread.value)
 
     wide |= {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
-    objective = (
-        np.full(m, np.nan) if problem.objective is None else settled(*evaluate(problem, [problem.objective], wide))
-    )
+    objective = settled(*evaluate(problem, [problem.objective], wide)) if problem.objective else np.full(m, np.nan)
     doubles = {name: settled(wide[name]) for name in ("abscissa", "damping_ratio")}
     plain = given | doubles | {ANGULAR_FREQUENCY: found.frequency}
     violations, doubt = _violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
-    feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)
+    feasible = np.all(np.isnan([np.full(m, np.nan), *violations.values()]), axis=0)
     bound, related = np.full(m, -np.inf), np.zeros(m, dtype=bool)
     if bounded(problem):
         bound, related = _bounds(problem, coefficients, settled)

@@ -98,7 +98,9 @@ def held(
         ends = problem.free.items()
         inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
         groups = [names for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if names and clusters]
-        ways = (_Spread(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist()))
+        ways = (
+            _SpreadRoots(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist())
+        )
         others: Iterator[dict[str, float]] = (design for way in ways for design in way.designs())
     else:
         others = filter(partial(_has_objective, problem), _beside(problem, parameters))
@@ -138,7 +140,7 @@ def multiple_roots_exist(problem: Posed, parameters: Numbers) -> bool:
     ]
     if not clusters:
         return True
-    spread = _Spread(problem, parameters, clusters, list(problem.free), 0.0)
+    spread = _SpreadRoots(problem, parameters, clusters, list(problem.free), 0.0)
     with flint.ctx.workdps(_DIGITS):
         off = spread.solved()[1]
     return all(abs(float(x)) <= _GONE * scale for x, scale in zip(off, spread.aims[2].tolist(), strict=True))
@@ -195,7 +197,7 @@ def _clusters(
 
 
 @dataclass(frozen=True)
-class _Spread:
+class _SpreadRoots:
     """A design whose clusters are to be spread along their limits.
 
     Attributes:
