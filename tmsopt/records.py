@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Truth = NDArray[np.bool_]
 
+Numbers = Mapping[str, float]
+"""Name → number: a design by its parameters, weights, amounts."""
+
 
 class Printable(Protocol):
     """What every result shows of itself. Who writes it stands floors above, and is found when first asked."""

@@ -1,6 +1,5 @@
 from .explain import Explanation as Explanation, explain as explain
-from .again import moved as moved
-from .limits import Lever as Lever
+from .limits import Lever as Lever, moved as moved
 from .optimality import (
     NOT_COVERED as NOT_COVERED, NOT_MINIMAL as NOT_MINIMAL, STRICT as STRICT, UNDECIDED as UNDECIDED,
     Optimality as Optimality, optimality as optimality,

@@ -26,8 +26,7 @@ class Conditions:
         multipliers: y with ∇f = Σ yᵢ ∇hᵢ, one per held row: change of f per unit of hᵢ.
         scaled: the same for rows of length 1 and a gradient of length 1.
         residual: part of the gradient that is left, as a share of it.
-        rank: of the gradients ∇h.
-        independent: whether that is their number, so that the multipliers are the only ones.
+        independent: whether the gradients ∇h are, so that the multipliers are the only ones.
         downhill: direction of descent that the held rows leave open to first order, or with negative curvature.
         curvature: least curvature of f − y·h along what is held firmly, in scaled variables and as a share of the
             largest; nan where nothing is left to move.
@@ -37,7 +36,6 @@ class Conditions:
     multipliers: Array
     scaled: Array
     residual: float
-    rank: int
     independent: bool
     downhill: Array
     curvature: float
@@ -50,33 +48,27 @@ def conditions(program: LocalProgram) -> Conditions:
     signed = np.array([held.signed for held in program.held])
     slope, rows = gradient * program.sizes, jacobian * program.sizes
     lengths = np.linalg.norm(rows, axis=1)
+    lengths[lengths == 0] = 1.0
     steepness = float(np.linalg.norm(slope)) or 1.0
-    unit, target = rows / np.where(lengths > 0, lengths, 1.0)[:, None], slope / steepness
-    rank = int(np.sum(np.linalg.svd(unit, compute_uv=False) > _RANK))
-    independent = rank == len(unit)
+    unit, target = rows / lengths[:, None], slope / steepness
+    independent = bool(np.sum(np.linalg.svd(unit, compute_uv=False) > _RANK) == len(unit))
     y = np.linalg.lstsq(unit.T, target, rcond=_RANK)[0]
-    downhill = np.zeros_like(slope)
+    downhill, curvature = np.zeros_like(slope), np.nan
     if not independent or np.any(y[signed] < -POSITIVE) or np.linalg.norm(target - unit.T @ y) > STATIONARY:
         from scipy.optimize import lsq_linear  # a quarter of a second, paid only where multipliers are in question
 
         least = np.where(signed, 0.0, -np.inf)
-        allowed = lsq_linear(unit.T, target, bounds=(least, np.full(len(least), np.inf)), method="bvls", tol=1e-14).x
+        allowed = lsq_linear(unit.T, target, bounds=(least, np.inf), method="bvls", tol=1e-14).x
         left = target - unit.T @ allowed
         if np.linalg.norm(left) > STATIONARY:
             downhill = -left * program.sizes  # what is left of the gradient, once the cone of multipliers is used up
-        if not independent:
-            y = allowed
+        y = y if independent else allowed
     residual = float(np.linalg.norm(target - unit.T @ y))
-    multipliers = y * steepness / np.where(lengths > 0, lengths, 1.0)
-    firm = ~signed | (y > POSITIVE)
-    curvature = np.nan
+    multipliers, firm = y * steepness / lengths, ~signed | (y > POSITIVE)
     if not downhill.any():
         curvature, along = _curvature(program, multipliers, unit[firm], steepness)
-        if curvature < -_CURVED:
-            downhill = along * program.sizes
-    return Conditions(
-        np.asarray(multipliers), np.asarray(y), residual, rank, independent, np.asarray(downhill), curvature, firm
-    )
+        downhill = along * program.sizes if curvature < -_CURVED else downhill
+    return Conditions(multipliers, y, residual, independent, downhill, curvature, firm)
 
 
 def curved(curvature: float) -> int:
@@ -86,15 +78,10 @@ def curved(curvature: float) -> int:
 
 def _curvature(program: LocalProgram, multipliers: Array, firm: Array, steepness: float) -> tuple[float, Array]:
     """Least curvature along what is held firmly, relative to the largest or the slope, and its direction."""
-    free = _null_space(firm) if len(firm) else np.eye(len(program.x))
+    _, lengths, directions = np.linalg.svd(firm)
+    free = directions[np.sum(lengths > _RANK * lengths.max(initial=0.0)) :].T  # columns that no row changes
     if not free.shape[1]:
         return np.nan, np.zeros(len(program.x))
     hessian = program.at(program.x, multipliers)[4] * np.outer(program.sizes, program.sizes)
     values, vectors = np.linalg.eigh(free.T @ hessian @ free)
     return float(values[0] / max(np.abs(values).max(), steepness)), free @ vectors[:, 0]
-
-
-def _null_space(rows: Array) -> Array:
-    """Orthonormal directions, as columns, that no row changes."""
-    _, lengths, directions = np.linalg.svd(rows)
-    return directions[np.sum(lengths > _RANK * lengths.max()) :].T

@@ -38,21 +38,16 @@ class Better:
 
 def better(program: LocalProgram, found: Conditions, solution: Solution) -> Better | None:
     """The design after the longest step downhill that improves; None where none does."""
-    problem = program.problem
-    judged = solution.abscissa if (problem.minimize or "").strip() == "abscissa" else solution.value
-    sign = problem.sign
-    order = 2 if curved(found.curvature) < 0 else 1
+    problem, order = program.problem, 2 if curved(found.curvature) < 0 else 1
+    of_abscissa = (problem.minimize or "").strip() == "abscissa"
+    judged = solution.abscissa if of_abscissa else solution.value
     for x in _along(program, found, both=order == 2):
-        names = list(problem.free)
-        free = {n: x[program.variables.index(n)] if n in program.variables else None for n in names}
-        values = [solution.parameters[n] if v is None else float(v) for n, v in free.items()]
-        moved = design_of(problem, values) | {n: solution.parameters[n] for n, v in free.items() if v is None}
-        parameters = problem.ordered(moved)
-        checked = recheck(problem, parameters)
-        value = checked.objective
-        if (problem.minimize or "").strip() == "abscissa":
-            value = max(value, checked.realised)  # true of the numbers as stored
-        if not checked.violations and sign * (judged - value) > _BETTER * (1 + abs(judged)):
+        at = dict(zip(program.variables, x.tolist(), strict=True))
+        moved = design_of(problem, [at.get(n, 0.0) for n in problem.free])
+        moved |= {n: solution.parameters[n] for n in problem.free if n not in at}
+        checked = recheck(problem, parameters := problem.ordered(moved))
+        value = max(checked.objective, checked.realised) if of_abscissa else checked.objective  # true as stored, too
+        if not checked.violations and problem.sign * (judged - value) > _BETTER * (1 + abs(judged)):
             return Better(Table(parameters), value, order)
     return None
 

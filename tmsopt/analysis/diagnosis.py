@@ -13,7 +13,7 @@ from tmsopt.models import Model, ParameterSet
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.files import Given
 from tmsopt.progress import Listener, start_steps
-from tmsopt.records import Printable, plain
+from tmsopt.records import Numbers, Printable, plain
 from tmsopt.roots import Root, Structure, backward_error
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.search.solve import solved_first
@@ -108,7 +108,7 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
 def diagnosed(
     model: Model,
     of: ParameterSet,
-    design: Mapping[str, float],
+    design: Numbers,
     structure: Structure,
     free: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[Diagnosis, ...]:
@@ -126,10 +126,10 @@ def diagnosed(
 def _diagnosis(
     model: Model,
     of: ParameterSet,
-    design: Mapping[str, float],
+    design: Numbers,
     distance: float,
     root: Root,
-    widths: Mapping[str, float],
+    widths: Numbers,
 ) -> Diagnosis:
     k = root.multiplicity
     stored = met(model, of, design, widths, complex(root.re, root.im), k)

@@ -6,15 +6,19 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tmsopt.analysis.again import moved, solve_again
+import numpy as np
+
 from tmsopt.analysis.steps import natural_step, step_within
 from tmsopt.errors import InputError
 from tmsopt.problem.expression import written_sides
+from tmsopt.problem.limit import limit_of, with_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, dimension_of, limit_text, unit_of, unit_of_all
+from tmsopt.program.options import DEFAULTS
 from tmsopt.progress import Counts
 from tmsopt.records import plain
+from tmsopt.search.solve import solve_any_status
 
 DIFFERS = 0.2
 """Relative difference of the two gains from which the reader is told why."""
@@ -94,16 +98,13 @@ def levers(solution: Solution, resolve: bool = True, progress: Counts | None = N
     """One lever per limit that binds at an optimum, the most valuable step first."""
     if solution.status != "optimal":
         return ()
-    found = [
-        _of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name) for name in solution.active
-    ]
+    found = [_unresolved(solution, name) for name in solution.active]
     look = resolve and (len(found) == 1 or _lets_in(solution, found))
-    checked = []
-    for lever in found:
-        checked.append(_resolved(solution, lever, look) if resolve and lever.step else lever)
+    for k, lever in enumerate(found):
+        found[k] = _resolved(solution, lever, look) if resolve and lever.step else lever
         if progress:
-            progress(len(checked), len(solution.active))
-    return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
+            progress(k + 1, len(found))
+    return tuple(sorted(found, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
 
 
 def is_physical(problem: Posed, bound: str) -> bool:
@@ -113,50 +114,58 @@ def is_physical(problem: Posed, bound: str) -> bool:
     return problem.free[name][end == "max"] == (allowed.upper if end == "max" else allowed.lower)
 
 
-def _is_bound(solution: Solution, name: str) -> bool:
-    problem = solution.problem.posed
-    return name not in problem.constraints and name.rsplit(".", 1)[0] in problem.free
+def moved(problem: Posed, name: str, step: float) -> Posed:
+    """The problem with one limit changed by a step: a bound, or the right-hand side of a constraint."""
+    if name in problem.constraints:
+        text = problem.constraints[name]
+        left, sign, right = written_sides(text)
+        number = limit_of(f"{right} {sign} x")
+        if number is None or limit_of(f"{left} {sign} x") is not None:
+            text = f"({left}) {sign} ({right}) {'+' if step > 0 else '-'} {abs(step)!r}"
+        else:
+            text = with_limit(text, number + step)
+        return replace(problem.problem, constraints={**problem.constraints, name: text}).posed
+    parameter, end = name.rsplit(".", 1)
+    lower, upper = problem.free[parameter]
+    ends = (lower, upper + step) if end == "max" else (lower + step, upper)
+    return replace(problem.problem, free={**problem.free, parameter: ends}).posed
 
 
-def _of_bound(solution: Solution, bound: str) -> Lever:
+def _unresolved(solution: Solution, name: str) -> Lever:
+    """The lever of a bound or a constraint, to first order."""
     problem = solution.problem.posed
-    name, end = bound.rsplit(".", 1)
-    parameter, (lower, upper) = problem.parameter_set[name], problem.free[name]
-    limit, direction = (upper, 1.0) if end == "max" else (lower, -1.0)
-    width = upper - lower
+    goal = problem.minimize or problem.maximize
+    gained, worth = unit_of_all(problem, goal) if goal else Unit(), solution.active[name]
+    if name in problem.constraints:
+        condition, shown = problem.conditions[name], limit_text(problem, name)
+        natural = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, name))
+        sign, words = condition.sign, f"relaxing {name} ({shown}) by {natural.text}"
+        if condition.equality:  # the right-hand side moves to where the objective is better
+            sign = math.copysign(1.0, -problem.sign * worth)
+            words = f"moving {name} ({shown}) by {'' if sign > 0 else '-'}{natural.text}"
+        return Lever(name, "constraint", shown, False, words, sign * natural.size, abs(worth), gained=gained)
+    parameter, end = problem.parameter_set[name.rsplit(".", 1)[0]], name.endswith(".max")
+    limit, width = problem.free[parameter.name][end], float(np.ptp(problem.free[parameter.name]))
     # an angle is measured by its box, for 0 is a tilt like any other
     size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
-    unit = unit_of(problem, name)
+    unit, direction = unit_of(problem, parameter.name), 1.0 if end else -1.0
     step = step_within(unit, parameter.unit, size, limit, direction, parameter.range)
-    words = f"{step.text if step else 'nothing'} {'more' if direction > 0 else 'less'} {bound}"
-    change, written = direction * step.size if step else 0.0, unit.show(limit, 10)
-    return _lever(solution, bound, "bound", written, is_physical(problem, bound), words, change)
+    words = f"{step.text if step else 'nothing'} {'more' if end else 'less'} {name}"
+    change, shown = direction * step.size if step else 0.0, unit.show(limit, 10)
+    return Lever(name, "bound", shown, is_physical(problem, name), words, change, abs(worth), gained=gained)
 
 
-def _of_row(solution: Solution, name: str) -> Lever:
-    problem = solution.problem.posed
-    condition, text, shown = problem.conditions[name], problem.constraints[name], limit_text(problem, name)
-    step = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, text))
-    sign, words = condition.sign, f"relaxing {name} ({shown}) by {step.text}"
-    if condition.equality:  # the right-hand side moves to where the objective is better
-        sign = math.copysign(1.0, -problem.sign * solution.active[name])
-        words = f"moving {name} ({shown}) by {'' if sign > 0 else '-'}{step.text}"
-    return _lever(solution, name, "constraint", shown, False, words, sign * step.size)
-
-
-def _lever(solution: Solution, name: str, kind: str, limit: str, physical: bool, move: str, step: float) -> Lever:
-    text = solution.problem.minimize or solution.problem.maximize
-    gained = unit_of_all(solution.problem.posed, text) if text else Unit()
-    return Lever(name, kind, limit, physical, move, step, abs(solution.active[name]), gained=gained)
-
-
-def _size(solution: Solution, text: str) -> float:
+def _size(solution: Solution, name: str) -> float:
     """Size of the sides of a constraint at the optimum, where they are equal but for rounding."""
     problem = solution.problem.posed
-    left, _, right = written_sides(text)
-    values = problem.values(solution.parameters)
-    sides = (abs(float(problem.read(side)(values))) for side in (left, right))
-    return max((size for size in sides if math.isfinite(size)), default=1.0)
+    sides = problem.conditions[name].sides(problem.values(solution.parameters))
+    return max((size for size in (abs(float(side)) for side in sides) if math.isfinite(size)), default=1.0)
+
+
+def _solved_again(solution: Solution, problem: Posed, starts: int, look: bool) -> Solution:
+    """The solution of a moved problem from the optimum; `look`: also for better designs in the whole box."""
+    options = replace(DEFAULTS, starts=starts, near={n: solution.parameters[n] for n in problem.free})
+    return solve_any_status(problem, options, without_sample=not look, bound=False)
 
 
 def _lets_in(solution: Solution, found: Sequence[Lever]) -> bool:
@@ -165,31 +174,31 @@ def _lets_in(solution: Solution, found: Sequence[Lever]) -> bool:
     for lever in found:
         with suppress(InputError):
             problem = moved(problem, lever.name, lever.step)
-    near, whole = (solve_again(solution, problem, 1, look) for look in (False, True))
+    near, whole = (_solved_again(solution, problem, 1, look) for look in (False, True))
     return near.status != "optimal" or problem.sign * (near.value - whole.value) > _NOISE * (1 + abs(solution.value))
 
 
 def _resolved(solution: Solution, lever: Lever, look: bool) -> Lever:
     """A lever with the gain found by solving again from the optimum."""
     try:
-        asked = moved(solution.problem.posed, lever.name, lever.step)
+        problem = moved(solution.problem.posed, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
-    gain, found = math.nan, None
+    best = None
     for starts in (1, _RETRY):
-        ended = solve_again(solution, asked, starts, look or starts > 1)
-        better = -solution.problem.posed.sign * (ended.value - solution.value)
-        if ended.status == "optimal" and not better <= gain:
-            gain, found = better, ended
-            checked = replace(lever, resolved=gain, structure=found.structure)
-            if abs(checked.relative) <= DIFFERS:
-                return checked
-    if found is None:
+        ended = _solved_again(solution, problem, starts, look or starts > 1)
+        if ended.status == "optimal" and not (best and problem.sign * (ended.value - best.value) >= 0):
+            best = ended
+            gain = -problem.sign * (best.value - solution.value)
+            lever = replace(lever, resolved=gain, structure=best.structure)
+            if abs(lever.relative) <= DIFFERS:
+                return lever
+    if best is None:
         return replace(lever, reason=f"the moved problem is {ended.status.replace('_', ' ')}")
-    return replace(checked, reason=", ".join(_reasons(solution, lever, found)))
+    return replace(lever, reason=", ".join(_reasons(solution, best)))
 
 
-def _reasons(solution: Solution, lever: Lever, found: Solution) -> Iterator[str]:
+def _reasons(solution: Solution, found: Solution) -> Iterator[str]:
     """Why the gain is not what the multiplier says."""
     if found.structure != solution.structure:
         yield f"the structure changes from {solution.structure} to {found.structure}"

@@ -11,6 +11,7 @@ import numpy as np
 from tmsopt.algebra.balls import exact
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.model import Matrix
+from tmsopt.records import Numbers
 from tmsopt.roots.polynomial import characteristic_polynomial
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
@@ -48,8 +49,8 @@ class Meeting:
 
     polynomial: Polynomial
     values: Mapping[str, Any]
-    doubt: Mapping[str, float]
-    sizes: Mapping[str, float]
+    doubt: Numbers
+    sizes: Numbers
     free: Collection[str]
     s: Any
     multiplicity: int
@@ -75,6 +76,10 @@ class Meeting:
         """
         values = {n: flint.arb(x, self.doubt[n]) if doubt else x for n, x in self.values.items()}
         return self.polynomial({**values, name: values[name] + by})
+
+    def own(self, scale: Any = 1) -> list[Any]:
+        """The same of its own polynomial."""
+        return self.taylor(self.polynomial(self.values), scale)
 
     def taylor(self, coefficients: Sequence[Any], scale: Any = 1, doubt: bool = False) -> list[Any]:
         """Coefficients in t of p(s + unit · scale · t), ascending."""
@@ -119,8 +124,8 @@ def pencil_of(model: Model, of: ParameterSet, values: Mapping[str, Any]) -> tupl
 def met(
     model: Model,
     of: ParameterSet,
-    design: Mapping[str, float],
-    widths: Mapping[str, float],
+    design: Numbers,
+    widths: Numbers,
     s: complex,
     multiplicity: int,
 ) -> Meeting:
@@ -147,7 +152,7 @@ def polished(found: Meeting, geometric: int) -> Meeting:
 
 def _improved(start: Meeting, moving: Sequence[str]) -> Meeting:
     """With conditions met better by what may be moved; the place alone where nothing may."""
-    best, lead = start, abs(start.taylor(start.polynomial(start.values))[start.multiplicity]).mid()
+    best, lead = start, abs(start.own()[start.multiplicity]).mid()
     left = _conditions(best, lead, bool(moving))
     off = _norm(left)
     while 2.0 ** (-2 * _BITS // 3) < off < np.inf:
@@ -169,7 +174,7 @@ def _improved(start: Meeting, moving: Sequence[str]) -> Meeting:
 def _conditions(at: Meeting, lead: Any, every: bool) -> list[Any]:
     """What must be 0, relative; of a place alone what makes it the mean of the roots that nearly meet."""
     k, g = at.multiplicity, at.geometric
-    found = at.taylor(at.polynomial(at.values))[:k] if every else [at.taylor(at.polynomial(at.values))[k - 1]]
+    found = at.own()[:k] if every else at.own()[k - 1 : k]
     for name in at.values if every and g > 1 else ():
         series = at.changed(name, flint.arb_series([0, at.sizes[name] or 1], prec=g))
         for m in range(1, g):
@@ -210,11 +215,9 @@ def _settled(at: Meeting) -> Meeting:
 
 def _size(at: Meeting) -> float:
     """A bound on the roots, of the sizes of coefficients, as each parameter changes by a half of its size."""
-    largest = 0.0
-    for c in (at.polynomial(at.values), *(at.changed(n, flint.arb(x / 2 or 1)) for n, x in at.sizes.items())):
-        ratios = [abs(middle(flint.acb(x) / c[0])) ** (1 / k) for k, x in enumerate(c[1:], start=1)]
-        largest = max(largest, *(x for x in ratios if np.isfinite(x)), 0.0)
-    return largest
+    each = (at.polynomial(at.values), *(at.changed(n, flint.arb(x / 2 or 1)) for n, x in at.sizes.items()))
+    ratios = (abs(middle(flint.acb(x) / c[0])) ** (1 / k) for c in each for k, x in enumerate(c[1:], start=1))
+    return max(filter(np.isfinite, ratios), default=0.0)
 
 
 def _norm(left: Sequence[Any]) -> Any:

@@ -151,7 +151,7 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     beyond = better(around, found, solution) if found.downhill.any() else None
     verdict, order, reason = _verdict(solution, around, found, beyond)
     stationary = found.residual <= STATIONARY
-    unknowns = _unknowns(around)
+    unknowns, count = _counts(around)
     return Optimality(
         verdict=verdict,
         reason=reason,
@@ -160,7 +160,7 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
         roots=_on_line(around, found) if stationary else (),
         limits=Table(_limits(solution, around, found) if stationary else {}),
         unknowns=unknowns,
-        conditions=_count(around, unknowns),
+        conditions=count,
         residual=found.residual,
         curvature=found.curvature,
         idle=around.idle,
@@ -217,8 +217,7 @@ def _verdict(
         return NOT_MINIMAL, beyond.order, f"{name} no {extreme}: {_pays(around, found)}; {_way(solution, beyond)}"
     if doubt := _doubt(around, found):
         return UNDECIDED, 0, f"not decided whether {name} a {extreme}: {doubt}"
-    unknowns = _unknowns(around)
-    count = _count(around, unknowns)
+    unknowns, count = _counts(around)
     held = f"{count} condition{'s that bind leave' if count != 1 else ' that binds leaves'}"
     idle = f"; without effect: {', '.join(around.idle)}" if around.idle else ""
     if np.isnan(found.curvature):
@@ -248,14 +247,10 @@ def _goal(problem: Posed) -> str:
     return (problem.minimize or problem.maximize or "").strip()
 
 
-def _unknowns(around: LocalProgram) -> int:
-    """Free parameters that matter, and the abscissa."""
-    return sum(name in around.problem.free for name in around.variables) + 1
-
-
-def _count(around: LocalProgram, unknowns: int) -> int:
-    """What is held, less the equations that only serve to define the other variables."""
-    return len(around.held) - (len(around.x) - unknowns)
+def _counts(around: LocalProgram) -> tuple[int, int]:
+    """Free parameters that matter and the abscissa; what is held, less the equations that define other variables."""
+    unknowns = sum(name in around.problem.free for name in around.variables) + 1
+    return unknowns, len(around.held) - (len(around.x) - unknowns)
 
 
 def _pays(around: LocalProgram, found: Conditions) -> str:
@@ -279,13 +274,12 @@ def _way(solution: Solution, beyond: Better) -> str:
 
 def _on_line(around: LocalProgram, found: Conditions) -> tuple[OnLine, ...]:
     """The roots on the line with their multipliers."""
-    listed = []
-    held = list(zip(around.held, found.multipliers, strict=True))
+    listed, held = [], list(zip(around.held, found.multipliers.tolist(), strict=True))
     total = sum(around.line[h.cluster].multiplicity * y for h, y in held if h.name == "c1")
     for k, root in enumerate(around.line):
-        own = {h.name: float(y) for h, y in held if h.cluster == k}
+        own = {h.name: y for h, y in held if h.cluster == k}
         first, second = own.pop("c1"), own.pop("c2", math.nan)
-        share = float(root.multiplicity * first / total) if total else math.nan
+        share = root.multiplicity * first / total if total else math.nan
         beta = first / 2 if root.im else first  # β moves two roots of a pair, by half of it
         shown, *omega = _shown(around.problem.model, root)
         listed.append(OnLine(shown.re, shown.im, root.multiplicity, share, beta, second, tuple(own.values()), *omega))
@@ -303,13 +297,11 @@ def _shown(model: Model, upper: Root) -> tuple[Any, ...]:
 
 def _limits(solution: Solution, around: LocalProgram, found: Conditions) -> Mapping[str, float]:
     """Gain of the objective per unit that a limit is relaxed; of an equality, change per unit added on the right."""
-    problem = around.problem
-    limits: dict[str, float] = {}
-    sign = problem.sign
-    for h, y, firm in zip(around.held, found.multipliers, found.firm, strict=True):
+    problem, limits = around.problem, dict[str, float]()
+    for h, y, firm in zip(around.held, found.multipliers.tolist(), found.firm, strict=True):
         if h.name in problem.constraints:
-            limits[h.name] = float(y if h.signed else sign * y)
+            limits[h.name] = y if h.signed else problem.sign * y
         elif h.signed and h.cluster < 0 and firm and (name := h.name.rsplit(".", 1)[0]) in problem.free:
             tilt = problem.parameter_set[name].tangent
-            limits[h.name] = float(y * (1 + math.tan(solution.parameters[name]) ** 2 if tilt else 1.0))
+            limits[h.name] = y * (1 + math.tan(solution.parameters[name]) ** 2 if tilt else 1.0)
     return limits

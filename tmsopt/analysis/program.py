@@ -16,7 +16,7 @@ right. For EP4 as two factors t² + βᵢ t + κᵢ these are c₁ = β₁ + β�
 multipliers of c₁ and c₂, whichever way a multiple root is shared out between factors.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -96,87 +96,65 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
     Raises:
         NotCovered: where the damping ratio binds, or the abscissa does not.
     """
-    nlp = abscissa(problem)
-    symbols = ca.SX.sym("x", len(nlp.variables))
-    f, g = nlp.symbolic(symbols)
-    values = problem.values(solution.parameters)
-    point = dict(zip(problem.free, variables_of(problem, solution.parameters), strict=True))
-    names = [*problem.free, *nlp.variables[len(problem.free) :]]
-    known = {
-        n: point[n]
-        if n in point
-        else solution.abscissa / nlp.unit
-        if n == "abscissa"
-        else _value(values, n) / (nlp.unit if n == ANGULAR_FREQUENCY else 1)
-        for n in names
-    }
-    at = ca.Function("rows", [symbols], [g])
-    reached = np.array(at([known[n] if np.isfinite(known[n]) else 0.0 for n in names])).ravel()
-    steady = [i for i, name in enumerate(names) if _steady(nlp, name, reached)]
-    f, g = ca.substitute([f, g], [symbols[i] for i in steady], [ca.SX(known[names[i]]) for i in steady])
-    build = _Rows()
+    nlp, values, free = abscissa(problem), problem.values(solution.parameters), problem.free
+    values = values.with_known({"abscissa": solution.abscissa})
+    units = {"abscissa": nlp.unit, ANGULAR_FREQUENCY: nlp.unit}
+    at = dict(zip(free, variables_of(problem, solution.parameters), strict=True))
+    for n in nlp.variables[len(free) :]:  # nan for a coefficient of a factor, which this program does not use
+        at[n] = float(values[n]) / units.get(n, 1.0) if n in values else np.nan
+    x = {n: ca.SX.sym(n) for n in at}
+    f, g = nlp.symbolic(ca.vertcat(*x.values()))
+    rows = ca.Function("rows", [*x.values()], [g])
+    reached = np.array(rows(*(value if np.isfinite(value) else 0.0 for value in at.values()))).ravel()
+    steady = [n for n in x if _is_steady(nlp, n, reached)]
+    f, g = ca.substitute([f, g], [x[n] for n in steady], [ca.SX(at[n]) for n in steady])
+    build = _Builder()
     for k, name in enumerate(nlp.rows):
-        if name in problem.constraints and ca.depends_on(g[k], symbols):
-            build.row(name, g[k], reached[k], nlp.row_lower[k], nlp.row_upper[k])
-    needed = ["abscissa"] if "abscissa" in names else []
+        if name in problem.constraints and ca.depends_on(g[k], ca.vertcat(*x.values())):
+            build.hold_row(nlp, k, g[k], reached[k])
+    needed = [n for n in x if n == "abscissa"]
     for _ in nlp.lifts:
         binding = ca.vertcat(f, *build.rows)
-        for i in range(len(problem.free), len(names)):
-            if names[i] not in needed and ca.depends_on(binding, symbols[i]):
-                needed.append(names[i])
-                for k in _rows_of(nlp, names[i]):
-                    build.row(names[i], g[k], reached[k], nlp.row_lower[k], nlp.row_upper[k])
-    if "damping_ratio" in needed:
-        raise NotCovered("the damping ratio binds, which the conditions on the abscissa do not cover")
-    if ANGULAR_FREQUENCY in needed:
-        raise NotCovered("the angular frequency binds, which the conditions on the abscissa do not cover")
-    if "abscissa" not in needed or not ca.depends_on(ca.vertcat(f, *build.rows), symbols[names.index("abscissa")]):
+        for n in [n for n in x if n not in free and n not in needed and ca.depends_on(binding, x[n])]:
+            needed.append(n)
+            for k in _rows_of(nlp, n):
+                build.hold_row(nlp, k, g[k], reached[k])
+    if beyond := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed]:
+        raise NotCovered(f"the {beyond[0]} binds, which the conditions on the abscissa do not cover")
+    if not (needed and ca.depends_on(ca.vertcat(f, *build.rows), x["abscissa"])):
         raise NotCovered("the abscissa does not bind, so the roots have no part in this optimum")
-    line, rest = on_the_line(solution)
-    design = {
-        n: ca.atan(s) if problem.parameter_set[n].tangent else s
-        for n, s in zip(problem.free, ca.vertsplit(symbols), strict=False)
-    }
-    gamma = nlp.unit * symbols[names.index("abscissa")]
+    roots = solution.of_polynomial.roots
+    size = max(float(np.hypot(r.re, r.im)) for r in roots)
+    near = 0.0 if solution.of_polynomial.name in ("pair", "real") else _LINE * size
+    right = [r for r in roots if r.re >= solution.abscissa - near]
+    line = tuple(r for r in right if r.im >= 0)
+    design = {n: ca.atan(x[n]) if problem.parameter_set[n].tangent else x[n] for n in free}
     a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
-    factored = _factored(build, a, float(values.coefficients[0]), gamma, line, rest)
-    expression = ca.vertcat(f, *build.rows)
-    idle = tuple(n for k, n in enumerate(problem.free) if not ca.depends_on(expression, symbols[k]))
-    kept = [k for k, n in enumerate(names) if (n in problem.free and n not in idle) or n in needed]
-    for k in (k for k in kept if names[k] in problem.free):
-        for end, limit in zip(("min", "max"), problem.free[names[k]], strict=True):
-            width = np.ptp(problem.free[names[k]])
-            if abs(solution.parameters[names[k]] - limit) <= _AT * (abs(limit) + width):
-                bound = symbols[k] - known[names[k]]
-                build.one(Held(f"{names[k]}.{end}", True), bound if end == "min" else -bound)
-    size = max(np.hypot(r.re, r.im) for r in solution.of_polynomial.roots)
-    widths = [
-        _natural_size(problem, names[k], known[names[k]])
-        if names[k] in problem.free
-        else size / nlp.unit
-        if names[k] == "abscissa"
-        else max(abs(known[names[k]]), 1e-3)
-        for k in kept
-    ]
-    x = ca.vertcat(*(symbols[k] for k in kept), *factored.unknowns)
+    lead = abs(float(values.coefficients[0]))
+    build.hold_factors(a, lead, size, nlp.unit * x["abscissa"], line, [r for r in roots if r not in right])
+    binding = ca.vertcat(f, *build.rows)
+    idle = tuple(n for n in free if not ca.depends_on(binding, x[n]))
+    variables = []
+    for n in (n for n in x if (n in free and n not in idle) or n in needed):
+        own = size / nlp.unit if n == "abscissa" else max(abs(at[n]), 1e-3)
+        if n in free:
+            low, high = (float(np.tan(e)) if problem.parameter_set[n].tangent else e for e in free[n])
+            own = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range beyond 1 says nothing
+            for end, limit, side in zip(("min", "max"), free[n], (1, -1), strict=True):
+                if abs(solution.parameters[n] - limit) <= _AT * (abs(limit) + np.ptp(free[n])):
+                    build.hold(Held(f"{n}.{end}", True), side * (x[n] - at[n]))
+        variables.append((n, x[n], at[n], own))
+    names, symbols, point, sizes = zip(*variables, *build.unknowns, strict=True)
     return LocalProgram(
         problem=problem,
-        variables=(*(names[k] for k in kept), *factored.names),
-        x=np.array([*(known[names[k]] for k in kept), *factored.values]),
-        sizes=np.array([*widths, *factored.sizes]),
+        variables=names,
+        x=np.array(point),
+        sizes=np.array(sizes),
         held=tuple(build.held),
-        functions=_derivatives(x, f, ca.vertcat(*build.rows)),
+        functions=_derivatives(ca.vertcat(*symbols), f, ca.vertcat(*build.rows)),
         line=line,
         idle=idle,
     )
-
-
-def on_the_line(solution: Solution) -> tuple[tuple[Root, ...], tuple[Root, ...]]:
-    """The roots on the rightmost line, complex pairs by their upper root, and all others."""
-    size = max(np.hypot(r.re, r.im) for r in solution.of_polynomial.roots)
-    near = 0.0 if solution.of_polynomial.name in ("pair", "real") else _LINE * size
-    line = [r for r in solution.of_polynomial.roots if r.re >= solution.abscissa - near]
-    return tuple(r for r in line if r.im >= 0), tuple(r for r in solution.of_polynomial.roots if r not in line)
 
 
 def _rows_of(nlp: NLP, name: str) -> list[int]:
@@ -185,97 +163,68 @@ def _rows_of(nlp: NLP, name: str) -> list[int]:
     return [k for k, (row, lower) in tied if row == name and row not in _ROOT_ROWS and lower == 0]
 
 
-def _steady(nlp: NLP, name: str, reached: Array) -> bool:
+def _is_steady(nlp: NLP, name: str, reached: Array) -> bool:
     """Whether a quantity that is the greatest of several is the constant one of them here."""
-    return (
-        name in nlp.rows
-        and all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in _rows_of(nlp, name))
-        and name not in _ROOT_ROWS
-    )
+    lifted = name in nlp.rows and name not in _ROOT_ROWS
+    return lifted and all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in _rows_of(nlp, name))
 
 
-class _Rows:
-    """Collects what is held; discarded once the program is finished."""
+class _Builder:
+    """Collects what is held, and the coefficients of the factors: name, symbol, value, size of each."""
 
     def __init__(self) -> None:
         self.held: list[Held] = []
         self.rows: list[Any] = []
+        self.unknowns: list[tuple[str, Any, float, float]] = []
 
-    def one(self, held: Held, expression: Any) -> None:
+    def hold(self, held: Held, expression: Any) -> None:
         self.held.append(held)
         self.rows.append(expression)
 
-    def row(self, name: str, expression: Any, value: float, lower: float, upper: float) -> None:
+    def hold_row(self, nlp: NLP, k: int, expression: Any, value: float) -> None:
         """A row of the NLP, if it is an equality or holds with equality."""
-        if lower == upper:
-            self.one(Held(name, False), expression - lower)
-        elif np.isfinite(lower) and abs(value - lower) <= _ACTIVE * (1 + abs(lower)):
-            self.one(Held(name, True), expression - lower)
-        elif np.isfinite(upper) and abs(value - upper) <= _ACTIVE * (1 + abs(upper)):
-            self.one(Held(name, True), upper - expression)
+        name, lower, upper = nlp.rows[k], nlp.row_lower[k], nlp.row_upper[k]
+        for end, side in ((lower, 1), (upper, -1)):
+            if np.isfinite(end) and (lower == upper or abs(value - end) <= _ACTIVE * (1 + abs(end))):
+                self.hold(Held(name, lower != upper), side * (expression - end))
+                return
+
+    def unknown(self, name: str, value: float, size: float) -> Any:
+        self.unknowns.append((name, ca.SX.sym(name), value, size))
+        return self.unknowns[-1][1]
+
+    def hold_factors(
+        self, a: Sequence[Any], lead: float, size: float, gamma: Any, line: Sequence[Root], others: Sequence[Root]
+    ) -> None:
+        """p(t + γ) = a0 · ∏ q · r with the roots of the structure as the values of the unknowns; `lead` is |a0|."""
+        factors = []
+        for j, root in enumerate(line):
+
+            def zero(name: str, k: int, signed: bool, j: int = j) -> Any:
+                symbol = self.unknown(f"{name}.{j}", 0.0, size**k)
+                self.hold(Held(name, signed, j, size**k), symbol)
+                return symbol
+
+            real, imaginary = [1], [0]
+            omega = self.unknown(f"omega.{j}", root.im, size) if root.im else 0
+            for k in range(1, root.multiplicity + 1):
+                real.append(zero(f"c{k}", k, k <= 2))
+                imaginary.append(zero(f"im c{k}", k, False) if root.im and k > 1 else 0)
+            factors.append(_times_conjugate(omega, real, imaginary) if root.im else real)
+        rest = [complex(r.re, r.im) - line[0].re for r in others for _ in range(r.multiplicity)]
+        monic = np.atleast_1d(np.poly(rest)).real.tolist()
+        factors.append([1, *(self.unknown(f"r{k}", monic[k], size**k) for k in range(1, len(monic)))])
+        moved, matched = shift(a, gamma), product(*factors)
+        for k in range(1, len(moved)):
+            self.hold(Held("roots", False, size=lead * size**k), moved[k] - a[0] * matched[k])
 
 
-@dataclass(frozen=True)
-class _Factored:
-    """The coefficients of the factors as unknowns."""
-
-    names: list[str]
-    unknowns: list[Any]
-    values: list[float]
-    sizes: list[float]
-
-
-def _factored(
-    build: _Rows, a: Sequence[Any], lead: float, gamma: Any, line: Sequence[Root], rest: Sequence[Root]
-) -> _Factored:
-    """p(t + γ) = a0 · ∏ q · r with the roots of the structure as the values of the unknowns; `lead` is a0's."""
-    made = _Factored([], [], [], [])
-    size = max(np.hypot(r.re, r.im) for r in (*line, *rest))
-
-    def unknown(name: str, value: float, power: int) -> Any:
-        symbol = ca.SX.sym(name)
-        made.names.append(name)
-        made.unknowns.append(symbol)
-        made.values.append(value)
-        made.sizes.append(size**power)
-        return symbol
-
-    def coefficient(name: str, power: int, cluster: int, signed: bool) -> Any:
-        symbol = unknown(f"{name}.{cluster}", 0.0, power)
-        build.one(Held(name, signed, cluster, size**power), symbol)
-        return symbol
-
-    factors = []
-    for j, root in enumerate(line):
-        if not root.im:
-            factors.append([1, *(coefficient(f"c{k}", k, j, k <= 2) for k in range(1, root.multiplicity + 1))])
-            continue
-        omega = unknown(f"omega.{j}", root.im, 1)
-        real, imaginary = [1, coefficient("c1", 1, j, True)], [0, 0]
-        for k in range(2, root.multiplicity + 1):
-            real.append(coefficient(f"c{k}", k, j, k == 2))
-            imaginary.append(coefficient(f"im c{k}", k, j, False))
-        factors.append(_squared(*_about(omega, real, imaginary)))
-    others = [z for r in rest for z in [complex(r.re, r.im) - line[0].re] * r.multiplicity]
-    monic = np.atleast_1d(np.poly(others)).real
-    factors.append([1, *(unknown(f"r{k}", float(monic[k]), k) for k in range(1, len(monic)))])
-    moved, matched = shift(a, gamma), product(*factors)
-    for k in range(1, len(moved)):
-        build.one(Held("roots", False, size=abs(lead) * size**k), moved[k] - a[0] * matched[k])
-    return made
-
-
-def _about(omega: Any, real: Sequence[Any], imaginary: Sequence[Any]) -> tuple[list[Any], list[Any]]:
-    """Coefficients in t of a complex polynomial in t − iω: a Taylor shift by Horner division."""
+def _times_conjugate(omega: Any, real: Sequence[Any], imaginary: Sequence[Any]) -> list[Any]:
+    """A complex polynomial in t − iω, times its conjugate, in t: a Taylor shift by Horner division first."""
     re, im = list(real), list(imaginary)
     for end in range(len(re), 1, -1):
         for k in range(1, end):
             re[k], im[k] = re[k] + omega * im[k - 1], im[k] - omega * re[k - 1]
-    return re, im
-
-
-def _squared(re: Sequence[Any], im: Sequence[Any]) -> list[Any]:
-    """A complex polynomial times its conjugate."""
     return [a + b for a, b in zip(product(re, re), product(im, im), strict=True)]
 
 
@@ -284,15 +233,3 @@ def _derivatives(x: Any, f: Any, h: Any) -> ca.Function:
     lagrangian = f - ca.dot(y, h)
     parts = [f, ca.gradient(f, x), h, ca.jacobian(h, x), ca.hessian(lagrangian, x)[0]]
     return ca.Function("held", [x, y], [ca.densify(part) for part in parts])
-
-
-def _value(values: Mapping[str, Any], name: str) -> float:
-    """A lifted quantity of the design; nan for a coefficient of a factor, which this program does not use."""
-    return float(values[name]) if name in set(values) else np.nan
-
-
-def _natural_size(problem: Posed, name: str, value: float) -> float:
-    """Size of a parameter: its own, or the width of its range as the program sees it, which beyond 1 says nothing."""
-    ends = problem.free[name]
-    low, high = (float(np.tan(e)) if problem.parameter_set[name].tangent else e for e in ends)
-    return max(abs(value), min(high - low, 1.0), 1e-12)

@@ -11,7 +11,7 @@ import flint
 import numpy as np
 
 from tmsopt.evaluation.recheck import FEASIBLE, judged_exactly
-from tmsopt.evaluation.worst_case import peaks
+from tmsopt.evaluation.worst_case import worst_cases
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
@@ -62,37 +62,34 @@ class Rounded:
 def rounded_designs(solution: Solution) -> tuple[Table[Rounded], tuple[Rounded, ...]]:
     """Each free parameter rounded alone, unless it is no longer than that, and all together, to ever more digits."""
     names = list(solution.problem.free)
-    alone = [n for n in names if not _short(solution, n, ALONE)]
+    alone = [n for n in names if not _short(solution, n)]
     found = rounded(solution, [*(([n], ALONE) for n in alone), *((names, digits) for digits in DIGITS if names)])
     return Table(dict(zip(alone, found, strict=False))), found[len(alone) :]
 
 
 def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) -> tuple[Rounded, ...]:
-    """A design with some of its parameters rounded, for each choice of these and of significant digits, all at once."""
-    if not choices:
-        return ()
+    """A design with some of its parameters rounded, for each choice of these and of significant digits."""
+    with flint.ctx.workdps(_WORKING), np.errstate(all="ignore"):  # what has no value is nan or inf
+        return tuple(_rounded(solution, names, digits) for names, digits in choices)
+
+
+def _rounded(solution: Solution, names: Sequence[str], digits: int) -> Rounded:
     problem = solution.problem.posed
-    units = {n: unit_of(problem, n) for n in problem.free}
-    written = [{n: _rounded(solution, n, units[n], digits) for n in names} for names, digits in choices]
-    found = []
-    with flint.ctx.workdps(_WORKING):
-        designs = [{**solution.parameters, **{n: _exact(x, units[n]) for n, x in row.items()}} for row in written]
-        cases = _cases(solution, designs)
-        for texts, (_, digits), design, own in zip(written, choices, designs, cases, strict=True):
-            with np.errstate(all="ignore"):  # what has no value is nan or inf
-                values, violated = judged_exactly(problem, design, own)
-                objective = float(problem.objective(values)) if problem.objective else math.nan
-            shown = Table({n: f"{text} {units[n].text}".rstrip() for n, text in texts.items()})
-            abscissa = float(values["abscissa"])
-            all_there = (
-                sum(r.multiplicity for r in values["structure"].roots) == problem.model.degree
-            )  # none at infinity
-            told = all_there and problem.model.carrier is None
-            ratio = float(values["damping_ratio"]) if told else math.nan
-            beyond = Table(violated | _beyond_box(problem, design))
-            loss = abscissa - solution.abscissa
-            found.append(Rounded(digits, shown, abscissa, loss, ratio, objective, beyond))
-    return tuple(found)
+    units = {n: unit_of(problem, n) for n in names}
+    written = {n: _decimal(solution, n, unit, digits) for n, unit in units.items()}
+    design = {**solution.parameters, **{n: _exact(text, units[n]) for n, text in written.items()}}
+    values, violated = judged_exactly(problem, design, _cases(solution, design))
+    abscissa, roots = float(values["abscissa"]), values["structure"].roots
+    has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
+    return Rounded(
+        digits=digits,
+        written=Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()}),
+        realised=abscissa,
+        loss=abscissa - solution.abscissa,
+        damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # not with a root at infinity
+        objective=float(problem.objective(values)) if problem.objective else math.nan,
+        violations=Table(violated | _beyond_box(problem, design)),
+    )
 
 
 def worst(alone: Mapping[str, Rounded]) -> str:
@@ -101,14 +98,14 @@ def worst(alone: Mapping[str, Rounded]) -> str:
     return max(losing, key=lambda name: losing[name], default="")
 
 
-def _cases(solution: Solution, designs: Sequence[Mapping[str, Any]]) -> list[list[Case]]:
-    """Of each rounded design: the listed cases, the worst of the design and its own; one that changes nothing else."""
+def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
+    """The listed cases, the worst of the unrounded design and those of the rounded one, or one that changes nothing."""
     problem = solution.problem.posed
-    listed = [case for case in problem.cases if not case.direction]
-    shared = [*listed, *([solution.worst] if solution.worst else [])]
-    columns = {n: np.array([float(design[n]) for design in designs]) for n in designs[0]}
-    own = peaks(problem, columns, len(designs)) if listed else [[] for _ in designs]
-    return [list(dict.fromkeys([*shared, *cases])) or [Case()] for cases in own]
+    cases = [case for case in problem.cases if not case.direction]
+    cases += [solution.worst] if solution.worst else []
+    if problem.scenarios or problem.tolerances:
+        cases += [w.case for w in worst_cases(problem, {n: float(x) for n, x in design.items()}).values()]
+    return list(dict.fromkeys(cases)) or [Case()]
 
 
 def _beyond_box(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
@@ -122,14 +119,13 @@ def _beyond_box(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
     return found
 
 
-def _short(solution: Solution, name: str, digits: int) -> bool:
-    """Whether a parameter has no more digits than that."""
+def _short(solution: Solution, name: str) -> bool:
+    """Whether a parameter has no more digits than it is rounded to alone."""
     value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
-    there = float(_rounded(solution, name, unit, digits)) * unit.one
-    return abs(there - value) <= _SAME * abs(value)
+    return abs(float(_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _SAME * abs(value)
 
 
-def _rounded(solution: Solution, name: str, unit: Unit, digits: int) -> str:
+def _decimal(solution: Solution, name: str, unit: Unit, digits: int) -> str:
     """A parameter in its reported unit, as a decimal of so many significant digits, inwards at an end of its range."""
     value = solution.parameters[name] / unit.one
     low, high = (end / unit.one for end in solution.problem.free.get(name, (-math.inf, math.inf)))

@@ -96,75 +96,67 @@ def _terms(at: Meeting, name: str) -> list[list[complex]] | None:
 def _confirmed(at: Meeting, name: str, branch: Branches) -> Law | None:
     """The law with its ends, if the roots are where it has them at changes of both signs and of two sizes."""
     ends = [_ends(at, name, branch, sign) for sign in (-1, 1)]
-    least = max(low for low, _ in ends)
     if any(high < 10**_SCALES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
-    return Law(_in_unit(branch, at.unit), ends[0][1], ends[1][1], least)
+    of_s = replace(branch, constants=tuple(c * at.unit**branch.denominator for c in branch.constants))
+    return Law(of_s, ends[0][1], ends[1][1], max(low for low, _ in ends))
 
 
 def _ends(at: Meeting, name: str, branch: Branches, sign: int) -> tuple[float, float]:
     """The least and the largest sampled change between which the roots are where the law has them; (0, 0) if none."""
 
-    def held(changes: Sequence[float]) -> list[bool]:
-        rows, predicted = [], [branch.shifts(sign * eps) for eps in changes]
-        scales = [max(abs(t) for t in each) for each in predicted]
-        for eps, scale in zip(changes, scales, strict=True):
-            shifted = _about(at, name, sign * eps, scale)
-            # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
-            row = np.array([middle(c / shifted[at.multiplicity].abs_upper()) for c in shifted])
-            row[np.cumsum(np.abs(row)) <= _SLOWER * np.abs(row).sum()] = 0  # of roots that stay far behind
-            rows.append(row)
-        return [_deviation(*each) <= DEVIATION for each in zip(predicted, scales, rows, strict=True)]
+    def holds(eps: float) -> bool:
+        predicted = branch.shifts(sign * eps)
+        scale = max(map(abs, predicted))
+        shifted = _about(at, name, sign * eps, scale)
+        # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
+        row = np.array([middle(c / shifted[at.multiplicity].abs_upper()) for c in shifted])
+        row[np.cumsum(np.abs(row)) <= _SLOWER * np.abs(row).sum()] = 0  # of roots that stay far behind
+        return _deviation(predicted, scale, row) <= DEVIATION
 
     seen = _CLEAR * _scatter(at)
-    decades = [m for m in _DECADES if max(abs(t) for t in branch.shifts(sign * 10.0**m)) > seen]
-    every = dict(zip(decades, held([10.0**m for m in decades]), strict=True)) if decades else {}
-    low = next((m for m, right in every.items() if right), None)
+    decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > seen]
+    low = next((m for m in decades if holds(10.0**m)), None)
     if low is None:
         return 0.0, 0.0
     least = 10.0**low if low > _DECADES[0] else 0.0
-    first = next((m for m, right in every.items() if m > low and not right), None)
+    first = next((m for m in decades if m > low and not holds(10.0**m)), None)
     if first is None:
         return least, 10.0 ** _DECADES[-1]
-    reached = [10.0 ** (first - 1 + share) for share in _WITHIN]
-    end = next((eps for eps, right in zip(reached, held(reached), strict=True) if right), 10.0 ** (first - 1))
-    return least, end
+    reached = (10.0 ** (first - 1 + share) for share in _WITHIN)
+    return least, next(filter(holds, reached), 10.0 ** (first - 1))
 
 
 def _stays(at: Meeting, name: str, moved: Sequence[Branches], unmoved: int) -> bool:
     """Whether so many roots stay as a parameter changes, by Rouché's theorem at each of a few changes."""
-    return all(
-        any(_within(at, name, sign * eps, radius) == unmoved for radius in _radii(at, moved, eps))
-        for eps in _STILL
-        for sign in (-1, 1)
-    )
 
+    def within(eps: float, radius: float) -> int | None:
+        """How many roots are within a radius; None where one term does not outweigh all others there."""
+        terms = [abs(x) for x in _about(at, name, eps, radius)]
+        return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
 
-def _radii(at: Meeting, moved: Sequence[Branches], eps: float) -> list[float]:
-    """Radii, in the root's unit, within which only roots that stay should be."""
-    if moved:
+    def radii(eps: float) -> list[float]:
+        """In the root's unit, within which only roots that stay should be."""
+        if not moved:
+            return [max(small, _SCATTER * _scatter(at)) for small in _SMALL]
         least = min(abs(t) for branch in moved for t in branch.shifts(eps))
         return [small * least for small in (*_SMALL, *_BESIDE)]
-    return [max(small, _SCATTER * _scatter(at)) for small in _SMALL]
 
-
-def _within(at: Meeting, name: str, eps: float, radius: float) -> int | None:
-    """How many roots are within a radius; None where one term does not outweigh all others there."""
-    terms = [abs(x) for x in _about(at, name, eps, radius)]
-    return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
+    changes = [(eps, sign) for eps in _STILL for sign in (-1, 1)]
+    return all(any(within(sign * eps, radius) == unmoved for radius in radii(eps)) for eps, sign in changes)
 
 
 def _about(at: Meeting, name: str, eps: float, scale: float) -> list[Any]:
     """Coefficients in t of a changed polynomial, less what keeps the root from being met where nothing is changed."""
     changed = at.taylor(at.changed(name, eps * at.step(name)), scale)
-    own = at.taylor(at.polynomial(at.values), scale)
+    own = at.own(scale)
     return [a - b if j < at.multiplicity else a for j, (a, b) in enumerate(zip(changed, own, strict=True))]
 
 
 def _scatter(at: Meeting) -> float:
     """How far apart the roots are, in their unit, that nearly meet."""
     k = at.multiplicity
-    terms = [middle(x) for x in at.taylor(at.polynomial(at.values))[: k + 1]]
+    terms = [middle(x) for x in at.own()[: k + 1]]
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
@@ -182,8 +174,3 @@ def _deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.compl
             return np.inf
         worst = max(worst, abs(left.pop(nearest) - t) / abs(t))
     return float(worst)
-
-
-def _in_unit(branch: Branches, unit: float) -> Branches:
-    """With the shift in the unit of s."""
-    return replace(branch, constants=tuple(c * unit**branch.denominator for c in branch.constants))

@@ -1,7 +1,7 @@
 """A solution in words: its structure, how good it is, and what a reader must be warned of."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def warnings(solution: Solution) -> tuple[str, ...]:
     idle = {name: _idle(solution, name) for name in problem.free}
     return (
         *_timeless(problem),
-        *_leaning(solution, list(_leant_on(solution))),
+        *_leaning(solution),
         *(text for name in problem.free if (text := idle[name])),
         *(text for name in problem.free if not idle[name] for text in _touching(solution, name)),
     )
@@ -90,18 +90,13 @@ def _timeless(problem: Posed) -> Iterator[str]:
         yield f"abscissa is counted per √(g/w), and {' and '.join(free)} may vary: {advice}"
 
 
-def _leant_on(solution: Solution) -> Iterator[str]:
+def _leaning(solution: Solution) -> Iterator[str]:
     """Active bounds that are no physical ends."""
     problem = solution.problem.posed
-    for name in problem.free:
-        for bound in (f"{name}.min", f"{name}.max"):
-            if bound in solution.active and bound not in problem.constraints and not is_physical(problem, bound):
-                yield bound
-
-
-def _leaning(solution: Solution, bounds: Sequence[str]) -> Iterator[str]:
-    if bounds:
-        named = ", ".join(f"{bound} = {_limit(solution.problem.posed, bound)}" for bound in bounds)
+    bounds = (f"{name}.{end}" for name in problem.free for end in ("min", "max"))
+    active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
+    if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
+        named = ", ".join(f"{bound} = {_limit(problem, bound)}" for bound in arbitrary)
         yield f"the optimum leans on {named}: widen what is arbitrary, and state what is real as a constraint"
 
 

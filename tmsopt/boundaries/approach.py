@@ -56,21 +56,20 @@ def approach(
         sign: sign of a0 on the side of the edge that is stable or heavily damped.
         size: distance to expect, the unit in which the NLP measures.
     """
-    n, own = len(place.weights), {name: place.parameters[name] for name in place.problem.parameter_set.names}
-    own |= {_WEIGHT + name: weight for name, weight in place.weights.items()}
-    own |= {f"{_SCALE}{k}": x for k, x in enumerate(place.scale.tolist())}
-    own |= {f"{_SIZE}{k}": x for k, x in enumerate(place.sizes.tolist())} | {_SIGN: sign, _SIZE: size}
+    n = len(place.weights)
     plain = _nlp(place.problem.model, place.problem.parameter_set.name, tuple(place.weights), edge)
+    own = [place.parameters[name] for name in place.problem.parameter_set.names]
+    own += [*place.weights.values(), *place.scale.tolist(), *place.sizes.tolist(), sign, size]
     nlp = replace(
         plain,
-        lower=(*(place.space.lower / size).tolist(), *plain.lower[n:]),
-        upper=(*(place.space.upper / size).tolist(), *plain.upper[n:]),
-        numbers=own,
+        lower=(*(place.lower / size).tolist(), *plain.lower[n:]),
+        upper=(*(place.upper / size).tolist(), *plain.upper[n:]),
+        numbers=dict(zip(plain.formula.names[len(plain.variables) :], own, strict=True)),
     )
     run, polish = method(nlp, max_iterations=_ITERATIONS), polisher(nlp)
 
     def from_start(u: Array, below: float) -> Approach | None:
-        c = sign * place.space.coefficients(u)
+        c = sign * place.coefficients(u)
         if not (np.all(np.isfinite(c)) and c.any()):
             return None
         raw = run(np.concatenate([u / size, edge.guess(c)]))
@@ -81,7 +80,7 @@ def approach(
         point = polish(raw, nlp)
         if not point.violation <= _FEASIBLE:
             return None
-        u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
+        u_found = np.clip(point.x[:n] * size, place.lower, place.upper)
         amiss = point.violation * float(np.abs(point.row_multipliers).max(initial=0.0))
         return Approach(u_found, point.stationarity <= _STATIONARY and amiss <= _SHIFTED * point.objective)
 
@@ -102,8 +101,7 @@ def _nlp(model: Model, set_name: str, weighted: tuple[str, ...], edge: Edge) -> 
     moved = {name: given[name] + given[_WEIGHT + name] * given[_SIZE] * y for name, y in zip(weighted, x, strict=False)}
     a = model.coefficients({name: moved.get(name, given[name]) for name in of.names}, of)
     c = [given[_SIGN] * coefficient / given[f"{_SCALE}{k}"] for k, coefficient in enumerate(a)]
-    found = zip(edge.equations(c, x[n:]), edge.powers, strict=True)
-    equations = [e / given[f"{_SIZE}{k}"] for e, k in found]
+    equations = [e / given[f"{_SIZE}{k}"] for k, e in edge.equations(c, x[n:]).items()]
     others = edge.nonnegative(c, x[n:])
     rows = [*equations, *others]
     return NLP(

@@ -1,7 +1,7 @@
 """Whether a design stands on the boundary of stability already, as far as the rounding of its parameters tells."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import flint
@@ -11,7 +11,7 @@ from tmsopt.models.exact import Written, written
 from tmsopt.models.user_spectrum import beyond_axis
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot, longest_on_line
-from tmsopt.records import Array
+from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure, exact_longest, lienard_chipart, rebuilt, structure
 from tmsopt.roots.exact import isolated_roots
 
@@ -20,7 +20,7 @@ _FAR = 1e-3  # of the largest root: an abscissa of no edge
 _ON_LINE = 1e-6  # of the largest root: beyond it none is on the axis but for rounding
 
 
-def edges_at(problem: Posed, parameters: Mapping[str, float]) -> tuple[str, ...]:
+def edges_at(problem: Posed, parameters: Numbers) -> tuple[str, ...]:
     """The boundaries of stability that a design stands on as far as rounding tells, of weave, capsize and infinity.
 
     Empty where a root is right of the imaginary axis. Judged by coefficients: with roots moved onto the axis, or the
@@ -41,7 +41,7 @@ def edges_at(problem: Posed, parameters: Mapping[str, float]) -> tuple[str, ...]
 
 def stands_on(
     problem: Posed,
-    parameters: Mapping[str, float],
+    parameters: Numbers,
     structure: Structure,
     optimal: bool,
     abscissa: float,
@@ -67,7 +67,7 @@ def stands_on(
     return edges, bool(edges) and longest_on_axis(problem, parameters) == (longest or 1)
 
 
-def longest_on_axis(problem: Posed, parameters: Mapping[str, float]) -> int | None:
+def longest_on_axis(problem: Posed, parameters: Numbers) -> int | None:
     """Length of the longest Jordan chain of roots on the imaginary axis, in fractions.
 
     None where no root is there or one is right of it, and where fractions do not tell.
@@ -96,7 +96,7 @@ def longest_on_axis(problem: Posed, parameters: Mapping[str, float]) -> int | No
     return max((exact_longest(matrices, f, m) if matrices else m for f, m in multiple), default=1)
 
 
-def is_exactly_multiple(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root]) -> bool:
+def is_exactly_multiple(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> bool:
     """Whether the multiplicities of the roots of a polynomial are those of the numbers as typed, in fractions."""
     a = as_typed(problem, parameters).coefficients(problem.model, problem.parameter_set)
     if a is None or a[0] == 0:
@@ -104,7 +104,7 @@ def is_exactly_multiple(problem: Posed, parameters: Mapping[str, float], roots: 
     return sorted(r.multiplicity for r in roots) == sorted(m for _, m in isolated_roots(a))
 
 
-def as_typed(problem: Posed, parameters: Mapping[str, float]) -> Written:
+def as_typed(problem: Posed, parameters: Numbers) -> Written:
     """A design in exact numbers: what was typed for the fixed ones, decimals for the others."""
     typed = {n: text for n, text in problem.typed(parameters).items() if n in problem.fixed}
     return written(problem.parameter_set, parameters, None, typed)

@@ -35,129 +35,90 @@ class Edge:
         name: ``weave``, ``capsize``, ``infinity``, ``EP2``, and ``capsize, real`` and ``infinity, real``, where
             all other roots are real; ``real`` for heavy damping itself, as it is seen from outside.
         unknowns, upper: names of factor coefficients, and what they are at most.
-        equations: expressions of the coefficients and the unknowns that are 0.
-        powers: which coefficient each equation is about.
-        nonnegative: expressions that are ≥ 0: the other roots are not right of the axis, or are real.
+        equations: number of a coefficient → an expression of the coefficients and the unknowns that is 0.
+        nonnegative: expressions of these that are ≥ 0: the other roots are not right of the axis, or are real.
         guess: unknowns to start from, for numeric coefficients.
     """
 
     name: str
     unknowns: tuple[str, ...]
     upper: tuple[float, ...]
-    equations: Callable[[Sequence[Any], Sequence[Any]], list[Any]]
-    powers: tuple[int, ...]
+    equations: Callable[[Sequence[Any], Sequence[Any]], dict[int, Any]]
     nonnegative: Callable[[Sequence[Any], Sequence[Any]], list[Any]]
     guess: Callable[[Array], list[float]]
 
 
 @lru_cache(maxsize=16)
 def edges(degree: int) -> Mapping[str, Edge]:
-    """Every piece of a boundary among the polynomials of a degree ≥ 2, by name."""
+    """Every piece of a boundary among the polynomials of a degree ≥ 2, by name.
+
+    Heavy damping is seen from outside too: there the nearest polynomial with real roots is on an edge, or on several.
+    """
     every = (
-        _divided("weave", degree, _pair, real=False),
-        _ended("capsize", degree, degree, real=False),
-        _ended("infinity", degree, 0, real=False),
-        _divided("EP2", degree, _double, real=True),
-        _ended("capsize, real", degree, degree, real=True),
-        _ended("infinity, real", degree, 0, real=True),
-        _whole(degree),
+        _multiples("weave", degree, False, lambda e: [e, 0, 1 - e], _pairs),
+        _multiples("capsize", degree, False, lambda e: [1, 0]),
+        _multiples("infinity", degree, False, lambda e: [0, 1]),
+        _multiples("EP2", degree, True, lambda e: [e * e, 2 * e * (1 - e), (1 - e) * (1 - e)], _doubles),
+        _multiples("capsize, real", degree, True, lambda e: [1, 0]),
+        _multiples("infinity, real", degree, True, lambda e: [0, 1]),
+        _multiples("real", degree, True, lambda e: [1]),
     )
     return MappingProxyType({edge.name: edge for edge in every})
 
 
-def _pair(e: Any) -> list[Any]:
-    """e s² + 1 − e: a pair on the imaginary axis."""
-    return [e, 0, 1 - e]
+def _multiples(
+    name: str,
+    degree: int,
+    real: bool,
+    divisor: Callable[[Any], list[Any]],
+    candidates: Callable[[Array], list[float]] | None = None,
+) -> Edge:
+    """The multiples of a divisor; `candidates` gives values of its unknown e, if it has one, that may be near."""
+    left_over, own = degree + 1 - len(divisor(0.0)), 0 if candidates is None else 1
+    if left_over == degree - 1 <= _BY_SIGNS and not (own or real):
+        end = degree * divisor(0.0)[0]  # the coefficient that is 0
+        return Edge(name, (), (), lambda c, u: {end: c[end]}, lambda c, u: _limits_of_stable(c, end), lambda c: [])
+    others = rest(left_over, real)
 
-
-def _double(e: Any) -> list[Any]:
-    """(e s + 1 − e)²: a double root ≤ 0."""
-    return [e * e, 2 * e * (1 - e), (1 - e) * (1 - e)]
-
-
-def _divided(name: str, degree: int, divisor: Callable[[Any], list[Any]], real: bool) -> Edge:
-    """The multiples of a factor with one unknown."""
-    others = rest(degree - 2, real)
+    def equations(c: Sequence[Any], u: Sequence[Any]) -> dict[int, Any]:
+        whole = product(divisor(u[0] if own else 0.0), *others.factors(u[own:]))
+        return {k: a - b for k, (a, b) in enumerate(zip(c, whole, strict=True))}
 
     def guess(c: Array) -> list[float]:
-        e, left = _nearest(c, divisor, _candidates(c, name), terms(c))
-        return [e, *others.guess(left)]
+        """The e with which the divisor divides c most nearly, and the unknowns of the quotient."""
+        if candidates is None:
+            first = divisor(0.0).index(1)
+            return others.guess(c[first : first + left_over + 1])
+        size = terms(c)
 
-    return Edge(
-        name,
-        ("e", *others.unknowns),
-        (1.0, *others.upper),
-        lambda c, u: _difference(c, divisor(u[0]), *others.factors(u[1:])),
-        tuple(range(degree + 1)),
-        lambda c, u: others.nonnegative(u[1:]),
-        guess,
-    )
+        def left(e: float) -> Array:
+            return quotient(c, np.array(divisor(e)), size)
 
+        best = min(candidates(c), key=lambda e: float(np.abs((c - np.convolve(divisor(e), left(e))) / size).max()))
+        return [best, *others.guess(left(best))]
 
-def _ended(name: str, degree: int, end: int, real: bool) -> Edge:
-    """Where the first or the last coefficient is 0: a root at infinity, or at 0."""
-    inner = slice(0, degree) if end else slice(1, degree + 1)
-    if not real and degree - 1 <= _BY_SIGNS:
-        return Edge(name, (), (), lambda c, u: [c[end]], (end,), lambda c, u: _limits_of_stable(c[inner]), lambda c: [])
-    others = rest(degree - 1, real)
-
-    def equations(c: Sequence[Any], u: Sequence[Any]) -> list[Any]:
-        matched = _difference(c[inner], *others.factors(u))
-        return [*matched, c[end]] if end else [c[end], *matched]
-
-    return Edge(
-        name,
-        others.unknowns,
-        others.upper,
-        equations,
-        tuple(range(degree + 1)),
-        lambda c, u: others.nonnegative(u),
-        lambda c: others.guess(c[inner]),
-    )
+    unknowns, upper = ("e",) * own + others.unknowns, (1.0,) * own + others.upper
+    return Edge(name, unknowns, upper, equations, lambda c, u: others.nonnegative(u[own:]), guess)
 
 
-def _whole(degree: int) -> Edge:
-    """All roots real: from outside the nearest of these polynomials is on an edge, be it of several at once."""
-    every = rest(degree, True)
-    return Edge(
-        "real",
-        every.unknowns,
-        every.upper,
-        lambda c, u: _difference(c, *every.factors(u)),
-        tuple(range(degree + 1)),
-        lambda c, u: every.nonnegative(u),
-        every.guess,
-    )
+def _limits_of_stable(c: Sequence[Any], end: int) -> list[Any]:
+    """≥ 0 exactly for the limits of stable polynomials without an end: coefficients, of a cubic c1 c2 − c0 c3 too."""
+    rest = [x for k, x in enumerate(c) if k != end]
+    return [*rest, *([hurwitz_minors(rest)[1]] if len(rest) - 1 == _BY_SIGNS else [])]
 
 
-def _limits_of_stable(c: Sequence[Any]) -> list[Any]:
-    """≥ 0 exactly for the limits of stable polynomials of degree 3 at most: the coefficients, and c1 c2 − c0 c3."""
-    return [*c, *([hurwitz_minors(c)[1]] if len(c) - 1 == _BY_SIGNS else [])]
-
-
-def _difference(c: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
-    """Coefficients less those of a product."""
-    return [a - b for a, b in zip(c, product(*factors), strict=True)]
-
-
-def _candidates(c: Array, name: str) -> list[float]:
-    """Values of e at which an edge may be near: every pair as if on the axis, or every two neighbours as if one."""
+def _pairs(c: Array) -> list[float]:
+    """Every pair as if it were on the axis."""
     z = roots(regular(c))
-    if name == "weave":
-        return [1 / (1 + abs(x) ** 2) for x in z[z.imag > 0]] + [0.0, 1.0]
+    return [float(1 / (1 + abs(x) ** 2)) for x in z[z.imag > 0]] + [0.0, 1.0]
+
+
+def _doubles(c: Array) -> list[float]:
+    """Every two neighbours as if they were one."""
+    z = roots(regular(c))
     real = np.sort(z[z.imag == 0].real)
     doubles = [*((real[1:] + real[:-1]) / 2), *z[z.imag > 0].real]
-    return [1 / (1 - x) for x in doubles if x < 0] or [1 / (1 + float(np.abs(z).mean()))]
-
-
-def _nearest(c: Array, divisor: Callable[[Any], list[Any]], among: Sequence[float], size: Array) -> tuple[float, Array]:
-    """The e with which the factor divides c most nearly, and the quotient."""
-
-    def left(e: float) -> Array:
-        return quotient(c, np.array(divisor(e)), size)
-
-    best = min(among, key=lambda e: float(np.abs((c - np.convolve(divisor(e), left(e))) / size).max()))
-    return float(best), left(best)
+    return [float(1 / (1 - x)) for x in doubles if x < 0] or [1 / (1 + float(np.abs(z).mean()))]
 
 
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -280,15 +241,13 @@ def _guess(c: Array, odd: int) -> list[float]:
     found = roots(regular(c))
     linear: list[float] = []
     if odd:
-        real = found[found.imag == 0]
-        rightmost = real[np.argmax(real.real)]
+        rightmost = max((z for z in found if z.imag == 0), key=lambda z: z.real)
         linear = [1 / (1 + max(-float(rightmost.real), 0.0))]
         found = np.delete(found, np.flatnonzero(found == rightmost)[0])
     order = np.lexsort((found.imag, np.abs(found.imag), found.real, found.imag == 0))
-    scaled = []
-    for z, w in found[order].reshape(-1, 2):
-        bounded = np.maximum([1.0, -(z + w).real, (z * w).real], 0.0)
-        scaled.append(bounded / bounded.sum())
-    whole = np.array(product(*([[*linear, 1 - linear[0]]] if odd else []), *scaled), dtype=float)
+    z, w = found[order].reshape(-1, 2).T
+    bounded = np.maximum(np.stack([np.ones(len(z)), -(z + w).real, (z * w).real], axis=1), 0.0)
+    scaled = bounded / bounded.sum(axis=1, keepdims=True)
+    whole = np.array(product(*([x, 1 - x] for x in linear), *scaled), dtype=float)
     size = max(float(whole @ c) / float(whole @ whole), 0.0)
-    return [*linear, *(size * scaled[0]).tolist(), *(x for s in scaled[1:] for x in s[:2].tolist())]
+    return [*linear, *(size * scaled[0]).tolist(), *scaled[1:, :2].ravel().tolist()]

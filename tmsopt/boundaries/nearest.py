@@ -1,7 +1,7 @@
 """The nearest point of a boundary: by how much a design may change before it is unstable, or heavily damped no more."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -20,7 +20,7 @@ from tmsopt.problem.solution import Solution
 from tmsopt.program.ipopt import ipopt
 from tmsopt.program.sqp import sqp
 from tmsopt.progress import Listener, start_steps
-from tmsopt.records import Array, Printable, Table, plain
+from tmsopt.records import Array, Numbers, Printable, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
@@ -142,8 +142,8 @@ def nearest(
     design: Given,
     pattern: str,
     *,
-    parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
+    parameters: Numbers | None = None,
+    weights: Numbers | None = None,
     progress: Listener | None = None,
 ) -> Nearest:
     """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
@@ -175,14 +175,14 @@ def nearest(
         raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", ("pattern",))])
     place = _place(design, parameters, weights)
     start_steps(progress, f"looking for the nearest {pattern}")
-    return _nearest(place, ray_crossings(place.space), pattern)
+    return _nearest(place, ray_crossings(place), pattern)
 
 
 def robustness(
     design: Given,
     *,
-    parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
+    parameters: Numbers | None = None,
+    weights: Numbers | None = None,
     progress: Listener | None = None,
 ) -> Robustness:
     """The nearest points of all boundaries, and the radius within which a design stays stable.
@@ -201,7 +201,7 @@ def robustness(
     return _surveyed(place)
 
 
-def robustness_at(problem: Posed, parameters: Mapping[str, float]) -> Robustness:
+def robustness_at(problem: Posed, parameters: Numbers) -> Robustness:
     """The same for the boundaries of stability alone, with the weights of the problem; kept for a while.
 
     IPOPT, which searches for designs, has no part in it.
@@ -216,12 +216,12 @@ def _at(problem: Posed, parameters: Table[float], weights: Table[float]) -> Robu
 
 def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS), method: Method = ipopt) -> Robustness:
     damped = "heavy damping" in kinds
-    seen = ray_crossings(place.space, damped=damped)
+    seen = ray_crossings(place, damped=damped)
     found = _each(place, seen, kinds, method)
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
-        seen = sorted([*seen, *between(place.space, u, damped)], key=lambda c: c.distance)
+        seen = sorted([*seen, *between(place, u, damped)], key=lambda c: c.distance)
         found = _each(place, seen, kinds, method)
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
@@ -245,9 +245,7 @@ def _zeros(place: WeightedDesign) -> tuple[str, ...]:
     )
 
 
-def _place(
-    design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None
-) -> WeightedDesign:
+def _place(design: Given, parameters: Numbers | None, weights: Numbers | None) -> WeightedDesign:
     problem = pose(design)
     given = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
     if faults := [f for n, (x, example) in given.items() if x is not None for f in table_faults(n, x, example)]:
@@ -263,35 +261,29 @@ def _place(
 
 
 def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, method: Method = ipopt) -> Nearest:
-    """The least distance over the pieces of one boundary."""
-    if kind in place.stands_on or (kind == "heavy damping" and place.on_edge):
+    """The least distance over the pieces of one boundary; the way into heavy damping is sought without a ray too."""
+    heavy = kind == "heavy damping"
+    if kind in place.stands_on or (heavy and place.on_edge):
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
     mine = [s for s in seen if s.edge in KINDS[kind]]
-    best = Approach()
+    starts: dict[tuple[str, float], list[Array]] = {}
+    for crossing in mine:
+        starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
+    if heavy and not place.heavily_damped:
+        sign = float(np.sign(place.coefficients(np.zeros(len(place.weights)))[0]))
+        starts.setdefault(("real", sign), []).extend(most_damped(place, sign))
     pieces = edges(place.problem.model.degree)
-    for edge, sign, starts in _pieces(place, mine, kind):
-        best = min(best, _best(place, pieces[edge], sign, starts, method), key=lambda found: found.distance)
+    found = [_best(place, pieces[edge], sign, points, method) for (edge, sign), points in starts.items()]
+    best = min([Approach(), *found], key=lambda each: each.distance)
     if mine and mine[0].distance < best.distance * (1 - ALIKE):
         best = Approach(mine[0].u, False)
-    if not best.u.size or not is_boundary(place, best.u, kind == "heavy damping"):
+    if not best.u.size or not is_boundary(place, best.u, heavy):
         return Nearest(kind)
-    direct = not between(place.space, best.u, kind == "heavy damping")
+    direct = not between(place, best.u, heavy)
     direction = Table(dict(zip(place.weights, best.u.tolist(), strict=True)))
     there = {n: 0.0 if abs(x) <= _NOTHING * place.weights.get(n, 0.0) else x for n, x in place.design(best.u).items()}
     return Nearest(kind, best.distance, Table(there), direction, best.refined, direct)
-
-
-def _pieces(place: WeightedDesign, seen: list[RayCrossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
-    """Each edge that rays crossed, the sign of a0, and starts; the way into heavy damping is sought without a ray."""
-    starts: dict[tuple[str, float], list[Array]] = {}
-    for crossing in seen:
-        starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
-    if kind == "heavy damping" and not place.heavily_damped:
-        sign = float(np.sign(place.space.coefficients(np.zeros(len(place.weights)))[0]))
-        starts.setdefault(("real", sign), []).extend(most_damped(place.space, sign))
-    for (edge, sign), points in starts.items():
-        yield edge, sign, points
 
 
 def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], method: Method) -> Approach:
@@ -306,10 +298,10 @@ def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], m
             best = found or best
         if not best.u.size:
             break
-        met = between(place.space, best.u, edge.name not in STABILITY)
+        met = between(place, best.u, edge.name not in STABILITY)
         starts = [c.u for c in met if (c.edge, c.sign) == (edge.name, sign)]
         if edge.name == "real" and best.distance < before:  # no rays came there, and starts much alike end alike
-            starts += elsewhere(place.space, best.distance, turn)
+            starts += elsewhere(place, best.distance, turn)
         if not starts:
             break
     return best

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.boundaries.boundaries import heavily_damped, losses
+from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, roots
 
@@ -19,24 +20,6 @@ _ELSEWHERE = 4  # starts; as many as led 11 of 196 random systems of degrees 6 t
 _POINTS = 400  # looked at on the straight way to a nearest point
 _AROUND = np.array([0.1, 0.3, 1.0])
 _STEP = 1e-6  # of differences, which only choose directions
-
-
-@dataclass(frozen=True)
-class Space:
-    """Designs around one, in units of the weights.
-
-    Attributes:
-        coefficients: displacements of shape (…, n) → coefficients of shape (…, degree + 1), scaled to the size of 1.
-        lower, upper: physical ranges.
-    """
-
-    coefficients: Callable[[Array], Array]
-    lower: Array
-    upper: Array
-
-    def along(self, directions: Array, t: Array) -> Array:
-        """Displacements t · direction, inside the ranges."""
-        return np.clip(t[..., None] * directions, self.lower, self.upper)
 
 
 @dataclass(frozen=True)
@@ -54,33 +37,33 @@ class RayCrossing:
     distance: float
 
 
-def ray_crossings(space: Space, seed: int = 0, damped: bool = True) -> list[RayCrossing]:
+def ray_crossings(place: WeightedDesign, seed: int = 0, damped: bool = True) -> list[RayCrossing]:
     """The nearest few crossings of each edge in different directions, nearest first.
 
     Args:
         damped: whether the edges of heavy damping are looked for too.
     """
-    rays = directions(space, seed)
-    return along(space, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))), damped)
+    rays = directions(place, seed)
+    return along(place, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))), damped)
 
 
-def between(space: Space, u: Array, damped: bool = True) -> list[RayCrossing]:
+def between(place: WeightedDesign, u: Array, damped: bool = True) -> list[RayCrossing]:
     """Crossings on the straight way to u, short of its end."""
-    return along(space, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1], damped)
+    return along(place, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1], damped)
 
 
-def along(space: Space, rays: Array, t: Array, damped: bool = True) -> list[RayCrossing]:
+def along(place: WeightedDesign, rays: Array, t: Array, damped: bool = True) -> list[RayCrossing]:
     """Crossings between displacements t · ray, t of shape (rays, steps)."""
-    c = space.coefficients(space.along(rays[:, None, :], t))
+    c = place.coefficients(place.along(rays[:, None, :], t))
     found: list[RayCrossing] = []
     for heavy, test in ((False, _stable), (True, heavily_damped))[: 1 + damped]:
         inside = test(c)
         ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
         if not ray.size:
             continue
-        all_of = _Bracket(space, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).narrowed(*_COARSE)
+        all_of = _Bracket(place, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).narrowed(*_COARSE)
         names = [losses(c, heavy) for c in all_of.sides()[0]]
-        distance = np.linalg.norm(space.along(all_of.rays, all_of.high), axis=1)
+        distance = np.linalg.norm(place.along(all_of.rays, all_of.high), axis=1)
         unit = all_of.rays / np.linalg.norm(all_of.rays, axis=1, keepdims=True)
         for name in sorted({n for each in names for n in each}):
             rows = [k for k in np.argsort(distance, kind="stable") if name in names[k]]
@@ -88,11 +71,11 @@ def along(space: Space, rays: Array, t: Array, damped: bool = True) -> list[RayC
     return sorted(found, key=lambda x: x.distance)
 
 
-def directions(space: Space, seed: int) -> Array:
+def directions(place: WeightedDesign, seed: int) -> Array:
     """Unit vectors: the axes, the gradients of the boundaries both ways, and random ones."""
-    axes = np.eye(len(space.lower))
+    axes = np.eye(len(place.lower))
     random = np.random.default_rng(seed).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
-    near = space.coefficients(_STEP * np.concatenate([axes, -axes]))
+    near = place.coefficients(_STEP * np.concatenate([axes, -axes]))
     slopes = (_tests(near[: len(axes)]) - _tests(near[len(axes) :])).T
     slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
     slopes = np.ldexp(
@@ -102,11 +85,11 @@ def directions(space: Space, seed: int) -> Array:
     return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
 
 
-def most_damped(space: Space, sign: float, seed: int = 0) -> list[Array]:
+def most_damped(place: WeightedDesign, sign: float, seed: int = 0) -> list[Array]:
     """The design and points around it that are nearest to having real roots only, for a given sign of a0."""
-    rays = directions(space, seed)
-    u = space.along(rays[:, None, :], np.broadcast_to(_AROUND, (len(rays), len(_AROUND)))).reshape(-1, rays.shape[1])
-    c = sign * space.coefficients(u)
+    rays = directions(place, seed)
+    u = place.along(rays[:, None, :], np.broadcast_to(_AROUND, (len(rays), len(_AROUND)))).reshape(-1, rays.shape[1])
+    c = sign * place.coefficients(u)
     u, c = (
         part[np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)] for part in (u, c)
     )
@@ -116,11 +99,11 @@ def most_damped(space: Space, sign: float, seed: int = 0) -> list[Array]:
     return [np.zeros(rays.shape[1]), *u[_different(unit, rows)]]
 
 
-def elsewhere(space: Space, distance: float, seed: int) -> list[Array]:
+def elsewhere(place: WeightedDesign, distance: float, seed: int) -> list[Array]:
     """A few points at a distance in random directions, be they stable or not."""
-    rays = np.random.default_rng(seed).standard_normal((_ELSEWHERE, len(space.lower)))
+    rays = np.random.default_rng(seed).standard_normal((_ELSEWHERE, len(place.lower)))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    return [*space.along(rays, np.full(_ELSEWHERE, distance))]
+    return [*place.along(rays, np.full(_ELSEWHERE, distance))]
 
 
 def _stable(c: Array) -> Truth:
@@ -154,7 +137,7 @@ def _different(unit: Array, rows: list[int]) -> NDArray[np.int_]:
 class _Bracket:
     """Points t · ray on either side of a change of a test: `low` has its value `inside`, `high` has not."""
 
-    space: Space
+    place: WeightedDesign
     test: Callable[[Array], Truth]
     rays: Array
     low: Array
@@ -168,7 +151,7 @@ class _Bracket:
     def at(self, t: Array) -> Array:
         """Coefficients at t of shape (rays,) or (rays, points)."""
         rays = self.rays if t.ndim == 1 else self.rays[:, None, :]
-        return self.space.coefficients(self.space.along(rays, t))
+        return self.place.coefficients(self.place.along(rays, t))
 
     def narrowed(self, parts: int, times: int) -> "_Bracket":
         """The first change within each, looked for at a few points at once: calls cost more than points."""
@@ -190,7 +173,7 @@ class _Bracket:
     def crossings(self, heavy: bool) -> list[RayCrossing]:
         """As data."""
         beyond, sign = self.sides()
-        u = self.space.along(self.rays, self.high)
+        u = self.place.along(self.rays, self.high)
         return [
             RayCrossing(name, float(sign[k]), u[k], float(np.linalg.norm(u[k])))
             for k, c in enumerate(beyond)

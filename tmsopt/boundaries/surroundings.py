@@ -9,12 +9,10 @@ import numpy as np
 
 from tmsopt.boundaries.axis import edges_at
 from tmsopt.boundaries.boundaries import terms
-from tmsopt.boundaries.rays import Space
 from tmsopt.errors import Fault, InputError, is_number, suggest
-from tmsopt.models import Range
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
-from tmsopt.records import Array
+from tmsopt.records import Array, Numbers
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
 _NOTHING = 1e-12  # of a free parameter's range: what is smaller is 0 but for rounding
@@ -31,8 +29,8 @@ class WeightedDesign:
     """
 
     problem: Posed
-    parameters: Mapping[str, float]
-    weights: Mapping[str, float]
+    parameters: Numbers
+    weights: Numbers
 
     def displaced(self, u: Any) -> dict[str, Any]:
         """Every parameter for displacements: one number, array or symbol per weight."""
@@ -45,8 +43,8 @@ class WeightedDesign:
         for k, n in enumerate(self.weights):
             r = self.problem.parameter_set[n].range
             at[n] = min(max(float(at[n]), r.lower), r.upper)
-            at[n] = r.lower if u[k] <= self.space.lower[k] and r.closed else at[n]
-            at[n] = r.upper if u[k] >= self.space.upper[k] and r.closed else at[n]
+            at[n] = r.lower if u[k] <= self.lower[k] and r.closed else at[n]
+            at[n] = r.upper if u[k] >= self.upper[k] and r.closed else at[n]
         return at
 
     def scaled(self, parameters: Mapping[str, Any]) -> list[Any]:
@@ -55,10 +53,35 @@ class WeightedDesign:
         return [c / s for c, s in zip(a, self.scale, strict=True)]
 
     @cached_property
-    def space(self) -> Space:
-        """The polynomials around the design."""
-        ends = [_ends(self.problem.parameter_set[n].range, self.parameters[n], w) for n, w in self.weights.items()]
-        return Space(self._coefficients, np.array([lo for lo, _ in ends]), np.array([hi for _, hi in ends]))
+    def lower(self) -> Array:
+        """Displacements to the lower ends of the physical ranges."""
+        return self._ends[:, 0]
+
+    @cached_property
+    def upper(self) -> Array:
+        """Displacements to their upper ends."""
+        return self._ends[:, 1]
+
+    @cached_property
+    def _ends(self) -> Array:
+        """A little inside a range that excludes its ends."""
+        found = []
+        for n, weight in self.weights.items():
+            allowed, value = self.problem.parameter_set[n].range, self.parameters[n]
+            inset = 0.0 if allowed.closed else _OPEN * abs(value)
+            ends = (allowed.lower + inset - value) / weight, (allowed.upper - inset - value) / weight
+            found.append((min(ends[0], 0.0), max(ends[1], 0.0)))
+        return np.array(found)
+
+    def along(self, directions: Array, t: Array) -> Array:
+        """Displacements t · direction, inside the ranges."""
+        return np.clip(t[..., None] * directions, self.lower, self.upper)
+
+    def coefficients(self, u: Array) -> Array:
+        """Displacements of shape (…, n) → coefficients of shape (…, degree + 1), scaled to the size of 1."""
+        with np.errstate(all="ignore"):
+            c = self.scaled(self.displaced(np.moveaxis(u, -1, 0)))
+            return np.stack(np.broadcast_arrays(*c, u[..., 0])[:-1], axis=-1)
 
     @cached_property
     def stable(self) -> bool:
@@ -101,20 +124,8 @@ class WeightedDesign:
         powers = unit ** np.arange(len(a))
         return np.asarray(powers * (float(np.abs(a / powers).max()) or 1.0))
 
-    def _coefficients(self, u: Array) -> Array:
-        with np.errstate(all="ignore"):
-            c = self.scaled(self.displaced(np.moveaxis(u, -1, 0)))
-            return np.stack(np.broadcast_arrays(*c, u[..., 0])[:-1], axis=-1)
 
-
-def _ends(allowed: Range, value: float, weight: float) -> tuple[float, float]:
-    """Ends of a displacement, a little inside a range that excludes them."""
-    inset = 0.0 if allowed.closed else _OPEN * abs(value)
-    lower, upper = (allowed.lower + inset - value) / weight, (allowed.upper - inset - value) / weight
-    return min(lower, 0.0), max(upper, 0.0)
-
-
-def placed(problem: Posed, parameters: Mapping[str, float], weights: Mapping[str, float] | None) -> WeightedDesign:
+def placed(problem: Posed, parameters: Numbers, weights: Numbers | None) -> WeightedDesign:
     """A design with checked parameters and weights.
 
     Raises:
@@ -129,7 +140,7 @@ def placed(problem: Posed, parameters: Mapping[str, float], weights: Mapping[str
     return WeightedDesign(problem, own, {n: float(given[n]) for n in own if given.get(n, 0.0) > 0})
 
 
-def relative(problem: Posed, parameters: Mapping[str, float]) -> dict[str, float]:
+def relative(problem: Posed, parameters: Numbers) -> dict[str, float]:
     """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, 1 without one."""
     of = problem.parameter_set
     weights = {}
@@ -141,7 +152,7 @@ def relative(problem: Posed, parameters: Mapping[str, float]) -> dict[str, float
     return weights
 
 
-def parameter_faults(problem: Posed, parameters: Mapping[str, float]) -> Iterator[Fault]:
+def parameter_faults(problem: Posed, parameters: Numbers) -> Iterator[Fault]:
     """What is wrong with the parameters of a design."""
     of = problem.parameter_set
     for name in parameters:
@@ -157,7 +168,7 @@ def parameter_faults(problem: Posed, parameters: Mapping[str, float]) -> Iterato
             yield Fault(f"found {parameters[name]:.6g}; {of[name].meaning} is {of[name].range}", key)
 
 
-def _weight_faults(problem: Posed, weights: Mapping[str, float]) -> Iterator[Fault]:
+def _weight_faults(problem: Posed, weights: Numbers) -> Iterator[Fault]:
     of = problem.parameter_set
     for name, weight in weights.items():
         key = ("weights", name)

@@ -4,7 +4,7 @@ Where coefficients are differences of large numbers, or all vanish together, an 
 around which nothing changes.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import flint
 import numpy as np
@@ -13,7 +13,7 @@ from tmsopt.boundaries.boundaries import MATCHED, heavily_damped
 from tmsopt.boundaries.rays import directions
 from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.problem.problem import Posed
-from tmsopt.records import Array
+from tmsopt.records import Array, Numbers
 from tmsopt.roots import exact_roots, is_stable, lienard_chipart, multiple_real_roots, routh, shift
 
 BITS = 400
@@ -34,7 +34,7 @@ def is_boundary(place: WeightedDesign, u: Array, heavy: bool) -> bool:
     Designs right beside the point must differ from the design itself, in balls at their doubles. From outside, that
     edge may be the tip of a cusp: real and negative roots at the point do as well.
     """
-    c = place.space.coefficients(u)
+    c = place.coefficients(u)
     if not u.any():
         return True  # the design itself is met by the equations of the edge
     if not np.all(np.isfinite(c)) or np.all(np.abs(c) <= _NONE * place.sizes):
@@ -51,10 +51,10 @@ def is_boundary(place: WeightedDesign, u: Array, heavy: bool) -> bool:
 def _beside(place: WeightedDesign, u: Array, heavy: bool, within: bool) -> Iterator[Array]:
     """Displacements near one at which doubles find the other verdict."""
     size = float(np.linalg.norm(u))
-    around = np.concatenate([[u / size, -u / size], directions(place.space, seed=0)])
+    around = np.concatenate([[u / size, -u / size], directions(place, seed=0)])
     for reach in _BESIDE:
-        points = np.clip(u + max(reach * size, _LEAST) * around, place.space.lower, place.space.upper)
-        at = place.space.coefficients(points)
+        points = np.clip(u + max(reach * size, _LEAST) * around, place.lower, place.upper)
+        at = place.coefficients(points)
         verdict = heavily_damped(np.sign(at[:, :1]) * at) if heavy else is_stable(at, exact=False)
         yield from points[np.flatnonzero(verdict != within)[:_FEW]]
     if not heavy and not within:  # towards a corner with a multiple root, stable designs are few
@@ -63,17 +63,17 @@ def _beside(place: WeightedDesign, u: Array, heavy: bool, within: bool) -> Itera
 
 def _moved_left(place: WeightedDesign, u: Array, left: float) -> Array:
     """A displacement at which all roots lie further to the left than at u, those at infinity too, by Gauss-Newton."""
-    target = shift(shift(place.space.coefficients(u).tolist(), left)[::-1], left)[::-1]
+    target = shift(shift(place.coefficients(u).tolist(), left)[::-1], left)[::-1]
     v = u
     for _ in range(_ROUNDS):
         steps = _STEP * np.eye(len(u))
-        slope = (place.space.coefficients(v + steps) - place.space.coefficients(v - steps)) / (2 * _STEP)
-        v = v + np.linalg.lstsq(slope.T, np.array(target) - place.space.coefficients(v), rcond=None)[0]
-        v = np.clip(v, place.space.lower, place.space.upper)
+        slope = (place.coefficients(v + steps) - place.coefficients(v - steps)) / (2 * _STEP)
+        v = v + np.linalg.lstsq(slope.T, np.array(target) - place.coefficients(v), rcond=None)[0]
+        v = np.clip(v, place.lower, place.upper)
     return v
 
 
-def exactly_stable(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def exactly_stable(problem: Posed, parameters: Numbers) -> bool:
     """Whether all roots of the design as stored lie left of the imaginary axis, in ball arithmetic."""
     with flint.ctx.workprec(BITS):
         c = _balls(problem, parameters)
@@ -84,7 +84,7 @@ def exactly_stable(problem: Posed, parameters: Mapping[str, float]) -> bool:
         return all(x > 0 for x in tests)
 
 
-def _all_real(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def _all_real(problem: Posed, parameters: Numbers) -> bool:
     with flint.ctx.workprec(BITS):
         c = _balls(problem, parameters)
         if c[0].contains(0):
@@ -92,6 +92,6 @@ def _all_real(problem: Posed, parameters: Mapping[str, float]) -> bool:
     return all(root.im == 0 and root.re < 0 for root in exact_roots(c))
 
 
-def _balls(problem: Posed, parameters: Mapping[str, float]) -> list[flint.arb]:
+def _balls(problem: Posed, parameters: Numbers) -> list[flint.arb]:
     at = {n: flint.arb(float(x)) for n, x in parameters.items()}
     return [flint.arb(c) for c in problem.model.coefficients(at, problem.parameter_set)]

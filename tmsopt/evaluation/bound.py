@@ -40,7 +40,6 @@ _CORNERS = 12  # free parameters, beyond which their ranges have too many
 _FIT = np.linalg.pinv(np.vander(_NODES, _DEGREE + 1))
 
 _MORE = 8  # designs at which a relation is tried beyond those that determine it
-_DEPENDENT = 1e-9  # singular value of the coefficients at random designs, relative, above which there is no relation
 _FINENESS = 2**40  # steps of a range, one of which an exact design takes at random
 
 _RATIONAL = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div", "quotient", "ratio"}
@@ -106,8 +105,8 @@ def _largest_product(problem: Posed) -> float:
     inside = [_point_of(box, part) for part in (Fraction(1, 2), Fraction(2, 3))]
     constant = [n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, inside)]
     varying = [n for n in box if n not in constant]
-    curved = [n for n in varying if not _linear(model, n, inside)]
-    if len(curved) > 1 or not all(_linear(model, n, inside, _DEGREE + 1) for n in curved):
+    curved = [n for n in varying if not _has_degree(model, n, inside, 1)]
+    if len(curved) > 1 or not all(_has_degree(model, n, inside, _DEGREE) for n in curved):
         return _enclosed_product(problem)
     ends = [box[n] if n in varying and n not in curved else ((box[n][0] + box[n][1]) / 2,) for n in box]
     corners = dict(zip(box, np.array(list(itertools.product(*ends))).T, strict=True))
@@ -203,31 +202,25 @@ def _algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], Know
 
 
 def _plays_no_role(model: Model, name: str, inside: Sequence[Exact]) -> bool:
-    """Whether aₙ/a0 is free of a parameter: exact arithmetic at points where a difference would show."""
-    for others in inside:
-        (last, first), (last2, first2) = _exact(model, name, others, [Fraction(3, 7), Fraction(11, 5)])
-        if not _vanishes(last * first2 - last2 * first):
-            return False
-    return True
+    """Whether aₙ/a0 is free of a parameter: exact arithmetic at points where a difference would show.
 
-
-def _linear(model: Model, name: str, inside: Sequence[Exact], order: int = 2) -> bool:
-    """Whether the exact differences of an order of aₙ and a0 vanish, at points where others would show.
-
-    Those of order 2 do where both are linear in the parameter, those of order k where they are of a degree below k.
+    A quotient that does not exist is a ball nan, which equals nothing.
     """
+    each = (_exact(model, name, others, [Fraction(3, 7), Fraction(11, 5)]) for others in inside)
+    return all(last * other == another * first for (last, first), (another, other) in each)
+
+
+def _has_degree(model: Model, name: str, inside: Sequence[Exact], degree: int) -> bool:
+    """Whether aₙ and a0 are of a degree in a parameter at most, by exact differences where a higher one would show."""
     for others in inside:
-        at = _exact(model, name, others, [Fraction(1, 3) + k for k in range(order + 2)])
+        at = _exact(model, name, others, [Fraction(1, 3) + k for k in range(degree + 3)])
         for row in zip(*at, strict=True):
-            for terms in (row[: order + 1], row[1:]):
-                if not _vanishes(sum((-1) ** k * math.comb(order, k) * c for k, c in enumerate(terms))):
-                    return False
+            differences = list(row)
+            for _ in range(degree + 1):
+                differences = [b - a for a, b in itertools.pairwise(differences)]
+            if not all(difference == 0 for difference in differences):
+                return False
     return True
-
-
-def _vanishes(x: Any) -> bool:
-    """Whether a number is 0 for certain; not so a quotient that does not exist, a ball nan."""
-    return bool(x == 0)
 
 
 def _point_of(box: Box, part: Fraction) -> Exact:
@@ -244,6 +237,7 @@ def _exact(model: Model, name: str, others: Exact, at: Sequence[Fraction]) -> li
     return [(a[-1], a[0]) for a in rows]
 
 
+@lru_cache(maxsize=64)
 def relation_bound(problem: Posed) -> float:
     """The greatest of the bounds on the abscissa by relations of the coefficients; −inf without any.
 
@@ -251,13 +245,9 @@ def relation_bound(problem: Posed) -> float:
     that are rational functions of the free parameters (tangents of angles) with fractions for coefficients, and
     without rounding: they hold at designs drawn at random, more of them than they are determined by.
     """
-    if not (is_rational(problem.model, problem.parameter_set) and _dependent(problem)):
-        return -math.inf
-    rows = _exact_rows(problem)
-    if rows is None:
-        return -math.inf
+    rows = _exact_rows(problem) if is_rational(problem.model, problem.parameter_set) else None
     with flint.ctx.workprec(_BITS):
-        return max((_bound_of(relation) for relation in relations(rows)), default=-math.inf)
+        return max(map(_bound_of, relations(rows) if rows else []), default=-math.inf)
 
 
 @lru_cache(maxsize=64)
@@ -309,23 +299,6 @@ def _bound_of(relation: Sequence[Any]) -> float:
         zeros += [float(z.real.upper()) for z, _ in integral.complex_roots() if z.imag == 0]
         h = h.derivative()
     return math.nextafter(-max(zeros), -math.inf) if max(zeros) else 0.0
-
-
-def _dependent(problem: Posed) -> bool:
-    """Whether the coefficients at random designs look dependent, in doubles."""
-    of, rng = problem.parameter_set, np.random.default_rng(0)
-    count = 2 * problem.model.degree + _MORE
-    drawn = {n: rng.uniform(*ends, count) for n, ends in problem.free.items()}
-    a = problem.model.coefficients(problem.ordered(drawn), of)
-    columns = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in a), np.zeros(count))[:-1], axis=1)
-    if not np.all(np.isfinite(columns)):
-        return False
-    rows = columns / np.maximum(np.abs(columns).max(axis=1, keepdims=True), 1e-300)
-    sizes = np.linalg.norm(rows, axis=0)
-    if np.any(sizes == 0):
-        return True
-    values = np.linalg.svd(rows / sizes, compute_uv=False)
-    return bool(values[-1] <= _DEPENDENT * values[0])
 
 
 def _exact_rows(problem: Posed) -> list[list[Any]] | None:

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt import laws
 from tmsopt.algebra.formula import NotAccepted
 from tmsopt.algebra.rounding import Bounded, as_bounded
 from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
-from tmsopt.evaluation.law_rows import SAME_LAW
+from tmsopt.evaluation.law_rows import speed_laws
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import tms
 from tmsopt.problem.evaluate import coefficients_of, evaluate
@@ -23,7 +22,6 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
 from tmsopt.problem.validate import SMALLEST
 from tmsopt.records import Array, Truth
-from tmsopt.roots import is_stable
 from tmsopt.roots.discs import Motions, enclose_motions
 
 BLOCK = 8192
@@ -101,14 +99,12 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
         return np.asarray(spread.value)
 
     wide |= {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
-    objective = (
-        np.full(m, np.nan) if problem.objective is None else settled(*evaluate(problem, [problem.objective], wide))
-    )
+    objective = settled(*evaluate(problem, [problem.objective], wide)) if problem.objective else np.full(m, np.nan)
     doubles = {name: settled(wide[name]) for name in ("abscissa", "damping_ratio")}
     plain = given | doubles | {ANGULAR_FREQUENCY: found.frequency}
     violations, doubt = _violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
-    feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)
+    feasible = np.all(np.isnan([np.full(m, np.nan), *violations.values()]), axis=0)
     bound, related = np.full(m, -np.inf), np.zeros(m, dtype=bool)
     if bounded(problem):
         bound, related = _bounds(problem, coefficients, settled)
@@ -206,30 +202,14 @@ def _laws(
 ) -> dict[str, Array]:
     """Relative residual of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
     m = len(feasible)
-    names = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
-    *native, number = evaluate(problem, [*names, "Fr_c"], wide)
+    names = problem.model.sets[0].names
+    *native, number = (_spread(x, m) for x in evaluate(problem, [*names, "Fr_c"], wide))
     p = {n: settled(x) for n, x in zip(names, native, strict=True)}
-    shape = {n: p[n] for n in names[1:]}
-    heights, tilt = {k: p[k] for k in ("zeta_B", "zeta_H")}, {"lambda_s": p["lambda_s"]}
-    number = _spread(number, m)
     exists = np.isfinite(number.value)
     critical = np.where(exists, settled(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)
-
-    def relative(numeric: Any, law: Any, applies: Any) -> Array:
-        law = _column(law, m)
+    found = {}
+    for label, (numeric, law, applies) in speed_laws(p, critical, np.stack([*map(settled, coefficients)], -1)).items():
         residual = (numeric - law) / np.where(law == 0, 1.0, np.abs(law))
         settled(np.where(feasible & applies, residual, 0.0))  # a law without a value
-        return np.where(feasible & applies, residual, np.nan)
-
-    stable = is_stable(np.stack([settled(c) for c in coefficients], axis=-1))
-    printed = np.all(laws.lscf(p["Fr"], **shape), axis=0)
-    one = p["chi_H"] == 1
-    first = np.sqrt(np.maximum(np.nan_to_num(laws.Frc1(p["chi_B"], **heights, **tilt)), 0.0))
-    best = laws.chibm(**heights)
-    optimal = np.abs(p["chi_B"] - best) <= SAME_LAW * np.maximum(np.abs(p["chi_B"]), np.abs(best))
-    return {
-        "lscf": relative(1.0 * stable, 1.0 * printed, (p["lambda_s"] > 0) & (p["chi_H"] >= 1)),
-        "flus": relative(critical, laws.Fr_c(**shape), exists),
-        "Frc1": relative(critical, first, one & exists),
-        "frm": relative(critical, laws.frm(**heights, **tilt), one & exists & optimal),
-    }
+        found[label] = np.where(feasible & applies, residual, np.nan)
+    return found

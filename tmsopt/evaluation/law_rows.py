@@ -89,56 +89,77 @@ class LawRow:
 def law_rows(design: Solution) -> Iterator[LawRow]:
     """Every law, with the reason where its conditions do not hold."""
     p = {name: float(value) for name, value in design.dimensionless.items()}
-    heights = {k: p[k] for k in ("zeta_B", "zeta_H")}
-    tilt = {"lambda_s": p["lambda_s"]}
+    heights, tilt = _heights(p), {"lambda_s": p["lambda_s"]}
     not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_why_not_ep4(design)}"
     not_one = "" if p["chi_H"] == 1 else f"needs chi_H = 1; here chi_H = {p['chi_H']:.6g}"
-    special = not_one or not_ep4
     r, T = design.abscissa, math.tan(p["lambda_s"])
-
-    yield LawRow("w0", "abscissa, the 4-fold root", r, _f(laws.w0(p["mu"], p["chi_H"], **heights, **tilt)), not_ep4)
     a = np.array([design.quantities[f"a{k}"] for k in range(5)])
+
+    def row(label: str, subject: str, numeric: Any, law: Any, reason: str) -> LawRow:
+        return LawRow(label, subject, float(numeric), float(law), reason)
+
+    root = "abscissa, the 4-fold root"
+    yield row("w0", root, r, laws.w0(p["mu"], p["chi_H"], **heights, **tilt), not_ep4)
     mismatch = np.max(np.abs(a / a[0] / laws.poly4(r) - 1)) if r and a[0] else math.nan
-    yield LawRow("4poly", "largest relative mismatch of a coefficient", _f(mismatch), 0.0, not_ep4)
-    yield LawRow("chib", "chi_B", p["chi_B"], _f(laws.chib(r, p["chi_H"], **heights)), not_ep4)
+    yield row("4poly", "largest relative mismatch of a coefficient", mismatch, 0.0, not_ep4)
+    yield row("chib", "chi_B", p["chi_B"], laws.chib(r, p["chi_H"], **heights), not_ep4)
     a2 = laws.a2(p["Fr"], p["mu"], p["chi_H"], **heights, **tilt, omega0=r)
-    yield LawRow("a2", "left minus right side", _f(a2), 0.0, not_ep4)
+    yield row("a2", "left minus right side", a2, 0.0, not_ep4)
 
     general = not_ep4 or ("" if not_one else "at chi_H = 1 the mass ratio is free; see the laws for chi_H = 1")
-    branch = _nearest(laws.ep4(r, **heights, chi_H=p["chi_H"]), p)
+    branches = laws.ep4(r, **heights, chi_H=p["chi_H"])
+    branch = min(branches, key=lambda b: abs(float(b.tan_lambda_s) - T) + abs(float(b.Fr) - p["Fr"]))  # it is on this
     closed = (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s))
     for subject, numeric, law in closed:
-        yield LawRow(_CLOSED, f"{subject}, closed form for any chi_H", numeric, _f(law), general)
+        yield row(_CLOSED, f"{subject}, closed form for any chi_H", numeric, law, general)
 
-    yield from _speed_rows(design, p, not_one)
-    yield LawRow("w01", "abscissa, the 4-fold root", r, _f(laws.w01(**heights)), special)
-    yield LawRow("chib1", "chi_B", p["chi_B"], _f(laws.chib1(**heights)), special)
-    yield LawRow("tls", "tan(lambda_s)", T, _f(laws.tls(**heights)), special)
-    yield LawRow("frep4", "Fr", p["Fr"], _f(laws.frep4(**heights)[0]), special)
-    on_set = design.structure in ("EP4", "2EP2", "CEP2")
-    off_set = not_one or ("" if on_set else f"holds on the EP set; the structure is '{design.structure}'")
-    yield LawRow("epset", "Fr", p["Fr"], _f(laws.epset(**heights, **tilt)), off_set)
-
-
-def _speed_rows(design: Solution, p: Mapping[str, float], not_one: str) -> Iterator[LawRow]:
-    """Laws of stability and of the critical Froude number."""
-    heights = {k: p[k] for k in ("zeta_B", "zeta_H")}
-    tilt = {"lambda_s": p["lambda_s"]}
-    shape = {k: p[k] for k in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")}
-    stable = bool(is_stable([design.quantities[f"a{k}"] for k in range(5)]))
-    printed = bool(np.all(laws.lscf(p["Fr"], **shape)))
-    regime = "" if p["lambda_s"] > 0 else "stated for lambda_s > 0"
-    if not regime and p["chi_H"] < 1:
-        regime = "incomplete for chi_H < 1: a1 > 0 is missing"
-    yield LawRow("lscf", "stable (1) or not (0)", float(stable), float(printed), regime)
     critical = design.quantities["Fr_c"]
     absent = "" if math.isfinite(critical) else "the design has no weave boundary"
-    yield LawRow("flus", "Fr_c", critical, _f(laws.Fr_c(**shape)), absent)
-    frc1 = math.sqrt(max(_f(laws.Frc1(p["chi_B"], **heights, **tilt)), 0.0))
-    yield LawRow("Frc1", "Fr_c", critical, frc1, not_one or absent)
-    optimal = _f(laws.chibm(**heights))
-    off = "" if math.isclose(p["chi_B"], optimal, rel_tol=SAME_LAW) else f"holds at chi_B = {optimal:.6g}"
-    yield LawRow("frm", "Fr_c, least over chi_B", critical, _f(laws.frm(**heights, **tilt)), not_one or absent or off)
+    low = "incomplete for chi_H < 1: a1 > 0 is missing" if p["chi_H"] < 1 else ""
+    off = f"holds at chi_B = {float(laws.chibm(**heights)):.6g}"
+    of_speed = speed_laws(p, critical, a)
+    for label, subject, reason in (
+        ("lscf", "stable (1) or not (0)", low if p["lambda_s"] > 0 else "stated for lambda_s > 0"),
+        ("flus", "Fr_c", absent),
+        ("Frc1", "Fr_c", not_one or absent),
+        ("frm", "Fr_c, least over chi_B", not_one or absent or off),
+    ):
+        numeric, law, applies = of_speed[label]
+        yield row(label, subject, numeric, law, "" if applies else reason)
+
+    special = not_one or not_ep4
+    yield row("w01", root, r, laws.w01(**heights), special)
+    yield row("chib1", "chi_B", p["chi_B"], laws.chib1(**heights), special)
+    yield row("tls", "tan(lambda_s)", T, laws.tls(**heights), special)
+    yield row("frep4", "Fr", p["Fr"], laws.frep4(**heights)[0], special)
+    on_set = design.structure in ("EP4", "2EP2", "CEP2")
+    off_set = not_one or ("" if on_set else f"holds on the EP set; the structure is '{design.structure}'")
+    yield row("epset", "Fr", p["Fr"], laws.epset(**heights, **tilt), off_set)
+
+
+def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[str, tuple[Any, Any, Any]]:
+    """Laws of stability and of the critical Froude number: label → number of the design, law, whether it applies.
+
+    Args:
+        p: dimensionless parameters, numbers or arrays of these.
+        coefficients: shape (…, 5).
+    """
+    heights, tilt, exists, one = _heights(p), {"lambda_s": p["lambda_s"]}, np.isfinite(critical), p["chi_H"] == 1
+    shape = {n: p[n] for n in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")}
+    best = laws.chibm(**heights)
+    optimal = np.abs(p["chi_B"] - best) <= SAME_LAW * np.maximum(np.abs(p["chi_B"]), np.abs(best))
+    printed = np.all(laws.lscf(p["Fr"], **shape), axis=0)
+    first = np.sqrt(np.maximum(laws.Frc1(p["chi_B"], **heights, **tilt), 0.0))
+    return {
+        "lscf": (1.0 * is_stable(coefficients), 1.0 * printed, (p["lambda_s"] > 0) & (p["chi_H"] >= 1)),
+        "flus": (critical, laws.Fr_c(**shape), exists),
+        "Frc1": (critical, first, one & exists),
+        "frm": (critical, laws.frm(**heights, **tilt), one & exists & optimal),
+    }
+
+
+def _heights(p: Mapping[str, Any]) -> dict[str, Any]:
+    return {n: p[n] for n in ("zeta_B", "zeta_H")}
 
 
 def _why_not_ep4(design: Solution) -> str:
@@ -147,14 +168,3 @@ def _why_not_ep4(design: Solution) -> str:
     if not design.problem.free:
         why = " and nothing is free"
     return f"the structure is '{design.structure}'{why}"
-
-
-def _nearest(branches: tuple[laws.EP4, laws.EP4], p: Mapping[str, float]) -> laws.EP4:
-    """The algebraic branch that the design is on."""
-    T = math.tan(p["lambda_s"])
-    distance = [abs(_f(b.tan_lambda_s) - T) + abs(_f(b.Fr) - p["Fr"]) for b in branches]
-    return branches[1] if distance[1] < distance[0] else branches[0]
-
-
-def _f(x: Any) -> float:
-    return float(x)

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.algebra.formula import Formula, NotAccepted, formula, symbol
 from tmsopt.algebra.intervals import ranges
@@ -19,10 +18,10 @@ from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE, roots_at
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, roots_at
 from tmsopt.problem.verdict.meetings import is_crossing
-from tmsopt.records import Array, Table
-from tmsopt.roots import Root, Structure, pattern_distance, roots
+from tmsopt.records import Numbers, Table
+from tmsopt.roots import Root, Structure, pattern_distance
 
 FEASIBLE = 1e-9
 """Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
@@ -31,7 +30,6 @@ MATCHED = 1e-10
 """Relative change of a coefficient up to which a pattern counts as located."""
 
 _SCATTER = 2e-3  # of the largest root: five times what numeric roots beside a 4-fold one are off
-_TAKEN = 10 * STRUCTURE_TOLERANCE  # of the terms of a polynomial, more than those are off that are taken for multiple
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ class Evaluation:
 
 def recheck(
     problem: Posed,
-    parameters: Mapping[str, float],
+    parameters: Numbers,
     cases: Sequence[Case] | None = None,
     around: Robustness | None = None,
 ) -> Evaluation:
@@ -74,12 +72,11 @@ def recheck(
         around: the boundaries nearest to this design, where they are known already.
     """
     looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
-    listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
-    violations, amounts = _violated(problem, looked, problem.conditions)
-    crossing = False
-    structure = each[top]["structure"]
+    violations, amounts = looked.violations(problem.conditions)
+    nominal, worst, crossing = looked.nominal, looked.each[looked.top], False
+    structure = worst["structure"]
     if not math.isfinite(structure.abscissa):
-        exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
+        exist = all(math.isfinite(float(c)) for c in worst.coefficients)
         violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or none
     if problem.pattern is not None:
         a = [float(c) for c in nominal.coefficients]
@@ -89,30 +86,28 @@ def recheck(
             violations[problem.pattern.name] = 1.0 if crossing else distance
     of = problem.parameter_set
     names = [n for n in (*public_names(problem.model, of), "damping_ratio") if n not in problem.model.sets[0].names]
-    if around is not None:
-        names.append(RADIUS)
-    if problem.asks(ANGULAR_FREQUENCY):
-        names.append(ANGULAR_FREQUENCY)
+    names += [RADIUS] if looked.around is not None else []
+    names += [ANGULAR_FREQUENCY] if problem.asks(ANGULAR_FREQUENCY) else []
     if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
         nominal = nominal.with_known({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
-        realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
-        objective=_objective(problem, nominal, each, listed),
+        realised=realised_abscissa(problem, looked.cases[looked.top].applied(parameters)),
+        objective=looked.objective,
         violations=Table(violations),
         amounts=Table(violations | amounts),
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
-        worst=listed[top] if listed else Case(),
-        least_damped=listed[looked.least] if listed else Case(),
-        fastest=listed[looked.fastest] if listed else Case(),
-        around=around,
+        worst=looked.cases[looked.top],
+        least_damped=looked.cases[looked.least],
+        fastest=looked.cases[looked.fastest],
+        around=looked.around,
         crossing=crossing,
     )
 
 
 def missed(
-    problem: Posed, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
+    problem: Posed, parameters: Numbers, cases: Sequence[Case], around: Robustness | None = None
 ) -> dict[str, float]:
     """Limits on the roots that the exact roots of the parameters as stored miss → by how much, in their own units.
 
@@ -123,9 +118,9 @@ def missed(
     if not asked:
         return {}
     looked = _look(problem, parameters, cases, around)
-    near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(problem, c))}
+    near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(c))}
     exactly = _look(problem, parameters, cases, looked.around, parameters) if near else looked
-    return _violated(problem, exactly, near)[1]
+    return exactly.violations(near)[1]
 
 
 def judged_exactly(
@@ -137,7 +132,7 @@ def judged_exactly(
     """
     looked = _look(problem, {n: float(x) for n, x in parameters.items()}, cases, stored=parameters)
     conditions = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
-    return looked.nominal, _violated(problem, looked, conditions)[1]
+    return looked.nominal, looked.violations(conditions)[1]
 
 
 def _is_near(condition: Expression, values: Values) -> bool:
@@ -145,20 +140,6 @@ def _is_near(condition: Expression, values: Values) -> bool:
     left, right = condition.sides(values)
     slack = -condition.sign * float(condition(values))
     return condition.equality or not slack > _SCATTER * max(1.0, abs(left), abs(right))
-
-
-def _violated(
-    problem: Posed, looked: "_Look", conditions: Mapping[str, Expression]
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Violations of conditions beyond tolerance, relative and in the units of the sides."""
-    violations, amounts = {}, {}
-    for name, condition in conditions.items():
-        at = looked.at(problem, condition)
-        violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
-        if not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, worst)):
-            violations[name] = violation
-            amounts[name] = float(condition.excess(float(condition(worst))))
-    return violations, amounts
 
 
 def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
@@ -191,16 +172,13 @@ def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str
     return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
-def excesses(problem: Posed, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
+def excesses(problem: Posed, parameters: Numbers, cases: Sequence[Case]) -> dict[str, float]:
     """Amount by which each constraint's limit must be moved for a design: 0 or more, signed for an equality."""
-    looked = _look(problem, parameters, cases)
-    found = {}
+    looked, found = _look(problem, parameters, cases), {}
     for name, condition in problem.conditions.items():
-        differences = [float(condition(v)) for v in looked.at(problem, condition)]
-        if condition.equality:
-            found[name] = differences[0]
-        else:
-            found[name] = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
+        differences = [float(condition(v)) for v in looked.at(condition)]
+        beyond = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
+        found[name] = differences[0] if condition.equality else beyond
     return found
 
 
@@ -214,6 +192,7 @@ class _Look:
         fastest: number of the case with the greatest angular frequency, where that is asked for, else `top`.
     """
 
+    problem: Posed
     cases: list[Case]
     nominal: Values
     each: list[Values]
@@ -222,83 +201,62 @@ class _Look:
     fastest: int
     around: Robustness | None
 
-    def at(self, problem: Posed, condition: Expression) -> list[Values]:
-        """The cases that a condition holds in."""
-        return self.each if depends_on_case(problem, condition, self.cases) else [self.nominal]
+    def at(self, expression: Expression) -> list[Values]:
+        """The cases in which a condition must hold, or an objective is the worst."""
+        return self.each if depends_on_case(self.problem, expression, self.cases) else [self.nominal]
+
+    @property
+    def objective(self) -> float:
+        """The objective, the worst over the cases where it differs between them; nan without one."""
+        objective, sign = self.problem.objective, self.problem.sign
+        if objective is None:
+            return math.nan
+        return sign * max((sign * float(objective(values)) for values in self.at(objective)), key=_or_infinite)
+
+    def violations(self, conditions: Mapping[str, Expression]) -> tuple[dict[str, float], dict[str, float]]:
+        """Violations of conditions beyond tolerance, relative and in the units of the sides."""
+        violations, amounts = {}, {}
+        for name, condition in conditions.items():
+            at = self.at(condition)
+            violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
+            if not violation <= FEASIBLE or (violation > 0 and _beyond(self.problem, condition, worst)):
+                violations[name] = violation
+                amounts[name] = float(condition.excess(float(condition(worst))))
+        return violations, amounts
 
 
 def _look(
     problem: Posed,
-    parameters: Mapping[str, float],
+    parameters: Numbers,
     cases: Sequence[Case],
     around: Robustness | None = None,
     stored: Mapping[str, Any] | None = None,
 ) -> _Look:
     """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
-    listed = [case for case in cases if not case.direction]
-    designs = [case.applied(parameters) for case in listed] or [dict(parameters)]
+    listed = [case for case in cases if not case.direction] or [Case()]
     nominal = problem.values(parameters)
-    each = [problem.values(design) for design in designs] if listed else [nominal]
-    near_top, near_least, near_fastest = _candidates(each)
+    each = [nominal if case == Case() else problem.values(case.applied(parameters)) for case in listed]
+    numbers = range(len(each))
     if stored is not None:
-        exact = [case.applied(stored) for case in listed] or [dict(stored)]
         nominal, *each = (
-            values.with_known({"structure": Structure("undecided", realised_roots(problem, design), 0.0)})
-            for design, values in zip((stored, *exact), (nominal, *each), strict=True)
+            values.with_known(
+                {"structure": Structure("undecided", _realised_roots(problem, case.applied(stored)), 0.0)}
+            )
+            for case, values in zip((Case(), *listed), (nominal, *each), strict=True)
         )
-    top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
-    least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
+    top = max(numbers, key=lambda k: _or_infinite(each[k]["abscissa"]))
+    least = min(numbers, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
     fastest = top
     if problem.asks(ANGULAR_FREQUENCY):
-        fastest = max(near_fastest, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
+        fastest = max(numbers, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
         worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]
     if around is None and problem.asks_radius and stored is None:
         around = robustness_at(problem, parameters)
     if around is not None:
         worst[RADIUS] = around.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **worst}) for v in (nominal, *each))
-    return _Look(listed, nominal, each, top, least, fastest, around)
-
-
-def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int], list[int]]:
-    """Cases that may have the largest abscissa, the least damping ratio and the greatest angular frequency.
-
-    Numeric roots are off by 4e-4 at most, simple ones by far less.
-    """
-    a = np.array([[float(c) for c in values.coefficients] for values in each])
-    if len(each) == 1 or not np.all(np.isfinite(a)) or np.any(a[:, 0] == 0):
-        return list(range(len(each))), list(range(len(each))), list(range(len(each)))
-    z = roots(a)
-    off = _off(a, z)
-    ratio = np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
-    off_ratio = np.minimum(_SCATTER, np.max(off / (np.abs(z) + 1e-300), axis=1))
-    top, fastest = (
-        np.flatnonzero((part + off).max(axis=1) >= (part - off).max(axis=1).max()).tolist() for part in (z.real, z.imag)
-    )
-    least = np.flatnonzero(ratio - 2 * off_ratio <= (ratio + 2 * off_ratio).min()).tolist()
-    return top, least, fastest
-
-
-def _off(a: Array, z: NDArray[np.complex128]) -> Array:
-    """How far numeric roots may be off: by what the polynomial is off over its slope, at most as multiple ones are."""
-    size = np.abs(z)
-    powers = np.arange(a.shape[1] - 1, -1, -1)
-    terms = (np.abs(a)[:, None] * size[..., None] ** powers).sum(axis=-1)
-    slope = np.abs((a[:, None, :-1] * powers[:-1] * z[..., None] ** (powers[:-1] - 1)).sum(axis=-1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first = np.nan_to_num(_TAKEN * terms / slope, nan=np.inf)
-    return np.asarray(np.minimum(first, _SCATTER * size.max(axis=1, keepdims=True)))
-
-
-def _objective(problem: Posed, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:
-    """The objective, the worst over the cases where it differs between them."""
-    if problem.objective is None:
-        return math.nan
-    if not depends_on_case(problem, problem.objective, cases):
-        return float(problem.objective(nominal))
-    sign = problem.sign
-    return sign * max((sign * float(problem.objective(values)) for values in each), key=_or_infinite)
+    return _Look(problem, listed, nominal, each, top, least, fastest, around)
 
 
 def _or_infinite(value: float) -> float:
@@ -306,12 +264,11 @@ def _or_infinite(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 
-def realised_abscissa(problem: Posed, parameters: Mapping[str, float]) -> float:
+def realised_abscissa(problem: Posed, parameters: Numbers) -> float:
     """Abscissa of the parameters exactly as stored."""
-    found = realised_roots(problem, parameters)
+    found = _realised_roots(problem, parameters)
     return found[0].re if found else math.nan
 
 
-def realised_roots(problem: Posed, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
-    """Roots of the parameters exactly as stored, rightmost first; none where a coefficient does not exist."""
+def _realised_roots(problem: Posed, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
     return roots_at(problem.model, problem.parameter_set, parameters)

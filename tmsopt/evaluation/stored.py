@@ -15,7 +15,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import flint
@@ -29,7 +29,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text, unit_at
-from tmsopt.records import Array
+from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.enclosed import nearest_roots
@@ -82,39 +82,37 @@ class _Cluster:
 
 
 def held(
-    problem: Posed, parameters: Mapping[str, float], checked: Evaluation, cases: Sequence[Case]
-) -> tuple[Mapping[str, float], Evaluation, Mapping[str, float]]:
+    problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case]
+) -> tuple[Numbers, Evaluation, Numbers]:
     """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
 
     It is moved, too, where its objective does not exist as stored: beside the end of a square root. The structure
     remains that of the ideal design. Where no such design is found, the one that is given, and what it misses → by how
     much.
     """
-    if checked.violations:
+    amounts = {} if checked.violations else missed(problem, parameters, cases, checked.around)
+    if checked.violations or (not amounts and _has_objective(problem, parameters)):
         return parameters, checked, {}
-    amounts = missed(problem, parameters, cases, checked.around)
-    if not amounts and not _has_objective(problem, parameters):
-        for design in filter(partial(_has_objective, problem), _beside(problem, parameters)):
+    if amounts:
+        clusters = _clusters(problem, parameters, checked, cases, list(amounts))
+        ends = problem.free.items()
+        inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
+        groups = [names for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if names and clusters]
+        ways = (
+            _SpreadRoots(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist())
+        )
+        others: Iterator[dict[str, float]] = (design for way in ways for design in way.designs())
+    else:
+        others = filter(partial(_has_objective, problem), _beside(problem, parameters))
+    for design in others:
+        if not missed(problem, design, cases, checked.around):
             again = recheck(problem, design, cases, checked.around)
-            if not (again.violations or missed(problem, design, cases, checked.around)):
+            if set(again.violations) <= set(problem.asked_of_roots):
                 return design, _structured(problem, design, checked, again), {}
-    if not amounts:
-        return parameters, checked, {}
-    clusters = _clusters(problem, parameters, checked, cases, list(amounts))
-    ends = problem.free.items()
-    inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
-    for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if clusters else ():
-        for spread in _SPREADS.tolist() if names else ():
-            for design in _nearest(problem, parameters, clusters, names, spread):
-                if not all(lo <= design[n] <= hi for n, (lo, hi) in ends) or missed(problem, design, cases):
-                    continue
-                again = recheck(problem, design, cases, checked.around)
-                if set(again.violations) <= set(problem.asked_of_roots):
-                    return design, _structured(problem, design, checked, again), {}
     return parameters, checked, amounts
 
 
-def _has_objective(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def _has_objective(problem: Posed, parameters: Numbers) -> bool:
     """Whether the objective exists at the parameters exactly as stored; one of the roots always does."""
     asked = problem.objective
     if asked is None or set(asked.names) & set(ROOT_NAMES):
@@ -124,14 +122,14 @@ def _has_objective(problem: Posed, parameters: Mapping[str, float]) -> bool:
         return bool(as_ball(asked(Values(problem.model, problem.parameter_set, exact))).is_finite())
 
 
-def _beside(problem: Posed, parameters: Mapping[str, float]) -> Iterator[dict[str, float]]:
+def _beside(problem: Posed, parameters: Numbers) -> Iterator[dict[str, float]]:
     """Designs some roundings of one free parameter off, inside the box."""
     for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items()):
         if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper:
             yield {**parameters, name: x}
 
 
-def multiple_roots_exist(problem: Posed, parameters: Mapping[str, float]) -> bool:
+def multiple_roots_exist(problem: Posed, parameters: Numbers) -> bool:
     """Whether a design within rounding of one has exactly the multiple roots that this one has to rounding.
 
     There Newton's method, in 150 digits, gains digits with every step; where equations are all but singular it stalls.
@@ -140,10 +138,12 @@ def multiple_roots_exist(problem: Posed, parameters: Mapping[str, float]) -> boo
     clusters = [
         _Cluster(Case(), r, 1j, True, True) for r in roots if r.multiplicity > 1 and r.im >= 0 and (r.re or r.im)
     ]
-    target, _, size = _aims(clusters, 0.0) if clusters else (np.empty(0),) * 3
+    if not clusters:
+        return True
+    spread = _SpreadRoots(problem, parameters, clusters, list(problem.free), 0.0)
     with flint.ctx.workdps(_DIGITS):
-        _, off, _ = _solved(problem, parameters, clusters, list(problem.free), target, size)
-        return all(abs(float(x)) <= _GONE * scale for x, scale in zip(off, size.tolist(), strict=True))
+        off = spread.solved()[1]
+    return all(abs(float(x)) <= _GONE * scale for x, scale in zip(off, spread.aims[2].tolist(), strict=True))
 
 
 def abscissa_as_stored(solution: Solution) -> str:
@@ -163,7 +163,7 @@ def abscissa_as_stored(solution: Solution) -> str:
     return f"{first}as stored {unit.number(realised, _SHOWN)}"
 
 
-def missed_note(problem: Posed, amounts: Mapping[str, float]) -> tuple[str, ...]:
+def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
     """What parameters miss as they are stored, as a sentence for the reader."""
     why = "no doubles nearby that meet every limit were found" if problem.free else "the ideal design does not"
     return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
@@ -171,7 +171,7 @@ def missed_note(problem: Posed, amounts: Mapping[str, float]) -> tuple[str, ...]
 
 def _clusters(
     problem: Posed,
-    parameters: Mapping[str, float],
+    parameters: Numbers,
     checked: Evaluation,
     cases: Sequence[Case],
     names: Sequence[str],
@@ -196,93 +196,95 @@ def _clusters(
     return found
 
 
-def _nearest(
-    problem: Posed,
-    parameters: Mapping[str, float],
-    clusters: Sequence[_Cluster],
-    names: Sequence[str],
-    spread: float,
-) -> Iterator[dict[str, float]]:
-    """Doubles close to a design whose clusters are spread along their limits, the most promising first."""
-    target, leeway, size = _aims(clusters, spread)
-    with flint.ctx.workdps(_DIGITS):
-        at, _, slope = _solved(problem, parameters, clusters, names, target, size)
-        start = {n: float(at[n]) for n in names}
-        off = [float(x) for x in _off(problem, {**at, **{n: flint.arb(x) for n, x in start.items()}}, clusters, target)]
-        aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
-    if not np.all(np.isfinite([*off, *start.values(), *slope.ravel()])):
-        return
-    widths = _widths(problem, parameters, names)
-    units = np.maximum([math.ulp(x) for x in start.values()], _FINEST * widths)
-    rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / (_MOVE * widths))])
-    for counts in _rounded(rows, np.array([*(off / leeway), *(aside / (_MOVE * widths))])):
-        moves = zip(start.items(), counts, units.tolist(), strict=True)
-        yield {**parameters, **{n: x + count * unit for (n, x), count, unit in moves}}
+@dataclass(frozen=True)
+class _SpreadRoots:
+    """A design whose clusters are to be spread along their limits.
 
+    Attributes:
+        names: parameters that may be moved.
+        spread: h² over s₀² C(m, 2).
+    """
 
-def _widths(problem: Posed, parameters: Mapping[str, float], names: Sequence[str]) -> Array:
-    """Natural sizes of parameters."""
-    return np.array([max(abs(parameters[n]), _LEAST * np.ptp(problem.free[n])) for n in names])
+    problem: Posed
+    parameters: Numbers
+    clusters: Sequence[_Cluster]
+    names: Sequence[str]
+    spread: float
 
+    @cached_property
+    def aims(self) -> tuple[Array, Array, Array]:
+        """Of each part of each cₖ: what it is in the spread, how far it may be off, and its natural size."""
+        aims = []
+        for cluster in self.clusters:
+            m, size = cluster.root.multiplicity, abs(cluster.place)
+            h = size * math.sqrt(self.spread * math.comb(m, 2))
+            inside = 0.0 if cluster.exactly else size * self.spread
+            c = np.poly(h * np.linspace(-1, 1, m) + 1j * inside)
+            across = (FEASIBLE * size + inside) / 2
+            for k, real in cluster.parts():
+                leeway = h**k / 8 if real else h ** (k - 1) * across
+                aims.append((c[k].real if real else c[k].imag, leeway, size**k))
+        target, leeways, sizes = np.array(aims).T
+        return target, leeways, sizes
 
-def _solved(
-    problem: Posed,
-    parameters: Mapping[str, float],
-    clusters: Sequence[_Cluster],
-    names: Sequence[str],
-    target: Array,
-    size: Array,
-) -> tuple[dict[str, Any], list[Any], Array]:
-    """A design after some steps of Newton's method with the first slopes, what is off there, and those slopes."""
-    widths = _widths(problem, parameters, names)
-    at = {n: flint.arb(x) for n, x in parameters.items()}
-    known, slopes = _off(problem, at, clusters, target), []
-    for n, width in zip(names, widths.tolist(), strict=True):
-        step = flint.arb(width) * flint.arb(2) ** -100
-        moved = _off(problem, {**at, n: at[n] + step}, clusters, target)
-        slopes.append([float((b - a) / step) for a, b in zip(known, moved, strict=True)])
-    slope = np.array(slopes)
-    if np.all(np.isfinite(slope)):
-        inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
-        for _ in range(_STEPS):
-            steps = widths * (inverse @ (np.array([float(x) for x in known]) / size))
-            at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(names, steps.tolist(), strict=True)}
-            known = _off(problem, at, clusters, target)
-    return at, known, slope
+    @cached_property
+    def widths(self) -> Array:
+        """Natural sizes of the parameters that may be moved."""
+        free = self.problem.free
+        return np.array([max(abs(self.parameters[n]), _LEAST * np.ptp(free[n])) for n in self.names])
 
+    def designs(self) -> Iterator[dict[str, float]]:
+        """Doubles in the box that are close to the design with spread clusters, the most promising first."""
+        leeway, moves = self.aims[1], _MOVE * self.widths
+        with flint.ctx.workdps(_DIGITS):
+            at, _, slope = self.solved()
+            start = {n: float(at[n]) for n in self.names}
+            off = [float(x) for x in self.off({**at, **{n: flint.arb(x) for n, x in start.items()}})]
+            aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
+        if not np.all(np.isfinite([*off, *start.values(), *slope.ravel()])):
+            return
+        units = np.maximum([math.ulp(x) for x in start.values()], _FINEST * self.widths)
+        rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / moves)])
+        for counts in _rounded(rows, np.array([*(off / leeway), *(aside / moves)])):
+            steps = zip(start.items(), counts, units.tolist(), strict=True)
+            design = {**self.parameters, **{n: x + count * unit for (n, x), count, unit in steps}}
+            if all(lo <= design[n] <= hi for n, (lo, hi) in self.problem.free.items()):
+                yield design
 
-def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Array]:
-    """Of each part of each cₖ: what it is in the spread, how far it may be off, and its natural size."""
-    aims = []
-    for cluster in clusters:
-        m, size = cluster.root.multiplicity, abs(cluster.place)
-        h = size * math.sqrt(spread * math.comb(m, 2))
-        inside = 0.0 if cluster.exactly else size * spread
-        c = np.poly(h * np.linspace(-1, 1, m) + 1j * inside)
-        across = (FEASIBLE * size + inside) / 2
-        for k, real in cluster.parts():
-            aims.append((c[k].real, h**k / 8, size**k) if real else (c[k].imag, h ** (k - 1) * across, size**k))
-    target, leeway, sizes = (np.array(column) for column in zip(*aims, strict=True))
-    return target, leeway, sizes
+    def solved(self) -> tuple[dict[str, Any], list[Any], Array]:
+        """The design after some steps of Newton's method with the first slopes, what is off there, and those slopes."""
+        size, widths = self.aims[2], self.widths
+        at = {n: flint.arb(x) for n, x in self.parameters.items()}
+        off, slopes = self.off(at), []
+        for n, width in zip(self.names, widths.tolist(), strict=True):
+            step = flint.arb(width) * flint.arb(2) ** -100
+            moved = self.off({**at, n: at[n] + step})
+            slopes.append([float((b - a) / step) for a, b in zip(off, moved, strict=True)])
+        slope = np.array(slopes)
+        if np.all(np.isfinite(slope)):
+            inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
+            for _ in range(_STEPS):
+                steps = widths * (inverse @ (np.array([float(x) for x in off]) / size))
+                at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(self.names, steps.tolist(), strict=True)}
+                off = self.off(at)
+        return at, off, slope
 
-
-def _off(problem: Posed, parameters: Mapping[str, Any], clusters: Sequence[_Cluster], target: Array) -> list[Any]:
-    """Each part of each cₖ of an exact design, minus what is aimed at."""
-    found = []
-    for cluster in clusters:
-        a = problem.model.coefficients(cluster.case.applied(parameters), problem.parameter_set)
-        if not all(c.is_finite() for c in a):
-            return [flint.arb("nan")] * len(target)
-        z = [z for z, m in isolated_roots(a) for _ in range(m)]
-        place, c = flint.acb(cluster.place), [flint.acb(1)]
-        z.sort(key=lambda z: float(abs(z - place)))
-        own = z[: cluster.root.multiplicity]
-        place = sum(own, flint.acb(0)) / len(own) if cluster.anywhere else place
-        for root in own:
-            t = (root - place) / flint.acb(cluster.along)
-            c = [a - t * b for a, b in zip([*c, 0], [0, *c], strict=True)]
-        found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]
-    return [(x - t).mid() for x, t in zip(found, target.tolist(), strict=True)]
+    def off(self, at: Mapping[str, Any]) -> list[Any]:
+        """Each part of each cₖ of an exact design, minus what is aimed at."""
+        found, target = [], self.aims[0].tolist()
+        for cluster in self.clusters:
+            a = self.problem.model.coefficients(cluster.case.applied(at), self.problem.parameter_set)
+            if not all(c.is_finite() for c in a):
+                return [flint.arb("nan")] * len(target)
+            place, c = flint.acb(cluster.place), [flint.acb(1)]
+            z = sorted((z for z, m in isolated_roots(a) for _ in range(m)), key=lambda z: float(abs(z - place)))
+            own = z[: cluster.root.multiplicity]
+            middle = sum(own, flint.acb(0)) / len(own) if cluster.anywhere else place
+            for root in own:
+                t = (root - middle) / flint.acb(cluster.along)
+                c = [a - t * b for a, b in zip([*c, 0], [0, *c], strict=True)]
+            found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]
+        return [(x - t).mid() for x, t in zip(found, target, strict=True)]
 
 
 def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
@@ -303,7 +305,7 @@ def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
         yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
 
 
-def _structured(problem: Posed, design: Mapping[str, float], checked: Evaluation, again: Evaluation) -> Evaluation:
+def _structured(problem: Posed, design: Numbers, checked: Evaluation, again: Evaluation) -> Evaluation:
     """The recheck of a design, with the structure of the ideal one that it was moved from."""
     structure = again.structure
     if structure.name != checked.structure.name:

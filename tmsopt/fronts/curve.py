@@ -293,16 +293,15 @@ def _thinned(search: _Search) -> Front:
     stretches = search.stretches()
     chain = [stretches[0].left, *(s.right for s in stretches)]
     words = [[search.ends[0].label], *(list[str]() for _ in chain[1:-1]), [search.ends[1].label]]  # even if better
-    changes: list[tuple[int, str, float]] = []
-    gaps: list[tuple[int, str, bool]] = []
+    kinks, gaps = list[Kink](), list[Gap]()
     for i, s in enumerate(stretches):
         if s.gap and s.length > _WIDE:
-            gaps.append((i, _missing(search.ask, s), s.failed))
+            gaps.append(Gap(_missing(search.ask, s), i, s.failed))
             words[i].append("gap begins")
             words[i + 1].append("gap ends")
         elif s.changes and not (s.left.label or s.right.label):
             words[i] += (names := change_names(s.left, s.right))
-            changes += [(i, name, s.length) for name in names]
+            kinks += [Kink(name, i, s.length) for name in names]
     spacing = sum(s.length for s in stretches if not s.gap) / max(search.points - 1, 1)
     at = [*accumulate((s.length for s in stretches), initial=0.0)]
     kept, last = list[int](), -math.inf
@@ -318,8 +317,8 @@ def _thinned(search: _Search) -> Front:
         problem=search.ask.problem.problem,
         objectives=search.ask.texts,
         points=tuple(replace(chain[i], solution=proved[k], label="; ".join(words[i])) for k, i in enumerate(kept)),
-        kinks=tuple(Kink(name, place[i], width) for i, name, width in changes),
-        gaps=tuple(Gap(reason, place[i], failed) for i, reason, failed in gaps),
+        kinks=tuple(replace(kink, index=place[kink.index]) for kink in kinks),
+        gaps=tuple(replace(gap, index=place[gap.index]) for gap in gaps),
         solved=len(search.probes) + 2,
         seconds=0.0,
         notes=notes,

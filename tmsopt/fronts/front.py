@@ -116,12 +116,12 @@ class Front(Tabular):
     @property
     def ideal(self) -> tuple[float, ...]:
         """Least value of each objective."""
-        return tuple(min(column) for column in zip(*(p.objectives for p in self.points), strict=True))
+        return tuple(map(min, zip(*(p.objectives for p in self.points), strict=True)))
 
     @property
     def nadir(self) -> tuple[float, ...]:
         """Greatest value of each objective on the front."""
-        return tuple(max(column) for column in zip(*(p.objectives for p in self.points), strict=True))
+        return tuple(map(max, zip(*(p.objectives for p in self.points), strict=True)))
 
     def records(self) -> Iterable[dict[str, Any]]:
         """One record per point: objectives, parameters, roots, limits, label."""

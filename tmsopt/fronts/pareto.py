@@ -77,25 +77,26 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
 
 
 def _front(team: Team, ask: FrontSolver, points: int, progress: Steps | None) -> Front:
-    n, ends = len(ask.texts), dict[int, FrontPoint]()
+    n, easier, ends = len(ask.texts), dict[int, Solution](), dict[int, FrontPoint]()
     begin(progress, "looking for the ends of the front", "sub-problem")
-    if progress:
-        progress(0, 2 * n)
+
+    def count() -> None:
+        if progress:
+            progress(len(easier) + len(ends), 2 * n)
+
+    count()
     front = Front(ask.problem.problem, ask.texts, (), (), (), n, 0.0)
     try:
-        easier: dict[int, Solution] = {}
         for k, found in team.each(alone, ask, range(n)):
             easier[k] = found
-            if progress:
-                progress(len(easier), 2 * n)
+            count()
             for solution in (easier[j] for j in takewhile(easier.__contains__, range(n))):
                 if solution.status != "optimal":
                     raise NotSolved(solution)
         ask = replace(ask, easier=easier)
         for k, best in team.each(best_first, ask, range(n)):
             ends[k] = replace(point(ask, best), label=_label(ask.texts[k].strip()))
-            if progress:
-                progress(n + len(ends), 2 * n)
+            count()
     except KeyboardInterrupt:
         if not ends:
             raise

@@ -1,10 +1,10 @@
 """The front of three objectives: a grid of limits on two of them, over the payoff table."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from tmsopt.fronts.front import FrontPoint, Gap, efficient
-from tmsopt.fronts.subproblems import FrontSolver, least, point, solvable
+from tmsopt.fronts.subproblems import FrontSolver, least, objectives, point, solvable
 from tmsopt.fronts.team import Team
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps, begin
@@ -15,8 +15,7 @@ MOST = 12
 _SAME = 1e-7  # of the range: a corner of the table is held with a slack of 1e-9
 
 
-@dataclass(frozen=True)
-class _Cell:
+class _Cell(NamedTuple):
     """A sub-problem: limits on objectives, designs near by, and its number."""
 
     limits: Mapping[int, float]
@@ -34,49 +33,40 @@ def surface(
     every tighter one with it.
     """
     begin(progress, "following the front", "sub-problem")
-    table = [[p.objectives[k] for p in ends] for k in range(3)]
-    low, high = [min(c) for c in table], [max(c) for c in table]
-    side = min(points, MOST)
+    low, high = ([f(column) for column in zip(*(p.objectives for p in ends), strict=True)] for f in (min, max))
+    side, count, interrupted = min(points, MOST), 0, False
     solved: dict[tuple[int, int], Solution | None] = {(side, side): ends[0].solution}  # the loosest limits cut nothing
-    impossible: set[tuple[int, int]] = set()
-    failed: list[str] = []
-    count = 0
-    interrupted = False
+    failed: dict[int, str] = {}
     try:
         for diagonal in range(2 * side - 1, 1, -1):
             cells: dict[tuple[int, int], _Cell] = {}
             for i, j in ((i, diagonal - i) for i in range(side, 0, -1) if 1 <= diagonal - i <= side):
-                looser = [(i + 1, j), (i, j + 1)]
-                if any(cell in impossible for cell in looser):
-                    impossible.add((i, j))
+                looser = [cell for cell in ((i + 1, j), (i, j + 1)) if max(cell) <= side]
+                if any(cell not in solved for cell in looser):  # no design meets its limits, nor these
                     continue
                 limits = {k: low[k] + (high[k] - low[k]) * step / side for k, step in ((1, i), (2, j))}
-                near = [s for s in (solved.get(cell) for cell in looser) if s is not None]
-                meets = [s for s in near if all(point(ask, s).objectives[k] <= v for k, v in limits.items())]
+                near = [s for s in map(solved.get, looser) if s is not None]
+                meets = [s for s in near if all(objectives(ask, s)[k] <= v for k, v in limits.items())]
                 if meets:  # the best under looser limits is the best here
                     solved[i, j] = meets[0]
                 else:
                     cells[i, j] = _Cell(limits, tuple(near or [p.solution for p in ends]), count + len(cells))
-            ended: dict[int, tuple[Solution | None, bool]] = {}
-            try:
-                for k, outcome in team.each(_solved, ask, list(cells.values())):
-                    ended[k] = outcome
-                    count += 1
-                    if progress:
-                        progress(count, side * side - 1)
-            finally:
-                for k, (cell, of) in enumerate(cells.items()):
-                    solved[cell], possible = ended.get(k, (None, True))
-                    if not possible:
-                        impossible.add(cell)
-                    elif solved[cell] is None and k in ended:
-                        failed.append(" and ".join(f"{ask.texts[j]} <= {v:.6g}" for j, v in of.limits.items()))
+            places = list(cells)
+            for k, (found, possible) in team.each(_solved, ask, list(cells.values())):
+                count += 1
+                if progress:
+                    progress(count, side * side - 1)
+                if possible:
+                    solved[places[k]] = found
+                if possible and found is None:
+                    own = cells[places[k]]
+                    failed[own.number] = " and ".join(f"{ask.texts[n]} <= {v:.6g}" for n, v in own.limits.items())
     except KeyboardInterrupt:
         interrupted = True
-    every = [*ends, *(point(ask, s) for s in {id(s): s for s in solved.values() if s is not None}.values())]
-    ranges = [h - b for b, h in zip(low, high, strict=True)]
-    kept = efficient(every, [_SAME * r for r in ranges])
-    gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for text in failed)
+    ordered = [solved[cell] for cell in sorted(solved, key=lambda cell: (-sum(cell), -cell[0]))]
+    every = [*ends, *(point(ask, s) for s in {id(s): s for s in ordered if s is not None}.values())]
+    kept = efficient(every, [_SAME * (h - b) for b, h in zip(low, high, strict=True)])
+    gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for _, text in sorted(failed.items()))
     return tuple(kept), gaps, count + 3, interrupted
 
 

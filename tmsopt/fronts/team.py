@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
+from functools import partial
 from typing import Any, TypeVar
 
 from tmsopt.executor import Crash, EngineError, Executor, here, processes
@@ -37,16 +38,11 @@ class Team:
         Raises:
             EngineError: an item ends every process that tries it.
         """
-        with closing(self._executor.map(_solve, [(function, ask, item) for item in items])) as answers:
+        with closing(self._executor.map(partial(function, ask), items)) as answers:
             for place, answer in answers:
                 if isinstance(answer, Crash):
                     raise EngineError(f"a sub-problem of the front ends its process ({answer.cause})")
                 yield place, answer
-
-
-def _solve(task: tuple[Callable[[FrontSolver, T], R], FrontSolver, T]) -> R:
-    function, ask, item = task
-    return function(ask, item)
 
 
 def can_send(thing: Any) -> bool:
