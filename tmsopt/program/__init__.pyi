@@ -6,5 +6,5 @@ from .options import (
     options_of as options_of,
 )
 from .starts import (
-    designs as designs, initial_point as initial_point, opposite as opposite, start_objective as start_objective,
+    designs as designs, initial_point as initial_point,
 )

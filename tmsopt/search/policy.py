@@ -81,15 +81,18 @@ class Policy:
 
 
 def search(state: SearchState, policy: Policy) -> SearchState:
-    """Search one part of the box."""
-    begin(state.options.progress, "looking at designs")
-    state = replace(state, tuning=policy.tuning)
-    state = replace(state, sample=state.sample or policy.sample(state))
-    begin(state.options.progress, "searching", "start")
-    state = policy.accept(try_starts(state, policy.starts(state), policy))
-    for rescue in policy.rescues:
-        if not state.interrupted and rescue.applies(state):
-            state = rescue.run(state, policy)
+    """Search one part of the box; where the user ends that, the state has what was found so far."""
+    try:
+        begin(state.options.progress, "looking at designs")
+        state = replace(state, tuning=policy.tuning)
+        state = replace(state, sample=state.sample or policy.sample(state))
+        begin(state.options.progress, "searching", "start")
+        state = policy.accept(try_starts(state, policy.starts(state), policy))
+        for rescue in policy.rescues:
+            if not state.interrupted and rescue.applies(state):
+                state = rescue.run(state, policy)
+    except KeyboardInterrupt:
+        state = replace(state, interrupted=True)
     return state
 
 
