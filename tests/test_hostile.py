@@ -197,9 +197,9 @@ def test_formulas_are_computed_or_refused(text, sense):
             constraints={"c": f"{text} <= 3"},
             **{sense: text},
         )
-        values = problem.values({**problem.fixed, "Fr": 2.0, "chi_B": 1.5, "lambda_s": 0.3})
+        values = problem.posed.values({**problem.fixed, "Fr": 2.0, "chi_B": 1.5, "lambda_s": 0.3})
         assert problem.objective is not None
-        float(problem.objective(values))
+        float(problem.posed.objective(values))
 
     answered(ask)
 

@@ -287,7 +287,7 @@ def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, run):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(import_module("tmsopt.search.solve"), "explore", stop)
+    monkeypatch.setattr(import_module("tmsopt.search.solve"), "search_part", stop)
     monkeypatch.setattr(import_module("tmsopt.search.solve"), "_so_far", stop)
     for command in ("solve", "prove", "compare", "speeds"):
         status, out, err = run(command, "problems/ep4.toml")

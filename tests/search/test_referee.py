@@ -183,12 +183,14 @@ def test_a_bound_far_away_is_still_one():
 
 @pytest.mark.parametrize("lower", [0.0, -1.0])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_an_infimum_at_a_root_at_0_is_no_optimum(lower, sign):
-    """(s + x)(s² + 0.6 s + 1) has the damping ratio 0.3 for x > 0, 0 at x = 0 and −1 below: there is no least x."""
+def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower, sign):
+    """(s + x)(s² + 0.6 s + 1) has the damping ratio 0.3 for x > 0, 0 at x = 0 and −1 below: no least x, but a limit.
+
+    What is not told to be the limit is no optimum.
+    """
     a = [sign * c for c in product([1, x], [1, 0.6, 1])]
     design = tmsopt.solve(problem(a, {"x": (lower, 1.0)}, ("damping_ratio >= 0.1",), minimize="x"), throw=False)
-    assert design.status == "not_converged"
-    assert 0 < design.value <= 1e-3
+    assert 0 < design.value <= (1e-7 if design.status == "optimal" else 1e-3)
     assert not design.violations
 
 
