@@ -29,7 +29,7 @@ from .studies import (
     run_study as run_study, sobol as sobol,
 )
 from .tracing import (
-    Branch as Branch, Domain as Domain, Event as Event, Swallowtail as Swallowtail, Trace as Trace, domain as domain,
+    Branch as Branch, Domain as Domain, Event as Event, EventPoint as EventPoint, Swallowtail as Swallowtail, Trace as Trace, domain as domain,
     swallowtail as swallowtail, trace as trace,
 )
 

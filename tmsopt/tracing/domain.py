@@ -17,11 +17,11 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import nearest_two
-from tmsopt.tracing.branch import Branch, Event
+from tmsopt.tracing.branch import Branch, EventPoint
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
 from tmsopt.tracing.equations import coefficients
 from tmsopt.tracing.infinity import Infinity, through_infinity
-from tmsopt.tracing.monitors import on_axis, roots_along
+from tmsopt.tracing.points import on_axis, roots_along
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
@@ -173,7 +173,7 @@ def _pieces(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence
             yield Arc(branch.pattern, {n: np.array([p[n] for p in points]) for n in problem.free})
 
 
-def _near(problem: Posed, event: Event, corners: Sequence[Corner]) -> list[Corner]:
+def _near(problem: Posed, event: EventPoint, corners: Sequence[Corner]) -> list[Corner]:
     """The corners within reach of an event, the nearest last."""
 
     def distance(corner: Corner) -> float:
@@ -234,7 +234,7 @@ def _corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 
 
-def _turns(branch: Branch, event: Event, problem: Posed) -> bool:
+def _turns(branch: Branch, event: EventPoint, problem: Posed) -> bool:
     if event.name == "end":
         return event.detail in pattern_of(problem.model, branch.pattern).ends.values()
     return event.name not in ("fold", "constraint")

@@ -1,6 +1,6 @@
 """A coarse grid over the plane of two free parameters, to see where branches of a pattern may be missing."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import cycle, islice, pairwise
 from typing import Any
 
@@ -10,9 +10,12 @@ from tmsopt.problem.problem import Posed
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
-from tmsopt.tracing.continuation import INFINITE, Walk
+from tmsopt.tracing.continuation import INFINITE, Curve, Walk, both_ways, contains
 from tmsopt.tracing.equations import Traced, coefficients, design_at, starting_points
 from tmsopt.tracing.solving import projected, rows_of
+
+Line = dict[str, Array]
+"""Free parameters along a curve."""
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
@@ -105,6 +108,22 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
         share = np.clip(np.sum(offset * along, axis=2) / length, 0, 1)
         far[rows] = np.min(np.sum((offset - share[..., None] * along) ** 2, axis=2), axis=1) > distance**2
     return far
+
+
+def walk_new(
+    on: Curve, problem: Posed, seeds: Iterable[Array], how: tuple[float, int], walks: list[Walk], lines: list[Line]
+) -> Iterator[Walk]:
+    """Curves through some of many points, shape (points, n + 1) each; `walks` and their `lines` in the box grow."""
+    for left in seeds:
+        for known in walks:
+            left = left[~contains(on, known, left)]
+        while len(left):
+            found, left = both_ways(on, left[0], *how), left[1:]
+            if found is not None:
+                walks.append(found)
+                lines.append(design_at(problem, found.y * on.scale))
+                left = left[~contains(on, found, left)]
+                yield found
 
 
 def seeds(

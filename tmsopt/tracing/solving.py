@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tmsopt.records import Array, Truth
 
 _SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
-_DAMPING = 0.5 ** np.arange(1, 10)  # of a Gauss–Newton step that does not help
+_DAMPING = 0.5 ** np.arange(1, 10)  # shares of a Gauss–Newton step, tried where the whole step does not help
 _FINE = 1e-17  # of an interval: a zero at 0 up to rounding has no relative accuracy
 _EPS = 4 * np.finfo(float).eps
 _HALVINGS = 100  # steps towards a zero at most
@@ -48,16 +48,13 @@ def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: 
         if not rows.size:
             break
         trial, value, jacobian = y + step, *evaluated(system, y + step)
-        left = np.flatnonzero(~_lower(trial, value, size))
-        if left.size:  # the longest shorter step that helps: all are tried at once
-            tried = y[left] + _DAMPING[:, None, None] * step[left]
-            values, jacobians = evaluated(system, tried.reshape(-1, y.shape[1]))
-            lower = _lower(tried, values.reshape(*tried.shape[:2], -1), size[left])
-            pick = np.argmax(lower, axis=0) * len(left) + np.arange(len(left))
-            trial[left], value[left], jacobian[left] = (
-                part[pick] for part in (tried.reshape(-1, y.shape[1]), values, jacobians)
-            )
-            left = left[~np.any(lower, axis=0)]
+        for share in _DAMPING:
+            left = np.flatnonzero(~_is_lower(trial, value, size))
+            if not left.size:
+                break
+            trial[left] = y[left] + share * step[left]
+            value[left], jacobian[left] = evaluated(system, trial[left])
+        left = np.flatnonzero(~_is_lower(trial, value, size))
         there = left[size[left] <= 1e-13]
         found[rows[there]] = y[there]
         better = np.ones(len(rows), dtype=bool)
@@ -66,14 +63,9 @@ def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: 
     return found
 
 
-def _lower(y: Array, value: Array, size: Array) -> Truth:
+def _is_lower(y: Array, value: Array, size: Array) -> Truth:
     """Where trials are finite and their mismatch is less than before."""
     return np.asarray(np.all(np.isfinite(y), axis=-1) & (np.abs(value).max(axis=-1) < size))
-
-
-def crossing(function: Callable[[float], float], end: float) -> float:
-    """Where a function that changes sign on [0, end] is 0."""
-    return float(crossings(lambda s: np.array([function(float(s[0]))]), np.array([end]))[0])
 
 
 def crossings(function: Callable[[Array], Array], ends: Array) -> Array:

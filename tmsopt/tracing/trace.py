@@ -2,9 +2,8 @@
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -28,11 +27,12 @@ from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
-from tmsopt.tracing.branch import Branch, Event, Trace
-from tmsopt.tracing.continuation import SINGULAR, Walk, both_ways, contains, same
-from tmsopt.tracing.equations import design_at, prepare
-from tmsopt.tracing.events import describe
-from tmsopt.tracing.seeds import beyond_infinity, missed, seeds
+from tmsopt.tracing.branch import Branch, EventPoint, Trace
+from tmsopt.tracing.continuation import SINGULAR, Walk
+from tmsopt.tracing.description import describe
+from tmsopt.tracing.equations import prepare
+from tmsopt.tracing.events import Event, check_events
+from tmsopt.tracing.seeds import Line, beyond_infinity, missed, seeds, walk_new
 
 STARTS = 48
 STEP = 0.005
@@ -48,6 +48,7 @@ def trace(
     seed: int = 0,
     most: int = MOST,
     through: Sequence[Mapping[str, float]] = (),
+    events: Sequence[Event] = (),
     progress: Listener | None = None,
 ) -> Trace:
     """Every branch of a pattern in the box of the free parameters, one more of which is free than the pattern ties.
@@ -60,10 +61,12 @@ def trace(
             search ends when so many in a row find nothing new, and a branch far from all of them can be missed.
         most: points of a branch in one direction.
         through: designs (values of every free parameter, in the box) to begin at, before the others.
+        events: what to look for along the branches, besides the events that tmsopt knows.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
-        InputError: for an unknown pattern, when the equations do not leave a curve, or for options out of range.
+        InputError: for an unknown pattern, when the equations do not leave a curve, for options out of range, or where
+            the function of an event raises or gives no finite number.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # EP2 where c² = 4 k
@@ -74,34 +77,30 @@ def trace(
     More: docs/how_to/tracing.md
     """
     began = time.perf_counter()
-    problem = _asked(pose(problem), pattern)
+    problem, own = _ask(pose(problem), pattern), check_events(events)
     _check(problem, step, starts, seed, most, through, progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
     ready = prepare(problem)
     walks: list[Walk] = []
-    lines: list[dict[str, Array]] = []
-    walking, tried = 0.0, 0
-    sources = (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks))
-    for count, points in chain.from_iterable(sources):
-        tried = max(tried, count)
-        if steps:
-            steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
-        left = points
-        for known in walks:
-            left = left[~contains(ready.on, known, left)]
-        while len(left):
-            before = time.perf_counter()
-            found = both_ways(ready.on, left[0], step, most)
-            walking += time.perf_counter() - before
-            left = left[1:]
-            if found is not None and not any(same(found, w) for w in walks):
-                walks.append(found)
-                lines.append(design_at(problem, found.y * ready.on.scale))
-                left = left[~contains(ready.on, found, left)]
+    lines: list[Line] = []
+    tried = 0
+
+    def points() -> Iterator[Array]:
+        nonlocal tried
+        for source in (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks)):
+            for count, found in source:
+                tried = max(tried, count)
+                if steps:
+                    steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
+                yield found
+
+    for _ in walk_new(ready.on, problem, points(), (step, most), walks, lines):
+        pass
     with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
-        branches = [b for b in (describe(ready, w) for w in walks) if b.residual <= _MET]  # not where it is nan
+        branches = [b for w in walks for b in describe(ready, w, own) if b.residual <= _MET]  # not where it is nan
     ordered = _meeting(sorted(branches, key=lambda b: -float(b.arclength[-1])), problem)
-    return Trace(problem.problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)
+    seconds = time.perf_counter() - began
+    return Trace(problem.problem, str(problem.locate), ordered, tried, seconds, sum(w.seconds for w in walks))
 
 
 def _meeting(branches: Sequence[Branch], problem: Posed) -> tuple[Branch, ...]:
@@ -109,7 +108,7 @@ def _meeting(branches: Sequence[Branch], problem: Posed) -> tuple[Branch, ...]:
     widths = {n: high - low for n, (low, high) in problem.free.items()}
     ends = [e for b in branches for e in b.events if e.name == "end" and e.detail == SINGULAR]
 
-    def said(event: Event) -> Event:
+    def said(event: EventPoint) -> EventPoint:
         if not any(event is e for e in ends):
             return event
         if problem.pattern is not None and is_crossing(problem, problem.pattern, event.parameters):
@@ -124,7 +123,7 @@ def _meeting(branches: Sequence[Branch], problem: Posed) -> tuple[Branch, ...]:
     return tuple(replace(b, events=tuple(said(e) for e in b.events)) for b in branches)
 
 
-def _asked(problem: Posed, name: str | None) -> Posed:
+def _ask(problem: Posed, name: str | None) -> Posed:
     """The problem with the pattern as its only question, checked to leave a curve."""
     name = name or problem.locate
     names = patterns_of(problem.model)
