@@ -43,14 +43,15 @@ class Curve:
         scale: units of the variables.
         lower, upper: limits of y, infinite where there are none.
         evaluate: y → F and its Jacobian in y.
-        advance: (y, t, s, origin) → next y, next t, and the numbers by which `_follow` judges them.
+        advance: (y, t, s, origin) → next y, next t, and the numbers by which `_follow` judges them;
+            None where there are more equations than a curve has.
     """
 
     scale: Array
     lower: Array
     upper: Array
     evaluate: ca.Function = field(repr=False)
-    advance: ca.Function = field(repr=False)
+    advance: Any = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -84,18 +85,19 @@ class Walk:
         return self.ends[1].reason == CLOSED
 
 
-def system(x: Any, equations: Any, scale: Array) -> ca.Function:
-    """Compile equations(x) of a CasADi symbol x: y = x / scale → their values and their Jacobian in y."""
-    y, unit = ca.SX.sym("y", x.numel()), ca.DM(scale)
-    plain = ca.Function("plain", [x], [equations, ca.jacobian(equations, x)])
-    value, jacobian = plain(y * unit)
-    return ca.Function("system", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
-
-
 def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
-    """Compile the curve equations(x) = 0 of a CasADi symbol x of n + 1 entries; limits are of x."""
-    size, scaled = x.numel(), system(x, equations, scale)
+    """Compile the curve equations(x) = 0 of a CasADi symbol x of n + 1 entries; limits are of x.
+
+    More equations than n leave points at most, which `Curve.evaluate` is enough to find.
+    """
+    size, unit = x.numel(), ca.DM(scale)
+    system = ca.Function("system", [x], [equations, ca.jacobian(equations, x)])
     y, t, s, origin = ca.SX.sym("y", size), ca.SX.sym("t", size), ca.SX.sym("s"), ca.SX.sym("origin", size)
+    value, jacobian = system(y * unit)
+    scaled = ca.Function("scaled", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
+    low, high = lower / scale, upper / scale
+    if equations.numel() != size - 1:
+        return Curve(scale, low, high, scaled, None)
     z, sizes = y + s * t, []
     for _ in range(3):
         value, jacobian = scaled(z)
@@ -106,7 +108,6 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
     tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(size - 1), 1))
     tangent = tangent / ca.norm_2(tangent)
 
-    low, high = lower / scale, upper / scale
     boxed = np.isfinite(low) & np.isfinite(high)
     unboxed = _ROOM * (1 + ca.fabs(z)) * ca.sqrt(ca.fmax(1, ca.fabs(z) / _REMOTE))
     room = ca.vertcat(*(1 if boxed[k] else unboxed[k] for k in range(size)))
@@ -115,13 +116,7 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
     checks = ca.vertcat(
         *sizes, ca.dot(t, tangent), reach, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
     )
-    return Curve(
-        scale=scale,
-        lower=low,
-        upper=high,
-        evaluate=scaled,
-        advance=ca.Function("advance", [y, t, s, origin], [z, tangent, checks]),
-    )
+    return Curve(scale, low, high, scaled, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
 
 def tangent_at(on: Curve, y: Array) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 from tmsopt.records import Array, Table
 from tmsopt.roots import Pattern, pattern as pattern_of
 from tmsopt.tracing.branch import Branch, EventPoint
-from tmsopt.tracing.continuation import CLOSED, End, Walk, system
-from tmsopt.tracing.equations import Traced, match
+from tmsopt.tracing.continuation import CLOSED, End, Walk
+from tmsopt.tracing.equations import Traced, prepare
 from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, points_of, refine
 from tmsopt.tracing.points import Points, roots_along
 from tmsopt.tracing.solving import project
@@ -23,9 +23,7 @@ _SAME_DESIGN = 1e-6
 """Like `TOGETHER`, in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
-_KINDS = (r"EP(?!2$)\d+", "(?!EP2$).*EP.*", ".*zero", "weave", "capsize", "EP2", "constraint", "fold")
-"""Kinds of events that take equally many conditions, the most telling first."""
-
+_SQUARE = 1e-9  # of a coefficient
 
 _EP4 = Event("EP4", lambda points: points.residual)  # located by equations of its own
 
@@ -54,11 +52,10 @@ def describe(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Itera
 
 def _branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch:
     problem, pattern, points = ready.problem, ready.pattern, points_of(ready, walked)
-    square, doubled = _doubled(pattern)
-    for row, event in happened:
-        if event.name in doubled:  # a double root of a quadratic factor: exact, or it scatters by 1e-8
-            b, c = ready.unknowns.start + square, ready.unknowns.start + square + 1
-            points.x[row, c] = points.x[row, b] ** 2 / 4
+    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a quadratic factor: exact, or it scatters by 1e-8
+        b, c = (points.x[:, ready.unknowns.stop - k] for k in (2, 1))
+        for row in {row for row, event in happened if "EP" in event.name}:
+            c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE * abs(c[row]) else c[row]
     kinds = pattern.kind(points.unknowns)
     for name in points.special:
         kinds[:] = name
@@ -104,26 +101,17 @@ def _eigenfrequency(points: Points) -> dict[str, Array] | None:
     return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
 
 
-def _doubled(pattern: Pattern) -> tuple[int, tuple[str, ...]]:
-    """Where b of a factor s² + bs + c stands among the unknowns, and the events at which it is a square."""
-    if pattern.form.lstrip("2C") != pattern.form and pattern.unknowns[:2] == ("b", "c"):
-        return 0, tuple(m for m in pattern.marks if re.fullmatch(r"EP\d+", m))
-    if pattern.form == "EP2" and pattern.unknowns[-2:] == ("b", "c"):
-        return len(pattern.unknowns) - 2, ("EP4", "2EP2")
-    return 0, ()
-
-
-def _groups(found: Iterable[Found], free: int) -> Iterator[list[Found]]:
-    """Events in order, those at one place together, the most special first: it says where that is."""
-    group: list[Found] = []
-    for event in sorted(found, key=lambda f: (f.after, f.s)):
-        apart = np.abs(event.y - group[-1].y) if group else np.zeros(1)
-        if apart.max() > TOGETHER * (1 + np.abs(event.y).max()) and apart[:free].max() > _SAME_DESIGN:
-            yield sorted(group, key=lambda f: _rank(f.event.name))
+def _groups(found: Sequence[Found], free: int) -> Iterator[list[Found]]:
+    """Events along the curve, those at one place together, the first of the list first: it says where that is."""
+    group: list[int] = []
+    for k in sorted(range(len(found)), key=lambda k: (found[k].after, found[k].s)):
+        apart = np.abs(found[k].y - found[group[-1]].y) if group else np.zeros(1)
+        if apart.max() > TOGETHER * (1 + np.abs(found[k].y).max()) and apart[:free].max() > _SAME_DESIGN:
+            yield [found[i] for i in sorted(group)]
             group = []
-        group.append(event)
+        group.append(k)
     if group:
-        yield sorted(group, key=lambda f: _rank(f.event.name))
+        yield [found[i] for i in sorted(group)]
 
 
 def _named(group: Sequence[Found], events: Sequence[Event]) -> Iterator[Event]:
@@ -135,7 +123,7 @@ def _named(group: Sequence[Found], events: Sequence[Event]) -> Iterator[Event]:
         folds = dict.fromkeys(e.detail for e in own if e.name == "fold")
         words = [f"beside an {higher}"] if (higher := _beside(name, names)) else []
         for e in own:
-            if e.name != "fold" and not ("EP" in e.name and _rank(e.name)[0] < -1):
+            if e.name != "fold" and ("EP" not in e.name or e.name == "EP2"):
                 words.append(e.detail if e.name == name else f"{e.name} {e.detail}".strip())
         if name == "EP3" and len(folds) > 1:
             words.append("cusp")
@@ -150,15 +138,6 @@ def _beside(name: str, names: set[str]) -> str:
     match = re.fullmatch(r"EP(\d+)", name)
     order = int(match[1]) if match else 0
     return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
-
-
-def _rank(name: str) -> tuple[int, int]:
-    """The most special first: by conditions that the event takes, then by kind."""
-    parts = re.findall(r"(\d*)(C?)EP(\d+)", name)
-    taken = sum(int(count or 1) * (int(order) - 1) * (2 if pair else 1) for count, pair, order in parts)
-    zero = re.match(r"(\d*)\S* zero", name)
-    taken += int(zero[1] or 2) if zero else name in ("weave", "capsize")
-    return -taken, next((k for k, kind in enumerate(_KINDS) if re.fullmatch(kind, name)), len(_KINDS))
 
 
 def _natural_tangent(points: Points) -> Array:
@@ -191,8 +170,8 @@ def _end_words(ready: Traced, end: End) -> str:
     return ready.pattern.ends.get(name, "the other roots reach a limit of the search")
 
 
-def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> Iterator[Found]:
-    """The events, each EP4 exact; where symmetry takes a curve through one, the traced equations locate it to 1e-6.
+def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> list[Found]:
+    """The events, each EP4 exact and first; where symmetry takes a curve through one, it is located to 1e-6 only.
 
     On a curve of EP2 it is where EP3 and 2EP2 vanish at once: in a section through it they only touch 0.
     """
@@ -201,37 +180,33 @@ def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> Iterator[Found
     def height(points: Points) -> Array:
         return np.asarray(sum(np.abs(points.mark(name)) for name in marks))
 
-    for f in found:
-        near = f.event.name in marks and height(Points(ready, f.y[None] * ready.on.scale, f.t[None]))[0] < _LOW
-        yield (near or f.event.name == "EP4") and _exact_EP4(ready, f) or f
+    near = [f for f in found if f.event.name == "EP4"]
     if marks:
         value = height(points_of(ready, walked))
         least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
-        for k in (np.flatnonzero(least) + 1).tolist():
-            exact = _exact_EP4(ready, Found(_EP4, walked.y[k], walked.t[k], k, 0.0))
-            if exact is not None:
-                s = float(walked.t[k] @ (exact.y - walked.y[k]))
-                yield replace(exact, after=k if s >= 0 else k - 1, s=s)
+        named = [f for f in found if f.event.name in marks]
+        near += [f for f in named if height(Points(ready, f.y[None] * ready.on.scale, f.t[None]))[0] < _LOW]
+        near += [Found(_EP4, walked.y[k], walked.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
+    exact = [e for f in near if (e := _exact_EP4(ready, walked, f)) is not None]
+    return [*exact, *found]
 
 
-def _exact_EP4(ready: Traced, found: Found) -> Found | None:
+def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
     """The EP4 next to an event, by its own equations; None if there is none."""
     problem, pattern, scale = ready.problem, ready.pattern, ready.on.scale
-    free, special = len(problem.free), pattern_of("EP4", problem.model.degree)
-    made = match(problem.derive(constraints={}), special)
-    start = found.y * scale
-    x = np.array([*start[:free], *_converted(pattern, start[ready.unknowns], special)])
-    unit = np.array([*scale[:free], *made.unit[free:]])
-    end = project(system(made.x, made.equations, unit), x / unit)
+    free, special = len(problem.free), prepare(problem.derive(constraints={}), pattern_of("EP4", problem.model.degree))
+    start, unit = found.y * scale, special.on.scale
+    guess = _converted(pattern, start[ready.unknowns], special.pattern)
+    end = project(special.on.evaluate, np.array([*start[:free], *guess]) / unit)
     if end is None or np.abs(end[:free] - found.y[:free]).max() > _NEAR:
         return None
-    at = Points(replace(ready, pattern=special, unknowns=made.unknowns), end[None] * unit, found.t[None])
-    if at.residual[0] > _EXACT:
+    if Points(special, end[None] * unit, found.t[None]).residual[0] > _EXACT:
         return None  # a section next to an EP4, not through it
     exact = found.y.copy()
     exact[:free] = end[:free]
-    exact[ready.unknowns] = _converted(special, (end * unit)[free:], pattern) / scale[ready.unknowns]
-    return replace(found, event=_EP4, y=exact)
+    exact[ready.unknowns] = _converted(special.pattern, (end * unit)[free:], pattern) / scale[ready.unknowns]
+    s = float(walked.t[found.after] @ (exact - walked.y[found.after]))
+    return replace(found, event=_EP4, y=exact, after=found.after - (s < 0), s=s)
 
 
 def _converted(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:

@@ -66,40 +66,17 @@ class Traced:
         return np.asarray(np.abs(a[..., 0]) > _VANISHED * self.size[0] * share.max(axis=-1, initial=0.0))
 
 
-@dataclass(frozen=True)
-class Matching:
-    """The equations of a pattern, as those of an NLP; x are its variables in natural units.
-
-    Attributes:
-        unit: of each variable in the NLP.
-        unknowns: where the unknowns of the pattern stand among the variables.
-    """
-
-    nlp: NLP
-    unit: Array
-    unknowns: slice
-    x: Any
-    equations: Any
-
-
-def match(problem: Posed, pattern: Pattern) -> Matching:
-    """The coefficients of a problem are those of a pattern, and its constraints, which are equalities, hold."""
-    nlp, free = matching(problem, pattern), len(problem.free)
+def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
+    """The equations of a pattern, by default the one that the problem locates, compiled for tracing."""
+    pattern, free = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
+    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
+    nlp = matching(problem.derive(constraints=equalities), pattern)
     unit, unknowns = np.ones(len(nlp.variables)), slice(free, free + len(pattern.unknowns))
-    unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])
+    unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])  # of the NLP; x has natural units
     x = ca.SX.sym("x", len(unit))
     g = nlp.symbolic(x / ca.DM(unit))[1]
     rows = [g[k] for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
-    return Matching(nlp, unit, unknowns, x, ca.vertcat(*rows))
-
-
-def prepare(problem: Posed) -> Traced:
-    """The equations of a pattern problem, compiled for tracing."""
-    pattern, free = pattern_of(problem.model, str(problem.locate)), len(problem.free)
-    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
-    made = match(problem.derive(constraints=equalities), pattern)
-    nlp, unit = made.nlp, made.unit
-    if made.equations.numel() != len(unit) - 1:
+    if equalities and len(rows) != len(unit) - 1:
         names = ", ".join(equalities)
         message = f"an equality of a root quantity cannot be traced along {pattern.name}; leave out {names}"
         raise refusal(message, "constraints")
@@ -113,8 +90,8 @@ def prepare(problem: Posed) -> Traced:
     known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
     if known.size:
         scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1 * unit[free:], 1e3 * unit[free:])
-    on = curve(made.x, made.equations, scale, lower, upper)
-    return Traced(problem, pattern, nlp, on, made.unknowns, sizes(problem))
+    on = curve(x, ca.vertcat(*rows), scale, lower, upper)
+    return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
 
 
 def symbols_of(problem: Posed, x: Sequence[Any]) -> dict[str, Any]:
