@@ -205,8 +205,9 @@ def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
     exact = found.y.copy()
     exact[:free] = end[:free]
     exact[ready.unknowns] = _converted(special.pattern, (end * unit)[free:], pattern) / scale[ready.unknowns]
-    s = float(walked.t[found.after] @ (exact - walked.y[found.after]))
-    return replace(found, event=_EP4, y=exact, after=found.after - (s < 0), s=s)
+    k = int(np.argmin(np.abs(walked.y - exact).max(axis=1)))
+    s = float(walked.t[k] @ (exact - walked.y[k]))
+    return Found(_EP4, exact, found.t, k if s >= 0 else k - 1, s)
 
 
 def _converted(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:
