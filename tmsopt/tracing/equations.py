@@ -106,6 +106,13 @@ def design_at(problem: Posed, x: Array) -> dict[str, Any]:
     return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
+def limits_of(problem: Posed) -> tuple[Array, Array]:
+    """Least and greatest values of the traced variables that are free parameters."""
+    sides = zip(*problem.free.values(), strict=True)
+    low, high = (np.array(variables_of(problem, dict(zip(problem.free, side, strict=True)))) for side in sides)
+    return low, high
+
+
 def starting_points(
     nlp: NLP, problem: Posed, designs: Sequence[Mapping[str, float]], count: int | None = None
 ) -> list[list[Array]]:

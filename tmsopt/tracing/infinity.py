@@ -19,7 +19,7 @@ from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.tracing.continuation import Curve, Walk, curve
-from tmsopt.tracing.equations import design_at, sizes, symbols_of
+from tmsopt.tracing.equations import design_at, limits_of, sizes, symbols_of
 from tmsopt.tracing.events import Event, Found, has_turned, insert, locate_zeros
 from tmsopt.tracing.points import margins
 from tmsopt.tracing.seeds import Line, unexplained, walk_new
@@ -55,8 +55,7 @@ def through_infinity(problem: Posed, step: float, starts: int, seed: int) -> Ite
     a = Values(problem.model, of, problem.ordered(symbols_of(problem, ca.vertsplit(x)))).coefficients
     if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
         return
-    ends = (dict(zip(problem.free, side, strict=True)) for side in zip(*problem.free.values(), strict=True))
-    lower, upper = (np.array(variables_of(problem, end)) for end in ends)
+    lower, upper = limits_of(problem)
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], along))])
@@ -80,37 +79,33 @@ def _points(problem: Posed, on: Curve, starts: int, seed: int, lines: Sequence[M
 def _judged(
     on: Curve, walked: Walk, rest: ca.Function, usual: float
 ) -> tuple[Array, tuple[Truth, Truth, Truth], dict[int, str]]:
-    """Points with every change among them, and what each segment between them bounds."""
+    """Points with every change among them, what each segment between them bounds, and what changes at which row."""
 
     def values(y: Array) -> Array:
         return rows_of(rest, y * on.scale)[0]
 
-    known = values(walked.y)
-    vanishing = bool(np.all(np.abs(known[:, -2]) <= _NOTHING * usual))
+    def tests(y: Array) -> list[tuple[str, Array]]:
+        """Functions without a zero wherever the other roots keep their class, and what a zero means."""
+        v = values(y)
+        c = list(v[:, : -2 if vanishing else -1].T)
+        found = [("weave" if k else "capsize", value) for k, value in enumerate(margins(c))]
+        found += [("EP2", meeting(c))] if len(c) > 2 else []
+        return [("infinity", c[0]), *found, *([("capsize", v[:, -1])] if vanishing else [])]
 
-    def quantities(v: Array) -> tuple[Array, list[str]]:
-        """Columns without a zero wherever the other roots keep their class, and what a zero means."""
-        c = v[:, : -2 if vanishing else -1]
-        tests = margins(list(c.T))
-        named = [(c[:, 0], "infinity"), *zip(tests, ["capsize"] + ["weave"] * len(tests), strict=False)]
-        if c.shape[1] > 2:
-            named.append((meeting(list(c.T)), "EP2"))
-        if vanishing:
-            named.append((v[:, -1], "capsize"))
-        return np.stack([q for q, _ in named], axis=-1), [name for _, name in named]
-
-    columns, names = quantities(known)
+    vanishing = bool(np.all(np.abs(values(walked.y)[:, -2]) <= _NOTHING * usual))
     found: list[Found] = []
-    for k, name in enumerate(names):
-        event = Event(name, lambda y, k=k: quantities(values(y))[0][:, k])
-        rows = np.flatnonzero(has_turned(columns[:, k]))
-        found += locate_zeros(on, walked, lambda y, _, event=event: event.function(y), rows, event)
+    for k, (name, column) in enumerate(tests(walked.y)):
+
+        def at(y: Array, t: Array, k: int = k) -> Array:
+            return tests(y)[k][1]
+
+        found += locate_zeros(on, walked, at, np.flatnonzero(has_turned(column)), Event(name, tests))
     found.sort(key=lambda f: (f.after, f.s, f.event.name))
-    at, walked = insert(walked, found)
+    rows, walked = insert(walked, found)
     apart = np.append(True, np.any(np.diff(walked.y, axis=0) != 0, axis=1))  # else a zero at a point that was there
     points, numbers = walked.y[apart], np.cumsum(apart) - 1
     bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
-    named = {int(numbers[row]): f.event.name for row, f in zip(at, found, strict=True)}
+    named = {int(numbers[row]): f.event.name for row, f in zip(rows, found, strict=True)}
     changes = {row: name for row, name in named.items() if any(b[row - 1] != b[row] for b in bounds)}
     return points * on.scale, bounds, changes
 

@@ -21,7 +21,7 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, plain
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.tracing.branch import Branch, EventPoint, Trace
-from tmsopt.tracing.equations import Traced, coefficients, design_at, prepare
+from tmsopt.tracing.equations import Traced, coefficients, design_at, limits_of, prepare
 from tmsopt.tracing.solving import project
 from tmsopt.tracing.trace import STARTS, trace
 
@@ -179,13 +179,10 @@ def _on_surface(parts: Parts, r: Array) -> tuple[Array, Array]:
 def _cuts(problem: Posed, first: float, doubles: Iterable[float]) -> list[list[Cut]]:
     """For each interval of r inside the box, ascending: its ends, and the edges between them."""
     parts = _parts(problem, first)
-    low, high = (
-        variables_of(problem, dict(zip(problem.free, side, strict=True)))[1:]
-        for side in zip(*problem.free.values(), strict=True)
-    )
+    low, high = limits_of(problem)
 
     def slack(r: Array) -> Array:
-        inside = zip(_on_surface(parts, r), low, high, strict=True)
+        inside = zip(_on_surface(parts, r), low[1:], high[1:], strict=True)
         least = np.minimum(*(np.minimum(v - a, b - v) / (b - a) for v, a, b in inside))
         return np.where(np.isfinite(least), least, -1.0)
 
