@@ -189,6 +189,39 @@ class Trace(Tabular):
         }
 
 
+@dataclass(frozen=True)
+class BranchPoint:
+    """A point of a curve that is followed by hand, with `continue_from`.
+
+    Attributes:
+        parameters: every parameter of the design.
+        unknowns: factor coefficients of the pattern, by name.
+        tangent: free parameter → its derivative by the arclength, in the direction of travel.
+        arclength: from the first point, with every free parameter in widths of its box; negative behind it.
+        kind: name of the root pattern, such as ``2EP2`` or ``CEP2`` on one curve.
+        stable: whether the roots that the pattern does not tie to the imaginary axis lie left of it.
+        abscissa: largest real part of the roots.
+        events: names of the events that are at this point; most points have none.
+
+    Example:
+        >>> point = next(tmsopt.continue_from("problems/ep_set.toml"))
+        >>> law = tmsopt.laws.epset(-0.4, -0.2, point.parameters["lambda_s"])  # of the paper; no part of the trace
+        >>> bool(abs(point.parameters["Fr"] - law) < 1e-12)
+        True
+
+    More: docs/how_to/tracing.md
+    """
+
+    parameters: Table[float]
+    unknowns: Table[float]
+    tangent: Table[float]
+    arclength: float
+    kind: str
+    stable: bool
+    abscissa: float
+    events: tuple[str, ...] = ()
+
+
 def name_unknowns(pattern: str, unknowns: Mapping[str, Array], parameters: Iterable[str]) -> dict[str, Array]:
     """Unknowns by names of their own: a parameter may have the name of one, such as a damping c."""
     return {f"{pattern}.{name}" if name in parameters else name: column for name, column in unknowns.items()}

@@ -33,10 +33,7 @@ Happened = tuple[int, Event]
 
 def describe(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
     """A walked curve as one branch, or as several where events stop it, with its events among its points."""
-    walked = refine(ready, _trim(ready, walked), events)
-    groups = list(_groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free)))
-    rows, walked = insert(walked, [group[0] for group in groups])
-    happened = [(row, event) for row, group in zip(rows, groups, strict=True) for event in _named(group, events)]
+    walked, happened = find_events(ready, _trim(ready, walked), events)
     if walked.closed and (stops := [row for row, event in happened if event.stop]):
         first, around = stops[0], len(walked.y) - 1
         y, t = (np.concatenate([column[first:], column[1 : first + 1]]) for column in (walked.y, walked.t))
@@ -47,10 +44,19 @@ def describe(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Itera
     for low, high in pairwise(sorted({0, len(walked.y) - 1, *why})):
         ends = why.get(low, walked.ends[0]), why.get(high, walked.ends[1])
         part = Walk(walked.y[low : high + 1], walked.t[low : high + 1], ends)
-        yield _branch(ready, part, [(row - low, event) for row, event in happened if low <= row <= high])
+        yield make_branch(ready, part, [(row - low, event) for row, event in happened if low <= row <= high])
 
 
-def _branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch:
+def find_events(ready: Traced, walked: Walk, events: Sequence[Event]) -> tuple[Walk, list[Happened]]:
+    """A walk with its events among its points, and at which rows they are."""
+    walked = refine(ready, walked, events)
+    groups = list(_groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free)))
+    rows, walked = insert(walked, [group[0] for group in groups])
+    return walked, [(row, event) for row, group in zip(rows, groups, strict=True) for event in _named(group, events)]
+
+
+def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch:
+    """A walk in the parameters of the problem."""
     problem, pattern, points = ready.problem, ready.pattern, points_of(ready, walked)
     if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a quadratic factor: exact, or it scatters by 1e-8
         b, c = (points.x[:, ready.unknowns.stop - k] for k in (2, 1))
@@ -65,7 +71,7 @@ def _branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch
     named = [(row, event.name, event.detail) for row, event in happened]
     if not walked.closed:
         ends = zip((0, len(points) - 1), walked.ends, strict=True)
-        named += [(row, "end", _end_words(ready, end)) for row, end in ends]
+        named += [(row, "end", describe_end(ready, end)) for row, end in ends]
     off, columns = points.residual, points.parameters
     found = [
         EventPoint(name, detail, Table({n: float(c[row]) for n, c in columns.items()}), row, float(off[row]))
@@ -160,7 +166,8 @@ def _trim(ready: Traced, walked: Walk) -> Walk:
     return replace(walked, y=walked.y[inside], t=walked.t[inside])
 
 
-def _end_words(ready: Traced, end: End) -> str:
+def describe_end(ready: Traced, end: End) -> str:
+    """Why a curve ends, in words."""
     if end.limit is None:
         return end.reason if end.reason != CLOSED else ""
     free = list(ready.problem.free)

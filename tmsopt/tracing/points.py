@@ -154,13 +154,3 @@ def on_axis(z: Complex) -> Truth:
 def margins(factor: list[Any]) -> list[Any]:
     """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
     return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], balance(factor)]
-
-
-def sign_changes(value: Array) -> Truth:
-    """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
-    sign = np.sign(value)
-    if np.any(sign):
-        sign[0] = sign[0] or sign[np.flatnonzero(sign)[0]]
-    for k in range(1, len(sign)):
-        sign[k] = sign[k] or sign[k - 1]
-    return np.asarray(sign[1:] * sign[:-1] < 0)

@@ -1,7 +1,7 @@
 """A coarse grid over the plane of two free parameters, to see where branches of a pattern may be missing."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import cycle, islice, pairwise
+from itertools import chain, cycle, islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -37,65 +37,34 @@ def unexplained(
 ) -> Iterator[dict[str, float]]:
     """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile.
 
-    Those between which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
+    They are middles of the edges of a grid over the box, and the function does not count where it is nan. Those between
+    which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
     """
-    regular, others = changes(problem, test)
-    yield from _apart_from(lines, problem, regular, np.inf)
-    yield from _apart_from(lines, problem, others, _PATIENCE)
-
-
-def _apart_from(
-    lines: Sequence[Mapping[str, Array]], problem: Posed, left: Array, patience: float
-) -> Iterator[dict[str, float]]:
     low, high = np.array(list(problem.free.values())).T
-    np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
-    vain, known, seen = 0, len(lines), 0
-    while len(left) and vain < patience:
-        for line in lines[seen:]:
-            points = np.stack([line[n] for n in problem.free], axis=-1)
-            left = left[apart(left, (points - low) / (high - low), 1 / (points_of(problem) - 1))]
-        seen = len(lines)
-        if len(left):
-            yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
-            left = left[1:]
-            vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
-
-
-def points_of(problem: Posed) -> int:
-    """Points of the grid along each axis."""
-    return POINTS if problem.model.degree <= CLOSED else FEWER
-
-
-def changes(problem: Posed, test: Callable[[Sequence[Any]], Any], points: int | None = None) -> tuple[Array, Array]:
-    """Middles of the edges over which a function of the coefficients changes sign, in shares of the box, shape (n, 2).
-
-    Two parts: those where a0 keeps its sign, or is the function, and the others. Where it is nan it does not count.
-    """
-    points = points or points_of(problem)
-    share = np.linspace(0, 1, points)
-    x, y = np.meshgrid(share, share, indexing="ij")
-    ends = problem.free.items()
-    columns = {n: low + part * (high - low) for (n, (low, high)), part in zip(ends, (x, y), strict=True)}
+    points = POINTS if problem.model.degree <= CLOSED else FEWER
+    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, points)] * 2, indexing="ij"), axis=-1)
     with np.errstate(all="ignore"):
-        a = np.moveaxis(coefficients(problem, columns), -1, 0)
-        value = np.broadcast_to(np.asarray(test(list(a)), dtype=float), x.shape)
-    same = np.array_equal(value, a[0], equal_nan=True)
-    parts: list[list[Array]] = [[], []]
-    for axis, offset in ((0, np.array([0.5, 0.0])), (1, np.array([0.0, 0.5]))):
-        turns, through = _turns(value, axis), _turns(a[0], axis)
-        if same:
-            through[:] = False
-        parts[0].append(np.argwhere(turns & ~through) + offset)
-        parts[1].append(np.argwhere(turns & through) + offset)
-    regular, others = (np.concatenate(part) / (points - 1) for part in parts)
-    return regular, others
-
-
-def _turns(value: Array, axis: int) -> Truth:
-    """Where the sign changes from one grid point to the next; a 0 on the way counts on either side."""
-    sign = np.sign(value)
-    ahead, back = np.take(sign, range(1, sign.shape[axis]), axis), np.take(sign, range(sign.shape[axis] - 1), axis)
-    return np.asarray((ahead != back) & np.isfinite(ahead) & np.isfinite(back))
+        a = coefficients(problem, dict(zip(problem.free, np.moveaxis(low + grid * (high - low), -1, 0), strict=True)))
+        value = np.broadcast_to(np.asarray(test(list(np.moveaxis(a, -1, 0))), dtype=float), grid.shape[:2])
+    alone = np.array_equal(value, a[..., 0], equal_nan=True)
+    for last in (False, True):
+        middles = []
+        for axis in (0, 1):
+            turns, through = (np.nan_to_num(np.diff(np.sign(v), axis=axis)) != 0 for v in (value, a[..., 0]))
+            kept = turns & (through == last) if not alone else turns & (not last)
+            middles.append(np.argwhere(kept) + [(1 - axis) / 2, axis / 2])
+        left = np.concatenate(middles) / (points - 1)
+        np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
+        vain, known, seen = 0, len(lines), 0
+        while len(left) and (vain < _PATIENCE or not last):
+            for line in lines[seen:]:
+                at = np.stack([line[n] for n in problem.free], axis=-1)
+                left = left[apart(left, (at - low) / (high - low), 1 / (points - 1))]
+            seen = len(lines)
+            if len(left):
+                yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
+                left = left[1:]
+                vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
 def apart(points: Array, line: Array, distance: float) -> Truth:
@@ -103,10 +72,11 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
     start, along = line[:-1], np.diff(line, axis=0)
     length = np.maximum(np.sum(along**2, axis=1), 1e-300)
     far = np.ones(len(points), dtype=bool)
-    for rows in (slice(k, k + _BLOCK) for k in range(0, len(points), _BLOCK)):
-        offset = points[rows, None] - start
+    for k in range(0, len(points), _BLOCK):
+        offset = points[k : k + _BLOCK, None] - start
         share = np.clip(np.sum(offset * along, axis=2) / length, 0, 1)
-        far[rows] = np.min(np.sum((offset - share[..., None] * along) ** 2, axis=2), axis=1) > distance**2
+        nearest = np.min(np.sum((offset - share[..., None] * along) ** 2, axis=2), axis=1)
+        far[k : k + _BLOCK] = nearest > distance**2
     return far
 
 
@@ -114,16 +84,14 @@ def walk_new(
     on: Curve, problem: Posed, seeds: Iterable[Array], how: tuple[float, int], walks: list[Walk], lines: list[Line]
 ) -> Iterator[Walk]:
     """Curves through some of many points, shape (points, n + 1) each; `walks` and their `lines` in the box grow."""
-    for left in seeds:
-        for known in walks:
-            left = left[~contains(on, known, left)]
-        while len(left):
-            found, left = both_ways(on, left[0], *how), left[1:]
-            if found is not None:
-                walks.append(found)
-                lines.append(design_at(problem, found.y * on.scale))
-                left = left[~contains(on, found, left)]
-                yield found
+    for y in chain.from_iterable(seeds):
+        if (
+            not any(contains(on, known, y[None])[0] for known in walks)
+            and (found := both_ways(on, y, *how)) is not None
+        ):
+            walks.append(found)
+            lines.append(design_at(problem, found.y * on.scale))
+            yield found
 
 
 def seeds(

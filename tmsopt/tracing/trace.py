@@ -1,9 +1,9 @@
 """Trace a root pattern through parameter space: every branch in the box, with its events."""
 
-import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -77,8 +77,9 @@ def trace(
     More: docs/how_to/tracing.md
     """
     began = time.perf_counter()
-    problem, own = _ask(pose(problem), pattern), check_events(events)
-    _check(problem, step, starts, seed, most, through, progress)
+    problem, own = locate_pattern(pose(problem), pattern), check_events(events)
+    counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _FEWEST, None)
+    check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
     ready = prepare(problem)
     walks: list[Walk] = []
@@ -98,32 +99,24 @@ def trace(
         pass
     with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
         branches = [b for w in walks for b in describe(ready, w, own) if b.residual <= _MET]  # not where it is nan
-    ordered = _meeting(sorted(branches, key=lambda b: -float(b.arclength[-1])), problem)
+    branches.sort(key=lambda b: -float(b.arclength[-1]))
+    ordered = tuple(_with_crossings(b, problem) for b in branches)
     seconds = time.perf_counter() - began
     return Trace(problem.problem, str(problem.locate), ordered, tried, seconds, sum(w.seconds for w in walks))
 
 
-def _meeting(branches: Sequence[Branch], problem: Posed) -> tuple[Branch, ...]:
-    """The branches, with a word at singular ends that lie together: cusps or crossings, known to fewer digits."""
-    widths = {n: high - low for n, (low, high) in problem.free.items()}
-    ends = [e for b in branches for e in b.events if e.name == "end" and e.detail == SINGULAR]
+def _with_crossings(branch: Branch, problem: Posed) -> Branch:
+    """The branch, with a word at singular ends where roots meet and eigenvectors do not."""
 
-    def said(event: EventPoint) -> EventPoint:
-        if not any(event is e for e in ends):
-            return event
-        if problem.pattern is not None and is_crossing(problem, problem.pattern, event.parameters):
-            return replace(event, detail=CROSSING)
-        apart = [max(abs(event.parameters[n] - e.parameters[n]) / w for n, w in widths.items()) for e in ends]
-        near = min((d for d, e in zip(apart, ends, strict=True) if e is not event), default=math.inf)
-        if near > _NEAR:
-            return event
-        words = f"{SINGULAR}; {near:.0e} of the box from another such end: most likely one point, its last digits wrong"
-        return replace(event, detail=words)
+    def is_crossed(event: EventPoint) -> bool:
+        singular = event.name == "end" and event.detail == SINGULAR
+        return singular and is_crossing(problem, pattern_of(problem.model, branch.pattern), event.parameters)
 
-    return tuple(replace(b, events=tuple(said(e) for e in b.events)) for b in branches)
+    events = (replace(e, detail=CROSSING) if is_crossed(e) else e for e in branch.events)
+    return replace(branch, events=tuple(events))
 
 
-def _ask(problem: Posed, name: str | None) -> Posed:
+def locate_pattern(problem: Posed, name: str | None) -> Posed:
     """The problem with the pattern as its only question, checked to leave a curve."""
     name = name or problem.locate
     names = patterns_of(problem.model)
@@ -154,33 +147,33 @@ def _ask(problem: Posed, name: str | None) -> Posed:
     return asked
 
 
-def _check(
+def check_options(
     problem: Posed,
-    step: float,
-    starts: int,
-    seed: int,
-    most: int,
-    through: Sequence[Mapping[str, float]],
-    progress: Listener | None,
+    step: Any,
+    *counts: tuple[str, Any, int, int | None],
+    through: Any = (),
+    progress: Any = None,
 ) -> None:
-    faults = [*count_faults("starts", starts, 0, MOST_STARTS), *count_faults("seed", seed, 0)]
-    faults += count_faults("most", most, _FEWEST)
-    faults += [*call_faults("progress", progress), *list_faults("through", through, "[{'Fr': 1.2, 'mu': 0.1}]")]
+    """What is wrong with options: counts by name, value, least and most.
+
+    Raises:
+        InputError: with all faults.
+    """
+    faults = [fault for count in counts for fault in count_faults(*count)]
+    faults += [*call_faults("progress", progress), *list_faults("through", through, _DESIGN)]
     if not is_number(step) or not STEPS[0] <= step <= STEPS[1]:
         faults.append(Fault(f"found {step!r}; accepted: a number from {STEPS[0]:g} to {STEPS[1]:g}", ("step",)))
     for design in through if not faults else ():
-        if wrong := table_faults("through", design, "{'Fr': 1.2, 'mu': 0.1}"):
+        if wrong := table_faults("through", design, _DESIGN):
             faults += wrong
-            continue
-        if set(design) != set(problem.free):
+        elif set(design) != set(problem.free):
             names = ", ".join(problem.free)
             faults.append(Fault(f"found {', '.join(design) or 'nothing'}; accepted: each of {names}", ("through",)))
-            continue
-        for n, value in design.items():
-            low, high = problem.free[n]
-            if not is_number(value) or not low <= value <= high:
-                message = f"{n} = {short(value)} lies outside the box; accepted: {low:g} to {high:g}"
-                faults.append(Fault(message, ("through",)))
+        else:
+            for n, (low, high) in problem.free.items():
+                if not is_number(design[n]) or not low <= design[n] <= high:
+                    message = f"{n} = {short(design[n])} lies outside the box; accepted: {low:g} to {high:g}"
+                    faults.append(Fault(message, ("through",)))
     if faults:
         raise InputError(faults)
 
@@ -188,6 +181,6 @@ def _check(
 STEPS = (1e-6, 0.1)
 """Least and greatest longest step."""
 
+_DESIGN = "{'Fr': 1.2, 'mu': 0.1}"
 _FEWEST = 4  # points that make a curve with tangents
 _MET = 1e-3  # mismatch of the coefficients beyond which a curve is none of the pattern
-_NEAR = 1e-3  # widths of the box between ends that are one singular point: the equations lose digits there
