@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array
 
 _SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
-_DAMPING = 0.5 ** np.arange(1, 10)  # shares of a Gauss–Newton step, tried where the whole step does not help
+_DAMPING = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step, the first that helps is taken
 _FINE = 1e-17  # of an interval: a zero at 0 up to rounding has no relative accuracy
 _EPS = 4 * np.finfo(float).eps
 _HALVINGS = 100  # steps towards a zero at most
@@ -29,43 +29,34 @@ def project(system: ca.Function, y: Array, held: int | None = None, steps: int =
 @np.errstate(over="ignore")
 def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: int = 40) -> Array:
     """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
-    found = np.full(y.shape, np.nan)
+    y, found = y.copy(), np.full(y.shape, np.nan)
     moving = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
     rows: NDArray[np.intp] = np.arange(len(y))
-    value, jacobian = evaluated(system, y)
     for _ in range(steps):
+        value, jacobian = evaluated(system, y[rows])
         proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
-        rows, y, value, jacobian = rows[proper], y[proper], value[proper], jacobian[proper]
+        rows, value, jacobian = rows[proper], value[proper], jacobian[proper]
         if not rows.size:
             break
-        size = np.abs(value).max(axis=1)
+        here, size = y[rows], np.abs(value).max(axis=1)
+        most = 1 + np.abs(here).max(axis=1)
         step = -np.linalg.pinv(jacobian * moving[rows, None], rcond=1e-12) @ value[..., None]
-        step, most = step[..., 0] * moving[rows], np.abs(y).max(axis=1)
-        ended = np.abs(step).max(axis=1) <= 1e-13 * (1 + most)
-        solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * (1 + most))
-        found[rows[solved]] = (y + step)[solved]
-        rows, y, size, step = rows[~ended], y[~ended], size[~ended], step[~ended]
-        if not rows.size:
-            break
-        trial, value, jacobian = y + step, *evaluated(system, y + step)
+        step = step[..., 0] * moving[rows]
+        ended = np.abs(step).max(axis=1) <= 1e-13 * most
+        solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * most)
+        found[rows[solved]] = (here + step)[solved]
+        left = np.flatnonzero(~ended)
         for share in _DAMPING:
-            left = np.flatnonzero(~_is_lower(trial, value, size))
-            if not left.size:
-                break
-            trial[left] = y[left] + share * step[left]
-            value[left], jacobian[left] = evaluated(system, trial[left])
-        left = np.flatnonzero(~_is_lower(trial, value, size))
+            if left.size:
+                trial = here[left] + share * step[left]
+                value = evaluated(system, trial)[0]
+                lower = np.all(np.isfinite(trial), axis=1) & (np.abs(value).max(axis=1) < size[left])
+                y[rows[left[lower]]] = trial[lower]
+                left = left[~lower]
         there = left[size[left] <= 1e-13]
-        found[rows[there]] = y[there]
-        better = np.ones(len(rows), dtype=bool)
-        better[left] = False
-        rows, y, value, jacobian = rows[better], trial[better], value[better], jacobian[better]
+        found[rows[there]] = here[there]
+        rows = np.delete(rows, [*np.flatnonzero(ended), *left])
     return found
-
-
-def _is_lower(y: Array, value: Array, size: Array) -> Truth:
-    """Where trials are finite and their mismatch is less than before."""
-    return np.asarray(np.all(np.isfinite(y), axis=-1) & (np.abs(value).max(axis=-1) < size))
 
 
 def crossings(function: Callable[[Array], Array], ends: Array) -> Array:
