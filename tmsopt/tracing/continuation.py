@@ -3,7 +3,7 @@
 Keller's method: predict along the tangent, correct by Newton's method on F = 0 and a fixed arclength. Predictor,
 three corrections and the new tangent are one CasADi function of scalar operations, so that a point costs one call.
 
-`CurveSteps` is an iterator of the points. Whoever asks it for points may stop, or turn round; a whole `Walk` is made so.
+`CurveSteps` is an iterator of the points: a consumer may stop, or turn round. A `Walk` is made from it.
 """
 
 import time

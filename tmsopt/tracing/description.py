@@ -1,7 +1,7 @@
 """From a walked curve to branches in the parameters of the problem, with what happens along them among their points."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 

@@ -48,9 +48,9 @@ class Event:
         >>> half = tmsopt.Event("half a radian", lambda p: p["lambda_s"] - 0.5)
         >>> found = tmsopt.trace("problems/ep_set.toml", events=[half])
         >>> [f"{e.parameters['Fr']:.9f}" for e in found.events if e.name == "half a radian"]
-        ['2.297013588']
+        ['2.289532730']
         >>> f"{tmsopt.laws.epset(-0.4, -0.2, 0.5):.9f}"  # the law of the paper
-        '2.297013588'
+        '2.289532730'
 
     More: docs/how_to/tracing.md
     """

@@ -52,7 +52,7 @@ def unexplained(
         for axis in (0, 1):
             turns, through = (np.nan_to_num(np.diff(np.sign(v), axis=axis)) != 0 for v in (value, a[..., 0]))
             kept = turns & (through == last) if not alone else turns & (not last)
-            middles.append(np.argwhere(kept) + [(1 - axis) / 2, axis / 2])
+            middles.append(np.argwhere(kept) + np.array([(1 - axis) / 2, axis / 2]))
         left = np.concatenate(middles) / (points - 1)
         np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
         vain, known, seen = 0, len(lines), 0

@@ -7,7 +7,7 @@ import numpy as np
 from tmsopt.errors import refusal
 from tmsopt.problem import Solution
 from tmsopt.problem.files import Given, pose
-from tmsopt.records import Array, Table
+from tmsopt.records import Table
 from tmsopt.tracing.branch import BranchPoint
 from tmsopt.tracing.continuation import CLOSED, CurvePoint, CurveSteps, End, Walk, tangent_at
 from tmsopt.tracing.description import describe_end, find_events, make_branch
@@ -39,7 +39,8 @@ def continue_from(
         InputError: as `trace`, and where no point of the pattern is found.
 
     Example:
-        >>> curve = tmsopt.continue_from("problems/ep_set.toml", events=[tmsopt.Event("Fr is 3", lambda p: p["Fr"] - 3)])
+        >>> fast = tmsopt.Event("Fr is 3", lambda p: p["Fr"] - 3)
+        >>> curve = tmsopt.continue_from("problems/ep_set.toml", events=[fast])
         >>> reached = next(point for point in curve if "Fr is 3" in point.events)
         >>> f"{reached.parameters['Fr']:.9f}"
         '3.000000000'
