@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array
 from tmsopt.tracing.solving import MappedFunction, crossings, evaluated, rows_of
 
 _CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
@@ -232,23 +232,19 @@ def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
     return new, tangent
 
 
-def contains(on: Curve, walked: Walk, y: Array) -> Truth:
-    """Which of some points, shape (points, n + 1), lie on a curve already walked."""
-    apart = np.linalg.norm(y[:, None] - walked.y, axis=2)
-    k = np.argmin(apart, axis=1)
-    gaps = np.linalg.norm(np.diff(walked.y, axis=0), axis=1)
-    gaps = np.maximum(np.append(gaps, 0.0)[k], np.insert(gaps, 0, 0.0)[k])
-    there = apart[np.arange(len(k)), k] <= 2 * gaps
-    if np.any(there):
-        k, y = k[there], y[there]
-        new, _ = between(on, walked.y[k], walked.t[k], np.sum(walked.t[k] * (y - walked.y[k]), axis=1))
-        there[there] = _alike(new, y)
-    return np.asarray(there)
+def contains(on: Curve, walked: Walk, y: Array) -> bool:
+    """Whether a point lies on a curve already walked."""
+    apart = np.linalg.norm(walked.y - y, axis=1)
+    k = int(np.argmin(apart))
+    if apart[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
+        return False
+    new, _ = between(on, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
+    return _alike(new[0], y)
 
 
-def _alike(y: Array, other: Array) -> Truth:
+def _alike(y: Array, other: Array) -> bool:
     """Whether points are one."""
-    return np.asarray(np.abs(y - other).max(axis=-1) <= _SAME * (1 + np.abs(other).max(axis=-1)))
+    return bool(np.abs(y - other).max() <= _SAME * (1 + np.abs(other).max()))
 
 
 def _along(on: Curve, y: Array, t: Array) -> bool:
@@ -264,12 +260,12 @@ def _at_limit(on: Curve, y: Array, t: Array, s: float) -> tuple[CurvePoint, End]
     def points(shares: Array) -> tuple[Array, Array]:
         return between(on, np.tile(y, (len(shares), 1)), np.tile(t, (len(shares), 1)), shares)
 
-    limits, beyond = np.stack([on.lower, on.upper], axis=1), points(np.array([s]))[0][0]
-    k, side = np.nonzero(np.stack([beyond < on.lower, beyond > on.upper], axis=1))
-    shares = np.nan_to_num(
-        crossings(lambda r: points(r)[0][range(len(k)), k] - limits[k, side], np.full(len(k), s))
-    )  # nan: it is beyond the limit already
-    first = int(np.argmin(shares))
-    (last,), (tangent,) = points(shares[[first]])
-    last[k[first]] = limits[k[first], side[first]]
-    return CurvePoint(last, tangent), End(("min", "max")[side[first]], int(k[first]))
+    beyond = points(np.array([s]))[0][0]
+    limits = np.clip(beyond, on.lower, on.upper)
+    k = np.flatnonzero(limits != beyond)
+    shares = crossings(lambda r: points(r)[0][range(len(k)), k] - limits[k], np.full(len(k), s))
+    shares = np.nan_to_num(shares)  # nan: it is beyond the limit already
+    first = k[int(np.argmin(shares))]
+    (last,), (tangent,) = points(shares[[np.argmin(shares)]])
+    last[first] = limits[first]
+    return CurvePoint(last, tangent), End("max" if beyond[first] > limits[first] else "min", int(first))

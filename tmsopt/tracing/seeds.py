@@ -85,10 +85,7 @@ def walk_new(
 ) -> Iterator[Walk]:
     """Curves through some of many points, shape (points, n + 1) each; `walks` and their `lines` in the box grow."""
     for y in chain.from_iterable(seeds):
-        if (
-            not any(contains(on, known, y[None])[0] for known in walks)
-            and (found := both_ways(on, y, *how)) is not None
-        ):
+        if not any(contains(on, known, y) for known in walks) and (found := both_ways(on, y, *how)) is not None:
             walks.append(found)
             lines.append(design_at(problem, found.y * on.scale))
             yield found

@@ -5,24 +5,24 @@ the third, Fr, is then two linear equations p(r) = p′(r) = 0, so (Fr, r) param
 where the root is triple (EP3) and meets itself where a second pair is double (2EP2); cut there, every patch is smooth.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from tmsopt.errors import refusal
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
-from tmsopt.program.formulate import variables_of
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, plain
-from tmsopt.roots import determinant, is_stable, real_roots
-from tmsopt.tracing.branch import Branch, EventPoint, Trace
-from tmsopt.tracing.equations import Traced, coefficients, design_at, limits_of, prepare
-from tmsopt.tracing.solving import project
+from tmsopt.roots import is_stable, real_roots
+from tmsopt.roots.meetings import meeting
+from tmsopt.tracing.branch import EventPoint, Trace
+from tmsopt.tracing.equations import coefficients, design_at, limits_of
+from tmsopt.tracing.events import has_turned
+from tmsopt.tracing.solving import crossings
 from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]
@@ -121,9 +121,12 @@ def swallowtail(
         raise refusal(message, "parameters")
     cusps, crossing = (trace(plane, name, starts=starts, progress=progress) for name in ("EP3", "2EP2"))
     grid = _rows(plane, rows, (*cusps.events, *crossing.events))
-    ready, cuts, steps = prepare(crossing.problem.posed), [], start_steps(progress, "cutting the surface", "row")
+    scan = np.union1d(
+        -np.geomspace(1e3, 1e-3, _SCAN), [b.unknowns["r"][e.index] for b in cusps.branches for e in b.events]
+    )
+    cuts, steps = [], start_steps(progress, "cutting the surface", "row")
     for done, value in enumerate(grid.tolist(), 1):
-        cuts.append(_cuts(plane, value, [r for b in crossing.branches for r in _double_roots(ready, b, value)]))
+        cuts.append(_cuts(plane, value, scan[scan < 0]))
         if steps:
             steps(done, len(grid))
     patches = []
@@ -176,59 +179,40 @@ def _on_surface(parts: Parts, r: Array) -> tuple[Array, Array]:
         return (C * dA - A * dC) / size, (A * dB - B * dA) / size
 
 
-def _cuts(problem: Posed, first: float, doubles: Iterable[float]) -> list[list[Cut]]:
-    """For each interval of r inside the box, ascending: its ends, and the edges between them."""
-    parts = _parts(problem, first)
-    low, high = limits_of(problem)
+def _cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
+    """For each interval of r inside the box, ascending: its ends, and the edges between them; `scan` has values of r.
 
-    def slack(r: Array) -> Array:
-        inside = zip(_on_surface(parts, r), low[1:], high[1:], strict=True)
-        least = np.minimum(*(np.minimum(v - a, b - v) / (b - a) for v, a, b in inside))
-        return np.where(np.isfinite(least), least, -1.0)
+    Edges are zeros along r: of the slack to the box, of the other roots' polynomial at r (EP3), of its discriminant.
+    """
+    parts, (low, high) = _parts(problem, first), (limit[1:, None] for limit in limits_of(problem))
 
-    scan = -np.geomspace(1e3, 1e-3, _SCAN)
-    bounds = np.flatnonzero(np.diff(np.concatenate([[0], slack(scan) > 0, [0]])))
-    edges = [(r, "EP3") for r in _triple_roots(parts)] + [(r, "2EP2") for r in doubles]
-    intervals = []
-    for rows in zip(bounds[::2], bounds[1::2], strict=True):
-        begin, end = (
-            brentq(lambda r: float(slack(np.array(r))), scan[row - 1], scan[row])
-            if 0 < row < _SCAN
-            else float(scan[min(row, _SCAN - 1)])
-            for row in rows
-        )
-        between = sorted((r, kind) for r, kind in edges if begin < r < end)
-        intervals.append([(begin, "box"), *between, (end, "box")])
-    return intervals
+    def tests(r: Array) -> list[Array]:
+        x = np.stack(_on_surface(parts, r))
+        least = np.min(np.minimum(x - low, high - x) / (high - low), axis=0)
+        rest = _divided(_divided(parts[0][:, None] + np.tensordot(np.stack(parts[1:]), x, (0, 0)), r), r)
+        return [np.where(np.isfinite(least), least, -1.0), np.polyval(rest, r), meeting(list(rest))]
 
+    cuts: list[Cut] = []
+    values = tests(scan)
+    for k, kind in enumerate(("box", "EP3", "2EP2")):
+        rows = np.flatnonzero(has_turned(values[k]))
 
-def _triple_roots(parts: Parts) -> list[float]:
-    """Real triple roots: p, p′ and p″ vanish together for some (x, y) exactly where their determinant does."""
-    rows = [[np.polyder(p, k).tolist() for p in parts] for k in range(3)]
-    found = np.roots(np.trim_zeros(np.array(determinant(rows)), "f"))
-    return [float(z.real) for z in found if abs(z.imag) <= 1e-9 * abs(z) and z.real < 0]
+        def value(s: Array, k: int = k, here: Array = scan[rows]) -> Array:
+            return tests(here + s)[k]
+
+        cuts += [(float(r), kind) for r in scan[rows] + crossings(value, np.diff(scan)[rows])]
+    ends = [r for r in (scan[0], scan[-1]) if values[0][r == scan][0] > 0]
+    cuts = sorted([*cuts, *((float(r), "box") for r in ends)])
+    boxes = [k for k, (_, kind) in enumerate(cuts) if kind == "box"]
+    return [cuts[i : j + 1] for i, j in zip(boxes[::2], boxes[1::2], strict=True)]
 
 
-def _double_roots(ready: Traced, branch: Branch, first: float) -> Iterator[float]:
-    """Both double roots of every 2EP2 of a branch at a value of the first parameter."""
-    free, scale = ready.problem.free, ready.on.scale
-    along = branch.parameters[next(iter(free))] - first
-    for k in np.flatnonzero(along[1:] * along[:-1] <= 0):
-        share = along[k] / (along[k] - along[k + 1]) if along[k] != along[k + 1] else 0.0
-        rows = [
-            [
-                *variables_of(ready.problem, {n: branch.parameters[n][row] for n in free}),
-                *(c[row] for c in branch.unknowns.values()),
-            ]
-            for row in (k, k + 1)
-        ]
-        start = (1 - share) * np.array(rows[0]) + share * np.array(rows[1])
-        start[0] = first
-        end = project(ready.on.evaluate, start / scale, held=0)
-        if end is not None:
-            b, c = (end * scale)[3:5]
-            half = np.sqrt(max(b * b / 4 - c, 0.0))
-            yield from (float(-b / 2 - half), float(-b / 2 + half)) if half else ()
+def _divided(p: Array, r: Array) -> Array:
+    """Quotient of polynomials by s − r, coefficients first: Horner's rule."""
+    rows = [p[0]]
+    for row in p[1:-1]:
+        rows.append(row + rows[-1] * r)
+    return np.stack(rows)
 
 
 def _patch(problem: Posed, grid: Array, left: Array, right: Array, across: int) -> Patch:
