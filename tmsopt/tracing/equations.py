@@ -10,12 +10,13 @@ import numpy as np
 
 from tmsopt.errors import refusal
 from tmsopt.models.user_spectrum import pattern_of
+from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import matching, variables_of
 from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import spread
-from tmsopt.records import Array, Complex, Truth
-from tmsopt.roots import Pattern, roots
+from tmsopt.program.starts import completions, spread
+from tmsopt.records import Array, Truth
+from tmsopt.roots import Pattern
 from tmsopt.tracing.continuation import Curve, curve
 
 _SAMPLE = 32  # designs by which sizes are judged
@@ -24,22 +25,17 @@ _VANISHED = 1e-9
 
 def sizes(problem: Posed) -> Array:
     """Median sizes of the coefficients over the box of the free parameters; 0 of one that is mostly 0 there."""
-    a = _coefficients(problem, list(islice(spread(problem, 0), _SAMPLE)))
-    a = np.abs(a[np.all(np.isfinite(a), axis=1)])
+    designs = list(islice(spread(problem, 0), _SAMPLE))
+    with np.errstate(all="ignore"):
+        a = np.abs(coefficients(problem, {n: np.array([d[n] for d in designs]) for n in problem.free}))
+    a = a[np.all(np.isfinite(a), axis=1)]
     return np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1)
 
 
 def coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
     """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
-    a = problem.model.coefficients(problem.ordered(columns), problem.parameter_set)
-    shape = np.shape(next(iter(columns.values())))
-    return np.stack([np.broadcast_to(np.asarray(c, dtype=float), shape) for c in a], axis=-1)
-
-
-def _coefficients(problem: Posed, designs: Sequence[Mapping[str, float]]) -> Array:
-    """Likewise of a list of designs, with a parameter or more."""
-    with np.errstate(all="ignore"):
-        return coefficients(problem, {n: np.array([d[n] for d in designs]) for n in problem.free})
+    a = np.broadcast_arrays(*coefficients_of(problem, problem.ordered(columns)), next(iter(columns.values())))[:-1]
+    return np.stack(a, axis=-1).astype(float)
 
 
 @dataclass(frozen=True)
@@ -48,6 +44,7 @@ class Traced:
 
     Attributes:
         problem: with the pattern to locate and every constraint.
+        unit: of each variable in the NLP; here they have natural units.
         unknowns: where the unknowns of the pattern stand among the variables.
         size: of the coefficients over the box.
     """
@@ -56,6 +53,7 @@ class Traced:
     pattern: Pattern
     nlp: NLP
     on: Curve
+    unit: Array
     unknowns: slice
     size: Array
 
@@ -86,12 +84,11 @@ def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = starting_points(nlp, problem, list(islice(spread(problem, 0), _SAMPLE)), 1)
-    known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
-    if known.size:
-        scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1 * unit[free:], 1e3 * unit[free:])
+    sample = (starting_points(nlp, unit, problem, d)[:1] for d in islice(spread(problem, 0), _SAMPLE))
+    if known := [point for points in sample for point in points]:
+        scale[free:] = np.clip(np.median(np.abs(known), axis=0), 0.1 * unit, 1e3 * unit)[free:]
     on = curve(x, ca.vertcat(*rows), scale, lower, upper)
-    return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
+    return Traced(problem, pattern, nlp, on, unit, unknowns, sizes(problem))
 
 
 def symbols_of(problem: Posed, x: Sequence[Any]) -> dict[str, Any]:
@@ -113,21 +110,8 @@ def limits_of(problem: Posed) -> tuple[Array, Array]:
     return low, high
 
 
-def starting_points(
-    nlp: NLP, problem: Posed, designs: Sequence[Mapping[str, float]], count: int | None = None
-) -> list[list[Array]]:
-    """All variables for each design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
-    a = _coefficients(problem, designs)
-    proper = np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0)
-    found = iter(roots(a[proper]) if np.any(proper) else ())
-    known = zip(designs, proper, strict=True)
-    return [_guessed(nlp, problem, d, next(found), count) if there else [] for d, there in known]
-
-
-def _guessed(nlp: NLP, problem: Posed, design: Mapping[str, float], z: Complex, count: int | None) -> list[Array]:
-    values = [problem.values(problem.ordered(design))] if len(nlp.lifts) > 1 else []  # the pattern's takes the roots
-    guesses = [lift.guess(values, [z / nlp.unit if k else z]) for k, lift in enumerate(nlp.lifts)]  # those in its unit
-    if not all(guesses):
-        return []
-    x, others = variables_of(problem, design), [c for guess in guesses[1:] for c in guess[0]]
-    return [np.array([*x, *first, *others]) for first in guesses[0][:count]]
+def starting_points(nlp: NLP, unit: Array, problem: Posed, design: Mapping[str, float]) -> list[Array]:
+    """All variables at a design, for the first guesses of the pattern's unknowns; none where it has no polynomial."""
+    a = [float(c) for c in problem.values(problem.ordered(design)).coefficients]
+    proper = a[0] != 0 and np.all(np.isfinite(a))
+    return [x * unit for x in completions(nlp, problem, design)] if proper else []

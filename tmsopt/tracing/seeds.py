@@ -1,7 +1,7 @@
 """A coarse grid over the plane of two free parameters, to see where branches of a pattern may be missing."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import chain, cycle, islice, pairwise
+from itertools import chain, cycle, islice
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,12 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
 
 
 def walk_new(
-    on: Curve, problem: Posed, seeds: Iterable[Array], how: tuple[float, int], walks: list[Walk], lines: list[Line]
+    on: Curve,
+    problem: Posed,
+    seeds: Iterable[Iterable[Array]],
+    how: tuple[float, int],
+    walks: list[Walk],
+    lines: list[Line],
 ) -> Iterator[Walk]:
     """Curves through some of many points, shape (points, n + 1) each; `walks` and their `lines` in the box grow."""
     for y in chain.from_iterable(seeds):
@@ -93,7 +98,7 @@ def walk_new(
 
 def seeds(
     ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], lines: Sequence[Mapping[str, Array]]
-) -> Iterator[tuple[int, Array]]:
+) -> Iterator[tuple[int, list[Array]]]:
     """Points of the pattern's curve in the box, found from each of many designs, and the number of these.
 
     Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `lines`
@@ -102,12 +107,12 @@ def seeds(
     problem = ready.problem
     free = len(problem.free)
     given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
-    yield from ((0, found) for found in _seeds(ready, given, [None] * len(given)))
+    yield from ((0, found) for found in _near(ready, given, [None] * len(given)))
     vain, known, count = 0, len(lines), 0
     ways = cycle([None, *range(free)])
     designs = spread(problem, seed)
     while count < (starts if _swept(ready) else _ROUNDS * starts):
-        for found in _seeds(ready, list(islice(designs, starts)), list(islice(ways, starts))):
+        for found in _near(ready, list(islice(designs, starts)), list(islice(ways, starts))):
             if vain >= starts:
                 return
             count += 1
@@ -120,14 +125,14 @@ def _swept(ready: Traced) -> bool:
     return ready.pattern.test is not None and len(ready.problem.free) == 2
 
 
-def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array]]:
+def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, list[Array]]]:
     """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
     if ready.pattern.test is not None and _swept(ready):
         for design in unexplained(ready.problem, ready.pattern.test, lines):
-            yield 0, _nearest(ready, design)
+            yield 0, _near(ready, [design], most=1)[0]
 
 
-def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array]]:
+def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
     """Points where a curve may come back from infinity: there a root changes sides, and the parameters go on.
 
     They approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit, and a point beyond
@@ -144,37 +149,24 @@ def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int,
                 (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
                 limit = (far - weight * here) / (1 - weight)
                 x = (2 * limit - here) * ready.on.scale[:free]
-                yield 0, _nearest(ready, {n: float(v) for n, v in design_at(ready.problem, x).items()})
+                yield 0, _near(ready, [{n: float(v) for n, v in design_at(ready.problem, x).items()}], most=1)[0]
 
 
-def _seeds(ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None]) -> list[Array]:
-    """Points of the curve near each design, from the first guesses, with one variable held."""
-    tried = starting_points(ready.nlp, ready.problem, designs, _GUESSES)
-    every = [(x, h) for each, h in zip(tried, held, strict=True) for x in each]
-    y, found = _on_curve(ready, [x for x, _ in every], [h for _, h in every])
-    ends = np.cumsum([0, *map(len, tried)])
-    return [y[i:j][found[i:j]] for i, j in pairwise(ends)]
-
-
-def _nearest(ready: Traced, design: Mapping[str, float]) -> Array:
-    """A point of the curve near a design, from the best guess, or none."""
-    (tried,) = starting_points(ready.nlp, ready.problem, [design])
-    if tried:
-        mismatch = np.abs(rows_of(ready.on.evaluate, np.array(tried) / ready.on.scale)[0]).max(axis=1)
-        tried = [tried[int(np.argmin(mismatch))]]
-    y, found = _on_curve(ready, tried, [None] * len(tried))
-    return y[found]
-
-
-def _on_curve(ready: Traced, x: Sequence[Array], held: Sequence[int | None]) -> tuple[Array, Truth]:
-    """Where the variables x lead to, and whether that is a point of the curve in the box, not too far out."""
+def _near(
+    ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None] = (None,), most: int = _GUESSES
+) -> list[list[Array]]:
+    """Points of the curve in the box near each design, not too far out, from the best guesses, one variable held."""
     on, free = ready.on, len(ready.problem.free)
-    y = np.array(x).reshape(-1, len(on.scale)) / on.scale
-    if not len(y):
-        return y, np.zeros(0, dtype=bool)
-    y = projected(on.evaluate, y, held)
+    tried = [starting_points(ready.nlp, ready.unit, ready.problem, design) for design in designs]
+    if most == 1:
+        tried = [sorted(t, key=lambda x: np.abs(rows_of(on.evaluate, x[None] / on.scale)[0]).max()) for t in tried]
+    tried = [t[:most] for t in tried]
+    if not any(tried):
+        return [[] for _ in designs]
+    owner = [k for k, points in enumerate(tried) for _ in points]
+    y = projected(on.evaluate, np.concatenate([t for t in tried if t]) / on.scale, [held[k] for k in owner])
     inside = np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12), axis=1)  # not where it is nan
     inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, on.lower, on.upper)
     inside[inside] = ready.leads(coefficients(ready.problem, design_at(ready.problem, y[inside] * on.scale)))
-    return y, inside
+    return [[y[i] for i, of in enumerate(owner) if of == k and inside[i]] for k in range(len(designs))]

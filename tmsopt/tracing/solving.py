@@ -13,6 +13,7 @@ from tmsopt.records import Array
 _SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
 _DAMPING = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step, the first that helps is taken
 _FINE = 1e-17  # of an interval: a zero at 0 up to rounding has no relative accuracy
+_AT_END = 1e-6  # of the value at one end of an interval: a value so small at the other is a zero there
 _EPS = 4 * np.finfo(float).eps
 _HALVINGS = 100  # steps towards a zero at most
 
@@ -63,7 +64,9 @@ def crossings(function: Callable[[Array], Array], ends: Array) -> Array:
     """`crossing` on many intervals [0, end] at once, by Chandrupatla's method; nan where the sign does not change."""
     a, b = ends.astype(float), np.zeros(len(ends))
     fa, fb = function(a), function(b)
-    found = np.where(fb == 0, b, np.where(fa == 0, a, np.nan))
+    found = np.where(np.abs(fa) < np.abs(fb), a, b)
+    small, large = np.sort(np.abs([fa, fb]), axis=0)
+    found = np.where(small <= _AT_END * large, found, np.nan)  # at a point of the curve rounding may hide the change
     open_ = np.sign(fa) * np.sign(fb) < 0
     share = np.full(len(ends), 0.5)
     for _ in range(_HALVINGS):

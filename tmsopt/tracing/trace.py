@@ -86,7 +86,7 @@ def trace(
     lines: list[Line] = []
     tried = 0
 
-    def points() -> Iterator[Array]:
+    def points() -> Iterator[list[Array]]:
         nonlocal tried
         for source in (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks)):
             for count, found in source:
