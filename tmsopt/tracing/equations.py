@@ -14,9 +14,9 @@ from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import matching, variables_of
 from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import completions, spread
+from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
-from tmsopt.roots import Pattern
+from tmsopt.roots import Pattern, roots
 from tmsopt.tracing.continuation import Curve, curve
 
 _SAMPLE = 32  # designs by which sizes are judged
@@ -25,9 +25,7 @@ _VANISHED = 1e-9
 
 def sizes(problem: Posed) -> Array:
     """Median sizes of the coefficients over the box of the free parameters; 0 of one that is mostly 0 there."""
-    designs = list(islice(spread(problem, 0), _SAMPLE))
-    with np.errstate(all="ignore"):
-        a = np.abs(coefficients(problem, {n: np.array([d[n] for d in designs]) for n in problem.free}))
+    a = np.abs(_coefficients(problem, list(islice(spread(problem, 0), _SAMPLE))))
     a = a[np.all(np.isfinite(a), axis=1)]
     return np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1)
 
@@ -38,13 +36,18 @@ def coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
     return np.stack(a, axis=-1).astype(float)
 
 
+def _coefficients(problem: Posed, designs: Sequence[Mapping[str, float]]) -> Array:
+    """Coefficients of a list of designs, with a parameter or more."""
+    with np.errstate(all="ignore"):
+        return coefficients(problem, {n: np.array([d[n] for d in designs]) for n in problem.free})
+
+
 @dataclass(frozen=True)
 class Traced:
     """A problem made ready for tracing one pattern.
 
     Attributes:
         problem: with the pattern to locate and every constraint.
-        unit: of each variable in the NLP; here they have natural units.
         unknowns: where the unknowns of the pattern stand among the variables.
         size: of the coefficients over the box.
     """
@@ -53,7 +56,6 @@ class Traced:
     pattern: Pattern
     nlp: NLP
     on: Curve
-    unit: Array
     unknowns: slice
     size: Array
 
@@ -84,11 +86,11 @@ def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = (starting_points(nlp, unit, problem, d)[:1] for d in islice(spread(problem, 0), _SAMPLE))
-    if known := [point for points in sample for point in points]:
+    sample = starting_points(nlp, problem, list(islice(spread(problem, 0), _SAMPLE)))
+    if known := [points[0] for points in sample if points]:
         scale[free:] = np.clip(np.median(np.abs(known), axis=0), 0.1 * unit, 1e3 * unit)[free:]
     on = curve(x, ca.vertcat(*rows), scale, lower, upper)
-    return Traced(problem, pattern, nlp, on, unit, unknowns, sizes(problem))
+    return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
 
 
 def symbols_of(problem: Posed, x: Sequence[Any]) -> dict[str, Any]:
@@ -110,8 +112,15 @@ def limits_of(problem: Posed) -> tuple[Array, Array]:
     return low, high
 
 
-def starting_points(nlp: NLP, unit: Array, problem: Posed, design: Mapping[str, float]) -> list[Array]:
-    """All variables at a design, for the first guesses of the pattern's unknowns; none where it has no polynomial."""
-    a = [float(c) for c in problem.values(problem.ordered(design)).coefficients]
-    proper = a[0] != 0 and np.all(np.isfinite(a))
-    return [x * unit for x in completions(nlp, problem, design)] if proper else []
+def starting_points(nlp: NLP, problem: Posed, designs: Sequence[Mapping[str, float]]) -> list[list[Array]]:
+    """All variables at each design, for every guess of the pattern's unknowns; none where it has no polynomial."""
+    a = _coefficients(problem, designs)
+    proper = np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0)
+    found: list[list[Array]] = [[] for _ in designs]
+    for k, z in zip(np.flatnonzero(proper).tolist(), roots(a[proper]) if np.any(proper) else (), strict=True):
+        values = [problem.values(problem.ordered(designs[k]))] if len(nlp.lifts) > 1 else []
+        # the pattern's guesses are of the roots themselves, all others in the unit of the NLP
+        first, *others = (lift.guess(values, [z / nlp.unit if j else z]) for j, lift in enumerate(nlp.lifts))
+        rest = [x for guesses in others for x in (guesses or [[np.nan]])[0]]
+        found[k] = [np.array([*variables_of(problem, designs[k]), *guess, *rest]) for guess in first]
+    return found

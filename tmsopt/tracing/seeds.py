@@ -157,7 +157,7 @@ def _near(
 ) -> list[list[Array]]:
     """Points of the curve in the box near each design, not too far out, from the best guesses, one variable held."""
     on, free = ready.on, len(ready.problem.free)
-    tried = [starting_points(ready.nlp, ready.unit, ready.problem, design) for design in designs]
+    tried = starting_points(ready.nlp, ready.problem, designs)
     if most == 1:
         tried = [sorted(t, key=lambda x: np.abs(rows_of(on.evaluate, x[None] / on.scale)[0]).max()) for t in tried]
     tried = [t[:most] for t in tried]
