@@ -32,8 +32,9 @@ from .studies import (
     run_study as run_study, sobol as sobol,
 )
 from .tracing import (
-    Branch as Branch, Domain as Domain, Event as Event, Swallowtail as Swallowtail, Trace as Trace, domain as domain,
-    swallowtail as swallowtail, trace as trace,
+    Branch as Branch, BranchPoint as BranchPoint, Continuation as Continuation, Domain as Domain, Event as Event,
+    EventPoint as EventPoint, Swallowtail as Swallowtail, Trace as Trace, continue_from as continue_from,
+    domain as domain, swallowtail as swallowtail, trace as trace,
 )
 
 __version__: str

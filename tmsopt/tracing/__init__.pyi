@@ -1,9 +1,10 @@
-from .branch import Branch as Branch, Event as Event, Trace as Trace
+from .branch import Branch as Branch, BranchPoint as BranchPoint, EventPoint as EventPoint, Trace as Trace
 from .continuation import (
-    End as End, between as between, both_ways as both_ways, contains as contains, curve as curve, same as same,
+    CurvePoint as CurvePoint, CurveSteps as CurveSteps, End as End, both_ways as both_ways, curve as curve,
     tangent_at as tangent_at, walk as walk,
 )
 from .domain import Domain as Domain, domain as domain
-from .solving import crossing as crossing, project as project
+from .events import Event as Event
+from .steering import Continuation as Continuation, continue_from as continue_from
 from .swallowtail import Swallowtail as Swallowtail, swallowtail as swallowtail
 from .trace import trace as trace

@@ -15,7 +15,7 @@ from tmsopt.records import Array, Table, Tabular, plain
 
 
 @dataclass(frozen=True)
-class Event:
+class EventPoint:
     """A point of a branch where something happens.
 
     Attributes:
@@ -79,7 +79,7 @@ class Branch(Tabular):
     heavily_damped: NDArray[np.bool_]
     satisfied: NDArray[np.bool_]
     abscissa: Array
-    events: tuple[Event, ...]
+    events: tuple[EventPoint, ...]
     closed: bool
     residual: float
     eigenfrequency: Mapping[str, Array] | None = None
@@ -102,8 +102,7 @@ class Branch(Tabular):
                 "arclength": float(self.arclength[k]),
                 **{name: float(column[k]) for name, column in self.parameters.items()},
                 **{f"d_{name}": float(column[k]) for name, column in self.tangent.items()},
-                # a parameter may have the name of an unknown, such as a damping c
-                **{f"{self.pattern}.{n}" if n in self.parameters else n: float(c[k]) for n, c in self.told.items()},
+                **{n: float(c[k]) for n, c in name_unknowns(self.pattern, self.told, self.parameters).items()},
                 "abscissa": float(self.abscissa[k]),
                 "kind": str(self.kinds[k]),
                 "stable": bool(self.stable[k]),
@@ -152,7 +151,7 @@ class Trace(Tabular):
         return sum(len(b) for b in self.branches)
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[EventPoint, ...]:
         """Events of all branches."""
         return tuple(e for b in self.branches for e in b.events)
 
@@ -188,6 +187,44 @@ class Trace(Tabular):
             **plain(self, "branches starts points seconds"),
             "seconds_per_point": self.seconds_walking / max(self.points, 1),
         }
+
+
+@dataclass(frozen=True)
+class BranchPoint:
+    """A point of a curve that is followed by hand, with `continue_from`.
+
+    Attributes:
+        parameters: every parameter of the design.
+        unknowns: factor coefficients of the pattern, by name.
+        tangent: free parameter → its derivative by the arclength, in the direction of travel.
+        arclength: from the first point, with every free parameter in widths of its box; negative behind it.
+        kind: name of the root pattern, such as ``2EP2`` or ``CEP2`` on one curve.
+        stable: whether the roots that the pattern does not tie to the imaginary axis lie left of it.
+        abscissa: largest real part of the roots.
+        events: names of the events that are at this point; most points have none.
+
+    Example:
+        >>> point = next(tmsopt.continue_from("problems/ep_set.toml"))
+        >>> law = tmsopt.laws.epset(-0.4, -0.2, point.parameters["lambda_s"])  # of the paper; no part of the trace
+        >>> bool(abs(point.parameters["Fr"] - law) < 1e-12)
+        True
+
+    More: docs/how_to/tracing.md
+    """
+
+    parameters: Table[float]
+    unknowns: Table[float]
+    tangent: Table[float]
+    arclength: float
+    kind: str
+    stable: bool
+    abscissa: float
+    events: tuple[str, ...] = ()
+
+
+def name_unknowns(pattern: str, unknowns: Mapping[str, Array], parameters: Iterable[str]) -> dict[str, Array]:
+    """Unknowns by names of their own: a parameter may have the name of one, such as a damping c."""
+    return {f"{pattern}.{name}" if name in parameters else name: column for name, column in unknowns.items()}
 
 
 def kinds_along(branch: Branch) -> list[str]:

@@ -2,17 +2,21 @@
 
 Keller's method: predict along the tangent, correct by Newton's method on F = 0 and a fixed arclength. Predictor,
 three corrections and the new tangent are one CasADi function of scalar operations, so that a point costs one call.
+
+`CurveSteps` is an iterator of the points: a consumer may stop, or turn round. A `Walk` is made from it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import time
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from tmsopt.records import Array, Truth
-from tmsopt.tracing.solving import MappedFunction, crossing, evaluated, rows_of
+from tmsopt.records import Array
+from tmsopt.tracing.solving import MappedFunction, crossings, evaluated, rows_of
 
 _CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
 _CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
@@ -39,14 +43,23 @@ class Curve:
         scale: units of the variables.
         lower, upper: limits of y, infinite where there are none.
         evaluate: y → F and its Jacobian in y.
-        advance: (y, t, s, origin) → next y, next t, and the numbers of `_Check`.
+        advance: (y, t, s, origin) → next y, next t, and the numbers by which `_follow` judges them;
+            None where there are more equations than a curve has.
     """
 
     scale: Array
     lower: Array
     upper: Array
     evaluate: ca.Function = field(repr=False)
-    advance: ca.Function = field(repr=False)
+    advance: Any = field(repr=False)
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """A point y of a curve, in units of the scale, and the unit tangent t there, both of shape (n + 1,)."""
+
+    y: Array
+    t: Array
 
 
 @dataclass(frozen=True)
@@ -59,11 +72,12 @@ class End:
 
 @dataclass(frozen=True)
 class Walk:
-    """Points y and unit tangents t of a curve, shape (points, n + 1), and why it ends at either side."""
+    """Points y and unit tangents t of a curve, shape (points, n + 1), why it ends at either side, and what it took."""
 
     y: Array
     t: Array
     ends: tuple[End, End]
+    seconds: float = 0.0
 
     @property
     def closed(self) -> bool:
@@ -72,16 +86,18 @@ class Walk:
 
 
 def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
-    """Compile the curve equations(x) = 0 of a CasADi symbol x of n + 1 entries; limits are of x."""
-    size = x.numel()
-    unit = ca.DM(scale)
+    """Compile the curve equations(x) = 0 of a CasADi symbol x of n + 1 entries; limits are of x.
+
+    More equations than n leave points at most, which `Curve.evaluate` is enough to find.
+    """
+    size, unit = x.numel(), ca.DM(scale)
     system = ca.Function("system", [x], [equations, ca.jacobian(equations, x)])
     y, t, s, origin = ca.SX.sym("y", size), ca.SX.sym("t", size), ca.SX.sym("s"), ca.SX.sym("origin", size)
-
-    def scaled(at: Any) -> tuple[Any, Any]:
-        value, jacobian = system(at * unit)
-        return ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))
-
+    value, jacobian = system(y * unit)
+    scaled = ca.Function("scaled", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
+    low, high = lower / scale, upper / scale
+    if equations.numel() != size - 1:
+        return Curve(scale, low, high, scaled, None)
     z, sizes = y + s * t, []
     for _ in range(3):
         value, jacobian = scaled(z)
@@ -92,27 +108,15 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
     tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(size - 1), 1))
     tangent = tangent / ca.norm_2(tangent)
 
-    boxed = [k for k in range(size) if np.isfinite(lower[k]) and np.isfinite(upper[k])]
-    reach = ca.SX(np.inf)
-    for k in range(size):
-        room = 1.0 if k in boxed else _ROOM * (1 + ca.fabs(z[k])) * ca.sqrt(ca.fmax(1, ca.fabs(z[k]) / _REMOTE))
-        reach = ca.fmin(reach, room / (ca.fabs(tangent[k]) + 1e-300))
-    slack = ca.SX(np.inf)
-    for k in range(size):
-        if np.isfinite(lower[k]):
-            slack = ca.fmin(slack, z[k] - lower[k] / scale[k])
-        if np.isfinite(upper[k]):
-            slack = ca.fmin(slack, upper[k] / scale[k] - z[k])
+    boxed = np.isfinite(low) & np.isfinite(high)
+    unboxed = _ROOM * (1 + ca.fabs(z)) * ca.sqrt(ca.fmax(1, ca.fabs(z) / _REMOTE))
+    room = ca.vertcat(*(1 if boxed[k] else unboxed[k] for k in range(size)))
+    reach = ca.mmin(room / (ca.fabs(tangent) + 1e-300))
+    slack = ca.mmin(ca.vertcat(z - low, high - z))
     checks = ca.vertcat(
         *sizes, ca.dot(t, tangent), reach, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
     )
-    return Curve(
-        scale=scale,
-        lower=lower / scale,
-        upper=upper / scale,
-        evaluate=ca.Function("evaluate", [y], list(scaled(y))),
-        advance=ca.Function("advance", [y, t, s, origin], [z, tangent, checks]),
-    )
+    return Curve(scale, low, high, scaled, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
 
 def tangent_at(on: Curve, y: Array) -> Array:
@@ -135,16 +139,47 @@ def _even(matrix: Array, axis: int) -> Array:
     return np.asarray(matrix / np.where(norm > 0, norm, 1.0))
 
 
-def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
-    """Follow the curve from y in the direction t until a limit, a closed loop, infinity, or `most` points."""
+class CurveSteps(Iterator[CurvePoint]):
+    """Iterator of the points of a curve that follow one of them, in the direction of its tangent.
+
+    Attributes:
+        point: the last one, at first the one to begin at.
+        end: why there are no more; None while there are.
+    """
+
+    end: End | None
+
+    def __init__(self, on: Curve, start: CurvePoint, step: float) -> None:
+        self.on, self.step = on, step
+        self._begin(start)
+
+    def _begin(self, start: CurvePoint) -> None:
+        self.point, self.end = start, None
+        self._points = _follow(self.on, start.y, start.t, self.step)
+
+    def __next__(self) -> CurvePoint:
+        try:
+            self.point = next(self._points)
+        except StopIteration as stop:
+            self.end = self.end or stop.value
+            raise
+        return self.point
+
+    def reverse(self) -> None:
+        """Turn round at the last point."""
+        self._begin(CurvePoint(self.point.y, -self.point.t))
+
+
+def _follow(on: Curve, y: Array, t: Array, step: float) -> Generator[CurvePoint, None, End]:
+    """The points after y in the direction t, until a limit, a closed loop or infinity; the end is returned."""
 
     def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
-        new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), origin[None])
+        new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
         return new[0], tangent[0], *checks[0].tolist()
 
-    origin, ys, ts, step_from = y, [y], [t], MappedFunction(on.advance, 1)
+    start, count, step_from = CurvePoint(y, t), 1, MappedFunction(on.advance, 1)
     s, reach = step / 4, advance(y, t, 0.0)[6]
-    while len(ys) < most:
+    while True:
         s = min(s, step * reach)
         while True:
             new, tangent, first, second, third, cosine, reach, slack, largest, far, ahead = advance(y, t, s)
@@ -152,34 +187,43 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
                 break  # nan does not come here
             s /= 2
             if s < _SMALLEST:
-                return _ended(ys, ts, End(INFINITE if np.abs(y).max() > _FADING else SINGULAR))
-        if len(ys) > 2 and 0 < ahead <= s and far <= 2 * s and _alike(advance(y, t, ahead)[0], origin):
-            return _ended([*ys, ys[0]], [*ts, ts[0]], End(CLOSED))
+                return End(INFINITE if np.abs(y).max() > _FADING else SINGULAR)
+        if count > 2 and 0 < ahead <= s and far <= 2 * s and _alike(advance(y, t, ahead)[0], start.y):
+            yield start
+            return End(CLOSED)
         if slack < 0 and not _along(on, new, tangent):
-            last, direction, end = _at_limit(on, y, t, s)
-            return _ended([*ys, last], [*ts, direction], end)
-        ys.append(new)
-        ts.append(tangent)
+            last, end = _at_limit(on, y, t, s)
+            yield last
+            return end
+        yield CurvePoint(new, tangent)
         if largest > _FAR:
-            return _ended(ys, ts, End(INFINITE))
-        y, t, s = new, tangent, s * _GROWTH
-    return _ended(ys, ts, End(f"stopped after {most} points"))
+            return End(INFINITE)
+        y, t, s, count = new, tangent, s * _GROWTH, count + 1
+
+
+def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
+    """Follow the curve from y in the direction t until it ends, or there are `most` points."""
+    steps = CurveSteps(on, CurvePoint(y, t), step)
+    points = [steps.point, *islice(steps, most - 1)]
+    end = steps.end or End(f"stopped after {most} points")
+    return Walk(np.array([p.y for p in points]), np.array([p.t for p in points]), (End("start"), end))
 
 
 def both_ways(on: Curve, y: Array, step: float, most: int) -> Walk | None:
     """The whole curve through a point; None where it is no regular point of one."""
+    began = time.perf_counter()
     try:
         t = tangent_at(on, y)
     except ValueError:
         return None
     ahead = walk(on, y, t, step, most)
-    if ahead.closed:
-        return ahead
-    back = walk(on, y, -t, step, most)
-    if len(ahead.y) + len(back.y) < 4:
-        return None
-    points, tangents = np.concatenate([back.y[::-1], ahead.y[1:]]), np.concatenate([-back.t[::-1], ahead.t[1:]])
-    return Walk(points, tangents, (back.ends[1], ahead.ends[1]))
+    if not ahead.closed:
+        back = walk(on, y, -t, step, most)
+        if len(ahead.y) + len(back.y) < 4:
+            return None
+        points, tangents = np.concatenate([back.y[::-1], ahead.y[1:]]), np.concatenate([-back.t[::-1], ahead.t[1:]])
+        ahead = Walk(points, tangents, (back.ends[1], ahead.ends[1]))
+    return replace(ahead, seconds=time.perf_counter() - began)
 
 
 def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
@@ -188,35 +232,19 @@ def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
     return new, tangent
 
 
-def contains(on: Curve, walked: Walk, y: Array) -> Truth:
-    """Which of some points, shape (points, n + 1), lie on a curve already walked."""
-    apart = np.linalg.norm(y[:, None] - walked.y, axis=2)
-    k = np.argmin(apart, axis=1)
-    gaps = np.linalg.norm(np.diff(walked.y, axis=0), axis=1)
-    gaps = np.maximum(np.append(gaps, 0.0)[k], np.insert(gaps, 0, 0.0)[k])
-    there = apart[np.arange(len(k)), k] <= 2 * gaps
-    if np.any(there):
-        k, y = k[there], y[there]
-        new, _ = between(on, walked.y[k], walked.t[k], np.sum(walked.t[k] * (y - walked.y[k]), axis=1))
-        there[there] = _alike(new, y)
-    return np.asarray(there)
-
-
-def same(one: Walk, other: Walk) -> bool:
-    """Whether both ends of a walk are ends of another, at limits: through a regular point goes one curve only."""
-    if one.closed or other.closed or any(end.limit is None for walked in (one, other) for end in walked.ends):
+def contains(on: Curve, walked: Walk, y: Array) -> bool:
+    """Whether a point lies on a curve already walked."""
+    apart = np.linalg.norm(walked.y - y, axis=1)
+    k = int(np.argmin(apart))
+    if apart[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
         return False
-
-    def shared(row: int) -> bool:
-        near = (k for k in (0, -1) if _alike(other.y[k], one.y[row]))
-        return any(abs(one.t[row] @ other.t[k]) >= _COSINE for k in near)
-
-    return shared(0) and shared(-1)
+    new, _ = between(on, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
+    return _alike(new[0], y)
 
 
-def _alike(y: Array, other: Array) -> Truth:
+def _alike(y: Array, other: Array) -> bool:
     """Whether points are one."""
-    return np.asarray(np.abs(y - other).max(axis=-1) <= _SAME * (1 + np.abs(other).max(axis=-1)))
+    return bool(np.abs(y - other).max() <= _SAME * (1 + np.abs(other).max()))
 
 
 def _along(on: Curve, y: Array, t: Array) -> bool:
@@ -226,27 +254,18 @@ def _along(on: Curve, y: Array, t: Array) -> bool:
     return bool(np.all(beyond[over] <= _EDGE) and np.all(np.abs(t[over]) <= _EDGE))
 
 
-def _at_limit(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array, End]:
+def _at_limit(on: Curve, y: Array, t: Array, s: float) -> tuple[CurvePoint, End]:
     """The first point within a step that lies on a limit, on it exactly."""
 
-    def point(r: float) -> Array:
-        return np.asarray(between(on, y[None], t[None], np.array([r]))[0][0])
+    def points(shares: Array) -> tuple[Array, Array]:
+        return between(on, np.tile(y, (len(shares), 1)), np.tile(t, (len(shares), 1)), shares)
 
-    beyond, found = point(s), []
-    for k in range(y.size):
-        for side, limit in (("min", on.lower[k]), ("max", on.upper[k])):
-            if beyond[k] < limit if side == "min" else beyond[k] > limit:
-
-                def excess(r: float, k: int = k, limit: float = float(limit)) -> float:
-                    return float(point(r)[k]) - limit
-
-                share = crossing(excess, s) if excess(0.0) * excess(s) < 0 else 0.0
-                found.append((share, k, side, limit))
-    share, k, side, limit = min(found)
-    (last,), (direction,) = between(on, y[None], t[None], np.array([share]))
-    last[k] = limit
-    return last, direction, End(side, k)
-
-
-def _ended(ys: Sequence[Array], ts: Sequence[Array], end: End) -> Walk:
-    return Walk(np.array(ys), np.array(ts), (End("start"), end))
+    beyond = points(np.array([s]))[0][0]
+    limits = np.clip(beyond, on.lower, on.upper)
+    k = np.flatnonzero(limits != beyond)
+    shares = crossings(lambda r: points(r)[0][range(len(k)), k] - limits[k], np.full(len(k), s))
+    shares = np.nan_to_num(shares)  # nan: it is beyond the limit already
+    first = k[int(np.argmin(shares))]
+    (last,), (tangent,) = points(shares[[np.argmin(shares)]])
+    last[first] = limits[first]
+    return CurvePoint(last, tangent), End("max" if beyond[first] > limits[first] else "min", int(first))

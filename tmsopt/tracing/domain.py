@@ -17,11 +17,11 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import nearest_two
-from tmsopt.tracing.branch import Branch, Event
+from tmsopt.tracing.branch import Branch
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
 from tmsopt.tracing.equations import coefficients
 from tmsopt.tracing.infinity import Infinity, through_infinity
-from tmsopt.tracing.monitors import on_axis, roots_along
+from tmsopt.tracing.points import on_axis, roots_along
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
@@ -114,7 +114,9 @@ def domain(
 
     def arcs(names: Sequence[str], bounds: Callable[[Branch], Truth], beyond: str) -> tuple[Arc, ...]:
         traced = (arc for n in names for b in found[n] for arc in _pieces(b, bounds(b), plane, at_infinity))
-        return (*traced, *(arc for curve in infinite for arc in _runs(curve, getattr(curve, beyond))))
+        runs = ((curve.parameters, *run) for curve in infinite for run in _runs(getattr(curve, beyond)))
+        ends = (Arc("infinity", {n: x[start : stop + 1] for n, x in p.items()}) for p, start, stop in runs)
+        return (*traced, *ends)
 
     corners = [c for name in ("weave", "capsize", "EP2") for b in found[name] for c in _corners(b, plane)]
     corners += [c for curve in infinite for c in _changes(curve, corners=True)]
@@ -132,13 +134,7 @@ def _in_edge(branch: Branch, problem: Posed) -> bool:
     return any(bool(np.all(np.abs(branch.parameters[n] - limit) <= _EDGE * width)) for n, limit, width in limits)
 
 
-def _runs(curve: Infinity, inside: Truth) -> Iterator[Arc]:
-    """Runs of segments that bound a domain."""
-    for start, stop in _edges(inside):
-        yield Arc("infinity", {n: column[start : stop + 1] for n, column in curve.parameters.items()})
-
-
-def _edges(inside: Truth) -> list[tuple[int, int]]:
+def _runs(inside: Truth) -> list[tuple[int, int]]:
     """Begin and end of every run of truth."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
@@ -147,40 +143,35 @@ def _edges(inside: Truth) -> list[tuple[int, int]]:
 def _changes(curve: Infinity, corners: bool = False) -> Iterator[Corner]:
     """Points on a0 = 0 where another boundary comes in; only the corners of stability and of heavy damping, or all."""
     for row, what in curve.changes.items():
-        if corners and not any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
-            continue
-        name, detail = (f"infinity and {what}", "a0 = 0") if what != "infinity" else ("infinity", "a0 = a1 = 0")
-        yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
+        if not corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
+            name, detail = (f"infinity and {what}", "a0 = 0") if what != "infinity" else ("infinity", "a0 = a1 = 0")
+            yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
 
 
 def _pieces(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
-    """Runs of points that bound a domain; the events at their ends belong to them."""
-    marked = inside.copy()
-    beyond: dict[int, Corner] = {}
+    """Runs of points that bound a domain; the events at their ends belong to them, and a corner beyond an end."""
+    marked, beyond = inside.copy(), dict[int, list[Corner]]()
     for event in branch.events:
         k = event.index
         if event.name != "end":
             marked[k] = bool(inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)])
-        elif event.detail.startswith((INFINITE, SINGULAR)):
-            for corner in _near(problem, event, at_infinity):
-                beyond[k] = corner
-    for start, stop in _edges(marked):
+        elif event.detail.startswith((INFINITE, SINGULAR)) and at_infinity:
+            widths = ((n, high - low) for n, (low, high) in problem.free.items())
+            shares = {
+                n: [abs(event.parameters[n] - c.parameters[n]) / width for c in at_infinity] for n, width in widths
+            }
+            apart = np.max(list(shares.values()), axis=0)
+            beyond[k] = [at_infinity[int(apart.argmin())]] if apart.min() <= _CLOSE else []
+    for start, stop in _runs(marked):
         if stop - start > 1:
-            rows = [{n: branch.parameters[n][k] for n in problem.free} for k in range(start, stop)]
-            before = [beyond[start].parameters] if start in beyond else []
-            after = [beyond[stop - 1].parameters] if stop - 1 in beyond else []
-            points = [*before, *rows, *after]
-            yield Arc(branch.pattern, {n: np.array([p[n] for p in points]) for n in problem.free})
-
-
-def _near(problem: Posed, event: Event, corners: Sequence[Corner]) -> list[Corner]:
-    """The corners within reach of an event, the nearest last."""
-
-    def distance(corner: Corner) -> float:
-        widths = {n: high - low for n, (low, high) in problem.free.items()}
-        return max(abs(event.parameters[n] - corner.parameters[n]) / width for n, width in widths.items())
-
-    return sorted((c for c in corners if distance(c) <= _CLOSE), key=distance, reverse=True)
+            before, after = ([c.parameters for c in beyond.get(k, ())] for k in (start, stop - 1))
+            yield Arc(
+                branch.pattern,
+                {
+                    n: np.array([*(p[n] for p in before), *branch.parameters[n][start:stop], *(p[n] for p in after)])
+                    for n in problem.free
+                },
+            )
 
 
 def _bounds(branch: Branch, problem: Posed) -> Truth:
@@ -193,12 +184,14 @@ def _bounds(branch: Branch, problem: Posed) -> Truth:
     tied = np.where(on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)  # of the fastest, squared
     if np.all(tied < 0):
         return branch.stable
-    widths = {n: high - low for n, (low, high) in problem.free.items()}
-    (x, dx), (y, dy) = ((branch.parameters[n], branch.tangent[n] / width) for n, width in widths.items())
-    (wide, high), length = widths.values(), np.hypot(dx, dy) + 1e-300
-    sides = [(x - s * wide * dy / length, y + s * high * dx / length) for s in (-_BESIDE, _BESIDE)]
+    (x, dx, wide), (y, dy, high) = (
+        (branch.parameters[n], branch.tangent[n] / (end - begin), end - begin)
+        for n, (begin, end) in problem.free.items()
+    )
+    offset = np.array([[-_BESIDE], [_BESIDE]]) / (np.hypot(dx, dy) + 1e-300)
+    sides = dict(zip(problem.free, (x - offset * wide * dy, y + offset * high * dx), strict=True))
     with np.errstate(all="ignore"):  # a side may lie beyond what the model is made for: nan is not stable
-        one, other = (is_stable(coefficients(problem, dict(zip(widths, side, strict=True)))) for side in sides)
+        one, other = is_stable(coefficients(problem, sides))
     fastest = (tied >= 0) & (branch.unknowns.get("W", np.inf) >= tied)
     return np.asarray(branch.stable | (fastest & (one != other)))
 
@@ -228,16 +221,12 @@ def _once(branch: Branch) -> Truth:
 def _corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
     inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
+    ends = pattern_of(problem.model, branch.pattern).ends.values()
     for event in branch.events:
-        if _turns(branch, event, problem) and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
+        turns = event.detail in ends if event.name == "end" else event.name not in ("fold", "constraint")
+        if turns and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
             name = "double zero" if event.name == "end" else event.name
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
-
-
-def _turns(branch: Branch, event: Event, problem: Posed) -> bool:
-    if event.name == "end":
-        return event.detail in pattern_of(problem.model, branch.pattern).ends.values()
-    return event.name not in ("fold", "constraint")
 
 
 def _distinct(corners: Sequence[Corner]) -> list[Corner]:

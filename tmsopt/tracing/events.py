@@ -1,241 +1,266 @@
-"""What happens along a traced curve: its events, those at one place as one, put in among its points."""
+"""Events: functions of the points of a curve, whose zeros are located on the curve itself, to rounding.
 
-import re
-from collections.abc import Iterator
-from dataclasses import replace
+What the package looks for and what a user looks for are `Event`s alike. Between two steps a function may have two
+zeros: where it comes near 0, `refine` adds the point at which it is nearest.
+"""
 
-import casadi as ca
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
-from tmsopt.models import Values
-from tmsopt.records import Array, Table
-from tmsopt.roots import Pattern, pattern as pattern_of, roots
-from tmsopt.roots.patterns.pattern import mean_size
-from tmsopt.tracing.branch import Branch, Event
-from tmsopt.tracing.continuation import CLOSED, End, Walk
-from tmsopt.tracing.equations import Traced, symbols_of
-from tmsopt.tracing.monitors import Points
-from tmsopt.tracing.solving import project
-from tmsopt.tracing.zeros import TOGETHER, Found, inserted, located, points_of, refined
+from tmsopt.errors import Fault, InputError, is_number, list_faults, refusal, short, suggest, text_faults
+from tmsopt.problem.expression import Expression
+from tmsopt.records import Array, Truth
+from tmsopt.roots.meetings import nearest_two
+from tmsopt.tracing.continuation import Curve, Walk, between
+from tmsopt.tracing.equations import Traced
+from tmsopt.tracing.points import NOTHING, Points, margins
+from tmsopt.tracing.solving import crossings
 
-_NEAR = 1e-3  # distance within which an EP4 is looked for beside an EP3 and a 2EP2
-_TOUCHING = {"EP3", "2EP2"}  # what a double root meets at an EP4, a triple root and a second double one
-_LOW = 1e-2  # of the marks beside a place where they may touch 0: they grow with the square of a step of 0.1
-_EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
-_SAME_DESIGN = 1e-6
-"""Like `TOGETHER`, in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
-_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+TOGETHER = 1e-6
+"""Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""
 
-_KINDS = ("EP", "several", "zero", "weave", "capsize", "EP2", "constraint", "fold")
-"""Kinds of events of one codimension, the most telling first."""
+CHANGES = "stability changes"
+"""Detail of the events that count only where they change it."""
 
-
-def describe(ready: Traced, walked: Walk) -> Branch:
-    """A walked curve in the parameters of the problem, with its events among its points."""
-    problem, pattern, free = ready.problem, ready.pattern, len(ready.problem.free)
-    walked = refined(ready, _trimmed(ready, walked))
-    found = with_EP4(ready, [*located(ready, walked), *touched(ready, walked)])
-    merged = _merged(found, free)
-    rows, walked = inserted(walked, merged)
-    points = points_of(ready, walked)
-    square, doubled = _doubled(pattern)
-    for event, row in zip(merged, rows, strict=True):
-        if event.name in doubled:  # a double root of a quadratic factor: exact, or it scatters by 1e-8
-            b, c = ready.unknowns.start + square, ready.unknowns.start + square + 1
-            points.x[row, c] = points.x[row, b] ** 2 / 4
-    kinds = pattern.kind(points.unknowns)
-    for name in points.special:
-        kinds[:] = name
-    for event, row in zip(merged, rows, strict=True):
-        if event.name in pattern.marks or event.name == "EP4":
-            kinds[row] = event.name
-    named = [(e.name, e.detail, row) for e, row in zip(merged, rows, strict=True)]
-    if not walked.closed:
-        ends = zip(walked.ends, (0, len(points) - 1), strict=True)
-        named += [("end", _end_words(ready, end), row) for end, row in ends]
-    off, columns = points.residual, points.parameters
-    events = [
-        Event(name, detail, Table({n: float(c[row]) for n, c in columns.items()}), row, float(off[row]))
-        for name, detail, row in named
-    ]
-    steps = np.diff(walked.y, axis=0)[:, :free]
-    return Branch(
-        pattern=str(problem.locate),
-        parameters=columns,
-        unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
-        tangent=dict(zip(problem.free, _natural_tangent(points).T, strict=True)),
-        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
-        kinds=kinds,
-        stable=points.stable,
-        heavily_damped=points.heavily_damped,
-        satisfied=points.satisfied,
-        abscissa=points.column(points.values["abscissa"]),
-        events=tuple(sorted(events, key=lambda e: e.index)),
-        closed=walked.closed,
-        residual=float(np.max(off)),
-        eigenfrequency=_eigenfrequency(points),
-    )
+_DIP = 0.5
+"""Share of a small value that a parabola must fall further by, for its least to be looked for between the steps."""
+_ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as beside a singular point it may
+_ROUNDING = 1e-14  # of a variable of order 1
 
 
-def _eigenfrequency(points: Points) -> dict[str, Array] | None:
-    """Of a complex system ω = i s of a multiple root, of s² + bs + c less the carrier; None of a real one."""
-    carrier, pattern = points.ready.problem.model.carrier, points.ready.pattern
-    if carrier is None:
-        return None
-    if not pattern.form.startswith("CEP") or pattern.unknowns[:2] != ("b", "c"):
-        return {}
-    b, c = points.unknowns[:2]
-    return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
+@dataclass(frozen=True)
+class Event:
+    """What to look for along a curve: a function that changes its sign there.
 
+    Attributes:
+        name: shown wherever the curve is, on one line.
+        function: of a point, to a number. The point is a mapping: ``p["Fr"]`` is a parameter of the problem, a
+            quantity of its model such as ``p["abscissa"]``, or an unknown of the pattern such as ``p["r"]``.
+        stop: whether a branch ends there. The curve beyond is another branch.
+        detail: words to show next to the name.
 
-def _doubled(pattern: Pattern) -> tuple[int, tuple[str, ...]]:
-    """Where b of a factor s² + bs + c stands among the unknowns, and the events at which it is a square."""
-    if pattern.form.lstrip("2C") != pattern.form and pattern.unknowns[:2] == ("b", "c"):
-        return 0, tuple(m for m in pattern.marks if re.fullmatch(r"EP\d+", m))
-    if pattern.form == "EP2" and pattern.unknowns[-2:] == ("b", "c"):
-        return len(pattern.unknowns) - 2, ("EP4", "2EP2")
-    return 0, ()
+    Example:
+        >>> half = tmsopt.Event("half a radian", lambda p: p["lambda_s"] - 0.5)
+        >>> found = tmsopt.trace("problems/ep_set.toml", events=[half])
+        >>> [f"{e.parameters['Fr']:.9f}" for e in found.events if e.name == "half a radian"]
+        ['2.289532730']
+        >>> f"{tmsopt.laws.epset(-0.4, -0.2, 0.5):.9f}"  # the law of the paper
+        '2.289532730'
 
-
-def _merged(found: list[Found], free: int) -> list[Found]:
-    """Events in order, those at one place as one: the most special names it, the others stand in its detail."""
-    groups: list[list[Found]] = []
-    for event in found:
-        apart = np.abs(event.y - groups[-1][-1].y) if groups else np.array([np.inf])
-        if apart.max() <= TOGETHER * (1 + np.abs(event.y).max()) or apart[:free].max() <= _SAME_DESIGN:
-            groups[-1].append(event)
-        else:
-            groups.append([event])
-    return [_one(group) for group in groups]
-
-
-def _one(group: list[Found]) -> Found:
-    group = sorted(group, key=lambda e: _rank(e.name))
-    names = {e.name for e in group}
-    name = "double zero" if {"weave", "capsize"} <= names else group[0].name
-    folds = dict.fromkeys(e.detail for e in group if e.name == "fold")
-    special = [m for m in names if "EP" in m and _rank(m)[0] < -1]
-    higher = _beside(name, names)
-    others = [f"beside an {higher}"] if higher else []
-    others += [
-        e.detail if e.name == name else f"{e.name} {e.detail}".strip()
-        for e in group
-        if e.name not in ("fold", *special)
-    ]
-    others = [text for text in dict.fromkeys(others) if text]
-    if name == "EP3" and len(folds) > 1:
-        others.append("cusp")
-    elif folds:
-        others.append(("" if name == "fold" else "fold in ") + ", ".join(folds))
-    return replace(group[0], name=name, detail="; ".join(others))
-
-
-def _beside(name: str, names: set[str]) -> str:
-    """EP(k+1) where EPk and EP(k−1)+EP2, the two ways in which EP(k−1) comes near it, are at one place; else empty."""
-    match = re.fullmatch(r"EP(\d+)", name)
-    order = int(match[1]) if match else 0
-    return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
-
-
-def _rank(name: str) -> tuple[int, int]:
-    """The most special first: by conditions that the event takes, then by kind."""
-    parts = [re.fullmatch(r"(\d*)(C?)EP(\d+)", part) for part in name.split("+")]
-    if all(parts):
-        numbers = [(int(m[1] or 1), bool(m[2]), int(m[3])) for m in parts if m]
-        taken = sum(count * (order - 1) * (2 if pair else 1) for count, pair, order in numbers)
-        kind = "EP2" if name == "EP2" else "EP" if name.startswith("EP") and len(parts) == 1 else "several"
-        return -taken, _KINDS.index(kind)
-    if zero := re.fullmatch(r"(double|(\d+)-fold) zero", name):
-        return -int(zero[2] or 2), _KINDS.index("zero")
-    return -int(name in ("weave", "capsize")), _KINDS.index(name)
-
-
-def _natural_tangent(points: Points) -> Array:
-    """Derivative of the free parameters by the arclength in widths of the box."""
-    problem, t, scale = points.ready.problem, points.t, points.ready.on.scale
-    of = problem.parameter_set
-    slopes = [1 / (1 + v**2) if of[n].tangent else 1.0 + 0 * v for n, v in zip(problem.free, points.x.T, strict=False)]
-    along = t[:, : len(slopes)]
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    return np.asarray(along * scale[: len(slopes)] * np.transpose(slopes) / (size + 1e-300))
-
-
-def _trimmed(ready: Traced, walked: Walk) -> Walk:
-    """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
-    with np.errstate(all="ignore"):
-        good = np.flatnonzero(points_of(ready, walked).residual <= _FITTING)
-    if walked.closed or not good.size:
-        return walked
-    inside = slice(int(good[0]), int(good[-1]) + 1)
-    return replace(walked, y=walked.y[inside], t=walked.t[inside])
-
-
-def _end_words(ready: Traced, end: End) -> str:
-    if end.limit is None:
-        return end.reason if end.reason != CLOSED else ""
-    free = list(ready.problem.free)
-    if end.limit < len(free):
-        return f"{free[end.limit]}.{end.reason}"
-    name = ready.pattern.unknowns[end.limit - len(free)]
-    return ready.pattern.ends.get(name, "the other roots reach a limit of the search")
-
-
-def touched(ready: Traced, walked: Walk) -> Iterator[Found]:
-    """EP4 where a curve of EP2 passes through it in a section: EP3 and 2EP2 touch 0 there, and keep their signs."""
-    if ready.pattern.form != "EP2" or not {*ready.pattern.marks} >= _TOUCHING:
-        return
-    points = points_of(ready, walked)
-    value = np.asarray(sum(np.abs(points.mark(name)) for name in _TOUCHING))
-    least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
-    for k in (np.flatnonzero(least) + 1).tolist():
-        exact = _exact_EP4(ready, Found("EP4", "", walked.y[k], walked.t[k], k, 0.0))
-        if exact is not None:
-            s = float(walked.t[k] @ (exact.y - walked.y[k]))
-            yield replace(exact, after=k if s >= 0 else k - 1, s=s)
-
-
-def with_EP4(ready: Traced, found: list[Found]) -> list[Found]:
-    """Events in order; EP3 and 2EP2 side by side are one EP4 where there is one, and each EP4 is made exact.
-
-    Where symmetry takes a curve through EP4, the traced equations are singular there, and locate it to 1e-6 only.
+    More: docs/how_to/tracing.md
     """
-    result: list[Found] = []
-    for event in sorted(found, key=lambda e: (e.after, e.s)):
-        before = result[-1] if result else event
-        pair = {event.name, before.name} == {"EP3", "2EP2"}
-        if event.name == "EP4" or (pair and np.abs(event.y - before.y).max() <= _NEAR):
-            exact = _exact_EP4(ready, event)
-            if exact is not None:
-                result = [*(result[:-1] if pair else result), exact]
-                continue
-        result.append(event)
-    return result
+
+    name: str
+    function: Callable[[Any], Any] = field(repr=False)
+    stop: bool = False
+    detail: str = ""
 
 
-def _exact_EP4(ready: Traced, event: Found) -> Found | None:
-    """The EP4 beside an event, by its own equations; None if there is none."""
-    problem, pattern, scale = ready.problem, ready.pattern, ready.on.scale
-    free = len(problem.free)
-    special = pattern_of("EP4", problem.model.degree)
-    start = event.y * scale
-    factors = pattern.factors(list(start[ready.unknowns]))
-    guess = special.guesses(np.concatenate([roots(np.array(f, dtype=float)) for f in factors]))[0]
-    size = float(mean_size(special.monic(guess))) or 1.0
-    unit = np.array([*scale[:free], *(size**power for power in special.powers)])
-    y = ca.SX.sym("y", len(unit))
-    x = ca.vertsplit(y * ca.DM(unit))
-    a = Values(problem.model, problem.parameter_set, problem.ordered(symbols_of(problem, x))).coefficients
-    pairs = [(p / size**k, a[0] * c / size**k) for k, (p, c) in enumerate(zip(a, special.monic(x[free:]), strict=True))]
-    equations = ca.vertcat(*(p - q for p, q in pairs[1:]))
-    terms = ca.vertcat(*(ca.fabs(p) + ca.fabs(q) for p, q in pairs[1:]))
-    system = ca.Function("EP4", [y], [ca.densify(equations), ca.densify(ca.jacobian(equations, y))])
-    end = project(system, np.array([*start[:free], *guess]) / unit)
-    if end is None or np.abs(end[:free] - event.y[:free]).max() > _NEAR:
-        return None
-    if np.any(np.abs(ca.Function("mismatch", [y], [equations / terms])(end).full()) > _EXACT):
-        return None  # a section beside an EP4, not through it
-    exact = event.y.copy()
-    exact[:free] = end[:free]
-    fourfold = [roots(np.array(f, dtype=float)) for f in special.factors((end * unit)[free:].tolist())]
-    exact[ready.unknowns] = np.array(pattern.guesses(np.concatenate(fourfold))[0]) / scale[ready.unknowns]
-    return replace(event, name="EP4", detail="", y=exact)
+@dataclass(frozen=True)
+class Found:
+    """A zero of an event between two rows of a walk, an arclength s after the first of them."""
+
+    event: Event
+    y: Array
+    t: Array
+    after: int
+    s: float
+
+
+def check_events(events: Any) -> list[Event]:
+    """The events that a user gave, as functions of many `Points`, like those of the package.
+
+    Raises:
+        InputError: for what is no list of events, and later, where a function raises or gives no finite number.
+    """
+    faults = list_faults("events", events, "[tmsopt.Event('Fr is 3', lambda p: p['Fr'] - 3)]")
+    for k, event in enumerate(() if faults else events):
+        if not isinstance(event, Event) or not callable(event.function):
+            faults.append(
+                Fault(f"found {short(event)}; accepted: an Event of a name and a function", ("events", f"{k}"))
+            )
+        else:
+            faults += text_faults(event.name, "events", f"{k}", "name")
+    if faults:
+        raise InputError(faults)
+    return [replace(event, function=partial(_each, event)) for event in events]
+
+
+def _each(event: Event, points: Points) -> Array:
+    """The function at every point; nan where there is no point."""
+    exist = np.all(np.isfinite(points.x), axis=1)
+    return np.array([_value(event, _At(points, k)) if there else np.nan for k, there in enumerate(exist)])
+
+
+def _value(event: Event, at: Mapping[str, float]) -> float:
+    try:
+        value = event.function(at)
+        if is_number(value):
+            return float(value)
+        what = f"the function gives {short(value)}"
+    except Exception as error:
+        what = f"the function raises {type(error).__name__}: {error}"
+    place = ", ".join(f"{name} = {at[name]:.6g}" for name in at)
+    raise refusal(f"{what} at {place}; accepted: a finite number at every point of the curve", "events", event.name)
+
+
+@dataclass(frozen=True)
+class _At(Mapping[str, float]):
+    """One of many points, as a user's function sees it; it lists the free parameters and knows all names."""
+
+    points: Points
+    row: int
+
+    def __getitem__(self, name: str) -> float:
+        if name not in self.points.names:
+            raise KeyError(f"no '{name}' here; {suggest(name, self.points.names)}")
+        return float(self.points[name][self.row])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.points.ready.problem.free)
+
+    def __len__(self) -> int:
+        return len(self.points.ready.problem.free)
+
+
+def events_of(points: Points) -> Iterator[Event]:
+    """Everything that the package looks for along a curve."""
+    problem, pattern = points.ready.problem, points.ready.pattern
+
+    def margin(number: int, k: int, points: Points) -> Any:
+        return margins(pattern.remaining(points.unknowns)[number])[k]
+
+    def slope(k: int, points: Points) -> Any:  # by the arclength in the parameters: the unknowns may move much faster
+        return points.t[:, k] / (np.linalg.norm(points.t[:, : len(problem.free)], axis=1) + 1e-300)
+
+    def excess(condition: Expression, points: Points) -> Any:
+        return condition(points.values)
+
+    for name in pattern.marks:
+        yield Event(name, partial(Points.mark, name=name))
+    if pattern.form == "EP2" and "2EP2" in points.special:
+        # q(r) has a double zero where r is the double root of q
+        yield Event("EP4", lambda p: p.unknowns[0] - nearest_two(pattern.factors(p.unknowns)[-1]))
+    for number, factor in enumerate(pattern.remaining(points.unknowns)):
+        for k in range(len(margins(factor))):  # the first quantity is the constant term
+            yield Event("weave" if k else "capsize", partial(margin, number, k), detail=CHANGES)
+    for k, parameter in enumerate(problem.free):
+        yield Event("fold", partial(slope, k), detail=parameter)
+    for name, condition in problem.conditions.items():
+        if not condition.equality:
+            yield Event("constraint", partial(excess, condition), detail=name)
+
+
+def locate(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Iterator[Found]:
+    """Every zero of an event of the package, and of others, between the rows that show its change of sign."""
+    points = points_of(ready, walked)
+    for event, values in _live(points, events):
+        rows = np.flatnonzero(has_turned(values))
+        if event.detail == CHANGES:
+            rows = rows[points.stable[rows] != points.stable[rows + 1]]
+        for found in locate_zeros(ready.on, walked, partial(_at, ready, event), rows, event):
+            free = [*ready.problem.free]
+            if event.name != "fold" or _turns(walked, found.after, found.y, free.index(event.detail)):
+                yield found
+
+
+def locate_zeros(
+    on: Curve, walked: Walk, value: Callable[[Array, Array], Array], rows: NDArray[np.intp], event: Event
+) -> Iterator[Found]:
+    """Where a function of points y and tangents t is 0 between each of some rows and the next, on the curve."""
+    here, along = walked.y[rows], walked.t[rows]
+    ends = np.sum(along * (walked.y[rows + 1] - here), axis=1)
+    if rows.size:
+        s = crossings(lambda s: value(*between(on, here, along, s)), ends)
+        real = np.isfinite(s)  # else a jump through infinity, noise, or nan
+        found = zip(*between(on, here[real], along[real], s[real]), rows[real].tolist(), s[real].tolist(), strict=True)
+        for y, t, row, length in found:
+            if np.abs(y - walked.y[row]).max() <= _ASTRAY * length + TOGETHER:  # else on another curve
+                yield Found(event, y, t, row, length)
+
+
+def has_turned(value: Array) -> Truth:
+    """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
+    sign = np.sign(value)
+    if np.any(sign):
+        sign[0] = sign[0] or sign[np.flatnonzero(sign)[0]]
+    for k in range(1, len(sign)):
+        sign[k] = sign[k] or sign[k - 1]
+    return np.asarray(sign[1:] * sign[:-1] < 0)
+
+
+def refine(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Walk:
+    """The walk with a point wherever an event comes nearest to 0 between two steps: two zeros then show two signs."""
+    steps = np.sum(walked.t[:-1] * np.diff(walked.y, axis=0), axis=1)
+    before, after = steps[:-1], steps[1:]
+    added: dict[tuple[int, float], Found] = {}
+    for event, value in _live(points_of(ready, walked), events):
+        side = np.sign(value[1:-1])
+        left, here, right = side * value[:-2], side * value[1:-1], side * value[2:]
+        with np.errstate(all="ignore"):  # slope and second derivative of the parabola through three values
+            back, ahead = (here - left) / before, (right - here) / after
+            slope, bend = (back * after + ahead * before) / (before + after), 2 * (ahead - back) / (before + after)
+            dips = (here <= left) & (here <= right) & (bend > 0) & (slope**2 / (2 * bend) > _DIP * here)
+        for k in np.flatnonzero(dips & (before > 0) & (after > 0) & (here > 0)).tolist():
+            row = walked.y[[k + 1]], walked.t[[k + 1]]
+
+            def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:
+                return sign * float(_at(ready, event, *between(ready.on, *row, np.array([s])))[0])
+
+            from scipy.optimize import minimize_scalar  # a fifth of a second, paid only where it is needed
+
+            least = minimize_scalar(height, bounds=(-before[k], after[k]), method="bounded", options={"xatol": 1e-14})
+            s, nearby = float(least.x), between(ready.on, *row, np.array([least.x]))
+            (y,), (t,) = between(ready.on, *nearby, np.zeros(1))  # once more: beside a singular point Newton is slow
+            if np.abs(y - row[0][0]).max() <= _ASTRAY * abs(s) and t @ row[1][0] > 0:
+                place = (k + 1, s) if s >= 0 else (k, before[k] + s)
+                added.setdefault(place, Found(event, y, t, *place))
+    return insert(walked, [added[place] for place in sorted(added)])[1]
+
+
+def insert(walked: Walk, found: Sequence[Found]) -> tuple[list[int], Walk]:
+    """Rows of what was found, in order, and the walk with it among its points."""
+    y, t, rows = list(walked.y), list(walked.t), []
+    for shift, event in enumerate(found, 1):
+        rows.append(event.after + shift)
+        y.insert(rows[-1], event.y)
+        t.insert(rows[-1], event.t)
+    return rows, replace(walked, y=np.array(y), t=np.array(t))
+
+
+def points_of(ready: Traced, walked: Walk) -> Points:
+    """The points of a walk."""
+    return Points(ready, walked.y * ready.on.scale, walked.t)
+
+
+def _live(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Array]]:
+    """The events whose functions are not 0 all along the curve, with their values."""
+    special = points.special
+    for event in (*events_of(points), *events):
+        value = points.column(event.function(points))
+        if event.name not in special and (event.name != "fold" or np.abs(value).max() > NOTHING):
+            yield event, value
+
+
+def _at(ready: Traced, event: Event, y: Array, t: Array) -> Array:
+    """The function of an event at points of the curve."""
+    points = Points(ready, y * ready.on.scale, t)
+    return np.array(points.column(event.function(points)))
+
+
+def _turns(walked: Walk, i: int, y: Array, k: int) -> bool:
+    """Whether a variable has its neighbours, next or next but one, on one side of it by more than rounding.
+
+    Where the equations are singular the tangent alone may say so.
+    """
+    last = len(walked.y) - 1
+    for before, after in ((i, i + 1), (max(i - 1, 0), min(i + 2, last))):
+        back, ahead = walked.y[[before, after], k] - y[k]
+        if back * ahead > 0 and min(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])):
+            return True
+    return False

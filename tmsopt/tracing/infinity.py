@@ -18,11 +18,12 @@ from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
-from tmsopt.tracing.continuation import Curve, Walk, between, both_ways, contains, curve
-from tmsopt.tracing.equations import design_at, sizes, symbols_of
-from tmsopt.tracing.monitors import margins, sign_changes
-from tmsopt.tracing.seeds import unexplained
-from tmsopt.tracing.solving import crossing, projected, rows_of
+from tmsopt.tracing.continuation import Curve, Walk, curve
+from tmsopt.tracing.equations import design_at, limits_of, sizes, symbols_of
+from tmsopt.tracing.events import Event, Found, has_turned, insert, locate_zeros
+from tmsopt.tracing.points import margins
+from tmsopt.tracing.seeds import Line, unexplained, walk_new
+from tmsopt.tracing.solving import projected, rows_of
 
 _NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
 _MOST = 10**6
@@ -54,85 +55,58 @@ def through_infinity(problem: Posed, step: float, starts: int, seed: int) -> Ite
     a = Values(problem.model, of, problem.ordered(symbols_of(problem, ca.vertsplit(x)))).coefficients
     if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
         return
-    ends = (dict(zip(problem.free, side, strict=True)) for side in zip(*problem.free.values(), strict=True))
-    lower, upper = (np.array(variables_of(problem, end)) for end in ends)
+    lower, upper = limits_of(problem)
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], along))])
     usual = float(sizes(problem)[-1])
-    for walked in _walks(problem, on, step, starts, seed):
+    lines: list[Line] = []
+    for walked in walk_new(on, problem, _points(problem, on, starts, seed, lines), (step, _MOST), [], lines):
         x_on, bounds, changes = _judged(on, walked, rest, usual)
         yield Infinity(design_at(problem, x_on), *bounds, changes)
 
 
-def _walks(problem: Posed, on: Curve, step: float, starts: int, seed: int) -> Iterator[Walk]:
-    walks: list[Walk] = []
-    lines: list[dict[str, Array]] = []
-
-    def found(designs: Sequence[Mapping[str, float]], first: int) -> Array:
-        at = np.array([variables_of(problem, d) for d in designs]) / on.scale
-        return projected(on.evaluate, at, [(first + k) % 2 for k in range(len(designs))])
-
+def _points(problem: Posed, on: Curve, starts: int, seed: int, lines: Sequence[Mapping[str, Array]]) -> Iterator[Array]:
+    """Points of the curve in the box, from designs spread over it, then from a grid where no line is yet."""
     spots = list(islice(spread(problem, seed), starts))
-    missed = (found([d], k)[0] for k, d in enumerate(unexplained(problem, lambda a: a[0], lines), starts))
-    for y in chain(found(spots, 0) if spots else (), missed):
-        inside = np.all((on.lower <= y) & (y <= on.upper))  # not where it is nan
-        if not inside or any(contains(on, w, y[None])[0] for w in walks):
-            continue
-        walked = both_ways(on, y, step, _MOST)
-        if walked is not None:
-            walks.append(walked)
-            lines.append(design_at(problem, walked.y * on.scale))
-            yield walked
+    missed = ([d] for d in unexplained(problem, lambda a: a[0], lines))
+    for designs in chain([spots] if spots else [], missed):
+        at = np.array([variables_of(problem, d) for d in designs]) / on.scale
+        y = projected(on.evaluate, at, [k % 2 for k in range(len(at))])
+        yield y[np.all((on.lower <= y) & (y <= on.upper), axis=1)]  # not where it is nan
 
 
 def _judged(
     on: Curve, walked: Walk, rest: ca.Function, usual: float
 ) -> tuple[Array, tuple[Truth, Truth, Truth], dict[int, str]]:
-    """Points with every change among them, and what each segment between them bounds."""
+    """Points with every change among them, what each segment between them bounds, and what changes at which row."""
 
     def values(y: Array) -> Array:
         return rows_of(rest, y * on.scale)[0]
 
-    known = values(walked.y)
-    vanishing = bool(np.all(np.abs(known[:, -2]) <= _NOTHING * usual))
+    def tests(y: Array) -> list[tuple[str, Array]]:
+        """Functions without a zero wherever the other roots keep their class, and what a zero means."""
+        v = values(y)
+        c = list(v[:, : -2 if vanishing else -1].T)
+        found = [("weave" if k else "capsize", value) for k, value in enumerate(margins(c))]
+        found += [("EP2", meeting(c))] if len(c) > 2 else []
+        return [("infinity", c[0]), *found, *([("capsize", v[:, -1])] if vanishing else [])]
 
-    def quantities(v: Array) -> tuple[Array, list[str]]:
-        """Columns without a zero wherever the other roots keep their class, and what a zero means."""
-        c = v[:, : -2 if vanishing else -1]
-        tests = margins(list(c.T))
-        named = [(c[:, 0], "infinity"), *zip(tests, ["capsize"] + ["weave"] * len(tests), strict=False)]
-        if c.shape[1] > 2:
-            named.append((meeting(list(c.T)), "EP2"))
-        if vanishing:
-            named.append((v[:, -1], "capsize"))
-        return np.stack([q for q, _ in named], axis=-1), [name for _, name in named]
+    vanishing = bool(np.all(np.abs(values(walked.y)[:, -2]) <= _NOTHING * usual))
+    found: list[Found] = []
+    for k, (name, column) in enumerate(tests(walked.y)):
 
-    def beyond(i: int, s: float) -> Array:
-        return between(on, walked.y[[i]], walked.t[[i]], np.array([s]))[0]
+        def at(y: Array, t: Array, k: int = k) -> Array:
+            return tests(y)[k][1]
 
-    columns, names = quantities(known)
-    found: list[tuple[int, float, str]] = []
-    for k, name in enumerate(names):
-        for i in np.flatnonzero(sign_changes(columns[:, k])):
-
-            def at(s: float, i: int = int(i), k: int = k) -> float:
-                return float(quantities(values(beyond(i, s)))[0][0, k])
-
-            end = float(walked.t[i] @ (walked.y[i + 1] - walked.y[i]))
-            if at(0.0) * at(end) <= 0:
-                found.append((int(i), crossing(at, end), name))
-    y = list(walked.y)
-    rows: dict[int, str] = {}
-    shift = 0
-    for before, s, name in sorted(found):
-        if s > 0:
-            shift += 1
-            y.insert(before + shift, beyond(before, s)[0])
-        rows[before + shift] = name
-    points = np.array(y)
+        found += locate_zeros(on, walked, at, np.flatnonzero(has_turned(column)), Event(name, tests))
+    found.sort(key=lambda f: (f.after, f.s, f.event.name))
+    rows, walked = insert(walked, found)
+    apart = np.append(True, np.any(np.diff(walked.y, axis=0) != 0, axis=1))  # else a zero at a point that was there
+    points, numbers = walked.y[apart], np.cumsum(apart) - 1
     bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
-    changes = {row: name for row, name in rows.items() if any(b[row - 1] != b[row] for b in bounds)}
+    named = {int(numbers[row]): f.event.name for row, f in zip(rows, found, strict=True)}
+    changes = {row: name for row, name in named.items() if any(b[row - 1] != b[row] for b in bounds)}
     return points * on.scale, bounds, changes
 
 

@@ -1,7 +1,7 @@
 """A coarse grid over the plane of two free parameters, to see where branches of a pattern may be missing."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import cycle, islice, pairwise
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain, cycle, islice
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,12 @@ from tmsopt.problem.problem import Posed
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
-from tmsopt.tracing.continuation import INFINITE, Walk
+from tmsopt.tracing.continuation import INFINITE, Curve, Walk, both_ways, contains
 from tmsopt.tracing.equations import Traced, coefficients, design_at, starting_points
 from tmsopt.tracing.solving import projected, rows_of
+
+Line = dict[str, Array]
+"""Free parameters along a curve."""
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
@@ -34,65 +37,34 @@ def unexplained(
 ) -> Iterator[dict[str, float]]:
     """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile.
 
-    Those between which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
+    They are middles of the edges of a grid over the box, and the function does not count where it is nan. Those between
+    which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
     """
-    regular, others = changes(problem, test)
-    yield from _apart_from(lines, problem, regular, np.inf)
-    yield from _apart_from(lines, problem, others, _PATIENCE)
-
-
-def _apart_from(
-    lines: Sequence[Mapping[str, Array]], problem: Posed, left: Array, patience: float
-) -> Iterator[dict[str, float]]:
     low, high = np.array(list(problem.free.values())).T
-    np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
-    vain, known, seen = 0, len(lines), 0
-    while len(left) and vain < patience:
-        for line in lines[seen:]:
-            points = np.stack([line[n] for n in problem.free], axis=-1)
-            left = left[apart(left, (points - low) / (high - low), 1 / (points_of(problem) - 1))]
-        seen = len(lines)
-        if len(left):
-            yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
-            left = left[1:]
-            vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
-
-
-def points_of(problem: Posed) -> int:
-    """Points of the grid along each axis."""
-    return POINTS if problem.model.degree <= CLOSED else FEWER
-
-
-def changes(problem: Posed, test: Callable[[Sequence[Any]], Any], points: int | None = None) -> tuple[Array, Array]:
-    """Middles of the edges over which a function of the coefficients changes sign, in shares of the box, shape (n, 2).
-
-    Two parts: those where a0 keeps its sign, or is the function, and the others. Where it is nan it does not count.
-    """
-    points = points or points_of(problem)
-    share = np.linspace(0, 1, points)
-    x, y = np.meshgrid(share, share, indexing="ij")
-    ends = problem.free.items()
-    columns = {n: low + part * (high - low) for (n, (low, high)), part in zip(ends, (x, y), strict=True)}
+    points = POINTS if problem.model.degree <= CLOSED else FEWER
+    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, points)] * 2, indexing="ij"), axis=-1)
     with np.errstate(all="ignore"):
-        a = np.moveaxis(coefficients(problem, columns), -1, 0)
-        value = np.broadcast_to(np.asarray(test(list(a)), dtype=float), x.shape)
-    same = np.array_equal(value, a[0], equal_nan=True)
-    parts: list[list[Array]] = [[], []]
-    for axis, offset in ((0, np.array([0.5, 0.0])), (1, np.array([0.0, 0.5]))):
-        turns, through = _turns(value, axis), _turns(a[0], axis)
-        if same:
-            through[:] = False
-        parts[0].append(np.argwhere(turns & ~through) + offset)
-        parts[1].append(np.argwhere(turns & through) + offset)
-    regular, others = (np.concatenate(part) / (points - 1) for part in parts)
-    return regular, others
-
-
-def _turns(value: Array, axis: int) -> Truth:
-    """Where the sign changes from one grid point to the next; a 0 on the way counts on either side."""
-    sign = np.sign(value)
-    ahead, back = np.take(sign, range(1, sign.shape[axis]), axis), np.take(sign, range(sign.shape[axis] - 1), axis)
-    return np.asarray((ahead != back) & np.isfinite(ahead) & np.isfinite(back))
+        a = coefficients(problem, dict(zip(problem.free, np.moveaxis(low + grid * (high - low), -1, 0), strict=True)))
+        value = np.broadcast_to(np.asarray(test(list(np.moveaxis(a, -1, 0))), dtype=float), grid.shape[:2])
+    alone = np.array_equal(value, a[..., 0], equal_nan=True)
+    for last in (False, True):
+        middles = []
+        for axis in (0, 1):
+            turns, through = (np.nan_to_num(np.diff(np.sign(v), axis=axis)) != 0 for v in (value, a[..., 0]))
+            kept = turns & (through == last) if not alone else turns & (not last)
+            middles.append(np.argwhere(kept) + np.array([(1 - axis) / 2, axis / 2]))
+        left = np.concatenate(middles) / (points - 1)
+        np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
+        vain, known, seen = 0, len(lines), 0
+        while len(left) and (vain < _PATIENCE or not last):
+            for line in lines[seen:]:
+                at = np.stack([line[n] for n in problem.free], axis=-1)
+                left = left[apart(left, (at - low) / (high - low), 1 / (points - 1))]
+            seen = len(lines)
+            if len(left):
+                yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
+                left = left[1:]
+                vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
 def apart(points: Array, line: Array, distance: float) -> Truth:
@@ -100,16 +72,33 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
     start, along = line[:-1], np.diff(line, axis=0)
     length = np.maximum(np.sum(along**2, axis=1), 1e-300)
     far = np.ones(len(points), dtype=bool)
-    for rows in (slice(k, k + _BLOCK) for k in range(0, len(points), _BLOCK)):
-        offset = points[rows, None] - start
+    for k in range(0, len(points), _BLOCK):
+        offset = points[k : k + _BLOCK, None] - start
         share = np.clip(np.sum(offset * along, axis=2) / length, 0, 1)
-        far[rows] = np.min(np.sum((offset - share[..., None] * along) ** 2, axis=2), axis=1) > distance**2
+        nearest = np.min(np.sum((offset - share[..., None] * along) ** 2, axis=2), axis=1)
+        far[k : k + _BLOCK] = nearest > distance**2
     return far
+
+
+def walk_new(
+    on: Curve,
+    problem: Posed,
+    seeds: Iterable[Iterable[Array]],
+    how: tuple[float, int],
+    walks: list[Walk],
+    lines: list[Line],
+) -> Iterator[Walk]:
+    """Curves through some of many points, shape (points, n + 1) each; `walks` and their `lines` in the box grow."""
+    for y in chain.from_iterable(seeds):
+        if not any(contains(on, known, y) for known in walks) and (found := both_ways(on, y, *how)) is not None:
+            walks.append(found)
+            lines.append(design_at(problem, found.y * on.scale))
+            yield found
 
 
 def seeds(
     ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], lines: Sequence[Mapping[str, Array]]
-) -> Iterator[tuple[int, Array]]:
+) -> Iterator[tuple[int, list[Array]]]:
     """Points of the pattern's curve in the box, found from each of many designs, and the number of these.
 
     Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `lines`
@@ -118,12 +107,12 @@ def seeds(
     problem = ready.problem
     free = len(problem.free)
     given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
-    yield from ((0, found) for found in _seeds(ready, given, [None] * len(given)))
+    yield from ((0, found) for found in _near(ready, given, [None] * len(given)))
     vain, known, count = 0, len(lines), 0
     ways = cycle([None, *range(free)])
     designs = spread(problem, seed)
     while count < (starts if _swept(ready) else _ROUNDS * starts):
-        for found in _seeds(ready, list(islice(designs, starts)), list(islice(ways, starts))):
+        for found in _near(ready, list(islice(designs, starts)), list(islice(ways, starts))):
             if vain >= starts:
                 return
             count += 1
@@ -136,14 +125,14 @@ def _swept(ready: Traced) -> bool:
     return ready.pattern.test is not None and len(ready.problem.free) == 2
 
 
-def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array]]:
+def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, list[Array]]]:
     """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
     if ready.pattern.test is not None and _swept(ready):
         for design in unexplained(ready.problem, ready.pattern.test, lines):
-            yield 0, _nearest(ready, design)
+            yield 0, _near(ready, [design], most=1)[0]
 
 
-def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array]]:
+def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
     """Points where a curve may come back from infinity: there a root changes sides, and the parameters go on.
 
     They approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit, and a point beyond
@@ -160,37 +149,24 @@ def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int,
                 (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
                 limit = (far - weight * here) / (1 - weight)
                 x = (2 * limit - here) * ready.on.scale[:free]
-                yield 0, _nearest(ready, {n: float(v) for n, v in design_at(ready.problem, x).items()})
+                yield 0, _near(ready, [{n: float(v) for n, v in design_at(ready.problem, x).items()}], most=1)[0]
 
 
-def _seeds(ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None]) -> list[Array]:
-    """Points of the curve near each design, from the first guesses, with one variable held."""
-    tried = starting_points(ready.nlp, ready.problem, designs, _GUESSES)
-    every = [(x, h) for each, h in zip(tried, held, strict=True) for x in each]
-    y, found = _on_curve(ready, [x for x, _ in every], [h for _, h in every])
-    ends = np.cumsum([0, *map(len, tried)])
-    return [y[i:j][found[i:j]] for i, j in pairwise(ends)]
-
-
-def _nearest(ready: Traced, design: Mapping[str, float]) -> Array:
-    """A point of the curve near a design, from the best guess, or none."""
-    (tried,) = starting_points(ready.nlp, ready.problem, [design])
-    if tried:
-        mismatch = np.abs(rows_of(ready.on.evaluate, np.array(tried) / ready.on.scale)[0]).max(axis=1)
-        tried = [tried[int(np.argmin(mismatch))]]
-    y, found = _on_curve(ready, tried, [None] * len(tried))
-    return y[found]
-
-
-def _on_curve(ready: Traced, x: Sequence[Array], held: Sequence[int | None]) -> tuple[Array, Truth]:
-    """Where the variables x lead to, and whether that is a point of the curve in the box, not too far out."""
+def _near(
+    ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None] = (None,), most: int = _GUESSES
+) -> list[list[Array]]:
+    """Points of the curve in the box near each design, not too far out, from the best guesses, one variable held."""
     on, free = ready.on, len(ready.problem.free)
-    y = np.array(x).reshape(-1, len(on.scale)) / on.scale
-    if not len(y):
-        return y, np.zeros(0, dtype=bool)
-    y = projected(on.evaluate, y, held)
+    tried = starting_points(ready.nlp, ready.problem, designs)
+    if most == 1:
+        tried = [sorted(t, key=lambda x: np.abs(rows_of(on.evaluate, x[None] / on.scale)[0]).max()) for t in tried]
+    tried = [t[:most] for t in tried]
+    if not any(tried):
+        return [[] for _ in designs]
+    owner = [k for k, points in enumerate(tried) for _ in points]
+    y = projected(on.evaluate, np.concatenate([t for t in tried if t]) / on.scale, [held[k] for k in owner])
     inside = np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12), axis=1)  # not where it is nan
     inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, on.lower, on.upper)
     inside[inside] = ready.leads(coefficients(ready.problem, design_at(ready.problem, y[inside] * on.scale)))
-    return y, inside
+    return [[y[i] for i, of in enumerate(owner) if of == k and inside[i]] for k in range(len(designs))]

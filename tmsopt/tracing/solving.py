@@ -8,11 +8,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array
 
 _SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
-_DAMPING = 0.5 ** np.arange(1, 10)  # of a Gauss–Newton step that does not help
+_DAMPING = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step, the first that helps is taken
 _FINE = 1e-17  # of an interval: a zero at 0 up to rounding has no relative accuracy
+_AT_END = 1e-6  # of the value at one end of an interval: a value so small at the other is a zero there
 _EPS = 4 * np.finfo(float).eps
 _HALVINGS = 100  # steps towards a zero at most
 
@@ -29,58 +30,43 @@ def project(system: ca.Function, y: Array, held: int | None = None, steps: int =
 @np.errstate(over="ignore")
 def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: int = 40) -> Array:
     """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
-    found = np.full(y.shape, np.nan)
+    y, found = y.copy(), np.full(y.shape, np.nan)
     moving = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
     rows: NDArray[np.intp] = np.arange(len(y))
-    value, jacobian = evaluated(system, y)
     for _ in range(steps):
+        value, jacobian = evaluated(system, y[rows])
         proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
-        rows, y, value, jacobian = rows[proper], y[proper], value[proper], jacobian[proper]
+        rows, value, jacobian = rows[proper], value[proper], jacobian[proper]
         if not rows.size:
             break
-        size = np.abs(value).max(axis=1)
+        here, size = y[rows], np.abs(value).max(axis=1)
+        most = 1 + np.abs(here).max(axis=1)
         step = -np.linalg.pinv(jacobian * moving[rows, None], rcond=1e-12) @ value[..., None]
-        step, most = step[..., 0] * moving[rows], np.abs(y).max(axis=1)
-        ended = np.abs(step).max(axis=1) <= 1e-13 * (1 + most)
-        solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * (1 + most))
-        found[rows[solved]] = (y + step)[solved]
-        rows, y, size, step = rows[~ended], y[~ended], size[~ended], step[~ended]
-        if not rows.size:
-            break
-        trial, value, jacobian = y + step, *evaluated(system, y + step)
-        left = np.flatnonzero(~_lower(trial, value, size))
-        if left.size:  # the longest shorter step that helps: all are tried at once
-            tried = y[left] + _DAMPING[:, None, None] * step[left]
-            values, jacobians = evaluated(system, tried.reshape(-1, y.shape[1]))
-            lower = _lower(tried, values.reshape(*tried.shape[:2], -1), size[left])
-            pick = np.argmax(lower, axis=0) * len(left) + np.arange(len(left))
-            trial[left], value[left], jacobian[left] = (
-                part[pick] for part in (tried.reshape(-1, y.shape[1]), values, jacobians)
-            )
-            left = left[~np.any(lower, axis=0)]
+        step = step[..., 0] * moving[rows]
+        ended = np.abs(step).max(axis=1) <= 1e-13 * most
+        solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * most)
+        found[rows[solved]] = (here + step)[solved]
+        left = np.flatnonzero(~ended)
+        for share in _DAMPING:
+            if left.size:
+                trial = here[left] + share * step[left]
+                value = evaluated(system, trial)[0]
+                lower = np.all(np.isfinite(trial), axis=1) & (np.abs(value).max(axis=1) < size[left])
+                y[rows[left[lower]]] = trial[lower]
+                left = left[~lower]
         there = left[size[left] <= 1e-13]
-        found[rows[there]] = y[there]
-        better = np.ones(len(rows), dtype=bool)
-        better[left] = False
-        rows, y, value, jacobian = rows[better], trial[better], value[better], jacobian[better]
+        found[rows[there]] = here[there]
+        rows = np.delete(rows, [*np.flatnonzero(ended), *left])
     return found
-
-
-def _lower(y: Array, value: Array, size: Array) -> Truth:
-    """Where trials are finite and their mismatch is less than before."""
-    return np.asarray(np.all(np.isfinite(y), axis=-1) & (np.abs(value).max(axis=-1) < size))
-
-
-def crossing(function: Callable[[float], float], end: float) -> float:
-    """Where a function that changes sign on [0, end] is 0."""
-    return float(crossings(lambda s: np.array([function(float(s[0]))]), np.array([end]))[0])
 
 
 def crossings(function: Callable[[Array], Array], ends: Array) -> Array:
     """`crossing` on many intervals [0, end] at once, by Chandrupatla's method; nan where the sign does not change."""
     a, b = ends.astype(float), np.zeros(len(ends))
     fa, fb = function(a), function(b)
-    found = np.where(fb == 0, b, np.where(fa == 0, a, np.nan))
+    found = np.where(np.abs(fa) < np.abs(fb), a, b)
+    small, large = np.sort(np.abs([fa, fb]), axis=0)
+    found = np.where(small <= _AT_END * large, found, np.nan)  # at a point of the curve rounding may hide the change
     open_ = np.sign(fa) * np.sign(fb) < 0
     share = np.full(len(ends), 0.5)
     for _ in range(_HALVINGS):

@@ -5,30 +5,36 @@ the third, Fr, is then two linear equations p(r) = p′(r) = 0, so (Fr, r) param
 where the root is triple (EP3) and meets itself where a second pair is double (2EP2); cut there, every patch is smooth.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import refusal
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, plain
-from tmsopt.roots import determinant, is_stable, real_roots
-from tmsopt.tracing.branch import Trace
-from tmsopt.tracing.equations import Traced, prepare
-from tmsopt.tracing.solving import project
+from tmsopt.roots import is_stable, real_roots
+from tmsopt.roots.meetings import meeting
+from tmsopt.tracing.branch import EventPoint, Trace
+from tmsopt.tracing.equations import coefficients, design_at, limits_of
+from tmsopt.tracing.events import has_turned
+from tmsopt.tracing.solving import crossings
 from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]
+"""A double root and what is there: an edge of the surface, or of the box."""
+
+Parts = tuple[Array, Array, Array]
+"""Coefficients A, B, C of a polynomial A + x B + y C, where x and y are the last two variables."""
 
 _LEAST = 4  # degree
 
 _SCAN = 2000
+_SAME = 1e-12  # widths of the box
 _BESIDE = np.array([1e-7, 4e-5, 1e-4, 1e-3, 4e-3, 0.012])
 _AROUND = np.concatenate([-_BESIDE[::-1], _BESIDE])
 """Rows on either side of a value of Fr where the number of edges changes."""
@@ -100,90 +106,72 @@ def swallowtail(
 
     More: docs/how_to/tracing.md
     """
-    problem = pose(problem)
-    if problem.model.degree < _LEAST:
+    plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
+    if plane.model.degree < _LEAST:
         message = (
-            f"model '{problem.model.name}' has degree {problem.model.degree}; accepted: {_LEAST} or more, for a "
+            f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_LEAST} or more, for a "
             "swallowtail crosses itself where two double roots stand side by side; trace EP2 and EP3 instead"
         )
-        raise InputError([Fault(message, ("model",))])
-    if len(problem.free) != 3:
-        message = f"a surface takes three free parameters, and {len(problem.free)} are free"
-        raise InputError([Fault(message, ("parameters",))])
-    plain = problem.derive(constraints={}, minimize=None, maximize=None, locate=None)
-    names = list(plain.free)
-    axes = (names[0], names[1], names[2])
-    affine = _Affine(plain, axes)
-    cusps = trace(plain, "EP3", starts=starts, progress=progress)
-    crossing = trace(plain, "2EP2", starts=starts, progress=progress)
-    events = [*cusps.events, *crossing.events]
-    # The number of edges in a row changes at EP4, and at folds of the edges.
-    changes = [e for e in events if e.name == "EP4" or (e.name == "fold" and axes[0] in e.detail)]
-    low, high = plain.free[axes[0]]
-    grid = np.unique(
-        np.concatenate([np.linspace(low, high, rows), *(e.parameters[axes[0]] + _AROUND for e in changes)])
+        raise refusal(message, "model")
+    if len(plane.free) != 3:
+        raise refusal(f"a surface takes three free parameters, and {len(plane.free)} are free", "parameters")
+    first, *pair = plane.free
+    if not _is_affine(plane):
+        message = f"the coefficients are not affine in {' and '.join(pair)}; put two in which they are last"
+        raise refusal(message, "parameters")
+    cusps, crossing = (trace(plane, name, starts=starts, progress=progress) for name in ("EP3", "2EP2"))
+    grid = _rows(plane, rows, (*cusps.events, *crossing.events))
+    scan = np.union1d(
+        -np.geomspace(1e3, 1e-3, _SCAN), [b.unknowns["r"][e.index] for b in cusps.branches for e in b.events]
     )
-    grid = grid[(grid >= low) & (grid <= high)]
-    ready, cuts, steps = prepare(crossing.problem.posed), [], start_steps(progress, "cutting the surface", "row")
-    for done, value in enumerate(grid, 1):
-        cuts.append(_cuts(affine, float(value), crossing, ready))
+    cuts, steps = [], start_steps(progress, "cutting the surface", "row")
+    for done, value in enumerate(grid.tolist(), 1):
+        cuts.append(_cuts(plane, value, scan[scan < 0]))
         if steps:
             steps(done, len(grid))
     patches = []
     # Neighbouring rows with the same cuts in the same order belong to one set of patches.
     for _, run in groupby(range(len(grid)), key=lambda k: [[kind for _, kind in interval] for interval in cuts[k]]):
         inside = list(run)
-        if len(inside) < 2:
-            continue
-        for interval in range(len(cuts[inside[0]])):
-            table = np.array([[r for r, _ in cuts[k][interval]] for k in inside])
-            patches += [
-                _patch(affine, grid[inside], left, right, across)
-                for left, right in zip(table.T[:-1], table.T[1:], strict=True)
-            ]
-    return Swallowtail(plain.problem, axes, tuple(patches), cusps, crossing)
+        for intervals in zip(*(cuts[k] for k in inside), strict=True) if len(inside) > 1 else ():
+            table = np.array([[r for r, _ in interval] for interval in intervals])
+            patches += [_patch(plane, grid[inside], left, right, across) for left, right in pairwise(table.T)]
+    return Swallowtail(plane.problem, (first, pair[0], pair[1]), tuple(patches), cusps, crossing)
 
 
-class _Affine:
-    """Coefficients p = A + x B + y C in the affine pair (x, y), at a value of the first parameter."""
-
-    def __init__(self, problem: Posed, axes: Sequence[str]) -> None:
-        self.problem, self.axes = problem, axes
-        self._is_affine()
-
-    def at(self, first: float) -> tuple[Array, Array, Array]:
-        constant = self._coefficients(first, 0.0, 0.0)
-        return constant, self._coefficients(first, 1.0, 0.0) - constant, self._coefficients(first, 0.0, 1.0) - constant
-
-    def limits(self) -> Array:
-        """Least and greatest x and y, shape (2, 2)."""
-        of = self.problem.parameter_set
-        ends = (self.problem.free[n] for n in self.axes[1:])
-        return np.array([np.tan(e) if of[n].tangent else e for n, e in zip(self.axes[1:], ends, strict=True)])
-
-    def natural(self, x: Array, y: Array) -> tuple[Array, Array]:
-        of = self.problem.parameter_set
-        x, y = (np.arctan(v) if of[n].tangent else v for n, v in zip(self.axes[1:], (x, y), strict=True))
-        return x, y
-
-    def _coefficients(self, first: float, x: float, y: float) -> Array:
-        values = dict(zip(self.axes, (first, *(float(v) for v in self.natural(np.array(x), np.array(y)))), strict=True))
-        a = self.problem.model.coefficients(self.problem.ordered(values), self.problem.parameter_set)
-        return np.array([float(c) for c in a])
-
-    def _is_affine(self) -> None:
-        first = float(np.mean(self.problem.free[self.axes[0]]))
-        A, B, C = self.at(first)
-        for x, y in ((2.0, 3.0), (-1.0, 0.5)):
-            predicted = A + x * B + y * C
-            leeway = 1e-9 * np.abs(predicted).max()
-            if not np.allclose(self._coefficients(first, x, y), predicted, rtol=1e-9, atol=leeway):
-                pair = " and ".join(self.axes[1:])
-                message = f"the coefficients are not affine in {pair}; put two in which they are last"
-                raise InputError([Fault(message, ("parameters",))])
+def _rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Array:
+    """Values of the first parameter: evenly spaced, and around each at which the number of edges changes."""
+    name, (low, high) = next(iter(problem.free.items()))
+    changes = [
+        e.parameters[name] + _AROUND for e in events if e.name == "EP4" or (e.name == "fold" and name in e.detail)
+    ]
+    grid = np.unique(np.concatenate([np.linspace(low, high, count), *changes]))
+    grid = grid[(grid >= low) & (grid <= high)]
+    return np.asarray(grid[np.append(True, np.diff(grid) > _SAME * (high - low))])  # an EP4 is on every edge
 
 
-def _on_surface(parts: tuple[Array, Array, Array], r: Array) -> tuple[Array, Array]:
+def _polynomials(problem: Posed, x: Any) -> Array:
+    """Coefficients at variables x, tangents for angles, shape (designs, 3)."""
+    return coefficients(problem, design_at(problem, np.asarray(x)))
+
+
+def _parts(problem: Posed, first: float) -> Parts:
+    constant, one, other = _polynomials(problem, [(first, 0.0, 0.0), (first, 1.0, 0.0), (first, 0.0, 1.0)])
+    return constant, one - constant, other - constant
+
+
+def _is_affine(problem: Posed) -> bool:
+    first = float(np.mean(next(iter(problem.free.values()))))
+    A, B, C = _parts(problem, first)
+    for x, y in ((2.0, 3.0), (-1.0, 0.5)):
+        predicted = A + x * B + y * C
+        leeway = 1e-9 * np.abs(predicted).max()
+        if not np.allclose(_polynomials(problem, [(first, x, y)])[0], predicted, rtol=1e-9, atol=leeway):
+            return False
+    return True
+
+
+def _on_surface(parts: Parts, r: Array) -> tuple[Array, Array]:
     """x and y for which r is a double root: p(r) = p′(r) = 0 by Cramer's rule."""
     (A, B, C), (dA, dB, dC) = ([np.polyval(p, r) for p in parts], [np.polyval(np.polyder(p), r) for p in parts])
     with np.errstate(all="ignore"):
@@ -191,77 +179,50 @@ def _on_surface(parts: tuple[Array, Array, Array], r: Array) -> tuple[Array, Arr
         return (C * dA - A * dC) / size, (A * dB - B * dA) / size
 
 
-def _cuts(affine: _Affine, first: float, crossing: Trace, ready: Traced) -> list[list[Cut]]:
-    """For each interval of r inside the box, ascending: its ends, and the edges between them."""
-    parts = affine.at(first)
-    limits = affine.limits()
+def _cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
+    """For each interval of r inside the box, ascending: its ends, and the edges between them; `scan` has values of r.
 
-    def slack(r: Array) -> Array:
-        inside = zip(_on_surface(parts, r), limits, strict=True)
-        least = np.minimum(*(np.minimum(v - low, high - v) / (high - low) for v, (low, high) in inside))
-        return np.where(np.isfinite(least), least, -1.0)
+    Edges are zeros along r: of the slack to the box, of the other roots' polynomial at r (EP3), of its discriminant.
+    """
+    parts, (low, high) = _parts(problem, first), (limit[1:, None] for limit in limits_of(problem))
 
-    scan = -np.geomspace(1e3, 1e-3, _SCAN)
-    shown = slack(scan) > 0
-    bounds = np.flatnonzero(np.diff(np.concatenate([[0], shown.astype(int), [0]])))
-    edges = [(r, "EP3") for r in _triple(parts)] + [(r, "2EP2") for r in _doubles(affine, first, crossing, ready)]
-    intervals = []
-    for start, stop in zip(bounds[::2], bounds[1::2], strict=True):
-        ends = [scan[start], scan[stop - 1]]
-        for k, row in ((0, start), (1, stop)):
-            if 0 < row < _SCAN:
-                ends[k] = brentq(lambda r: float(slack(np.array(r))), scan[row - 1], scan[row])
-        low, high = float(ends[0]), float(ends[1])
-        between = sorted((r, kind) for r, kind in edges if low < r < high)
-        intervals.append([(low, "box"), *between, (high, "box")])
-    return intervals
+    def tests(r: Array) -> list[Array]:
+        x = np.stack(_on_surface(parts, r))
+        least = np.min(np.minimum(x - low, high - x) / (high - low), axis=0)
+        rest = _divided(_divided(parts[0][:, None] + np.tensordot(np.stack(parts[1:]), x, (0, 0)), r), r)
+        return [np.where(np.isfinite(least), least, -1.0), np.polyval(rest, r), meeting(list(rest))]
 
+    cuts: list[Cut] = []
+    values = tests(scan)
+    for k, kind in enumerate(("box", "EP3", "2EP2")):
+        rows = np.flatnonzero(has_turned(values[k]))
 
-def _triple(parts: tuple[Array, Array, Array]) -> list[float]:
-    """Real triple roots: p, p′ and p″ vanish together for some (x, y) exactly where their determinant does."""
-    rows = [[np.polyder(p, k).tolist() for p in parts] for k in range(3)]
-    found = np.roots(np.trim_zeros(np.array(determinant(rows)), "f"))
-    return [float(z.real) for z in found if abs(z.imag) <= 1e-9 * abs(z) and z.real < 0]
+        def value(s: Array, k: int = k, here: Array = scan[rows]) -> Array:
+            return tests(here + s)[k]
+
+        cuts += [(float(r), kind) for r in scan[rows] + crossings(value, np.diff(scan)[rows])]
+    ends = [r for r in (scan[0], scan[-1]) if values[0][r == scan][0] > 0]
+    cuts = sorted([*cuts, *((float(r), "box") for r in ends)])
+    boxes = [k for k, (_, kind) in enumerate(cuts) if kind == "box"]
+    return [cuts[i : j + 1] for i, j in zip(boxes[::2], boxes[1::2], strict=True)]
 
 
-def _doubles(affine: _Affine, first: float, crossing: Trace, ready: Traced) -> list[float]:
-    """Both double roots of every 2EP2 at this value of the first parameter."""
-    found: list[float] = []
-    for branch in crossing.branches:
-        along = branch.parameters[affine.axes[0]] - first
-        for k in np.flatnonzero(along[1:] * along[:-1] <= 0):
-            share = along[k] / (along[k] - along[k + 1]) if along[k] != along[k + 1] else 0.0
-            columns = [branch.parameters[n] for n in affine.axes] + list(branch.unknowns.values())
-            start = np.array([c[k] + share * (c[k + 1] - c[k]) for c in columns])
-            of = affine.problem.parameter_set
-            for index, name in enumerate(affine.axes):
-                start[index] = np.tan(start[index]) if of[name].tangent else start[index]
-            start[0] = first
-            end = project(ready.on.evaluate, start / ready.on.scale, held=0)
-            if end is None:
-                continue
-            b, c = (end * ready.on.scale)[3:5]
-            spread = b * b / 4 - c
-            if spread > 0:
-                found += [float(-b / 2 - np.sqrt(spread)), float(-b / 2 + np.sqrt(spread))]
-    return found
+def _divided(p: Array, r: Array) -> Array:
+    """Quotient of polynomials by s − r, coefficients first: Horner's rule."""
+    rows = [p[0]]
+    for row in p[1:-1]:
+        rows.append(row + rows[-1] * r)
+    return np.stack(rows)
 
 
-def _patch(affine: _Affine, grid: Array, left: Array, right: Array, across: int) -> Patch:
+def _patch(problem: Posed, grid: Array, left: Array, right: Array, across: int) -> Patch:
     share = (1 - np.cos(np.linspace(0, np.pi, across))) / 2  # crowds at the edges, where the surface turns
     r = left[:, None] + (right - left)[:, None] * share
-    x, y = np.empty_like(r), np.empty_like(r)
-    for k, first in enumerate(grid):
-        x[k], y[k] = _on_surface(affine.at(float(first)), r[k])
-    points = dict(zip(affine.axes, (np.broadcast_to(grid[:, None], r.shape), *affine.natural(x, y)), strict=True))
-    middle = (len(grid) // 2, across // 2)
-    damped = _damped(affine.at(float(grid[middle[0]])), float(x[middle]), float(y[middle]), float(r[middle]))
-    return Patch(points, r, damped)
-
-
-def _damped(parts: tuple[Array, Array, Array], x: float, y: float, r: float) -> bool:
-    """Whether the other two roots are real and negative as well, from the quotient by (s − r)²."""
-    A, B, C = parts
-    quotient = np.polydiv(A + x * B + y * C, np.array([1.0, -2 * r, r * r]))[0]
-    negative, _ = real_roots(quotient)
-    return bool(is_stable(quotient) and negative == len(quotient) - 1)
+    pairs = [_on_surface(_parts(problem, first), row) for first, row in zip(grid.tolist(), r, strict=True)]
+    x = np.stack([np.broadcast_to(grid[:, None], r.shape), *np.array(pairs).transpose(1, 0, 2)], axis=-1)
+    points = design_at(problem, x.reshape(-1, 3))
+    middle = len(grid) // 2, across // 2
+    p, root = _polynomials(problem, [x[middle]])[0], r[middle]
+    quotient = np.polydiv(p, np.array([1.0, -2 * root, root * root]))[0]  # by (s − r)²: the other roots
+    damped = bool(is_stable(quotient) and real_roots(quotient)[0] == len(quotient) - 1)
+    return Patch({n: column.reshape(r.shape) for n, column in points.items()}, r, damped)

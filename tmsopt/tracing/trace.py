@@ -1,10 +1,9 @@
 """Trace a root pattern through parameter space: every branch in the box, with its events."""
 
-import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -28,11 +27,12 @@ from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
-from tmsopt.tracing.branch import Branch, Event, Trace
-from tmsopt.tracing.continuation import SINGULAR, Walk, both_ways, contains, same
-from tmsopt.tracing.equations import design_at, prepare
-from tmsopt.tracing.events import describe
-from tmsopt.tracing.seeds import beyond_infinity, missed, seeds
+from tmsopt.tracing.branch import Branch, EventPoint, Trace
+from tmsopt.tracing.continuation import SINGULAR, Walk
+from tmsopt.tracing.description import describe
+from tmsopt.tracing.equations import prepare
+from tmsopt.tracing.events import Event, check_events
+from tmsopt.tracing.seeds import Line, beyond_infinity, missed, seeds, walk_new
 
 STARTS = 48
 STEP = 0.005
@@ -48,6 +48,7 @@ def trace(
     seed: int = 0,
     most: int = MOST,
     through: Sequence[Mapping[str, float]] = (),
+    events: Sequence[Event] = (),
     progress: Listener | None = None,
 ) -> Trace:
     """Every branch of a pattern in the box of the free parameters, one more of which is free than the pattern ties.
@@ -60,10 +61,12 @@ def trace(
             search ends when so many in a row find nothing new, and a branch far from all of them can be missed.
         most: points of a branch in one direction.
         through: designs (values of every free parameter, in the box) to begin at, before the others.
+        events: what to look for along the branches, besides the events that tmsopt knows.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
-        InputError: for an unknown pattern, when the equations do not leave a curve, or for options out of range.
+        InputError: for an unknown pattern, when the equations do not leave a curve, for options out of range, or where
+            the function of an event raises or gives no finite number.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # EP2 where c² = 4 k
@@ -74,57 +77,46 @@ def trace(
     More: docs/how_to/tracing.md
     """
     began = time.perf_counter()
-    problem = _asked(pose(problem), pattern)
-    _check(problem, step, starts, seed, most, through, progress)
+    problem, own = locate_pattern(pose(problem), pattern), check_events(events)
+    counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _FEWEST, None)
+    check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
     ready = prepare(problem)
     walks: list[Walk] = []
-    lines: list[dict[str, Array]] = []
-    walking, tried = 0.0, 0
-    sources = (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks))
-    for count, points in chain.from_iterable(sources):
-        tried = max(tried, count)
-        if steps:
-            steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
-        left = points
-        for known in walks:
-            left = left[~contains(ready.on, known, left)]
-        while len(left):
-            before = time.perf_counter()
-            found = both_ways(ready.on, left[0], step, most)
-            walking += time.perf_counter() - before
-            left = left[1:]
-            if found is not None and not any(same(found, w) for w in walks):
-                walks.append(found)
-                lines.append(design_at(problem, found.y * ready.on.scale))
-                left = left[~contains(ready.on, found, left)]
+    lines: list[Line] = []
+    tried = 0
+
+    def points() -> Iterator[list[Array]]:
+        nonlocal tried
+        for source in (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks)):
+            for count, found in source:
+                tried = max(tried, count)
+                if steps:
+                    steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
+                yield found
+
+    for _ in walk_new(ready.on, problem, points(), (step, most), walks, lines):
+        pass
     with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
-        branches = [b for b in (describe(ready, w) for w in walks) if b.residual <= _MET]  # not where it is nan
-    ordered = _meeting(sorted(branches, key=lambda b: -float(b.arclength[-1])), problem)
-    return Trace(problem.problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)
+        branches = [b for w in walks for b in describe(ready, w, own) if b.residual <= _MET]  # not where it is nan
+    branches.sort(key=lambda b: -float(b.arclength[-1]))
+    ordered = tuple(_with_crossings(b, problem) for b in branches)
+    seconds = time.perf_counter() - began
+    return Trace(problem.problem, str(problem.locate), ordered, tried, seconds, sum(w.seconds for w in walks))
 
 
-def _meeting(branches: Sequence[Branch], problem: Posed) -> tuple[Branch, ...]:
-    """The branches, with a word at singular ends that lie together: cusps or crossings, known to fewer digits."""
-    widths = {n: high - low for n, (low, high) in problem.free.items()}
-    ends = [e for b in branches for e in b.events if e.name == "end" and e.detail == SINGULAR]
+def _with_crossings(branch: Branch, problem: Posed) -> Branch:
+    """The branch, with a word at singular ends where roots meet and eigenvectors do not."""
 
-    def said(event: Event) -> Event:
-        if not any(event is e for e in ends):
-            return event
-        if problem.pattern is not None and is_crossing(problem, problem.pattern, event.parameters):
-            return replace(event, detail=CROSSING)
-        apart = [max(abs(event.parameters[n] - e.parameters[n]) / w for n, w in widths.items()) for e in ends]
-        near = min((d for d, e in zip(apart, ends, strict=True) if e is not event), default=math.inf)
-        if near > _NEAR:
-            return event
-        words = f"{SINGULAR}; {near:.0e} of the box from another such end: most likely one point, its last digits wrong"
-        return replace(event, detail=words)
+    def is_crossed(event: EventPoint) -> bool:
+        singular = event.name == "end" and event.detail == SINGULAR
+        return singular and is_crossing(problem, pattern_of(problem.model, branch.pattern), event.parameters)
 
-    return tuple(replace(b, events=tuple(said(e) for e in b.events)) for b in branches)
+    events = (replace(e, detail=CROSSING) if is_crossed(e) else e for e in branch.events)
+    return replace(branch, events=tuple(events))
 
 
-def _asked(problem: Posed, name: str | None) -> Posed:
+def locate_pattern(problem: Posed, name: str | None) -> Posed:
     """The problem with the pattern as its only question, checked to leave a curve."""
     name = name or problem.locate
     names = patterns_of(problem.model)
@@ -155,33 +147,33 @@ def _asked(problem: Posed, name: str | None) -> Posed:
     return asked
 
 
-def _check(
+def check_options(
     problem: Posed,
-    step: float,
-    starts: int,
-    seed: int,
-    most: int,
-    through: Sequence[Mapping[str, float]],
-    progress: Listener | None,
+    step: Any,
+    *counts: tuple[str, Any, int, int | None],
+    through: Any = (),
+    progress: Any = None,
 ) -> None:
-    faults = [*count_faults("starts", starts, 0, MOST_STARTS), *count_faults("seed", seed, 0)]
-    faults += count_faults("most", most, _FEWEST)
-    faults += [*call_faults("progress", progress), *list_faults("through", through, "[{'Fr': 1.2, 'mu': 0.1}]")]
+    """What is wrong with options: counts by name, value, least and most.
+
+    Raises:
+        InputError: with all faults.
+    """
+    faults = [fault for count in counts for fault in count_faults(*count)]
+    faults += [*call_faults("progress", progress), *list_faults("through", through, _DESIGN)]
     if not is_number(step) or not STEPS[0] <= step <= STEPS[1]:
         faults.append(Fault(f"found {step!r}; accepted: a number from {STEPS[0]:g} to {STEPS[1]:g}", ("step",)))
     for design in through if not faults else ():
-        if wrong := table_faults("through", design, "{'Fr': 1.2, 'mu': 0.1}"):
+        if wrong := table_faults("through", design, _DESIGN):
             faults += wrong
-            continue
-        if set(design) != set(problem.free):
+        elif set(design) != set(problem.free):
             names = ", ".join(problem.free)
             faults.append(Fault(f"found {', '.join(design) or 'nothing'}; accepted: each of {names}", ("through",)))
-            continue
-        for n, value in design.items():
-            low, high = problem.free[n]
-            if not is_number(value) or not low <= value <= high:
-                message = f"{n} = {short(value)} lies outside the box; accepted: {low:g} to {high:g}"
-                faults.append(Fault(message, ("through",)))
+        else:
+            for n, (low, high) in problem.free.items():
+                if not is_number(design[n]) or not low <= design[n] <= high:
+                    message = f"{n} = {short(design[n])} lies outside the box; accepted: {low:g} to {high:g}"
+                    faults.append(Fault(message, ("through",)))
     if faults:
         raise InputError(faults)
 
@@ -189,6 +181,6 @@ def _check(
 STEPS = (1e-6, 0.1)
 """Least and greatest longest step."""
 
+_DESIGN = "{'Fr': 1.2, 'mu': 0.1}"
 _FEWEST = 4  # points that make a curve with tangents
 _MET = 1e-3  # mismatch of the coefficients beyond which a curve is none of the pattern
-_NEAR = 1e-3  # widths of the box between ends that are one singular point: the equations lose digits there

@@ -1,25 +1,21 @@
-"""Points along a traced curve: parameters, values, stability, and the functions of them whose zeros are events."""
+"""Points along a traced curve: parameters, quantities, unknowns of the pattern, stability."""
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from tmsopt.models import Values
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import lienard_chipart, roots
-from tmsopt.roots.meetings import CLOSED, balance, nearest_two
+from tmsopt.roots.meetings import CLOSED, balance
 from tmsopt.roots.patterns.pattern import mean_size
+from tmsopt.tracing.branch import name_unknowns
 from tmsopt.tracing.equations import Traced
 
 NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
-
-CHANGES = "stability changes"
-"""Detail of the marks that count only where they change it."""
 
 _ROUNDED = 1e-14  # a tangent, its inverse and the scale, or a real part beside the modulus: some roundings
 _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
@@ -65,6 +61,21 @@ class Points:
         problem = self.ready.problem
         return Values(problem.model, problem.parameter_set, self.parameters, extra=extra)
 
+    def __getitem__(self, name: str) -> Array:
+        """A parameter, a quantity of the model or of the roots, or an unknown of the pattern, shape (n,)."""
+        return self.named_unknowns[name] if name in self.named_unknowns else self.column(self.values[name])
+
+    @property
+    def names(self) -> list[str]:
+        """What `__getitem__` takes."""
+        return [*self.values, *self.named_unknowns]
+
+    @cached_property
+    def named_unknowns(self) -> dict[str, Array]:
+        """The unknowns by name."""
+        pattern = self.ready.pattern
+        return name_unknowns(pattern.name, dict(zip(pattern.unknowns, self.unknowns, strict=True)), self.parameters)
+
     @cached_property
     def stable(self) -> Truth:
         """Where the other roots lie left of the imaginary axis by more than rounding; none count as stable."""
@@ -82,7 +93,7 @@ class Points:
         inside = np.ones(len(self), dtype=bool)
         for condition in self.ready.problem.conditions.values():
             if not condition.equality:
-                inside &= condition.holds(self.excess(condition))
+                inside &= condition.holds(self.column(condition(self.values)))
         return inside
 
     @property
@@ -97,10 +108,6 @@ class Points:
             size = np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k
             worst = np.maximum(worst, np.abs(a - a0 * c) / np.where(size == 0, 1.0, size))  # 0: roots that are all 0
         return worst
-
-    def excess(self, condition: Expression) -> Array:
-        """The difference of the sides of a constraint."""
-        return self.column(condition(self.values))
 
     @property
     def special(self) -> list[str]:
@@ -120,18 +127,6 @@ class Points:
     def _others(self) -> Complex:
         """The roots that the pattern does not tie."""
         return roots_along(self.ready.pattern.remaining(self.unknowns), len(self))
-
-
-Monitor = Callable[[Points], Array]
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A function of points whose zeros are events."""
-
-    name: str
-    detail: str
-    value: Monitor
 
 
 def _within(v: Array, low: float, high: float) -> Array:
@@ -156,41 +151,6 @@ def on_axis(z: Complex) -> Truth:
     return np.asarray(np.abs(z.real) <= _ROUNDED * np.abs(z))
 
 
-def marks(points: Points) -> Iterator[Mark]:
-    """Everything that may be an event of a curve."""
-    ready, problem = points.ready, points.ready.problem
-
-    def margin(number: int, k: int) -> Monitor:
-        return lambda p: margins(ready.pattern.remaining(p.unknowns)[number])[k]
-
-    def turn(k: int) -> Monitor:  # by the arclength in the parameters: the unknowns may move much faster
-        return lambda p: p.t[:, k] / (np.linalg.norm(p.t[:, : len(problem.free)], axis=1) + 1e-300)
-
-    for name in ready.pattern.marks:
-        yield Mark(name, "", partial(Points.mark, name=name))
-    if ready.pattern.form == "EP2" and "2EP2" in points.special:
-        # q(r) has a double zero where r is the double root of q
-        yield Mark("EP4", "", lambda p: p.unknowns[0] - nearest_two(ready.pattern.factors(p.unknowns)[-1]))
-    for number, factor in enumerate(ready.pattern.remaining(points.unknowns)):
-        for k in range(len(margins(factor))):  # the first quantity is the constant term
-            yield Mark("weave" if k else "capsize", CHANGES, margin(number, k))
-    for k, parameter in enumerate(problem.free):
-        yield Mark("fold", parameter, turn(k))
-    for name, condition in problem.conditions.items():
-        if not condition.equality:
-            yield Mark("constraint", name, partial(Points.excess, condition=condition))
-
-
 def margins(factor: list[Any]) -> list[Any]:
     """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
     return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], balance(factor)]
-
-
-def sign_changes(value: Array) -> Truth:
-    """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
-    sign = np.sign(value)
-    if np.any(sign):
-        sign[0] = sign[0] or sign[np.flatnonzero(sign)[0]]
-    for k in range(1, len(sign)):
-        sign[k] = sign[k] or sign[k - 1]
-    return np.asarray(sign[1:] * sign[:-1] < 0)

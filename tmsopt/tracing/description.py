@@ -1,0 +1,222 @@
+"""From a walked curve to branches in the parameters of the problem, with what happens along them among their points."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from tmsopt.records import Array, Table
+from tmsopt.roots import Pattern, pattern as pattern_of
+from tmsopt.tracing.branch import Branch, EventPoint
+from tmsopt.tracing.continuation import CLOSED, End, Walk
+from tmsopt.tracing.equations import Traced, prepare
+from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, points_of, refine
+from tmsopt.tracing.points import Points, roots_along
+from tmsopt.tracing.solving import project
+
+_NEAR = 1e-3  # distance within which an EP4 is looked for near an EP3 and a 2EP2
+_LOW = 1e-2  # of the marks next to a place where they may touch 0: they grow with the square of a step of 0.1
+_EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
+_SAME_DESIGN = 1e-6
+"""Like `TOGETHER`, in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
+_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+
+_SQUARE = 1e-9  # of a coefficient
+
+_EP4 = Event("EP4", lambda points: points.residual)  # located by equations of its own
+
+Happened = tuple[int, Event]
+"""A row of a walk and what happens there."""
+
+
+def describe(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
+    """A walked curve as one branch, or as several where events stop it, with its events among its points."""
+    walked, happened = find_events(ready, _trim(ready, walked), events)
+    if walked.closed and (stops := [row for row, event in happened if event.stop]):
+        first, around = stops[0], len(walked.y) - 1
+        y, t = (np.concatenate([column[first:], column[1 : first + 1]]) for column in (walked.y, walked.t))
+        walked = replace(walked, y=y, t=t)
+        happened = [((row - first) % around, event) for row, event in happened]
+        happened += [(around, event) for row, event in happened if row == 0]
+    why = {row: End(event.name) for row, event in happened if event.stop}
+    for low, high in pairwise(sorted({0, len(walked.y) - 1, *why})):
+        ends = why.get(low, walked.ends[0]), why.get(high, walked.ends[1])
+        part = Walk(walked.y[low : high + 1], walked.t[low : high + 1], ends)
+        yield make_branch(ready, part, [(row - low, event) for row, event in happened if low <= row <= high])
+
+
+def find_events(ready: Traced, walked: Walk, events: Sequence[Event]) -> tuple[Walk, list[Happened]]:
+    """A walk with its events among its points, and at which rows they are."""
+    walked = refine(ready, walked, events)
+    groups = list(_groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free)))
+    rows, walked = insert(walked, [group[0] for group in groups])
+    return walked, [(row, event) for row, group in zip(rows, groups, strict=True) for event in _named(group, events)]
+
+
+def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch:
+    """A walk in the parameters of the problem."""
+    problem, pattern, points = ready.problem, ready.pattern, points_of(ready, walked)
+    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a quadratic factor: exact, or it scatters by 1e-8
+        b, c = (points.x[:, ready.unknowns.stop - k] for k in (2, 1))
+        for row in {row for row, event in happened if "EP" in event.name}:
+            c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE * abs(c[row]) else c[row]
+    kinds = pattern.kind(points.unknowns)
+    for name in points.special:
+        kinds[:] = name
+    for row, event in happened:
+        if event.name in pattern.marks or event.name == "EP4":
+            kinds[row] = event.name
+    named = [(row, event.name, event.detail) for row, event in happened]
+    if not walked.closed:
+        ends = zip((0, len(points) - 1), walked.ends, strict=True)
+        named += [(row, "end", describe_end(ready, end)) for row, end in ends]
+    off, columns = points.residual, points.parameters
+    found = [
+        EventPoint(name, detail, Table({n: float(c[row]) for n, c in columns.items()}), row, float(off[row]))
+        for row, name, detail in sorted(named, key=lambda n: n[0])
+    ]
+    steps = np.diff(walked.y, axis=0)[:, : len(problem.free)]
+    return Branch(
+        pattern=str(problem.locate),
+        parameters=columns,
+        unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
+        tangent=dict(zip(problem.free, _natural_tangent(points).T, strict=True)),
+        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
+        kinds=kinds,
+        stable=points.stable,
+        heavily_damped=points.heavily_damped,
+        satisfied=points.satisfied,
+        abscissa=points["abscissa"],
+        events=tuple(found),
+        closed=walked.closed,
+        residual=float(np.max(off)),
+        eigenfrequency=_eigenfrequency(points),
+    )
+
+
+def _eigenfrequency(points: Points) -> dict[str, Array] | None:
+    """Of a complex system ω = i s of a multiple root, of s² + bs + c less the carrier; None of a real one."""
+    carrier, pattern = points.ready.problem.model.carrier, points.ready.pattern
+    if carrier is None:
+        return None
+    if not pattern.form.startswith("CEP") or pattern.unknowns[:2] != ("b", "c"):
+        return {}
+    b, c = points.unknowns[:2]
+    return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
+
+
+def _groups(found: Sequence[Found], free: int) -> Iterator[list[Found]]:
+    """Events along the curve, those at one place together, the first of the list first: it says where that is."""
+    group: list[int] = []
+    for k in sorted(range(len(found)), key=lambda k: (found[k].after, found[k].s)):
+        apart = np.abs(found[k].y - found[group[-1]].y) if group else np.zeros(1)
+        if apart.max() > TOGETHER * (1 + np.abs(found[k].y).max()) and apart[:free].max() > _SAME_DESIGN:
+            yield [found[i] for i in sorted(group)]
+            group = []
+        group.append(k)
+    if group:
+        yield [found[i] for i in sorted(group)]
+
+
+def _named(group: Sequence[Found], events: Sequence[Event]) -> Iterator[Event]:
+    """What happens at one place: the most special event of the package, the others in its detail; then a user's."""
+    own = [f.event for f in group if f.event not in events]
+    if own:
+        names = {e.name for e in own}
+        name = "double zero" if {"weave", "capsize"} <= names else own[0].name
+        folds = dict.fromkeys(e.detail for e in own if e.name == "fold")
+        words = [f"beside an {higher}"] if (higher := _beside(name, names)) else []
+        for e in own:
+            if e.name != "fold" and ("EP" not in e.name or e.name == "EP2"):
+                words.append(e.detail if e.name == name else f"{e.name} {e.detail}".strip())
+        if name == "EP3" and len(folds) > 1:
+            words.append("cusp")
+        elif folds:
+            words.append(("" if name == "fold" else "fold in ") + ", ".join(folds))
+        yield replace(own[0], name=name, detail="; ".join(filter(None, dict.fromkeys(words))))
+    yield from (f.event for f in group if f.event in events)
+
+
+def _beside(name: str, names: set[str]) -> str:
+    """EP(k+1) where EPk and EP(k−1)+EP2, the two ways in which EP(k−1) comes near it, are at one place; else empty."""
+    match = re.fullmatch(r"EP(\d+)", name)
+    order = int(match[1]) if match else 0
+    return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
+
+
+def _natural_tangent(points: Points) -> Array:
+    """Derivative of the free parameters by the arclength in widths of the box."""
+    problem, t, scale = points.ready.problem, points.t, points.ready.on.scale
+    of = problem.parameter_set
+    slopes = [1 / (1 + v**2) if of[n].tangent else 1.0 + 0 * v for n, v in zip(problem.free, points.x.T, strict=False)]
+    along = t[:, : len(slopes)]
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(along * scale[: len(slopes)] * np.transpose(slopes) / (size + 1e-300))
+
+
+def _trim(ready: Traced, walked: Walk) -> Walk:
+    """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
+    with np.errstate(all="ignore"):
+        good = np.flatnonzero(points_of(ready, walked).residual <= _FITTING)
+    if walked.closed or not good.size:
+        return walked
+    inside = slice(int(good[0]), int(good[-1]) + 1)
+    return replace(walked, y=walked.y[inside], t=walked.t[inside])
+
+
+def describe_end(ready: Traced, end: End) -> str:
+    """Why a curve ends, in words."""
+    if end.limit is None:
+        return end.reason if end.reason != CLOSED else ""
+    free = list(ready.problem.free)
+    if end.limit < len(free):
+        return f"{free[end.limit]}.{end.reason}"
+    name = ready.pattern.unknowns[end.limit - len(free)]
+    return ready.pattern.ends.get(name, "the other roots reach a limit of the search")
+
+
+def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> list[Found]:
+    """The events, each EP4 exact and first; where symmetry takes a curve through one, it is located to 1e-6 only.
+
+    On a curve of EP2 it is where EP3 and 2EP2 vanish at once: in a section through it they only touch 0.
+    """
+    marks = ("EP3", "2EP2") if ready.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*ready.pattern.marks} else ()
+
+    def height(points: Points) -> Array:
+        return np.asarray(sum(np.abs(points.mark(name)) for name in marks))
+
+    near = [f for f in found if f.event.name == "EP4"]
+    if marks:
+        value = height(points_of(ready, walked))
+        least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
+        named = [f for f in found if f.event.name in marks]
+        near += [f for f in named if height(Points(ready, f.y[None] * ready.on.scale, f.t[None]))[0] < _LOW]
+        near += [Found(_EP4, walked.y[k], walked.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
+    exact = [e for f in near if (e := _exact_EP4(ready, walked, f)) is not None]
+    return [*exact, *found]
+
+
+def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
+    """The EP4 next to an event, by its own equations; None if there is none."""
+    problem, pattern, scale = ready.problem, ready.pattern, ready.on.scale
+    free, special = len(problem.free), prepare(problem.derive(constraints={}), pattern_of("EP4", problem.model.degree))
+    start, unit = found.y * scale, special.on.scale
+    guess = _converted(pattern, start[ready.unknowns], special.pattern)
+    end = project(special.on.evaluate, np.array([*start[:free], *guess]) / unit)
+    if end is None or np.abs(end[:free] - found.y[:free]).max() > _NEAR:
+        return None
+    if Points(special, end[None] * unit, found.t[None]).residual[0] > _EXACT:
+        return None  # a section next to an EP4, not through it
+    exact = found.y.copy()
+    exact[:free] = end[:free]
+    exact[ready.unknowns] = _converted(special.pattern, (end * unit)[free:], pattern) / scale[ready.unknowns]
+    k = int(np.argmin(np.abs(walked.y - exact).max(axis=1)))
+    s = float(walked.t[k] @ (exact - walked.y[k]))
+    return Found(_EP4, exact, found.t, k if s >= 0 else k - 1, s)
+
+
+def _converted(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:
+    """Unknowns of another pattern, for the roots that this one has."""
+    return np.array(other.guesses(roots_along(pattern.factors(list(unknowns)), 1)[0])[0])

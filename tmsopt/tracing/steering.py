@@ -1,0 +1,143 @@
+"""One curve followed by hand: an iterator of its points, which a user stops, turns round and listens to."""
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from tmsopt.errors import refusal
+from tmsopt.problem import Solution
+from tmsopt.problem.files import Given, pose
+from tmsopt.records import Table
+from tmsopt.tracing.branch import BranchPoint
+from tmsopt.tracing.continuation import CLOSED, CurvePoint, CurveSteps, End, Walk, tangent_at
+from tmsopt.tracing.description import describe_end, find_events, make_branch
+from tmsopt.tracing.equations import Traced, prepare
+from tmsopt.tracing.events import TOGETHER, Event, check_events
+from tmsopt.tracing.seeds import seeds
+from tmsopt.tracing.trace import STARTS, STEP, check_options, locate_pattern
+
+
+def continue_from(
+    problem: Given,
+    pattern: str | None = None,
+    *,
+    through: Mapping[str, float] | None = None,
+    step: float = STEP,
+    events: Sequence[Event] = (),
+) -> "Continuation":
+    """Follow one curve of a pattern point by point, from a point near a design.
+
+    Args:
+        problem: as for `trace`; of a solution, its design is where the curve begins.
+        pattern: name; by default the one that the problem locates.
+        through: the design to begin near, a value for every free parameter; by default the one of a solution, or the
+            first from which the search of `trace` finds a point.
+        step: longest step, in widths of the box.
+        events: what to look for, besides the events that tmsopt knows.
+
+    Raises:
+        InputError: as `trace`, and where no point of the pattern is found.
+
+    Example:
+        >>> fast = tmsopt.Event("Fr is 3", lambda p: p["Fr"] - 3)
+        >>> curve = tmsopt.continue_from("problems/ep_set.toml", events=[fast])
+        >>> reached = next(point for point in curve if "Fr is 3" in point.events)
+        >>> f"{reached.parameters['Fr']:.9f}"
+        '3.000000000'
+
+    More: docs/how_to/tracing.md
+    """
+    if through is None and isinstance(problem, Solution):
+        through = {name: problem.parameters[name] for name in problem.problem.free}
+    posed, own = locate_pattern(pose(problem), pattern), check_events(events)
+    designs = [] if through is None else [through]
+    check_options(posed, step, through=designs)
+    ready = prepare(posed)
+    for _, points in seeds(ready, 0 if designs else STARTS, 0, designs, []):
+        for y in points:
+            try:
+                return Continuation(ready, CurvePoint(y, tangent_at(ready.on, y)), step, own)
+            except ValueError:  # no regular point of a curve
+                continue
+    near = "near the design" if designs else "in the box"
+    raise refusal(f"no point of {posed.locate} found {near}; give another one to begin at", "through")
+
+
+class Continuation(Iterator[BranchPoint]):
+    """Iterator of the points of one curve, events located among them; `continue_from` makes it.
+
+    It ends where the curve leaves the box, closes or has no direction, and at an event that stops it. Stop before by
+    asking for no more points.
+
+    Attributes:
+        end: in words, why there are no more points; empty while there are.
+
+    Example:
+        >>> curve = tmsopt.continue_from("problems/ep_set.toml", step=0.02)
+        >>> ahead = [point.parameters["lambda_s"] for point in curve]
+        >>> curve.end
+        'Fr.max'
+        >>> curve.reverse()
+        >>> back = [point.parameters["lambda_s"] for point in curve]
+        >>> curve.end, ahead[0] in (min(back), max(back)), len(back) > len(ahead)
+        ('Fr.max', False, True)
+
+    More: docs/how_to/tracing.md
+    """
+
+    end: str
+
+    def __init__(self, ready: Traced, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
+        self._ready, self._step, self._events = ready, step, events
+        self._sign, self._arclength, self._last = 1, 0.0, start
+        self._begin(start, fresh=True)
+
+    def __next__(self) -> BranchPoint:
+        try:
+            self._last, point = next(self._points)
+        except StopIteration as stop:
+            self.end = self.end or stop.value
+            raise
+        self._arclength = point.arclength
+        return point
+
+    def reverse(self) -> None:
+        """Turn round at the last point: the next one lies behind it."""
+        self._sign = -self._sign
+        self._begin(CurvePoint(self._last.y, -self._last.t), fresh=False)
+
+    def _begin(self, start: CurvePoint, fresh: bool) -> None:
+        self.end, self._points = "", self._follow(start, fresh)
+
+    def _follow(self, start: CurvePoint, fresh: bool) -> Generator[tuple[CurvePoint, BranchPoint], None, str]:
+        """Points from the next on, or from the start on where it is `fresh`; why there are no more is returned."""
+        steps, behind = CurveSteps(self._ready.on, start, self._step), [start]
+        for new in steps:
+            y, t = (np.array([getattr(p, name) for p in (*behind, new)]) for name in "yt")
+            walked, happened = find_events(self._ready, Walk(y, t, (End(""), End(""))), self._events)
+            branch, arclength = make_branch(self._ready, walked, happened), self._arclength
+            first = int(np.flatnonzero(np.all(walked.y == behind[-1].y, axis=1))[-1])
+            for row in range(first + (not fresh), len(walked.y)):
+                events = [event for at, event in happened if at == row]
+                again = len(behind) == 1 and np.abs(walked.y[row] - start.y).max() <= TOGETHER  # it turned round there
+                if (events and not again) or row == len(walked.y) - 1 or (fresh and row == first):
+                    columns = (branch.parameters, branch.unknowns, branch.tangent)
+                    parameters, unknowns, tangent = (Table({n: float(c[row]) for n, c in m.items()}) for m in columns)
+                    yield (
+                        CurvePoint(walked.y[row], walked.t[row]),
+                        BranchPoint(
+                            parameters,
+                            unknowns,
+                            tangent,
+                            arclength + self._sign * float(branch.arclength[row] - branch.arclength[first]),
+                            str(branch.kinds[row]),
+                            bool(branch.stable[row]),
+                            float(branch.abscissa[row]),
+                            tuple(event.name for event in events),
+                        ),
+                    )
+                    if stop := [event.name for event in events if event.stop]:
+                        return stop[0]
+            behind, fresh = [behind[-1], new], False
+        assert steps.end is not None
+        return CLOSED if steps.end.reason == CLOSED else describe_end(self._ready, steps.end)
