@@ -8,7 +8,7 @@ import inspect
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sized
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -63,7 +63,8 @@ def _entry(face: str, module: ModuleType, name: str) -> str:
         return f".. autoclass:: tmsopt.{path}\n   :members:\n"
     if callable(found):
         return f".. autofunction:: tmsopt.{path}\n"
-    text = repr(found) if len(repr(found)) < 90 else f"{type(found).__name__} of {len(found)}"
+    size = f" of {len(found)}" if isinstance(found, Sized) else ""
+    text = repr(found) if len(repr(found)) < 90 else f"{type(found).__name__}{size}"
     return f".. py:data:: tmsopt.{path}\n\n   ``{text}``\n"
 
 

@@ -504,7 +504,7 @@ def test_an_infeasible_problem_has_a_page(tmp_path, run):
 def test_a_design_so_far_has_a_page(tmp_path):
     for status, said in (
         ("not_converged", "stopped before the end, the best design so far"),
-        ("optimal", "starts, stopped before it was proved"),
+        ("optimal", ", stopped before it was proved"),
     ):
         tmsopt.save_report(
             replace(design(), status=status, interrupted=True, bound=tmsopt.Bound()), tmp_path / "p.html"

@@ -177,7 +177,7 @@ class Box:
     def without(self, limit: str) -> Looked:
         """Designs far from each other that violate the other limits least, refined; all of them count for no limit."""
         ignored = [name == limit for name in self.problem.conditions]
-        others = replace(self, scales=np.where(ignored, np.inf, self.scales))
+        others = replace(self, scales=np.where(ignored, 1e300, self.scales))
         seen = _looked(self.drawn.u, self.judged, others.scales)
         found = others.refine(
             others.approach_limits(seen.best(self.tuning.ranked).apart(self.tuning.leaders, self.tuning.apart))
