@@ -7,7 +7,13 @@ from benchmarks.suites.statements.remedies import infeasible_files
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["robots 10", "bicycles 4"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("robots 10", marks=pytest.mark.xfail(reason="the advice leads to a design that has no best one")),
+        "bicycles 4",
+    ],
+)
 def test_what_is_advised_leads_to_an_answer(name):
     """Robots 10: beside the smallest change there is no best design, for it improves towards a0 = 0."""
     file = next(file for file in infeasible_files(60) if file[0] == name)
