@@ -37,6 +37,7 @@ _SHARE = 1e-3  # of a range, by which a parameter is moved to see whether a0 dep
 
 UNCLEAR = "rounding leaves too little of the coefficients to tell the roots apart; keep a0 and the roots away from 0"
 UNBOUNDED = "unbounded, as far as was looked: what this design reaches is far below all else; limit what it divides by"
+BEATEN = "where a start of the solver ended: not known to be an optimum, but better than those that are"
 KEPT = "the best design that was looked at; no start of the solver ended as good"
 
 
@@ -235,6 +236,27 @@ def demote(state: SearchState, outcome: Outcome) -> Outcome:
     if not words:
         return outcome
     return replace(outcome, status="not_converged", without_best=True, notes=(*outcome.notes, words))
+
+
+def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
+    """An optimum, or the design at an end that beats it, which is known to be none: in its own worst cases too."""
+    problem, tuning = state.problem, state.tuning
+    if outcome.status != "optimal" or state.sample is None or problem.objective is None:
+        return outcome
+    box, worth = state.sample.box, problem.sign * outcome.checked.objective
+    least = worth - tuning.lost * (state.nlp.size + abs(worth))
+    own = box.space.points(outcome.parameters)
+    points = [box.space.points(design) for design in state.designs]
+    apart = [u for u in points if np.abs(u - own).max() > tuning.same_design]
+    for design in box.designs(
+        box.look(np.array(apart).reshape(-1, box.space.size)).better(least).best(tuning.appealed)
+    ):
+        other = as_it_is(problem, design, BEATEN)
+        merged = abs(other.checked.structure.abscissa - other.checked.realised)  # what merging roots may gain
+        sound = not other.checked.violations and not is_unclear(problem, other.checked)
+        if sound and problem.sign * other.checked.objective < least - merged:
+            return replace(other, starts=outcome.starts, formulation=outcome.formulation)
+    return outcome
 
 
 def runs_away(roots: Sequence[Root], ratio: float = TUNING.runaway) -> bool:

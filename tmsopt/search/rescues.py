@@ -164,7 +164,11 @@ def move_aside(state: SearchState, policy: Policy) -> SearchState:
     seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, size))
     close = (seen.violation == 0) & (np.abs(seen.worth - end.objective) <= tuning.edge * (1 + abs(end.objective)))
     whole = check_end(state, end)
-    for design in box.designs(seen.take(np.flatnonzero(close)[: tuning.kept])):
+    designs = (
+        {n: whole.parameters[n] for n in state.problem.free},
+        *box.designs(seen.take(np.flatnonzero(close)[: tuning.kept])),
+    )
+    for design in designs:  # that of the end first
         checked = state.recheck(design)
         moved = replace(whole, parameters=state.problem.ordered(design), checked=checked)
         exact = certified_numbers(state.problem, moved.parameters, checked, state.nlp.cases).value
@@ -249,7 +253,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
         if not state.problem.sign * own.best.checked.objective < least:
             continue
         ends, least = (*state.ends, *own.ends), least_worth(own, tuning.finer)
-        state = replace(own, ends=ends, accepted=len(ends))
+        state = replace(own, ends=ends, accepted=len(ends), kept=None, words="")
         if singular:
             goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * reached.objective:.9g}"
             words = f"no best design: it improves {goal}; {mass_advice(state.problem)}"

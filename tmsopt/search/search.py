@@ -6,7 +6,7 @@ from tmsopt.problem.quantities import RADIUS
 from tmsopt.search.accept import accept_best
 from tmsopt.search.enough import count_starts, is_enough
 from tmsopt.search.local import run_from
-from tmsopt.search.outcome import KEPT, Outcome, as_it_is, demote, found
+from tmsopt.search.outcome import KEPT, Outcome, as_it_is, demote, demote_if_beaten, found
 from tmsopt.search.policy import Policy, search
 from tmsopt.search.radius import RADIUS_POLICY
 from tmsopt.search.rescues import RESCUES
@@ -36,7 +36,7 @@ def outcome_of(state: SearchState, policy: Policy) -> Outcome | None:
         kept = replace(as_it_is(problem, state.kept, state.words), status="not_converged", starts=starts)
         return demote(state, replace(kept, formulation=state.nlp.formulation, without_best=state.words != KEPT))
     outcome = cover_cases(state, policy) if problem.cases else found(state, starts)
-    return demote(state, outcome) if outcome else None
+    return demote(state, demote_if_beaten(state, outcome)) if outcome else None
 
 
 def search_whole(state: SearchState) -> Outcome | None:

@@ -111,6 +111,7 @@ class Tuning:
     zero_root: float = number(1e-9, "of the largest root", "size of one that rounding may put on either side", "narrow")
     towards: int = number(30, "designs", "random ones, in whose direction it is", "hard")
     edge: float = number(1e-9, "relative", "difference of the objective that this may cost", "hard")
+    same_design: float = number(1e-3, "of the box", "distance at which an end is the same design", "hard")
     finer: float = number(1e-11, "relative", "the same where both were polished", "hard")
     finest: tuple[float, ...] = number(
         tuple(10.0 ** -(4 + k / 3) for k in range(19)),
