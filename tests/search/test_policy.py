@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import tmsopt
+from benchmarks.suites import hard_problem
 from tmsopt.models import from_coefficients
 from tmsopt.search import begin_search
 
@@ -167,6 +168,14 @@ def test_what_one_stage_draws_changes_no_other():
     assert not np.array_equal(box.stream("around").random(4), first)
     before, after = POLICY.sample(state), POLICY.sample(state)
     assert np.array_equal(before.refined.u, after.refined.u)
+
+
+@pytest.mark.slow
+def test_one_bold_design_is_enough_to_approach_a_singular_mass_matrix():
+    """All designs of its sample that are bold lie in one corner."""
+    found = tmsopt.solve(hard_problem(266, 2), throw=False)
+    assert found.status == "not_converged"
+    assert not found.violations
 
 
 # Records and numbers

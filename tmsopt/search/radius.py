@@ -61,7 +61,7 @@ def propose_tolerant(state: SearchState) -> Iterator[Start]:
     box = draw_box(asked, state.options.seed, tuning)
     seen = box.drawn.best(2 * tuning.estimated)
     if np.sum(seen.violation == 0) < tuning.estimated // 4:
-        seen = seen.joined(box.approach_limits(seen.take(np.arange(tuning.estimated // 2))))
+        seen = seen.joined(box.approach_limits(seen.first(tuning.estimated // 2)))
         seen = seen.take(seen.ranked)
     seen = seen.take(np.flatnonzero(seen.worth < 0)[: tuning.estimated])
     if not len(seen):

@@ -184,8 +184,8 @@ def keep_rival(state: SearchState, policy: Policy) -> SearchState:
     if not rivals or not state.sample:
         return state
     box = state.sample.box
-    finest = box.refine(rivals.take(np.arange(1)), state.tuning.finest).joined(rivals)
-    for design in box.designs(finest.take(np.arange(min(len(finest), state.tuning.kept)))):
+    finest = box.refine(rivals.first(1), state.tuning.finest).joined(rivals)
+    for design in box.designs(finest.first(state.tuning.kept)):
         checked = state.recheck(design)
         if not checked.violations and state.problem.sign * checked.objective < least_worth(state):
             return replace(state, kept=design, words=KEPT)
@@ -217,7 +217,7 @@ def singular_rivals(state: SearchState) -> Looked:
     """Designs with a singular mass matrix that are better than the best end, their roots at infinity left aside."""
     assert state.sample is not None
     if not state.sample.singular:
-        return state.sample.refined.take(np.arange(0))
+        return state.sample.refined.first(0)
     a0 = state.part.model.coefficient_names()[0]
     limits = {**state.part.constraints, "a singular mass matrix": f"{a0} == 0"}
     return sample_box(state.part.derive(constraints=limits), state.options.seed).refined.better(least_worth(state))
@@ -231,7 +231,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     few = np.unique([*range(len(rivals))][: tuning.open] + [*range(len(rivals))][-tuning.open :])
     starts = [Start(design) for design in box.designs(rivals.take(few))]
     starts += [Start({n: best.parameters[n] for n in state.problem.free})] if best else []
-    starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take(np.arange(tuning.open)))]
+    starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.first(tuning.open))]
     there = best is not None and abs(leading_of(state, best.parameters)) < tuning.singular  # all but there already
     least = least_worth(state, -tuning.lost if there else tuning.finer)
     for sign in (1, -1):

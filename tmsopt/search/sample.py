@@ -55,6 +55,10 @@ class Looked:
         """The first few by rank."""
         return self.take(self.ranked[:most])
 
+    def first(self, most: int) -> "Looked":
+        """The first few, if there are so many."""
+        return self.take(np.arange(min(most, len(self))))
+
     def apart(self, most: int, distance: float) -> "Looked":
         """The first few that lie so far apart from each other."""
         rows: list[int] = []

@@ -96,7 +96,7 @@ def _met(
     """What designs met on the way need, and the least violating one of a sample; those least in need first."""
     known, unlimited = list(designs), _unlimited(side.problem, limits)
     if sample := POLICY.sample(side):
-        known += [*sample.box.designs(sample.box.refine(sample.refined.take(np.arange(1)), _FINEST))]
+        known += [*sample.box.designs(sample.box.refine(sample.refined.first(1), _FINEST))]
     needs = [(p, _amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, known)]
     totals = [total(limits, amounts) for _, amounts in needs]
     for row in np.argsort(totals, kind="stable").tolist():
@@ -224,7 +224,7 @@ def _leads(box: Box, name: str) -> list[dict[str, float]]:
     """Designs that may do with one limit moved, as far as it takes; none where the others exclude each other."""
     found = box.without(name)
     excluded = found.misses_by(box.unreachable if box.problem.pattern else box.tuning.far_off)
-    return [] if excluded else [*box.designs(found.take(np.arange(min(len(found), _LED))))]
+    return [] if excluded else [*box.designs(found.first(_LED))]
 
 
 def _unlimited(problem: Posed, limits: Sequence[Limit]) -> Posed:
