@@ -249,6 +249,9 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             own = try_starts(own, [Start(state.design_at(reached))], try_all(policy))
         own = policy.accept(own)
         if own.best is None or own.best.checked.violations or is_merged(own.best):
+            if singular and best is not None and reached.objective < least_worth(state) and state.kept is None:
+                words = f"a better design may be next to a singular mass matrix (a0 = 0); {mass_advice(state.problem)}"
+                state = replace(state, kept={n: best.parameters[n] for n in state.problem.free}, words=words)
             continue
         if not state.problem.sign * own.best.checked.objective < least:
             continue

@@ -97,7 +97,7 @@ class Tuning:
     # Rescues
     fewer: int = number(8, "starts", "on another program where the first one has led somewhere", "variety")
     leads: int = number(3, "designs", "with roots of full multiplicity that are started from", "hard")
-    leadless: int = number(8, "starts", "that led to none, after which no more are tried", "hard")
+    leadless: int = number(4, "starts", "that led to none, after which no more are tried", "hard")
     chains: int = number(16, "starts", "for an exceptional point where the nearest one is a crossing", "statements")
     appeals: int = number(8, "times", "that better designs are started from", "hard")
     appealed: int = number(2, "designs", "that are started from each time", "hard")
@@ -110,7 +110,7 @@ class Tuning:
     )
     zero_root: float = number(1e-9, "of the largest root", "size of one that rounding may put on either side", "narrow")
     towards: int = number(30, "designs", "random ones, in whose direction it is", "hard")
-    edge: float = number(1e-9, "relative", "difference of the objective that this may cost", "hard")
+    edge: float = number(1e-8, "relative", "difference of the objective that this may cost", "hard")
     same_design: float = number(1e-3, "of the box", "distance at which an end is the same design", "hard")
     finer: float = number(1e-11, "relative", "the same where both were polished", "hard")
     finest: tuple[float, ...] = number(
@@ -120,7 +120,7 @@ class Tuning:
         "hard",
     )
     kept: int = number(8, "designs", "that are checked closely", "hard")
-    open: int = number(3, "designs", "from which a singular mass matrix is approached, of each kind", "hard")
+    open: int = number(8, "designs", "from which a singular mass matrix is approached, of each kind", "hard")
     singular: float = number(1e-9, "of the other coefficients", "a0 that is 0 in all but name", "hard")
     inside: float = number(1e-12, "of the other coefficients", "a0 of the design that is given for an infimum", "hard")
     far_root: float = number(1e5, "times the middle root", "size of a root near infinity", "hard")
