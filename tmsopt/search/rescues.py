@@ -158,12 +158,12 @@ def move_aside(state: SearchState, policy: Policy) -> SearchState:
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
     end = min(state.feasible, key=lambda end: end.objective)
-    own, size = box.space.points(state.design_at(end)), box.space.size
+    whole = check_end(state, end)
+    own, size = box.space.points(whole.parameters), box.space.size
     random = box.stream("aside").random((tuning.towards, size))
     towards = np.concatenate([state.sample.refined.u[: tuning.appealed], random])
     seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, size))
     close = (seen.violation == 0) & (np.abs(seen.worth - end.objective) <= tuning.edge * (1 + abs(end.objective)))
-    whole = check_end(state, end)
     designs = (
         {n: whole.parameters[n] for n in state.problem.free},
         *box.designs(seen.take(np.flatnonzero(close)[: tuning.kept])),
@@ -249,7 +249,8 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             own = try_starts(own, [Start(state.design_at(reached))], try_all(policy))
         own = policy.accept(own)
         if own.best is None or own.best.checked.violations or is_merged(own.best):
-            if singular and best is not None and reached.objective < least_worth(state) and state.kept is None:
+            near = best is not None and runs_away(best.checked.structure.roots, tuning.far_root)
+            if best is not None and near and singular and reached.objective < least_worth(state):
                 words = f"a better design may be next to a singular mass matrix (a0 = 0); {mass_advice(state.problem)}"
                 state = replace(state, kept={n: best.parameters[n] for n in state.problem.free}, words=words)
             continue

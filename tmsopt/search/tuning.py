@@ -120,7 +120,7 @@ class Tuning:
         "hard",
     )
     kept: int = number(8, "designs", "that are checked closely", "hard")
-    open: int = number(8, "designs", "from which a singular mass matrix is approached, of each kind", "hard")
+    open: int = number(4, "designs", "from which a singular mass matrix is approached, of each kind", "hard")
     singular: float = number(1e-9, "of the other coefficients", "a0 that is 0 in all but name", "hard")
     inside: float = number(1e-12, "of the other coefficients", "a0 of the design that is given for an infimum", "hard")
     far_root: float = number(1e5, "times the middle root", "size of a root near infinity", "hard")
