@@ -23,7 +23,7 @@ def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
 
     With bounds of errors, where a column has them.
     """
-    if any(isinstance(x, Bounded) for x in given.values()):
+    if Bounded in map(type, given.values()):
         with np.errstate(all="ignore"):
             return fold(formula, {n: as_bounded(given[n]) for n in formula.inputs}, BALLS)
     columns = {name: np.asarray(given[name], dtype=float)[()] for name in formula.inputs}

@@ -142,9 +142,7 @@ def is_ball(x: Any) -> bool:
 
 def exact(x: Any) -> Any:
     """A number as an exact fraction, a double as the binary number that it is; balls unchanged."""
-    if is_ball(x):
-        return x
-    return flint.fmpq(*x.as_integer_ratio())
+    return flint.fmpq(*x.as_integer_ratio()) if hasattr(x, "as_integer_ratio") else x
 
 
 def as_ball(x: Any) -> Any:
@@ -160,7 +158,7 @@ def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
     if isinstance(x, flint.fmpq):
         return x
     if isinstance(x, flint.arb):
-        figures, exponent = (int(part) for part in x.mid().man_exp())
+        figures, exponent = map(int, x.mid().man_exp())
         if abs(exponent) <= _FARTHEST:
             return x.mid().fmpq()
         far = flint.fmpq(2) ** (_FARTHEST if exponent > 0 else -_FARTHEST)

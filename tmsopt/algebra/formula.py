@@ -68,13 +68,13 @@ class Formula:
             if k in needed and k not in known:
                 needed.update(self.steps[k].operands)
         place = {k: number for number, k in enumerate(sorted(needed))}
-        steps = (
+        steps = [
             Step(INPUT, (), str(k))
             if k in known
             else self.steps[k]._replace(operands=tuple(map(place.__getitem__, self.steps[k].operands)))
             for k in place
-        )
-        return Formula(self.names, tuple(steps), tuple(place[o] for o in outputs))
+        ]
+        return Formula(self.names, tuple(steps), tuple(map(place.__getitem__, outputs)))
 
     def split(self, late: Collection[int]) -> tuple[tuple[str, ...], "Formula", "Formula"]:
         """The formula in two: what late steps and outputs take of the others, by name; these; and the rest in them.
@@ -96,7 +96,7 @@ class Formula:
     @cached_property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs that it depends on."""
-        return tuple(step.value for step in self.steps if step.op == INPUT)
+        return tuple([step.value for step in self.steps if step.op == INPUT])
 
     @property
     def constants(self) -> list[Constant]:
@@ -309,13 +309,13 @@ def constant(x: Any) -> Node:
 
 def made(op: str, *given: Any) -> Node:
     """An operation on nodes and numbers, in its simplest form."""
-    operands = tuple(map(constant, given))
-    truths = _LOGICAL.get(op, 0)
-    if truths or any(o.op in _TRUTHS for o in operands):
-        operands = tuple(_as_truth(o) if k < truths else _as_number(o) for k, o in enumerate(operands))
-    fractions = []
-    for x, o in zip(given, operands, strict=True):
+    operands, fractions, truths = tuple[Node, ...](), list[Fraction | None](), _LOGICAL.get(op, 0)
+    for k, x in enumerate(given):
+        o = x if isinstance(x, Node) else constant(x)
+        if truths or o.op in _TRUTHS:
+            o = _as_truth(o) if k < truths else _as_number(o)
         known = o.op == CONSTANT and isinstance(o.value, Fraction) and not (isinstance(x, float) and x == 0)
+        operands += (o,)
         fractions.append(o.value if known else None)
     if op in _EXACT and None not in fractions and (number := _EXACT[op](*fractions)) is not None:
         return Node(CONSTANT, (), number)
@@ -400,14 +400,14 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
 
 def formula(outputs: Iterable[Any], names: Iterable[str] = ()) -> Formula:
     """The formula of nodes and numbers, in inputs of these names and those that appear."""
-    return _listed([_as_number(constant(x)) for x in outputs], names, lambda node: node.fixed and node.op != CONSTANT)
+    return _listed([_as_number(constant(x)) for x in outputs], names)
 
 
-def _listed(outputs: Sequence[Node], names: Iterable[str], alone: Callable[[Node], bool]) -> Formula:
+def _listed(outputs: Sequence[Node], names: Iterable[str] = (), nested: bool = True) -> Formula:
     """The steps of nodes, equal ones once.
 
     Args:
-        alone: whether a node is a constant that is a formula of its own.
+        nested: whether a node without inputs is a constant that is a formula of its own.
     """
     places: dict[Step, int] = {}
     known: dict[int, int] = {}  # id of a node, which is kept alive by the outputs
@@ -416,16 +416,16 @@ def _listed(outputs: Sequence[Node], names: Iterable[str], alone: Callable[[Node
         node = waiting.pop()
         if id(node) in known:
             continue
-        if alone(node):
-            step = Step(CONSTANT, (), _listed([node], (), lambda node: False))
-        elif left := [o for o in node.operands if id(o) not in known]:
-            waiting += [node, *left[::-1]]
-            continue
-        else:
+        if nested and node.fixed and node.op != CONSTANT:
+            step = Step(CONSTANT, (), _listed([node], nested=False))
+        elif known.keys() >= set(map(id, node.operands)):
             step = Step(node.op, tuple(map(known.__getitem__, map(id, node.operands))), node.value)
+        else:
+            waiting += [node, *node.operands[::-1]]
+            continue
         known[id(node)] = places.setdefault(step, len(places))
     met = [step.value for step in places if step.op == INPUT]
-    return Formula(tuple(dict.fromkeys((*names, *met))), tuple(places), tuple(known[id(n)] for n in outputs))
+    return Formula(tuple(dict.fromkeys((*names, *met))), tuple(places), tuple(map(known.__getitem__, map(id, outputs))))
 
 
 def trace(function: Callable[[Mapping[str, Node]], Iterable[Any]], names: Sequence[str]) -> Formula:

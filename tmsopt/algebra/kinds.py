@@ -113,7 +113,7 @@ FLOATS = Kind(
         "negligible": lambda x, size: np.abs(x) <= ROUNDING * size,
     },
     as_double,
-    lambda x: np.float64(x) if type(x) is float else np.asarray(x, dtype=float)[()],
+    np.float64,
 )
 """Scalars and arrays that broadcast; to be folded without NumPy's warnings."""
 

@@ -133,7 +133,7 @@ def _at(model: Model, points: Mapping[str, Array], known: Known) -> tuple[Array,
     The largest are upper ends of balls: a small a0 is a difference, of which doubles lose as many digits as cancel.
     """
     a = model.polynomial(**points)
-    last, first, *_ = np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in (a[-1], a[0], *points.values())))
+    last, first, *_ = np.broadcast_arrays(*map(np.asarray, (a[-1], a[0], *points.values())))
     both = (last == 0) & (first == 0)
     if np.any((first == 0) & ~both) or np.all(both):
         return np.array([math.inf]), set()
@@ -233,7 +233,7 @@ def _point_of(box: Box, part: Fraction) -> Exact:
 
 def _exact(model: Model, name: str, others: Exact, at: Sequence[Fraction]) -> list[tuple[Any, Any]]:
     """aₙ and a0 for exact values of one parameter, the others fixed."""
-    rows = (model.polynomial(**{**others, name: exact(x)}) for x in at)
+    rows = [model.polynomial(**{**others, name: exact(x)}) for x in at]
     return [(a[-1], a[0]) for a in rows]
 
 
@@ -258,9 +258,9 @@ def is_rational(model: Model, of: ParameterSet) -> bool:
         lambda x: model.coefficients({n: made("atan", s) if n in tangents else s for n, s in x.items()}, of), of.names
     )
     wholes = {k for k, s in enumerate(coefficients.steps) if isinstance(s.value, Fraction) and s.value.denominator == 1}
-    powers = (s.op == "pow" and s.operands[1] in wholes for s in coefficients.steps)
-    rational = (s.op in _RATIONAL and not isinstance(s.value, Formula) for s in coefficients.steps)
-    return all(one or other for one, other in zip(rational, powers, strict=True))
+    powers = [s for s in coefficients.steps if s.op == "pow" and s.operands[1] in wholes]
+    rational = [s for s in coefficients.steps if s.op in _RATIONAL and not isinstance(s.value, Formula)]
+    return len(powers) + len(rational) == len(coefficients.steps)
 
 
 def relations(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:

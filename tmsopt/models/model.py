@@ -296,7 +296,7 @@ class Model:
         kind, native = kind_of(*parameters.values()), self.sets[0].names
         with np.errstate(all="ignore"):
             found = fold(self.formulas[of.name], parameters, kind)
-        rounded = kind is BALLS and any(isinstance(x, flint.arb | flint.arb_series) for x in parameters.values())
+        rounded = kind is BALLS and not {flint.arb, flint.arb_series}.isdisjoint(map(type, parameters.values()))
         coefficients = found[len(native) :]
         return dict(zip(native, found, strict=False)), [*map(as_ball, coefficients)] if rounded else coefficients
 
@@ -337,8 +337,8 @@ class Model:
     def quantity_names(self, of: ParameterSet) -> tuple[str, ...]:
         """Everything that an expression may use beside the parameters of a set and the root quantities."""
         native = () if of is self.sets[0] else self.sets[0].names
-        derived = tuple(q.name for q in (*self.quantities, *of.quantities))
-        return tuple(n for n in (*native, *self.coefficient_names(), *derived) if n not in of.names)
+        derived = [q.name for q in (*self.quantities, *of.quantities)]
+        return tuple([n for n in (*native, *self.coefficient_names(), *derived) if n not in of.names])
 
     def parameter_set(self, name: str) -> ParameterSet:
         """The parameter set of that name."""

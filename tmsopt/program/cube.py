@@ -27,18 +27,18 @@ class Cube:
 
     def designs(self, u: Array) -> dict[str, Array]:
         """Columns of parameters for points of shape (…, size)."""
-        lower, upper, first, width = (e.reshape(-1, *[1] * (u.ndim - 1)) for e in self._ends)
+        lower, upper, first, width = self._ends.reshape(4, -1, *[1] * (u.ndim - 1))
         place = np.moveaxis(u, -1, 0)
-        rows = zip(self.problem.free, first + width * place, strict=True)
-        x = np.minimum(np.maximum(np.stack([self._plain(name, row) for name, row in rows]), lower), upper)
+        plain = [back(row) for (_, back), row in zip(self._scales, first + width * place, strict=True)]
+        x = np.minimum(np.maximum(np.stack(plain), lower), upper)
         x = np.where(place <= 0, lower, np.where(place >= 1, upper, x))  # to the last digit
         return dict(zip(self.problem.free, x, strict=True))
 
     def points(self, designs: Mapping[str, float]) -> Array:
         """The point of one design."""
         found = []
-        for name, ends in self.problem.free.items():
-            lower, upper, x = self._stretched(name, np.array([*ends, designs[name]]))
+        for (name, ends), (stretch, _) in zip(self.problem.free.items(), self._scales, strict=True):
+            lower, upper, x = stretch(np.array([*ends, designs[name]]))
             found.append((x - lower) / (upper - lower))
         return np.asarray(np.clip(found, 0.0, 1.0))
 
@@ -65,8 +65,8 @@ class Cube:
     @cached_property
     def _zeros(self) -> tuple[NDArray[np.int_], Array, Array]:
         """Which parameters have 0 in their range; the unit of their scale, and its ends, shape (2, number)."""
-        plain = [not (self._tangent(n) or self._logarithmic(n)) for n in self.problem.free]
-        rows = np.flatnonzero(np.array(plain, dtype=bool) & (self._ends[0] <= 0) & (self._ends[1] >= 0))
+        plain = np.array([stretch is np.positive for stretch, _ in self._scales], dtype=bool)
+        rows = np.flatnonzero(plain & (self._ends[0] <= 0) & (self._ends[1] >= 0))
         ends = self._ends[:2][:, rows]
         size = np.abs(ends).max(axis=0, initial=0.0) / np.sinh(_STEEP)
         return rows, size, np.arcsinh(ends / size)
@@ -75,18 +75,18 @@ class Cube:
     def _ends(self) -> Array:
         """Lower and upper ends; the lower ones and the widths, stretched. Shape (4, size)."""
         plain = np.array([*self.problem.free.values()]).reshape(-1, 2)
-        ends = np.array([self._stretched(n, e) for n, e in zip(self.problem.free, plain, strict=True)]).reshape(-1, 2)
+        ends = np.array([stretch(e) for (stretch, _), e in zip(self._scales, plain, strict=True)]).reshape(-1, 2)
         return np.stack([*plain.T, ends[:, 0], ends[:, 1] - ends[:, 0]])
 
-    def _stretched(self, name: str, x: Array) -> Array:
-        return np.asarray(np.tan(x) if self._tangent(name) else np.log(x) if self._logarithmic(name) else x)
-
-    def _plain(self, name: str, x: Array) -> Array:
-        return np.asarray(np.arctan(x) if self._tangent(name) else np.exp(x) if self._logarithmic(name) else x)
-
-    def _tangent(self, name: str) -> bool:
-        return self.problem.parameter_set[name].tangent
-
-    def _logarithmic(self, name: str) -> bool:
-        lower, upper = self.problem.free[name]
-        return lower > 0 and upper > _DECADES * lower
+    @cached_property
+    def _scales(self) -> list[tuple[np.ufunc, np.ufunc]]:
+        """For each parameter the function that spreads its values evenly, and the inverse."""
+        scales = list[tuple[np.ufunc, np.ufunc]]()
+        for name, (lower, upper) in self.problem.free.items():
+            if self.problem.parameter_set[name].tangent:
+                scales.append((np.tan, np.arctan))
+            elif lower > 0 and upper > _DECADES * lower:
+                scales.append((np.log, np.exp))
+            else:
+                scales.append((np.positive, np.positive))
+        return scales

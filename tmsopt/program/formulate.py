@@ -299,17 +299,19 @@ class Builder:
             self.objective += ((variable - design[name]) / (upper - lower)) ** 2
 
     def finish(self, formulation: str) -> NLP:
-        names = (*(name_of(k) for k in range(len(self.x))), *self.numbers)
+        names = (*map(name_of, range(len(self.x))), *self.numbers)
+        names_of_rows, expressions, row_lower, row_upper = zip(*self.rows, strict=True) if self.rows else ((),) * 4
+        lower, upper = zip(*self.bounds, strict=True) if self.bounds else ((),) * 2
         return NLP(
             formulation=formulation,
             variables=tuple(self.names),
-            formula=formula([self.objective, *(r[1] for r in self.rows)], names),
+            formula=formula([self.objective, *expressions], names),
             numbers=self.numbers,
-            lower=tuple(lo for lo, _ in self.bounds),
-            upper=tuple(hi for _, hi in self.bounds),
-            rows=tuple(r[0] for r in self.rows),
-            row_lower=tuple(r[2] for r in self.rows),
-            row_upper=tuple(r[3] for r in self.rows),
+            lower=lower,
+            upper=upper,
+            rows=names_of_rows,
+            row_lower=row_lower,
+            row_upper=row_upper,
             lifts=tuple(self.lifts),
             cases=self.cases,
             touches=self.touches,

@@ -251,7 +251,7 @@ class _Conditions:
     def at(self, x: Array, rows: Array) -> tuple[float, Array, Array, Array, Array]:
         """Objective, its gradient, rows, their Jacobian, and the Hessian of the Lagrangian."""
         every = self.expand(x.tolist(), rows.tolist(), self.constants)
-        f, gradient, g, jacobian, hessian = (part.full() for part in every)
+        f, gradient, g, jacobian, hessian = [part.full() for part in every]
         return float(f.item()), gradient.ravel(), g.ravel(), jacobian, hessian
 
     def point(self, x: Array, rows: Array, bounds: Array) -> Point:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -48,13 +49,14 @@ def judge(problem: Posed, columns: Mapping[str, Array]) -> Judged:
     nominal = problem.ordered(columns)
     listed = [case.applied(nominal) for case in problem.cases if not case.direction]
     # All cases at once: one by one takes as often the time of small arrays. What is one number stays one.
-    varied = {n: _stacked([p[n] for p in listed or [nominal]], len(shape)) for n in nominal}
+    moved = {n for p in listed for n in p if p[n] is not nominal[n]}
+    varied = nominal | {n: _stacked([p[n] for p in listed], len(shape)) for n in moved}
     every = (len(listed) or 1, *shape)
     conditions = list(problem.conditions.values())
     asked = [e for e in (problem.objective, *conditions) if e]
     a, names = coefficients_of(problem, varied), {n for e in asked for n in e.names}
     # All coefficients exist, and the mass matrix is not singular: the recheck takes no other design.
-    moves = np.logical_and.reduce([np.broadcast_to(x, every) for x in (*map(np.isfinite, a), a[0] != 0)])
+    moves = np.broadcast_to(reduce(np.logical_and, map(np.isfinite, a), a[0] != 0), every)
     worst = {}
     for name, x in roots_of(a, {*names, "abscissa"} if _FLAT in names else names).items():
         sign = WORSE_DIRECTION[name]
@@ -89,8 +91,5 @@ def _graded(asked: Expression, sign: float, value: Array, worst: Mapping[str, Ar
 
 
 def _stacked(each: Sequence[Any], axes: int) -> Array:
-    """A parameter in all cases, along a first axis, as far as it differs; broadcast together these give all designs."""
-    first = np.asarray(each[0], dtype=float)
-    if all(x is each[0] for x in each):
-        return first.reshape(1, *(first.shape or (1,) * axes))
-    return np.stack([x.reshape(x.shape or (1,) * axes) for x in np.broadcast_arrays(first, *each[1:])])
+    """A parameter in all cases, along a first axis; broadcast together these give all designs."""
+    return np.stack([x.reshape(x.shape or (1,) * axes) for x in np.broadcast_arrays(*each)])

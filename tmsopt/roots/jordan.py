@@ -122,7 +122,7 @@ def _derivative(matrices: Sequence[Matrix], s: Any, order: int) -> list[list[Any
     d = len(matrices) - 1
     terms = [(P, comb(d - k, order) * s ** (d - k - order)) for k, P in enumerate(matrices) if d - k >= order]
     size = range(len(matrices[0]))
-    return [[sum((factor * P[i][j] for P, factor in terms), flint.acb(0)) for j in size] for i in size]
+    return [[sum([factor * P[i][j] for P, factor in terms], flint.acb(0)) for j in size] for i in size]
 
 
 def has_one_eigenvector(matrices: Sequence[Matrix], s: Any) -> bool:

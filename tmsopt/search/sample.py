@@ -43,8 +43,8 @@ class Looked:
 
     def joined(self, other: "Looked") -> "Looked":
         """These and others."""
-        pairs = ((self.u, other.u), (self.worth, other.worth), (self.violation, other.violation))
-        return Looked(*(np.concatenate(pair) for pair in pairs))
+        pairs = (self.u, other.u), (self.worth, other.worth), (self.violation, other.violation)
+        return Looked(*map(np.concatenate, pairs))
 
     @cached_property
     def ranked(self) -> Rows:
@@ -138,12 +138,12 @@ class Box:
             reaches: of the box, round after round, or of each design in each direction, shape (designs, 1, size).
             local: designs looked at around each, in each round.
         """
-        kept, rng, local = start, self.stream("refine"), local or self.tuning.local
+        kept, rng, local, size = start, self.stream("refine"), local or self.tuning.local, self.space.size
         rows = np.arange(len(kept))
         for reach in (reaches or self.tuning.reaches) if len(kept) else ():
-            steps = rng.standard_normal((len(kept), local, self.space.size))
-            steps[:, ::2] *= rng.random((len(kept), local // 2, self.space.size)) < 0.5  # not in all directions
-            near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, self.space.size))
+            steps = rng.standard_normal((len(kept), local, size))
+            steps[:, ::2] *= rng.random((len(kept), local // 2, size)) < 0.5  # not in all directions
+            near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, size))
             both, of = kept.joined(near), np.concatenate([rows, np.repeat(rows, local)])
             order = np.lexsort((both.worth, both.violation, of))
             kept = both.take(order[np.searchsorted(of[order], rows)])

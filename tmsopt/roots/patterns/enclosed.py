@@ -198,7 +198,7 @@ def _weights(roots: Sequence[Enclosed]) -> list[Any]:
     n = len(sizes)
     median = (sizes[(n - 1) // 2] + sizes[n // 2]) / 2
     floor = (sizes[-1] if median == 0 else median) / _FLOOR
-    return [as_ball(c) for c in product(*([flint.arb(1), size.max(floor).mid()] for size in sizes))]
+    return [as_ball(c) for c in product(*[[flint.arb(1), size.max(floor).mid()] for size in sizes])]
 
 
 def _factor_roots(factor: Sequence[Any]) -> list[tuple[Any, Any]]:

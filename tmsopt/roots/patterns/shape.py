@@ -60,7 +60,7 @@ class Shape:
 
     @property
     def _tied(self) -> bool:
-        return any(g.tied for g in self.groups)
+        return True in [g.tied for g in self.groups]
 
     def group_factors(self, unknowns: Sequence[Any]) -> list[list[Any]]:
         """One monic factor for each group."""
@@ -83,7 +83,7 @@ class Shape:
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the product of all factors, descending from 1."""
         each = zip(self.group_factors(unknowns), self.groups, strict=True)
-        return product(*(f for f, g in each for _ in range(g.multiplicity)), self.rest_factor(unknowns))
+        return product(*[f for f, g in each for _ in range(g.multiplicity)], self.rest_factor(unknowns))
 
     def start(self, places: Sequence[complex], rest: Sequence[Any]) -> list[Any]:
         """Unknowns for one root of each group, that of a pair in the upper half-plane, and the rest's coefficients."""

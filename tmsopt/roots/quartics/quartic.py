@@ -125,7 +125,7 @@ def columns(*coefficients: ArrayLike) -> tuple[Columns, tuple[int, ...]]:
         ValueError: for shapes that cannot be broadcast.
     """
     given = [np.asarray(c, dtype=float) for c in coefficients]
-    shape = np.broadcast_shapes(*(c.shape for c in given))
+    shape = np.broadcast_shapes(*map(np.shape, given))
     flat = [np.ascontiguousarray(np.broadcast_to(c, shape)).reshape(-1) for c in given]
     return (flat[0], flat[1], flat[2], flat[3], flat[4]), shape
 
@@ -140,7 +140,7 @@ def _fill(results: Sequence[Array], a: Columns, finish: Callable[..., tuple[Arra
     left = [np.empty(0, dtype=int)]
     with np.errstate(all="ignore"):  # a root of coefficients of very different sizes need not be a double
         for block in make_blocks(a[0].size):
-            monic = factors.monic(*(c[block] for c in a))
+            monic = factors.monic(*[c[block] for c in a])
             found = factors.start(*monic)
             error = factors.error(*monic, *found)
             rows = np.flatnonzero(~(error <= GOOD))
@@ -152,6 +152,8 @@ def _fill(results: Sequence[Array], a: Columns, finish: Callable[..., tuple[Arra
                 result[block] = values
             left.append(block.start + rows[~(some_error <= ACCEPTED)])
         rows = np.concatenate(left)
+        if not rows.size:
+            return 0
         last, unit, fallbacks = _factors_by_eigenvalues(np.stack([c[rows] for c in a]))
         for result, values in zip(results, finish(*last, unit), strict=True):
             result[rows] = values
