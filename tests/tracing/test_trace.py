@@ -6,6 +6,7 @@ import math
 import re
 from fractions import Fraction
 from math import comb
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -20,13 +21,14 @@ from tmsopt import laws
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem
-from tmsopt.tracing import trace
+from tmsopt.tracing import Event, trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 """The chi_H = 1 bicycle of the paper; mu does not matter there."""
 
 OFF = {"zeta_B": -0.4, "zeta_H": -0.2}
 MIRRORED = {"zeta_B": -0.2, "zeta_H": -0.4}
+EP_SET = Path(__file__).parents[2] / "problems" / "ep_set.toml"
 SQRT2 = math.sqrt(2)
 TAN_EP4 = 15 / 4 - 75 * SQRT2 / 32  # Table 1
 FR_EP4 = 3 * math.sqrt(110 * SQRT2 - 120) / 8  # Table 1
@@ -815,3 +817,15 @@ def test_a_curve_that_hugs_a0_zero_is_found():
     start = {"lambda_s": float(branch.parameters["lambda_s"][k]), "s": float(branch.unknowns["r"][k])}
     true = certified(equations("EP2"), start, fixed | {"Fr": float(branch.parameters["Fr"][k])})
     assert branch.parameters["lambda_s"][k] == pytest.approx(float(true.lambda_s), abs=1e-12)
+
+
+@pytest.mark.parametrize("beside", [-4e-3, -1e-3, 1e-4, 2e-3])
+def test_an_ep4_is_met_once_and_in_its_place_beside_other_events(beside: float) -> None:
+    # an exact EP4 takes the place of one that was found between two rows, next to what else is there
+    tilt = 0.4107 + beside
+    near = Event("near", lambda point: point["lambda_s"] - tilt)
+    (branch,) = trace(EP_SET, events=[near]).branches
+    tilts = [event.parameters["lambda_s"] for event in branch.events]
+    assert [event.name for event in branch.events].count("EP4") == 1
+    assert tilts in (sorted(tilts), sorted(tilts, reverse=True))
+    assert np.all(np.diff(branch.arclength) > 0)

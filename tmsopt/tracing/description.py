@@ -213,8 +213,8 @@ def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
     exact[:free] = end[:free]
     exact[ready.unknowns] = _converted(special.pattern, (end * unit)[free:], pattern) / scale[ready.unknowns]
     k = int(np.argmin(np.abs(walked.y - exact).max(axis=1)))
-    s = float(walked.t[k] @ (exact - walked.y[k]))
-    return Found(_EP4, exact, found.t, k if s >= 0 else k - 1, s)
+    after = k if walked.t[k] @ (exact - walked.y[k]) >= 0 else max(k - 1, 0)
+    return Found(_EP4, exact, found.t, after, float(walked.t[after] @ (exact - walked.y[after])))
 
 
 def _converted(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:
