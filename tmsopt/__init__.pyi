@@ -23,8 +23,9 @@ from .paper import Comparison as Comparison, Ledger as Ledger, compare as compar
 from .progress import Progress as Progress
 from .proofs import Proof as Proof, prove as prove
 from .search import (
-    POLICY as POLICY, TUNING as TUNING, Every as Every, Policy as Policy, Rescue as Rescue, SearchState as SearchState,
-    Start as Start, Tuning as Tuning, solve as solve, solve_all as solve_all,
+    POLICY as POLICY, TUNING as TUNING, CheckedEnd as CheckedEnd, Every as Every, LocalEnd as LocalEnd,
+    Policy as Policy, Rescue as Rescue, SearchState as SearchState, Start as Start, Tuning as Tuning, solve as solve,
+    solve_all as solve_all,
 )
 from .studies import (
     Results as Results, Row as Row, Sampling as Sampling, Span as Span, Study as Study,

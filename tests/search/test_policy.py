@@ -11,6 +11,7 @@ import pytest
 
 import tmsopt
 from benchmarks.suites import hard_problem
+from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients
 from tmsopt.search import begin_search
 
@@ -81,14 +82,19 @@ def test_the_best_end_is_accepted_whatever_their_order():
     assert POLICY.accept(replace(accepted, ends=more)).best == accepted.best
 
 
-def test_one_end_is_not_enough_and_an_exhaustive_search_never_has_enough():
+def test_one_end_is_not_enough():
     state = begun()
     state = replace(state, sample=POLICY.sample(state))
     end = POLICY.local(state, tmsopt.Start({"x": -1.3}))
     assert not POLICY.enough(replace(state, ends=(end,)))
     many = replace(state, ends=(replace(end, led=frozenset(range(len(state.sample.leaders)))),) * 8)
     assert POLICY.enough(many)
-    assert not POLICY.enough(replace(many, options=replace(many.options, exhaustive=True)))
+
+
+def test_an_exhaustive_search_asks_no_rule():
+    hasty = replace(POLICY, enough=lambda state: True)
+    runs = [tmsopt.solve(problem(), policy=hasty, starts=5, exhaustive=e).starts.runs for e in (False, True)]
+    assert runs == [1, 5]
 
 
 # The loop
@@ -117,6 +123,44 @@ def test_a_policy_cannot_make_a_design_look_better_than_it_is():
     assert design.value == pytest.approx(depth(design.parameters["x"]), abs=1e-12)
 
 
+def test_what_another_stage_accepts_is_rechecked_inside_the_box():
+    """A stage that praises a design outside the box, or one that violates a constraint."""
+    for praised in (5.0, 1.5):
+
+        def accept(state, praised=praised):
+            best = POLICY.accept(state).best
+            flattered = replace(best, parameters={"x": praised}, checked=replace(best.checked, objective=-1e3))
+            return replace(state, best=flattered, accepted=len(state.ends))
+
+        asked = problem(constraints={"left": "x <= 0"})
+        design = tmsopt.solve(asked, policy=replace(POLICY, accept=accept, rescues=()), throw=False)
+        assert design.status != "optimal"
+        assert design.parameters["x"] <= 2.0
+        assert design.value == pytest.approx(depth(design.parameters["x"]), abs=1e-12)
+        assert design.violations if design.parameters["x"] > 0 else not design.violations
+
+
+def test_a_search_that_ends_early_is_not_sure():
+    hasty = tmsopt.solve(problem(), policy=replace(POLICY, enough=lambda state: True))
+    assert hasty.starts.runs == 1
+    assert hasty.starts.sureness[-1] == "a better one is possible"
+    whole = tmsopt.solve(problem())
+    assert whole.starts.runs >= whole.starts.optima + 2
+    assert len(whole.starts.sureness) == 1
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        ("hasty", "found 'hasty'; accepted: a tmsopt.Policy"),
+        (replace(POLICY, enough=3, local=None), "policy.local: found None.*\n.*policy.enough: found 3"),
+    ],
+)
+def test_what_is_no_policy_is_refused(policy, words):
+    with pytest.raises(InputError, match=words):
+        tmsopt.solve(problem(), policy=policy)
+
+
 def test_starts_that_lead_to_the_same_end_are_not_run():
     tried = []
 
@@ -139,8 +183,8 @@ def test_rescues_are_left_out_by_name():
     for name in names:
         assert [rescue.name for rescue in POLICY.without(name).rescues] == [n for n in names if n != name]
         assert POLICY.without(name).tuning == POLICY.tuning
-    with pytest.raises(KeyError, match="nothing"):
-        POLICY.without("nothing")
+    with pytest.raises(InputError, match="no rescue is called 'apeals'; did you mean 'appeals'"):
+        POLICY.without("apeals")
 
 
 def test_a_rescue_of_ones_own_steps_in_after_the_loop():
@@ -201,3 +245,20 @@ def test_a_tuning_of_ones_own_is_used():
     fewer = replace(POLICY, tuning=replace(tmsopt.TUNING, most=600, least=600, first=600))
     assert 600 <= tmsopt.solve(problem(), policy=fewer).starts.looked < 610
     assert tmsopt.solve(problem()).starts.looked > 1500
+
+
+def test_tolerances_of_ones_own_are_obeyed():
+    """Nothing converges where the gradient and what rows are off by are to be negative."""
+    policy = replace(POLICY, tuning=replace(tmsopt.TUNING, exact=-1.0, polished=-1.0, stationary=-1.0))
+    assert tmsopt.solve(problem(), policy=policy, throw=False).status == "not_converged"
+
+
+def test_climbs_for_the_radius_are_tuned_too():
+    fewer = replace(POLICY, tuning=replace(tmsopt.TUNING, climbs=1, fewest_climbs=1))
+    asked = problem(model=from_coefficients([1, 1, x]), minimize=None, maximize="radius", free={"x": (0.5, 2.0)})
+    assert tmsopt.solve(asked, policy=fewer, throw=False).starts.runs == 1
+
+
+def test_an_odd_number_of_designs_may_be_looked_at_about_each():
+    odd = replace(POLICY, tuning=replace(tmsopt.TUNING, local=41, basin_local=25))
+    assert tmsopt.solve(problem(), policy=odd).value == pytest.approx(depth(LEFT), abs=1e-8)

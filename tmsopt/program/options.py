@@ -39,7 +39,8 @@ class Options:
     """How to solve.
 
     Attributes:
-        starts: starts tried at most; the search ends early when few better optima are expected, or at a proof.
+        starts: starts tried at most, of each side of the box and again by each rescue; the search ends early when few
+            better optima are expected, or at a proof.
         seed: of the quasi-random starting designs.
         linear_solver: ``mumps`` or ``spral``.
         progress: called with a `tmsopt.Progress` now and then: what is being done, how far it is.

@@ -3,6 +3,8 @@ from .policy import Policy as Policy, Rescue as Rescue
 from .search import POLICY as POLICY
 from .solve import evaluate_design as evaluate_design, solve as solve, solve_any_status as solve_any_status
 from .state import (
+    CheckedEnd as CheckedEnd,
+    LocalEnd as LocalEnd,
     SearchState as SearchState,
     Start as Start,
     begin_search as begin_search,

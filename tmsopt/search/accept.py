@@ -8,7 +8,6 @@ from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import design_of
 from tmsopt.program.ipopt import polisher
 from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, same_objective
-from tmsopt.search.tuning import TUNING
 
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 
@@ -17,7 +16,7 @@ def accept_best(state: SearchState) -> SearchState:
     """The state with the best of its ends: the first to pass the recheck once polished, or that fails it least."""
     best, tried = state.best, list[float]()
     for end in sorted((e for e in state.ends[state.accepted :] if e.feasible), key=lambda end: end.objective):
-        alike = sum(same_objective(end.objective, value, end.nlp.size) for value in tried)
+        alike = sum(same_objective(end.objective, value, end.nlp.size, state.tuning.same) for value in tried)
         if best and is_sound(state.problem, best) and not alike and best.end.objective <= end.objective:
             break
         if alike >= state.tuning.alike:
@@ -35,7 +34,14 @@ def check_end(state: SearchState, end: LocalEnd) -> CheckedEnd:
     """An end polished under the limits that held there, and rechecked in its cases."""
     point = polisher(end.nlp)(end.run, end.nlp)
     parameters = state.problem.ordered(design_of(state.problem, point.x.tolist()))
-    return CheckedEnd(end, point, parameters, recheck(state.problem, parameters, end.nlp.cases))
+    return CheckedEnd(end, point, parameters, recheck(state.problem, parameters, end.nlp.cases), state.tuning)
+
+
+def check_again(state: SearchState, trial: CheckedEnd) -> CheckedEnd:
+    """The end that another stage accepts, whatever it says of it: inside the box, and rechecked."""
+    inside = {n: min(max(trial.parameters[n], low), high) for n, (low, high) in state.part.free.items()}
+    parameters = state.problem.ordered(inside)
+    return replace(trial, parameters=parameters, checked=recheck(state.problem, parameters, trial.end.nlp.cases))
 
 
 def is_sound(problem: Posed, trial: CheckedEnd) -> bool:
@@ -45,21 +51,21 @@ def is_sound(problem: Posed, trial: CheckedEnd) -> bool:
 
 def is_stationary(trial: CheckedEnd) -> bool:
     """Whether the gradient of the Lagrangian vanishes, whatever IPOPT says."""
-    return trial.point.stationarity <= TUNING.stationary
+    return trial.point.stationarity <= trial.tuning.stationary
 
 
 def has_converged(trial: CheckedEnd) -> bool:
     """Whether the solver stopped at an optimum of its own, by its word or by the gradient, and on the rows."""
-    ended = trial.end.run.status in _CONVERGED or is_stationary(trial)
-    return ended and (trial.point.violation <= TUNING.exact or trial.point.stationarity <= TUNING.polished)
+    tuning, ended = trial.tuning, trial.end.run.status in _CONVERGED or is_stationary(trial)
+    return ended and (trial.point.violation <= tuning.exact or trial.point.stationarity <= tuning.polished)
 
 
 def claim_matches(problem: Posed, trial: CheckedEnd) -> bool:
     """Whether the objective that the solver claims is the design's own."""
     if problem.objective is None:
         return True
-    claimed, own = problem.sign * trial.point.objective, trial.checked.objective
-    return math.isclose(claimed, own, rel_tol=TUNING.claimed, abs_tol=TUNING.claimed)
+    claimed, own, most = problem.sign * trial.point.objective, trial.checked.objective, trial.tuning.claimed
+    return math.isclose(claimed, own, rel_tol=most, abs_tol=most)
 
 
 def is_better(problem: Posed, one: CheckedEnd, other: CheckedEnd) -> bool:
@@ -70,7 +76,7 @@ def is_better(problem: Posed, one: CheckedEnd, other: CheckedEnd) -> bool:
 
     def rank(trial: CheckedEnd) -> tuple[float, bool, float]:
         claimed, own = trial.point.objective, problem.sign * trial.checked.objective
-        doubt = 0.0 if claim_matches(problem, trial) else TUNING.doubt * abs(claimed - own)
+        doubt = 0.0 if claim_matches(problem, trial) else trial.tuning.doubt * abs(claimed - own)
         worth = claimed if math.isnan(own) else own + doubt
         return sum(trial.checked.violations.values()), _is_flattered(trial), worth
 
@@ -79,5 +85,5 @@ def is_better(problem: Posed, one: CheckedEnd, other: CheckedEnd) -> bool:
 
 def _is_flattered(trial: CheckedEnd) -> bool:
     """Whether an end that is no optimum owes its standing to a multiple root that it only comes close to."""
-    ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
-    return not has_converged(trial) and not math.isclose(ideal, stored, rel_tol=TUNING.claimed, abs_tol=TUNING.claimed)
+    ideal, stored, most = trial.checked.structure.abscissa, trial.checked.realised, trial.tuning.claimed
+    return not has_converged(trial) and not math.isclose(ideal, stored, rel_tol=most, abs_tol=most)

@@ -1,4 +1,4 @@
-"""When a search ends: the one rule, from which the words of certainty follow too."""
+"""When a search ends: at a proof, where it is hopeless, or by the rule of `Starts`, which gives reports their words."""
 
 import math
 from collections.abc import Sequence
@@ -6,8 +6,9 @@ from itertools import pairwise
 
 from tmsopt.evaluation.bound import bounded, closed, instant_bound
 from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.searches import Starts, expects_few_better
+from tmsopt.problem.searches import Starts
 from tmsopt.search.state import LocalEnd, SearchState, coefficients_at, same_objective
+from tmsopt.search.tuning import TUNING
 
 
 def is_enough(state: SearchState) -> bool:
@@ -17,12 +18,10 @@ def is_enough(state: SearchState) -> bool:
     bound, one for a pattern without freedom or an objective, or so many that end nowhere.
     """
     tuning, feasible, sample = state.tuning, state.feasible, state.sample
-    if state.options.exhaustive:
-        return False
     if not feasible:
         return is_hopeless(state)
     best, count = min(end.objective for end in feasible), len(state.ends)
-    starts = count_starts(state.ends, best)
+    starts = count_starts(state.ends, best, tuning.same)
     if state.problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
         freedom = degrees_of_freedom(state.part).count
         met = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
@@ -30,12 +29,11 @@ def is_enough(state: SearchState) -> bool:
     if state.ends[-1].objective == best and is_proven(state, state.ends[-1]):
         return True
     if sample is None:
-        agreed = count >= tuning.enough_blind and starts.at_best >= tuning.agree
-        return agreed and expects_few_better(starts.converged, starts.optima)
+        return count >= tuning.fewest_blind and starts.at_best >= tuning.agree and starts.suffice()
     alone = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
-    few = max(tuning.enough_narrow if sample.box.narrow else tuning.enough, starts.optima + tuning.enough - 1)
-    enough = count >= few and expects_few_better(starts.converged + alone, starts.optima + alone)
-    return enough or count - len(feasible) >= 2 * tuning.hopeless  # which takes long; the sample is the judge
+    enough = count >= tuning.fewest_narrow or not sample.box.narrow
+    # Where no way leads down from a design of the sample, it may lie in a basin of its own.
+    return (enough and starts.suffice(alone)) or count - len(feasible) >= 2 * tuning.hopeless
 
 
 def is_hopeless(state: SearchState) -> bool:
@@ -57,7 +55,7 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
     return near and instant_bound(problem, end.objective).proven
 
 
-def count_starts(ends: Sequence[LocalEnd], best: float) -> Starts:
+def count_starts(ends: Sequence[LocalEnd], best: float, same: float = TUNING.same) -> Starts:
     """How starts ended; a design of the sample from which a way falls to an end counts as a start that led there."""
     weights = [(end, 1 + len(end.led)) for end in ends]
     feasible = [(end, weight) for end, weight in weights if end.feasible]
@@ -66,15 +64,16 @@ def count_starts(ends: Sequence[LocalEnd], best: float) -> Starts:
     return Starts(
         tried=sum(weight for _, weight in weights),
         converged=sum(weight for _, weight in feasible),
-        at_best=sum(weight for end, weight in feasible if same_objective(end.objective, best, end.nlp.size)),
-        optima=bool(objectives) + sum(not same_objective(a, b, size) for a, b in pairwise(objectives)),
+        at_best=sum(weight for end, weight in feasible if same_objective(end.objective, best, end.nlp.size, same)),
+        optima=bool(objectives) + sum(not same_objective(a, b, size, same) for a, b in pairwise(objectives)),
+        runs=len(ends),
     )
 
 
-def distinct_ends(ends: Sequence[LocalEnd]) -> list[LocalEnd]:
+def distinct_ends(ends: Sequence[LocalEnd], same: float = TUNING.same) -> list[LocalEnd]:
     """The best end of each optimum, the best first."""
     kept: list[LocalEnd] = []
     for end in sorted((e for e in ends if e.feasible), key=lambda e: e.objective):
-        if not any(same_objective(end.objective, other.objective, end.nlp.size) for other in kept):
+        if not any(same_objective(end.objective, other.objective, end.nlp.size, same) for other in kept):
             kept.append(end)
     return kept

@@ -24,7 +24,7 @@ from tmsopt.roots import Root
 from tmsopt.search.accept import claim_matches, has_converged
 from tmsopt.search.newton import solutions
 from tmsopt.search.state import CheckedEnd, SearchState
-from tmsopt.search.tuning import TUNING
+from tmsopt.search.tuning import Tuning
 
 _MULTIPLIER = 1e-9  # below it a limit does not bind
 _TOUCHES = 1e-10  # of a range: distance that IPOPT may leave to an end that binds
@@ -134,11 +134,11 @@ def mass_advice(problem: Posed) -> str:
     return f"keep {known.get(problem.model.name, 'a0')} away from 0 by a constraint"
 
 
-def better(problem: Posed, one: Outcome, other: Outcome) -> bool:
+def beats(problem: Posed, one: Outcome, other: Outcome, tuning: Tuning) -> bool:
     """Whether one outcome beats another: feasible before not, then by objective, then optimal before not."""
     values = [problem.sign * o.checked.objective for o in (one, other)]
     doubtful = [bool(o.checked.violations) or math.isinf(v) for o, v in zip((one, other), values, strict=True)]
-    close = math.isclose(*values, rel_tol=TUNING.claimed)
+    close = math.isclose(*values, rel_tol=tuning.claimed)
     if not any(doubtful) and all(map(math.isfinite, values)) and not close:
         return values[0] < values[1]
     finite = [v if math.isfinite(v) else 0.0 for v in values]
@@ -231,7 +231,11 @@ def demote(state: SearchState, outcome: Outcome) -> Outcome:
     if state.sample and math.isfinite(value) and value < -state.tuning.endless * state.sample.spread < 0:
         if outcome.status != "optimal":
             return replace(outcome, without_best=True, notes=(UNBOUNDED,))
-    elif outcome.status == "optimal" and runs_away(outcome.checked.structure.roots) and not _held_off(problem, outcome):
+    elif (
+        outcome.status == "optimal"
+        and runs_away(outcome.checked.structure.roots, state.tuning.runaway)
+        and not _held_off(problem, outcome)
+    ):
         words = f"no best design: it improves towards a singular mass matrix (a0 = 0); {mass_advice(problem)}"
     if not words:
         return outcome
@@ -259,7 +263,7 @@ def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
     return outcome
 
 
-def runs_away(roots: Sequence[Root], ratio: float = TUNING.runaway) -> bool:
+def runs_away(roots: Sequence[Root], ratio: float) -> bool:
     """Whether a root is so far away from others that a0 is all but 0; from those that are 0 any other is."""
     sizes = sorted(size for r in roots if (size := math.hypot(r.re, r.im)))
     return bool(sizes) and sizes[-1] > ratio * sizes[(len(sizes) - 1) // 2]

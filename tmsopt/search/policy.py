@@ -6,10 +6,12 @@ replaced: ``tmsopt.solve(problem, policy=replace(POLICY, enough=mine))``.
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
+from tmsopt.errors import Fault, InputError, refusal, short, suggest
 from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
-from tmsopt.search.accept import is_better
+from tmsopt.search.accept import accept_best, check_again, is_better
 from tmsopt.search.sample import Sample
 from tmsopt.search.starts import is_led
 from tmsopt.search.state import LocalEnd, SearchState, Start
@@ -48,7 +50,8 @@ class Policy:
         starts: designs to start from, one after the other.
         local: where one start ends: IPOPT on the program of the state.
         accept: the state with the best of its ends, polished and rechecked.
-        enough: whether more starts would be waste.
+        enough: whether more starts would be waste; asked after each start, of the ends on the same program. Rescues
+            that have few starts, and cases that are added, try them all.
         rescues: in the order in which they are asked.
         tuning: the numbers that all these depend on.
 
@@ -73,11 +76,28 @@ class Policy:
         """The same without one rescue.
 
         Raises:
-            KeyError: when there is none of this name.
+            InputError: when there is none of this name.
         """
-        if name not in [rescue.name for rescue in self.rescues]:
-            raise KeyError(name)
+        names = [rescue.name for rescue in self.rescues]
+        if name not in names:
+            raise refusal(f"no rescue is called {short(name)}; {suggest(name, names)}", "policy", "rescues")
         return replace(self, rescues=tuple(r for r in self.rescues if r.name != name))
+
+
+def check_policy(policy: Any) -> None:
+    """Refuse what cannot be a policy.
+
+    Raises:
+        InputError: with everything that is wrong.
+    """
+    if not isinstance(policy, Policy):
+        raise refusal(f"found {short(policy)}; accepted: a tmsopt.Policy, such as tmsopt.POLICY", "policy")
+    stages = {name: getattr(policy, name) for name in ("sample", "starts", "local", "accept", "enough")}
+    wrong = {name: stage for name, stage in stages.items() if not callable(stage)}
+    if wrong:
+        raise InputError(
+            [Fault(f"found {short(stage)}; accepted: a function", ("policy", n)) for n, stage in wrong.items()]
+        )
 
 
 def search(state: SearchState, policy: Policy) -> SearchState:
@@ -87,7 +107,7 @@ def search(state: SearchState, policy: Policy) -> SearchState:
         state = replace(state, tuning=policy.tuning)
         state = replace(state, sample=state.sample or policy.sample(state))
         begin(state.options.progress, "searching", "start")
-        state = policy.accept(try_starts(state, policy.starts(state), policy))
+        state = accept(policy, try_starts(state, policy.starts(state), policy))
         for rescue in policy.rescues:
             if not state.interrupted and rescue.applies(state):
                 state = rescue.run(state, policy)
@@ -104,11 +124,19 @@ def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most
             state = replace(state, ends=(*state.ends, policy.local(state, start)))
             if state.options.progress:
                 state.options.progress(tried, most, state.so_far)
-            if tried >= most or policy.enough(state):
+            if tried >= most or (not state.options.exhaustive and policy.enough(state)):
                 break
     except KeyboardInterrupt:
         state = replace(state, interrupted=True)
     return state
+
+
+def accept(policy: Policy, state: SearchState) -> SearchState:
+    """The state with the best of its ends; what a stage of the user's accepts is rechecked."""
+    state = policy.accept(state)
+    if state.best is None or policy.accept is accept_best:
+        return state
+    return replace(state, best=check_again(state, state.best))
 
 
 def search_again(
@@ -116,11 +144,12 @@ def search_again(
 ) -> SearchState:
     """The search with more starts, perhaps on another program: their ends are added, and the better design is kept."""
     own = state.with_program(nlp or state.nlp)
-    own = policy.accept(try_starts(own, policy.starts(own) if starts is None else starts, policy, most))
+    own = accept(policy, try_starts(own, policy.starts(own) if starts is None else starts, policy, most))
     ends = (*state.ends, *own.ends)
     better = own.best and (state.best is None or is_better(state.problem, own.best, state.best))
-    kept = own if better else state
-    return replace(kept, ends=ends, accepted=len(ends), interrupted=own.interrupted)
+    if better:
+        state = replace(own, fallback=None)
+    return replace(state, ends=ends, accepted=len(ends), interrupted=own.interrupted)
 
 
 def try_all(policy: Policy) -> Policy:

@@ -6,7 +6,6 @@ Every one starts from other designs or on another program, and hands what it fin
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
@@ -22,11 +21,10 @@ from tmsopt.search.accept import check_end, claim_matches, is_sound
 from tmsopt.search.enough import distinct_ends
 from tmsopt.search.local import run_once
 from tmsopt.search.outcome import KEPT, mass_advice, runs_away
-from tmsopt.search.policy import Policy, Rescue, search_again, try_all, try_starts
+from tmsopt.search.policy import Policy, Rescue, accept, search_again, try_all, try_starts
 from tmsopt.search.sample import Looked, draw_box, sample_box
 from tmsopt.search.starts import sample_starts
-from tmsopt.search.state import CheckedEnd, SearchState, Start
-from tmsopt.search.tuning import TUNING
+from tmsopt.search.state import CheckedEnd, Fallback, SearchState, Start
 
 # Roots that meet
 
@@ -188,7 +186,7 @@ def keep_rival(state: SearchState, policy: Policy) -> SearchState:
     for design in box.designs(finest.first(state.tuning.kept)):
         checked = state.recheck(design)
         if not checked.violations and state.problem.sign * checked.objective < least_worth(state):
-            return replace(state, kept=design, words=KEPT)
+            return replace(state, fallback=Fallback(design, KEPT))
     return state
 
 
@@ -220,7 +218,8 @@ def singular_rivals(state: SearchState) -> Looked:
         return state.sample.refined.first(0)
     a0 = state.part.model.coefficient_names()[0]
     limits = {**state.part.constraints, "a singular mass matrix": f"{a0} == 0"}
-    return sample_box(state.part.derive(constraints=limits), state.options.seed).refined.better(least_worth(state))
+    sample = sample_box(state.part.derive(constraints=limits), state.options.seed, state.tuning)
+    return sample.refined.better(least_worth(state))
 
 
 def search_singular(state: SearchState, policy: Policy) -> SearchState:
@@ -247,21 +246,22 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
             own = state.with_program(replace(nlp, row_lower=lower))
             own = try_starts(own, [Start(state.design_at(reached))], try_all(policy))
-        own = policy.accept(own)
+        own = accept(policy, own)
         if own.best is None or own.best.checked.violations or is_merged(own.best):
             near = best is not None and runs_away(best.checked.structure.roots, tuning.far_root)
             if best is not None and near and singular and reached.objective < least_worth(state):
                 words = f"a better design may be next to a singular mass matrix (a0 = 0); {mass_advice(state.problem)}"
-                state = replace(state, kept={n: best.parameters[n] for n in state.problem.free}, words=words)
+                state = replace(state, fallback=Fallback({n: best.parameters[n] for n in state.problem.free}, words))
             continue
         if not state.problem.sign * own.best.checked.objective < least:
             continue
         ends, least = (*state.ends, *own.ends), least_worth(own, tuning.finer)
-        state = replace(own, ends=ends, accepted=len(ends), kept=None, words="")
+        state = replace(own, ends=ends, accepted=len(ends), fallback=None)
         if singular:
             goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * reached.objective:.9g}"
             words = f"no best design: it improves {goal}; {mass_advice(state.problem)}"
-            state = replace(state, kept={n: own.best.parameters[n] for n in state.problem.free}, words=words)
+            design = {n: own.best.parameters[n] for n in state.problem.free}
+            state = replace(state, fallback=Fallback(design, words, without_best=True))
     return state
 
 
@@ -274,7 +274,7 @@ def leading_of(state: SearchState, design: Mapping[str, float]) -> float:
 def is_merged(trial: CheckedEnd) -> bool:
     """Whether roots that are far apart count as one: next to a0 = 0 rounding leaves little of the coefficients."""
     ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
-    return abs(ideal - stored) > TUNING.merged * abs(ideal)
+    return abs(ideal - stored) > trial.tuning.merged * abs(ideal)
 
 
 # Stability
@@ -305,12 +305,11 @@ def search_stable(state: SearchState, policy: Policy) -> SearchState:
     starts = [Start(design, near) for seen, near in stable for design in sample.box.designs(seen)]
     if not starts:
         return state
+    others = [start for start in policy.starts(state) if start not in [end.start for end in state.ends]]
     state = search_again(state, try_all(policy), starts)
     if state.best and state.best.checked.structure.abscissa < 0:
         return state
-    more = replace(policy, enough=_is_stable_or_hopeless)
-    others = islice(policy.starts(state), len(state.ends), None)
-    return search_again(state, more, others)
+    return search_again(state, replace(policy, enough=_is_stable_or_hopeless), others)
 
 
 def _is_stable_or_hopeless(state: SearchState) -> bool:
@@ -338,6 +337,6 @@ RESCUES = (
     Rescue("aside", "", claims_more, move_aside),
     Rescue("infinity", "", is_open, search_singular),
     Rescue("stability", "", wants_stability, search_stable),
-    Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.kept is None, keep_rival),
+    Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.fallback is None, keep_rival),
 )
 """In the order in which they are asked."""

@@ -111,7 +111,7 @@ class Box:
 
     def look(self, u: Array) -> Looked:
         """Judge points of shape (n, size)."""
-        return _looked(u, judge(self.problem, self.space.designs(u)), self.scales)
+        return _looked(u, judge(self.problem, self.space.designs(u)), self.scales, self.tuning)
 
     def design(self, found: Looked, row: int = 0) -> dict[str, float]:
         """The free parameters of one design."""
@@ -142,7 +142,7 @@ class Box:
         rows = np.arange(len(kept))
         for reach in (reaches or self.tuning.reaches) if len(kept) else ():
             steps = rng.standard_normal((len(kept), local, size))
-            steps[:, ::2] *= rng.random((len(kept), local // 2, size)) < 0.5  # not in all directions
+            steps[:, ::2] *= rng.random((len(kept), (local + 1) // 2, size)) < 0.5  # not in all directions
             near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, size))
             both, of = kept.joined(near), np.concatenate([rows, np.repeat(rows, local)])
             order = np.lexsort((both.worth, both.violation, of))
@@ -182,7 +182,7 @@ class Box:
         """Designs far from each other that violate the other limits least, refined; all of them count for no limit."""
         ignored = [name == limit for name in self.problem.conditions]
         others = replace(self, scales=np.where(ignored, 1e300, self.scales))
-        seen = _looked(self.drawn.u, self.judged, others.scales)
+        seen = _looked(self.drawn.u, self.judged, others.scales, self.tuning)
         found = others.refine(
             others.approach_limits(seen.best(self.tuning.ranked).apart(self.tuning.leaders, self.tuning.apart))
         )
@@ -271,7 +271,7 @@ def draw_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Box:
     sizes = [np.abs(beyond[np.isfinite(beyond)]) for beyond in judged.beyond]
     medians = np.array([float(np.median(x)) if x.size else 0.0 for x in sizes])
     scales = np.where(medians > 0, medians, 1.0)
-    return Box(space, seed, scales, _looked(u, judged, scales), judged, tuning)
+    return Box(space, seed, scales, _looked(u, judged, scales, tuning), judged, tuning)
 
 
 def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
@@ -307,10 +307,10 @@ def _drawn(space: Cube, seed: int, tuning: Tuning) -> Array:
     return np.concatenate([np.full((1, size), 0.5), corners, u])
 
 
-def _looked(u: Array, judged: Judged, scales: Array) -> Looked:
+def _looked(u: Array, judged: Judged, scales: Array, tuning: Tuning) -> Looked:
     worth = np.zeros(len(u)) if judged.worth is None else judged.worth
     excess = judged.excess / scales[:, None]
-    violation = np.where(excess <= TUNING.met, 0.0, excess).sum(axis=0)
+    violation = np.where(excess <= tuning.met, 0.0, excess).sum(axis=0)
     return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
 
 

@@ -6,7 +6,7 @@ from tmsopt.problem.quantities import RADIUS
 from tmsopt.search.accept import accept_best
 from tmsopt.search.enough import count_starts, is_enough
 from tmsopt.search.local import run_from
-from tmsopt.search.outcome import KEPT, Outcome, as_it_is, demote, demote_if_beaten, found
+from tmsopt.search.outcome import Outcome, as_it_is, demote, demote_if_beaten, found
 from tmsopt.search.policy import Policy, search
 from tmsopt.search.radius import RADIUS_POLICY
 from tmsopt.search.rescues import RESCUES
@@ -22,7 +22,7 @@ def search_part(state: SearchState, policy: Policy = POLICY) -> tuple[SearchStat
     """A search at its end, and its best design; None where nothing feasible was found."""
     goal = state.problem.objective.names if state.problem.objective else ()
     if RADIUS in goal and state.problem.pattern is None:
-        state = search(state, RADIUS_POLICY)
+        state = search(state, replace(RADIUS_POLICY, tuning=policy.tuning))
     if state.best is None and not state.interrupted:
         state = search(state, policy)
     return state, outcome_of(state, policy)
@@ -30,11 +30,11 @@ def search_part(state: SearchState, policy: Policy = POLICY) -> tuple[SearchStat
 
 def outcome_of(state: SearchState, policy: Policy) -> Outcome | None:
     """The best design of a search."""
-    problem, best = state.problem, state.best
-    starts = count_starts(state.ends, best.end.objective if best else float("nan"))
-    if state.kept is not None:
-        kept = replace(as_it_is(problem, state.kept, state.words), status="not_converged", starts=starts)
-        return demote(state, replace(kept, formulation=state.nlp.formulation, without_best=state.words != KEPT))
+    problem, best, fallback = state.problem, state.best, state.fallback
+    starts = count_starts(state.ends, best.end.objective if best else float("nan"), state.tuning.same)
+    if fallback:
+        given = replace(as_it_is(problem, fallback.design, fallback.words), status="not_converged", starts=starts)
+        return demote(state, replace(given, formulation=state.nlp.formulation, without_best=fallback.without_best))
     outcome = cover_cases(state, policy) if problem.cases else found(state, starts)
     return demote(state, demote_if_beaten(state, outcome)) if outcome else None
 

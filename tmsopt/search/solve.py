@@ -29,8 +29,8 @@ from tmsopt.program.options import DEFAULTS, AskedOfSolve, Options, documents_op
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.records import Table
 from tmsopt.search.enough import count_starts
-from tmsopt.search.outcome import UNCLEAR, Outcome, as_it_is, better, evaluated, evaluated_cases, mass_advice
-from tmsopt.search.policy import Policy
+from tmsopt.search.outcome import UNCLEAR, Outcome, as_it_is, beats, evaluated, evaluated_cases, mass_advice
+from tmsopt.search.policy import Policy, check_policy
 from tmsopt.search.remedies.needs import add_required_speed
 from tmsopt.search.remedies.none import answered, explain_none
 from tmsopt.search.search import POLICY, search_part
@@ -56,13 +56,14 @@ def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **opti
     Args:
         problem: or the path of its file.
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
-        policy: how each part of the box is searched; see `tmsopt.Policy`.
+        policy: how each part of the box is searched; see `tmsopt.Policy`. The robustness radius is climbed first, in a
+            way of its own, and what limits must give where nothing is feasible is asked of `tmsopt.POLICY`.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
             ``stability`` and ``interruptible``; see `tmsopt.Options`.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
-        InputError: when parameters are free and nothing is asked of them.
+        InputError: when parameters are free and nothing is asked of them, or for a policy that is none.
         KeyboardInterrupt: when the user ends it before there is any design, or `interruptible` is False.
 
     Example:
@@ -72,6 +73,7 @@ def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **opti
 
     More: docs/tutorials/first_bicycle.md
     """
+    check_policy(policy)
     problem = as_solvable(problem)
     solution = solve_any_status(problem, options_of(options, AskedOfSolve, _ASKING), policy=policy)
     if throw and solution.status != "optimal":
@@ -108,7 +110,7 @@ def solve_any_status(
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
         options = replace(options, near=near)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
-    states = [s for s in begin_search(problem, options, tuple(extra_starts)) if s.side not in without]
+    states = [s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in without]
     found = _search_sides(states, policy)
     best = _winner(problem, found)
     interrupted = any(state.interrupted for state, _ in found)
@@ -131,10 +133,10 @@ def solve_any_status(
     if interrupted or not options.stability or options.near:  # which keeps to its side of the box
         return solution
     try:
-        judged = _with_stability(solution, options, began)
+        judged = _with_stability(solution, options, began, policy)
         needy, missed = add_required_speed(judged, options, partial(answered, asked=problem, thorough=True))
         words = "a search for the least speed found the stable design from which this one was reached"
-        return _led(needy, missed, words, options) if missed else needy
+        return _follow(needy, missed, words, options, policy) if missed else needy
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
@@ -143,10 +145,9 @@ def solve_any_status(
 
 
 def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[Found]:
-    """The search of each part of the box, in the order of these; a part of which more was seen comes first."""
+    """The search of each part of the box, in the order of these; that with the best design of a sample comes first."""
     if len(states) > 1:
         begin(states[0].options.progress, "looking at designs")
-        states = [replace(state, tuning=policy.tuning) for state in states]
         states = [replace(state, sample=policy.sample(state)) for state in states]
     found: dict[str, Found] = {}
     stable = False
@@ -193,7 +194,8 @@ def _so_far(problem: Posed, found: Sequence[Found], outcome: Outcome | None) -> 
         raise KeyboardInterrupt
     best = min(known, key=partial(_order, problem))
     ends = [end for state, _ in found for end in state.ends]
-    words = f"the user stopped the search after {len(ends)} starts; this is the best design so far"
+    many = f"{len(ends)} start{'' if len(ends) == 1 else 's'} of the solver"
+    words = f"the user stopped the search after {many}; this is the best design so far"
     formulation = found[0][0].nlp.formulation if ends else "none"
     starts = count_starts(ends, problem.sign * best.checked.objective)
     return replace(best, starts=starts, formulation=formulation, notes=(words,))
@@ -206,7 +208,7 @@ def _order(problem: Posed, outcome: Outcome) -> tuple[float, float]:
     return sum(outcome.checked.violations.values()), worth
 
 
-def _with_stability(solution: Solution, options: Options, began: float) -> Solution:
+def _with_stability(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
     """Of a search for stability that found none: whether there is any, and the design that one leads to."""
     problem = solution.problem.posed
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
@@ -217,7 +219,7 @@ def _with_stability(solution: Solution, options: Options, began: float) -> Solut
     asked = any_stable(problem, options.stability, solution.parameters, options.progress)
     if asked.design is not None:
         words = "branch and bound found the stable design from which this one was reached"
-        solution = _led(solution, asked.design, words, options)
+        solution = _follow(solution, asked.design, words, options, policy)
     elif asked.any is False:
         solution = replace(solution, notes=(*solution.notes, f"that none is stable is proved {asked.proof}"))
     if asked.failed:
@@ -226,11 +228,11 @@ def _with_stability(solution: Solution, options: Options, began: float) -> Solut
     return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
 
 
-def _led(solution: Solution, design: Mapping[str, float], words: str, options: Options) -> Solution:
+def _follow(solution: Solution, design: Mapping[str, float], words: str, options: Options, policy: Policy) -> Solution:
     """Where a design leads that the search has missed, if that is better."""
     problem = solution.problem.posed
     few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
-    found = solve_any_status(problem, replace(few, near=design))
+    found = solve_any_status(problem, replace(few, near=design), policy=policy)
     gain = problem.sign * (solution.value - found.value)
     better = found.status == "optimal" and (solution.status != "optimal" or gain > 0)
     return replace(found, notes=(*found.notes, words)) if better else solution
@@ -239,8 +241,8 @@ def _led(solution: Solution, design: Mapping[str, float], words: str, options: O
 def _winner(problem: Posed, found: Sequence[Found]) -> Outcome | None:
     """The best design of all parts of the box, with the starts of all of them."""
     best: Outcome | None = None
-    for _, outcome in found:
-        if outcome is not None and (best is None or better(problem, outcome, best)):
+    for state, outcome in found:
+        if outcome is not None and (best is None or beats(problem, outcome, best, state.tuning)):
             best = outcome
     if best is None or len(found) == 1:
         return best

@@ -46,10 +46,24 @@ class LocalEnd:
     Attributes:
         start: from which.
         nlp: with the limits that held.
-        objective: of the NLP; inf unless finite.
-        feasible: whether rows and bounds hold as IPOPT left them, and located roots have Jordan chains.
+        objective: of the NLP, less is better whatever the problem asks for, with what its rows may flatter it by; inf
+            unless finite.
+        feasible: whether the rows hold as IPOPT left them, the factors tell of all roots, and located ones have Jordan
+            chains; the recheck may still find a limit violated.
         crossing: whether these chains alone are missing.
         led: rows of the sample's designs from which a straight way falls to this end.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> ends = []
+        >>> def local(state, start):
+        ...     ends.append(tmsopt.POLICY.local(state, start))
+        ...     return ends[-1]
+        >>> design = tmsopt.solve("problems/ep4.toml", policy=replace(tmsopt.POLICY, local=local))
+        >>> [end.feasible for end in ends]
+        [True]
+
+    More: docs/explanation/search.md
     """
 
     start: Start
@@ -73,12 +87,47 @@ def no_end(start: Start, nlp: NLP) -> LocalEnd:
 
 @dataclass(frozen=True)
 class CheckedEnd:
-    """An end, polished and rechecked."""
+    """An end, polished and rechecked.
+
+    Attributes:
+        point: the end once polished.
+        parameters: every parameter of the design there.
+        checked: what the recheck found.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> best = []
+        >>> def accept(state):
+        ...     accepted = tmsopt.POLICY.accept(state)
+        ...     best.append(accepted.best)
+        ...     return accepted
+        >>> design = tmsopt.solve("problems/ep4.toml", policy=replace(tmsopt.POLICY, accept=accept))
+        >>> best[0].checked.structure.name
+        'EP4'
+
+    More: docs/explanation/search.md
+    """
 
     end: LocalEnd
     point: Point
     parameters: Mapping[str, float]
     checked: Evaluation
+    tuning: Tuning = TUNING
+
+
+@dataclass(frozen=True)
+class Fallback:
+    """A design that is given where no optimum is known: one better than all ends, or one next to an infimum.
+
+    Attributes:
+        design: its free parameters.
+        words: why it is no optimum.
+        without_best: whether there is none.
+    """
+
+    design: Mapping[str, float]
+    words: str
+    without_best: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,8 +145,7 @@ class SearchState:
         accepted: how many of these were considered for `best`.
         best: the best of these that passed the recheck, or that fails it least.
         stable_elsewhere: whether another part of the box is known to have a stable design.
-        kept: free parameters of a design that is better than all ends, though known to be no optimum.
-        words: why that is none.
+        fallback: the design to be given in place of `best`, which is no optimum either.
         interrupted: whether the user ended the search.
 
     Example:
@@ -125,13 +173,12 @@ class SearchState:
     accepted: int = 0
     best: CheckedEnd | None = None
     stable_elsewhere: bool = False
-    kept: Mapping[str, float] | None = None
-    words: str = ""
+    fallback: Fallback | None = None
     interrupted: bool = False
 
     @property
     def feasible(self) -> list[LocalEnd]:
-        """Ends that meet all rows."""
+        """Ends that are, as IPOPT left them."""
         return [end for end in self.ends if end.feasible]
 
     @property
@@ -184,15 +231,16 @@ class SearchState:
         return replace(self, nlp=nlp, ends=(), accepted=0, best=None)
 
 
-def split_sides(problem: Posed, near: Mapping[str, float] | None = None) -> dict[str, Posed]:
+def split_sides(problem: Posed, near: Mapping[str, float] | None = None, thin: float = TUNING.thin) -> dict[str, Posed]:
     """The parts into which a parameter with two sides divides the box, by name, positive values first.
 
     Args:
         near: a design; only the parts that it is on.
+        thin: width of a part that is worth no search of its own.
     """
     for name, (lower, upper) in problem.free.items():
         names = problem.parameter_set[name].sides
-        if names is not None and lower < -TUNING.thin and upper > TUNING.thin:
+        if names is not None and lower < -thin and upper > thin:
             halves = {names[1]: (0.0, upper), names[0]: (lower, 0.0)}
             at = (near or {}).get(name)
             kept = {side: ends for side, ends in halves.items() if at is None or ends[0] <= at <= ends[1]}
@@ -201,12 +249,15 @@ def split_sides(problem: Posed, near: Mapping[str, float] | None = None) -> dict
 
 
 def begin_search(
-    problem: Posed, options: Options = DEFAULTS, extra: tuple[Mapping[str, float], ...] = ()
+    problem: Posed,
+    options: Options = DEFAULTS,
+    extra: tuple[Mapping[str, float], ...] = (),
+    tuning: Tuning = TUNING,
 ) -> list[SearchState]:
     """The searches of a problem, one for each part of its box."""
-    parts = split_sides(problem, options.near)
+    parts = split_sides(problem, options.near, tuning.thin)
     return [
-        SearchState(problem, part, formulate(part, problem.cases), options, side=side, extra=extra)
+        SearchState(problem, part, formulate(part, problem.cases), options, tuning, side, extra)
         for side, part in parts.items()
     ]
 
@@ -231,9 +282,9 @@ def _on(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
     return problem.derive(free={**problem.free, name: ends}, start=problem.start if inside else {})
 
 
-def same_objective(a: float, b: float, size: float = 1.0) -> bool:
+def same_objective(a: float, b: float, size: float = 1.0, same: float = TUNING.same) -> bool:
     """Whether two objectives, of this size or larger, count as the same optimum."""
-    return abs(a - b) <= TUNING.same * (size + abs(b))
+    return abs(a - b) <= same * (size + abs(b))
 
 
 def coefficients_at(problem: Posed, nlp: NLP, run: Run) -> Array:

@@ -1,4 +1,8 @@
-"""Every number that a search depends on: its unit, the reason for it, and the benchmark that set it."""
+"""The numbers by which a search is tuned: the unit of each, the reason for it, and the benchmark that set it.
+
+Tolerances by which reports judge any design stand where they are used; how many better optima may be left to be
+expected, beside the rule that needs it, in `tmsopt.problem.searches`.
+"""
 
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -29,14 +33,14 @@ class Tuning:
     faces: int = number(4, "designs", "one of which is moved to faces of the box, where many optima lie", "solve")
     narrow: float = number(0.02, "share of the designs drawn", "that meet all limits, below which few do", "hard")
     ranked: int = number(1024, "designs", "first of an order among which those apart are chosen", "hard")
-    leaders: int = number(8, "designs", "to start from, refined", "solve")
+    leaders: int = number(8, "designs", "the best ones apart, that are refined and started from", "solve")
     bold: int = number(8, "designs", "to start from, whatever they violate", "hard")
     sought: int = number(256, "designs", "from which limits are approached", "hard")
     cell: float = number(0.05, "of the box", "cells with one of these each", "hard")
     apart: float = number(0.15, "of the box", "distance of designs that may lie in different basins", "solve")
     beside: float = number(0.01, "of the box", "distance of designs about one that count as different", "hard")
     basins: int = number(64, "designs", "the best ones of their neighbourhoods, that are refined", "narrow")
-    deepest: int = number(24, "designs", "of these, to start from", "narrow")
+    deepest: int = number(24, "designs", "of these basins, started from beside the leaders", "narrow")
     cells: int = number(2, "cells a design", "of the grid in which basins are told apart, at most", "narrow")
     reaches: tuple[float, ...] = number(
         (0.1, 0.03, 0.008, 2e-3, 4e-4), "of the box", "steps by which designs are refined, round after round", "solve"
@@ -83,9 +87,8 @@ class Tuning:
     thin: float = number(1e-9, "rad", "width of a part of the box that is worth no search of its own", "solve")
 
     # Enough
-    enough: int = number(3, "starts", "at least", "solve")
-    enough_narrow: int = number(8, "starts", "at least where few designs meet all limits", "hard")
-    enough_blind: int = number(12, "starts", "at least without a sample", "hard")
+    fewest_narrow: int = number(8, "starts", "at least where few designs meet all limits", "hard")
+    fewest_blind: int = number(12, "starts", "at least without a sample", "hard")
     agree: int = number(5, "starts", "at the best value that end a search without a sample", "hard")
     hopeless: int = number(8, "starts", "that end nowhere, after which no more are tried", "conflicts")
     hopeless_afar: int = number(
@@ -112,7 +115,7 @@ class Tuning:
     towards: int = number(30, "designs", "random ones, in whose direction it is", "hard")
     edge: float = number(1e-8, "relative", "difference of the objective that this may cost", "hard")
     same_design: float = number(1e-3, "of the box", "distance at which an end is the same design", "hard")
-    finer: float = number(1e-11, "relative", "the same where both were polished", "hard")
+    finer: float = number(1e-11, "relative", "difference of the objective between polished designs", "hard")
     finest: tuple[float, ...] = number(
         tuple(10.0 ** -(4 + k / 3) for k in range(19)),
         "of the box",

@@ -14,7 +14,7 @@ from tmsopt.records import Table
 from tmsopt.search.accept import is_better
 from tmsopt.search.enough import count_starts, distinct_ends
 from tmsopt.search.outcome import Outcome, found, listed_cases
-from tmsopt.search.policy import Policy, search, try_starts
+from tmsopt.search.policy import Policy, accept, search, try_starts
 from tmsopt.search.radius import RADIUS_POLICY
 from tmsopt.search.state import CheckedEnd, SearchState, Start, same_objective
 
@@ -26,7 +26,7 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
     every = replace(policy, enough=lambda _: False)
     if state.best and problem.asks_radius and not any(case.edge for case in state.nlp.cases):
         designs = (state.best.parameters, *_leaders(state))
-        climbed = search(replace(state.with_program(state.nlp), extra=designs), RADIUS_POLICY)
+        climbed = search(replace(state.with_program(state.nlp), extra=designs), replace(RADIUS_POLICY, tuning=tuning))
         state = climbed if climbed.best else state
     best, worst = state.best, dict[str, Worst]()
     for _ in range(tuning.far_rounds if problem.asks_radius else tuning.rounds):
@@ -43,11 +43,11 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
         ours = [best.parameters] if best is trial else [best.parameters, trial.parameters]
         leaders = _apart(problem, [*ours, *_leaders(state)], tuning.alike_designs)
         state = state.with_program(formulate(state.part, (*trial.end.nlp.cases, *more)))
-        state = policy.accept(try_starts(state, (Start(d) for d in leaders), every))
+        state = accept(policy, try_starts(state, (Start(d) for d in leaders), every))
         if _is_lost(state, leaders):
-            state = policy.accept(try_starts(state, (Start(d, near=False) for d in leaders), every))
+            state = accept(policy, try_starts(state, (Start(d, near=False) for d in leaders), every))
             if not problem.asks_radius and _is_lost(state, leaders):
-                state = policy.accept(try_starts(state, policy.starts(state), policy))
+                state = accept(policy, try_starts(state, policy.starts(state), policy))
         if state.interrupted:
             break
     if state.best is None:
@@ -66,7 +66,7 @@ def _is_lost(state: SearchState, leaders: Sequence[Mapping[str, float]]) -> bool
     sign, own = state.problem.sign, [state.recheck(design) for design in leaders]
     known = min((sign * c.objective for c in own if not c.violations), default=math.inf)
     reached = sign * state.best.checked.objective
-    return reached > known and not same_objective(reached, known, state.nlp.size)
+    return reached > known and not same_objective(reached, known, state.nlp.size, state.tuning.same)
 
 
 def _uncovered(problem: Posed, trial: CheckedEnd, found: Mapping[str, Worst]) -> list[Case]:

@@ -1,4 +1,4 @@
-"""How large the coefficients of a problem are over its box, so that no unit of time or mass matters."""
+"""A problem made ready to be traced: its pattern's equations as a curve, in units of its coefficients over the box."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

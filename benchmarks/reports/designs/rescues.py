@@ -13,14 +13,20 @@ import tmsopt
 from benchmarks.reports.tables import Asked, facts, page, table
 from benchmarks.suites import HARD_COUNT, hard_problem, random_problem
 from benchmarks.suites.conflicts import conflict
-from benchmarks.suites.narrow_optima import hidden
+from benchmarks.suites.narrow_optima import hidden, references
 from benchmarks.suites.random_systems import random_system
 from benchmarks.suites.varied_designs import varied_problem
 from benchmarks.timing import over_processes
 
 _SAME = 1e-7  # relative difference of values, and 1e-8 where they are small
 _HARD_SEEDS = (1, 2, 3)
-_COUNTS = {"solve": 200, "systems": 100, "narrow": 178, "conflicts": 50, "variety": 200}
+_SUITES = {
+    "solve": range(200),
+    "systems": range(100),
+    "narrow": sorted(references()),
+    "conflicts": range(50),
+    "variety": range(200),
+}
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,8 @@ def problem_of(name: str) -> tmsopt.Problem:
 def names_of(share: float = 1.0) -> list[str]:
     """All problems, or the first ones of each suite."""
     hard = [f"hard {seed} {k}" for seed in _HARD_SEEDS for k in range(math.ceil(share * HARD_COUNT))]
-    return hard + [f"{suite} {k}" for suite, count in _COUNTS.items() for k in range(math.ceil(share * count))]
+    others = {suite: numbers[: math.ceil(share * len(numbers))] for suite, numbers in _SUITES.items()}
+    return hard + [f"{suite} {k}" for suite, numbers in others.items() for k in numbers]
 
 
 def answer(name: str, without: str = "") -> Answer:

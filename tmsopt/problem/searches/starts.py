@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 _BETTER = 0.2  # optima that are better than the best one met and not met yet, expected where a search may end
 _LIKELY = 0.5  # the same, from which one is likely
+_MORE = 2  # starts of the solver beyond the optima met: those that only lead there have not shown any other
 
 
 def expected_unseen(searches: int, optima: int) -> float:
@@ -32,8 +33,9 @@ class Starts:
     A design of a sample counts as a start, if a way down leads from it to where another start ended.
 
     Attributes:
-        optima: different ones that starts ended at.
+        optima: values of the objective, or places, that starts ended at.
         looked: designs of the box that were looked at beside, to know where to start, and whether any is better.
+        runs: starts from which the solver was run.
 
     Example:
         >>> starts = tmsopt.solve("problems/ep4.toml").starts
@@ -48,18 +50,28 @@ class Starts:
     at_best: int = 0
     looked: int = 0
     optima: int = 0
+    runs: int = 0
 
     @property
     def expected_unseen(self) -> float:
         """Optima that no start met, as estimated; inf where the starts are too few to tell."""
         return expected_unseen(self.converged, self.optima)
 
+    def suffice(self, alone: int = 0) -> bool:
+        """Whether few better optima are to be expected: where a search ends, and may be sure of its answer.
+
+        Args:
+            alone: designs that may lie in basins of their own, to be counted as searches and as optima.
+        """
+        enough = self.runs >= self.optima + _MORE
+        return enough and expects_few_better(self.converged + alone, self.optima + alone)
+
     @property
     def sureness(self) -> tuple[str, ...]:
-        """How sure it is that the best one met is the best there is, in words; none where nothing was started.
+        """How sure it is, unless proved, that the best one met is the best there is; none where nothing was started.
 
         Example:
-            >>> tmsopt.Starts(tried=64, converged=64, at_best=1, optima=30).sureness
+            >>> tmsopt.Starts(tried=64, converged=64, at_best=1, optima=30, runs=64).sureness
             ('found by 1 of 64 starts', 'a better one is likely')
 
         More: docs/explanation/proofs.md
@@ -67,7 +79,7 @@ class Starts:
         if not self.tried:
             return ()
         by = f"found by {self.at_best} of {self.tried} start{'' if self.tried == 1 else 's'}"
-        if self.at_best and expects_few_better(self.converged, self.optima):
+        if self.at_best and self.suffice():
             return (by,)
         likely = self.at_best == 1 and not expects_few_better(self.converged, self.optima, _LIKELY)
         return by, f"a better one is {'likely' if likely else 'possible'}"

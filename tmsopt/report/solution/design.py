@@ -261,7 +261,9 @@ def _search(solution: Solution) -> Iterator[str]:
     yield from branch_lines(solution)
     if starts.tried:
         looked = f"; {starts.looked} designs looked at" if starts.looked else ""
-        tried = f"starts: {starts.tried} tried, {starts.converged} converged, {starts.at_best} at the best"
+        led = starts.tried - starts.runs
+        also = f", {led} of which lead{'s' * (led == 1)} straight to where others ended" if starts.runs and led else ""
+        tried = f"starts: {starts.tried} tried{also}, {starts.converged} converged, {starts.at_best} at the best"
         yield f"{tried}{looked}; {solution.seconds:.2f} s"
 
 

@@ -15,8 +15,8 @@ from tmsopt.program.options import Options
 from tmsopt.progress import begin
 from tmsopt.search.accept import accept_best
 from tmsopt.search.enough import count_starts
-from tmsopt.search.outcome import Outcome, as_it_is, better, found, mass_advice, runs_away
-from tmsopt.search.policy import Policy, try_all, try_starts
+from tmsopt.search.outcome import Outcome, as_it_is, beats, found, mass_advice, runs_away
+from tmsopt.search.policy import Policy, accept, try_all, try_starts
 from tmsopt.search.remedies.changes import relax
 from tmsopt.search.remedies.needs import irreducible, steady
 from tmsopt.search.search import POLICY, search_whole
@@ -51,9 +51,9 @@ def explain_none(problem: Posed, states: Sequence[SearchState], policy: Policy) 
     if relaxation is None or relaxation.amounts:
         status, note = "infeasible", f"{none} satisfies all constraints"
     else:
-        whole = SearchState(problem, problem, formulate(problem, problem.cases), options)
-        whole = policy.accept(try_starts(whole, (Start(design, near) for near in (True, False)), try_all(policy)))
-        if outcome := found(whole, Starts(tried + 2, len(whole.feasible), 1)):
+        whole = SearchState(problem, problem, formulate(problem, problem.cases), options, policy.tuning)
+        whole = accept(policy, try_starts(whole, (Start(design, near) for near in (True, False)), try_all(policy)))
+        if outcome := found(whole, Starts(tried + 2, len(whole.feasible), 1, runs=2)):
             return outcome
         advice = f"try more starts, give one, or {mass_advice(problem)}"
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
@@ -72,7 +72,7 @@ def answered(problem: Posed, options: Options, asked: Posed, thorough: bool = Fa
     for state in begin_search(problem, options):
         outcome = None if problem.cases else _settle(state, stable, thorough)
         outcome = outcome or search_whole(state)
-        best = outcome if outcome and (best is None or better(problem, outcome, best)) else best
+        best = outcome if outcome and (best is None or beats(problem, outcome, best, state.tuning)) else best
     if best is None or best.status != "optimal":
         return None
     return best.parameters if _meets(stable, best) else {}
@@ -86,7 +86,11 @@ def _settle(state: SearchState, stable: Posed, thorough: bool) -> Outcome | None
     if state.interrupted:
         raise KeyboardInterrupt
     one = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
-    if outcome is None or outcome.status != "optimal" or runs_away(outcome.checked.structure.roots):
+    if (
+        outcome is None
+        or outcome.status != "optimal"
+        or runs_away(outcome.checked.structure.roots, state.tuning.runaway)
+    ):
         return None
     agreed = not thorough and bounded(state.part) and one
     return outcome if agreed or _meets(stable, outcome) else None
