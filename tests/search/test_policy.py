@@ -14,6 +14,8 @@ from benchmarks.suites import hard_problem
 from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients
 from tmsopt.search import begin_search
+from tmsopt.search.policy import search_again
+from tmsopt.search.state import Fallback
 
 x = ca.SX.sym("x")
 LEFT, _, RIGHT = sorted(np.roots([1, 0, -1, 0.1]).real.tolist())
@@ -200,6 +202,19 @@ def test_a_rescue_of_ones_own_steps_in_after_the_loop():
     left = tmsopt.Rescue("left", "", lambda state: state.best.parameters["x"] > 0, run)
     found = tmsopt.solve(problem(), policy=replace(right, rescues=(left,)))
     assert found.value == pytest.approx(depth(LEFT), abs=1e-9)
+
+
+def test_a_better_end_takes_the_place_of_a_fallback_and_a_worse_one_does_not():
+    state = begun()
+    right = POLICY.accept(replace(state, ends=(POLICY.local(state, tmsopt.Start({"x": 0.9})),)))
+    told = replace(right, fallback=Fallback({"x": 0.0}, "no optimum"))
+    same = search_again(told, POLICY, [tmsopt.Start({"x": 0.8})])
+    assert same.fallback == told.fallback
+    assert same.best == right.best
+    left = search_again(told, POLICY, [tmsopt.Start({"x": -1.3})])
+    assert left.fallback is None
+    assert left.best.parameters["x"] == pytest.approx(LEFT, abs=1e-9)
+    assert len(left.ends) == left.accepted == 2
 
 
 def test_what_one_stage_draws_changes_no_other():
