@@ -14,6 +14,7 @@ from benchmarks.suites import hard_problem
 from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients
 from tmsopt.search import begin_search
+from tmsopt.search.accept import check_end, is_better
 from tmsopt.search.policy import search_again
 from tmsopt.search.state import Fallback
 
@@ -82,6 +83,20 @@ def test_the_best_end_is_accepted_whatever_their_order():
     assert accepted.accepted == 3
     more = (*ends, POLICY.local(state, tmsopt.Start({"x": 0.8})))
     assert POLICY.accept(replace(accepted, ends=more)).best == accepted.best
+
+
+def test_of_two_ends_as_good_the_converged_one_is_better():
+    state = begun()
+    whole = check_end(state, POLICY.local(state, tmsopt.Start({"x": -1.3})))
+    lower = replace(whole.checked, objective=whole.checked.objective - 1e-14)
+    run = replace(whole.end.run, status="Maximum_Iterations_Exceeded")
+    stopped = replace(
+        whole, end=replace(whole.end, run=run), point=replace(whole.point, stationarity=1.0), checked=lower
+    )
+    assert is_better(state.problem, whole, stopped)
+    assert not is_better(state.problem, stopped, whole)
+    better = replace(stopped, checked=replace(lower, objective=whole.checked.objective - 1e-9))
+    assert is_better(state.problem, better, whole)
 
 
 def test_one_end_is_not_enough():

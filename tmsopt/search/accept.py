@@ -71,7 +71,8 @@ def claim_matches(problem: Posed, trial: CheckedEnd) -> bool:
 def is_better(problem: Posed, one: CheckedEnd, other: CheckedEnd) -> bool:
     """Whether one trial beats another: by violation first, then by the objective that the recheck found.
 
-    Where that is not the solver's, what lies between them is weighed against it.
+    Where that is not the solver's, what lies between them is weighed against it. Of two that are as good, one that has
+    converged beats one that has not.
     """
 
     def rank(trial: CheckedEnd) -> tuple[float, bool, float]:
@@ -80,7 +81,10 @@ def is_better(problem: Posed, one: CheckedEnd, other: CheckedEnd) -> bool:
         worth = claimed if math.isnan(own) else own + doubt
         return sum(trial.checked.violations.values()), _is_flattered(trial), worth
 
-    return rank(one) < rank(other)
+    (*first, worth), (*second, known), most = rank(one), rank(other), one.tuning.finer
+    if first == second and same_objective(worth, known, one.end.nlp.size, most):
+        return has_converged(one) and not has_converged(other)
+    return (*first, worth) < (*second, known)
 
 
 def _is_flattered(trial: CheckedEnd) -> bool:
