@@ -48,9 +48,10 @@ def judge(problem: Posed, columns: Mapping[str, Array]) -> Judged:
     shape = next(iter(columns.values())).shape
     nominal = problem.ordered(columns)
     listed = [case.applied(nominal) for case in problem.cases if not case.direction]
-    # All cases at once: one by one takes as often the time of small arrays. What is one number stays one.
-    moved = {n for p in listed for n in p if p[n] is not nominal[n]}
-    varied = nominal | {n: _stacked([p[n] for p in listed], len(shape)) for n in moved}
+    varied = nominal
+    if listed:  # all cases at once: one by one takes as often the time of small arrays
+        moved = {n for p in listed for n in p if p[n] is not nominal[n]}
+        varied = nominal | {n: _stacked([p[n] for p in listed], len(shape)) for n in moved}
     every = (len(listed) or 1, *shape)
     conditions = list(problem.conditions.values())
     asked = [e for e in (problem.objective, *conditions) if e]
