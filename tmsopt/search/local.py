@@ -51,7 +51,7 @@ def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
 
 def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
     """The end, or that of a run which keeps to the start, or does not, where the start was better than the end."""
-    if state.sample is None or not best.feasible or (start.near and not state.nlp.touches):
+    if state.sample is None or not best.feasible:
         return best
     box = state.sample.box
     seen = box.look(box.space.points(start.design)[None])

@@ -113,7 +113,7 @@ class Tuning:
     )
     zero_root: float = number(1e-9, "of the largest root", "size of one that rounding may put on either side", "narrow")
     towards: int = number(30, "designs", "random ones, in whose direction it is", "hard")
-    edge: float = number(1e-8, "relative", "difference of the objective that this may cost", "hard")
+    edge: float = number(1e-6, "relative", "what numeric roots next to a double one tell of such a design", "narrow")
     same_design: float = number(1e-3, "of the box", "distance at which an end is the same design", "hard")
     finer: float = number(1e-11, "relative", "difference of the objective between polished designs", "hard")
     finest: tuple[float, ...] = number(
