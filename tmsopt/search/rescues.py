@@ -4,7 +4,7 @@ Every one starts from other designs or on another program, and hands what it fin
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from tmsopt.problem.dependence import STABLE, WORSE_DIRECTION
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.program.formulate import formulate, matching
 from tmsopt.program.starts import designs
-from tmsopt.search.accept import check_end, claim_matches, is_sound
+from tmsopt.search.accept import check_end, claim_matches, is_better, is_sound
 from tmsopt.search.enough import distinct_ends
 from tmsopt.search.local import run_once
 from tmsopt.search.outcome import KEPT, mass_advice, runs_away
@@ -152,28 +152,33 @@ def claims_more(state: SearchState) -> bool:
 
 
 def move_aside(state: SearchState, policy: Policy) -> SearchState:
-    """A design a hair's breadth from the best end that is what that end claims."""
+    """A design a hair's breadth from one of the best ends that is what that end claims."""
+    problem, lost = state.problem, state.tuning.lost
+    for end in distinct_ends(state.ends)[: state.tuning.asides]:
+        whole = check_end(state, end)
+        own = {n: whole.parameters[n] for n in problem.free}
+        for design in (own, *_designs_beside(state, own, end.objective)):
+            checked = state.recheck(design)
+            moved = replace(whole, parameters=problem.ordered(design), checked=checked)
+            if checked.violations or not claim_matches(problem, moved):
+                continue
+            exact = certified_numbers(problem, moved.parameters, checked, state.nlp.cases).value
+            told = math.isclose(exact, problem.sign * end.objective, rel_tol=lost, abs_tol=lost)
+            if told and (state.best is None or not is_better(problem, state.best, moved)):
+                return replace(state, best=moved)
+    return state
+
+
+def _designs_beside(state: SearchState, design: Mapping[str, float], objective: float) -> Iterator[dict[str, float]]:
+    """Designs next to one, towards others, that meet the limits and are worth about as much."""
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
-    end = min(state.feasible, key=lambda end: end.objective)
-    whole = check_end(state, end)
-    own, size = box.space.points(whole.parameters), box.space.size
-    random = box.stream("aside").random((tuning.towards, size))
+    own = box.space.points(design)
+    random = box.stream("aside").random((tuning.towards, len(own)))
     towards = np.concatenate([state.sample.refined.u[: tuning.appealed], random])
-    seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, size))
-    close = (seen.violation == 0) & (np.abs(seen.worth - end.objective) <= tuning.edge * (1 + abs(end.objective)))
-    designs = (
-        {n: whole.parameters[n] for n in state.problem.free},
-        *box.designs(seen.take(np.flatnonzero(close)[: tuning.kept])),
-    )
-    for design in designs:  # that of the end first
-        checked = state.recheck(design)
-        moved = replace(whole, parameters=state.problem.ordered(design), checked=checked)
-        exact = certified_numbers(state.problem, moved.parameters, checked, state.nlp.cases).value
-        told = math.isclose(exact, state.problem.sign * end.objective, rel_tol=tuning.lost, abs_tol=tuning.lost)
-        if told and not checked.violations and claim_matches(state.problem, moved):
-            return replace(state, best=moved)
-    return state
+    seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
+    close = (seen.violation == 0) & (np.abs(seen.worth - objective) <= tuning.edge * (1 + abs(objective)))
+    return box.designs(seen.take(np.flatnonzero(close)[: tuning.kept]))
 
 
 def keep_rival(state: SearchState, policy: Policy) -> SearchState:

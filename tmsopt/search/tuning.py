@@ -105,6 +105,7 @@ class Tuning:
     appeals: int = number(8, "times", "that better designs are started from", "hard")
     appealed: int = number(2, "designs", "that are started from each time", "hard")
     lost: float = number(1e-7, "relative", "difference of the objective that makes a design better", "hard")
+    asides: int = number(3, "optima", "the best that ends claim, beside which designs are looked for", "hard")
     hairs: tuple[float, ...] = number(
         tuple(10.0 ** -(7 + k / 4) for k in range(33)),
         "of the way to another design",
