@@ -59,7 +59,7 @@ def test_the_best_so_far(how):
     asked = problem("x >= -1.5", start={"x": 0.2})
     found = tmsopt.solve(asked, throw=False, exhaustive=True, progress=when(third, how))
     assert (found.status, found.interrupted, dict(found.violations)) == ("not_converged", True, {})
-    assert "the user stopped the search after 3 starts; this is the best design so far" in found.notes
+    assert "the user stopped the search after 3 starts of the solver; this is the best design so far" in found.notes
     assert found.starts.tried == 3
     assert found.parameters["x"] >= -1.5 - MET
     assert found.value == pytest.approx(depth(found.parameters["x"]), abs=1e-12)  # doubles of size 1

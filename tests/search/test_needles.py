@@ -78,5 +78,5 @@ def test_an_end_off_the_rows_is_no_optimum(violation, slope, ended):
     """IPOPT says that it succeeded of rows as it scales them; beside a pole they are large, and polished all the same."""
     run = SimpleNamespace(status="Solve_Succeeded")
     point = SimpleNamespace(violation=violation, stationarity=slope)
-    trial = SimpleNamespace(end=SimpleNamespace(run=run), point=point)
+    trial = SimpleNamespace(end=SimpleNamespace(run=run), point=point, tuning=tmsopt.TUNING)
     assert import_module("tmsopt.search.accept").has_converged(trial) is ended
