@@ -11,11 +11,9 @@ from tmsopt.models.bicycles.bicycle import WORDS, times
 from tmsopt.models.bicycles.feedback import UNCONTROLLED, Steered
 from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tms import GRAVITY, LAMBDA_S
-from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, matrices
-from tmsopt.models.bicycles.whipple_quantities import QUANTITIES, algebraic, canonical, tangent_matrices
+from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, tangent_matrices
+from tmsopt.models.bicycles.whipple_quantities import IN_MATRICES, QUANTITIES, algebraic, canonical
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
-
-__all__ = ["canonical", "carvallo_whipple", "matrices", "whipple"]
 
 _POSITIVE = Range(lower=0.0, closed=False)
 _NOT_NEGATIVE = Range(lower=0.0)
@@ -104,7 +102,7 @@ whipple = Model(
 
 def _steered(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
     """M, v C1 and g K0 + v² K2 for a steer angle in units of w/cos λ_s."""
-    return _at_speed(*tangent_matrices(p), p["v"], p["g"])
+    return _at_speed(*tangent_matrices(**{name: p[name] for name in ("T", *IN_MATRICES)}), p["v"], p["g"])
 
 
 STEERED = Steered(whipple, _steered, unit=lambda p, h: (p["w"] * h, p["w"] * p["w"] * (1 + p["T"] * p["T"])), speed="v")

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Mapping
+from inspect import signature
 from typing import Any
 
 from tmsopt.algebra.kinds import both, choose, least, less, positive_part, quotient, ratio, sqrt, tan
 from tmsopt.models.bicycles.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
-from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed
-from tmsopt.models.model import Quantity, Range
+from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed, tangent_matrices
+from tmsopt.models.model import Matrix, Quantity, Range
 
 Design = Mapping[str, Any]
 
@@ -16,28 +17,8 @@ _NOT_POSITIVE = Range(upper=0.0)
 
 _ABOVE = 1e300  # any square of a speed that counts is less
 
-_IN_MATRICES = (
-    "w",
-    "c",
-    "r_R",
-    "m_R",
-    "I_Rxx",
-    "x_B",
-    "z_B",
-    "m_B",
-    "I_Bxx",
-    "I_Bzz",
-    "I_Bxz",
-    "x_H",
-    "z_H",
-    "m_H",
-    "I_Hxx",
-    "I_Hzz",
-    "I_Hxz",
-    "r_F",
-    "m_F",
-    "I_Fxx",
-)
+IN_MATRICES = tuple(signature(matrices).parameters)[:-3]
+"""Algebraic parameters beside T, v and g: lengths, masses, inertias and spins."""
 
 
 def spin(I_yy: Any, r: Any) -> Any:
@@ -57,15 +38,15 @@ def spin(I_yy: Any, r: Any) -> Any:
 
 def algebraic(p: Design) -> dict[str, Any]:
     """The numbers in which the coefficients are polynomials: T = tan λ_s and the spins instead of I_yy."""
-    return {
-        **{name: p[name] for name in ("v", "g", *_IN_MATRICES)},
-        "T": tan(p["lambda_s"]),
-        "S_R": spin(p["I_Ryy"], p["r_R"]),
-        "S_F": spin(p["I_Fyy"], p["r_F"]),
-    }
+    return {"v": p["v"], "g": p["g"], "T": tan(p["lambda_s"]), **_bodies(p)}
 
 
-def canonical(p: Design) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
+def _bodies(p: Design) -> dict[str, Any]:
+    spins = {"S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"])}
+    return {name: p[name] for name in IN_MATRICES if name not in spins} | spins
+
+
+def canonical(p: Design) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no part in them), any numbers.
 
     Example:
@@ -76,9 +57,7 @@ def canonical(p: Design) -> tuple[list[list[Any]], list[list[Any]], list[list[An
     More: docs/how_to/import.md
     """
     sine, cosine = _sine_cosine(p)
-    bodies = {name: p[name] for name in _IN_MATRICES}
-    spins = {"S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"])}
-    return matrices(**bodies, **spins, sine=sine, cosine=cosine, turn=cosine / p["w"])
+    return matrices(**_bodies(p), sine=sine, cosine=cosine, turn=cosine / p["w"])
 
 
 def _sine_cosine(p: Design) -> tuple[Any, Any]:
@@ -90,15 +69,7 @@ def _sine_cosine(p: Design) -> tuple[Any, Any]:
 
 def _powers(v: Design) -> tuple[Any, ...]:
     """b0 … b7 of `powers_of_speed`, for a steer angle in units of w/cos λ_s."""
-    return powers_of_speed(*tangent_matrices(algebraic(v)))
-
-
-def tangent_matrices(
-    of: Mapping[str, Any],
-) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
-    """M, C1, K0 and K2 for algebraic parameters and a steer angle in units of w/cos λ_s."""
-    bodies = {name: of[name] for name in (*_IN_MATRICES, "S_R", "S_F")}
-    return matrices(**bodies, sine=of["w"] * of["T"], cosine=of["w"], turn=1)
+    return powers_of_speed(*tangent_matrices(tan(v["lambda_s"]), **_bodies(v)))
 
 
 def _v_capsize(v: Design) -> Any:
