@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt import Problem
 from tmsopt.models import tms
-from tmsopt.problem import parse_value
+from tmsopt.models.expression import parse_value
 
 SEED = 2018
 

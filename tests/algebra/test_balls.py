@@ -13,7 +13,7 @@ from mpmath import mp
 
 from tmsopt.algebra import BALLS, exact
 from tmsopt.models import FUNCTIONS, Values, tms, to_si
-from tmsopt.problem import parse_comparison, parse_value
+from tmsopt.models.expression import parse_comparison, parse_value
 
 kinds = import_module("tmsopt.algebra.kinds")
 absolute, greater, lesser, magnitude, positive_part, quotient, sqrt, tan = (

@@ -11,9 +11,9 @@ from tmsopt.algebra.kinds import BALLS
 from tmsopt.deprecated import read_from_posed
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.exact import number
+from tmsopt.models.expression import Expression, parse_comparison, parse_value
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.cases import Case, Scenario, first_cases
-from tmsopt.problem.expression import Expression, parse_comparison, parse_value
 from tmsopt.problem.normalise import normalise, settle
 from tmsopt.problem.quantities import (
     NO_RADIUS,

@@ -6,11 +6,11 @@ from typing import Any
 
 from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
 from tmsopt.models import Model, ParameterSet
+from tmsopt.models.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.models.names import MEANT
 from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
 from tmsopt.problem.advice.names import example_of, unknown
 from tmsopt.problem.cases import Band, points_of
-from tmsopt.problem.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.problem.quantities import expand_names, root_names
 
 VARIATIONS = ("scenarios", "tolerances", "weights")

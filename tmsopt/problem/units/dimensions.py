@@ -2,12 +2,14 @@
 
 import operator
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from tmsopt.algebra.formula import Kind
 from tmsopt.algebra.kinds import as_double
+from tmsopt.models.expression import Expression
 
 _DERIVED = {"N": "kg m/s^2", "Hz": "1/s", "1": "", "√(g/w)": "√g/√w"}
 _NAMED = {"kg m/s^2": "N", "kg m^2/s^2": "N m", "√g/√w": "√(g/w)"}
@@ -114,3 +116,12 @@ UNITS = Kind(
 
 def _power(name: str, p: Fraction) -> str:
     return name if p == 1 else f"{name}^{p}" if p.denominator == 1 else f"{name}^({p})"
+
+
+def dimension(expression: Expression, units: Mapping[str, str]) -> Dimension:
+    """What a value has units of, for the units of what it names; of a comparison, of both sides."""
+    try:
+        found = expression.of({n: Dimension.of(units.get(n, "1")) for n in expression.names}, UNITS)
+    except ArithmeticError:  # a number divided by 0
+        found = None
+    return found if isinstance(found, Dimension) else Dimension()
