@@ -6,8 +6,8 @@ In: parameters by name. Out: coefficients and quantities in any arithmetic. Open
 
 from tmsopt.models.bicycle_files import Bicycle, problem_text, read_bicycle, write_bicycle
 from tmsopt.models.bicycles.tms import GRAVITY, copo, from_si, matrices, tms, to_si
-from tmsopt.models.bicycles.whipple import canonical, whipple
-from tmsopt.models.bicycles.whipple_quantities import spin
+from tmsopt.models.bicycles.whipple import whipple
+from tmsopt.models.bicycles.whipple_quantities import canonical, spin
 from tmsopt.models.built_in import MODELS, controlled, gain_names, named
 from tmsopt.models.exact import decimal
 from tmsopt.models.inertia import INERTIAS, inertia_margin
