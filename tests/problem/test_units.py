@@ -17,9 +17,8 @@ from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
 import tmsopt
-from tmsopt.models.expression import parse_value
-from tmsopt.problem.units import USUAL, by_pint, factor, read, with_unit
-from tmsopt.problem.units.dimensions import dimension
+from tmsopt.models import parse_value
+from tmsopt.problem.units import USUAL, by_pint, dimension, factor, read, with_unit
 
 AT_ONCE = 1.0
 """Seconds; pint needs a third of one to start."""

@@ -6,7 +6,7 @@ from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, SupportsIndex
 
 import flint
 import numpy as np
@@ -291,6 +291,10 @@ class Model:
     def __repr__(self) -> str:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
 
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
+        """By its origin where it has one: in another process it is that process's own, and no copy of this."""
+        return self.origin or super().__reduce_ex__(protocol)
+
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""
         return self.computed(of or self.sets[0], parameters)[1]
@@ -320,7 +324,7 @@ class Model:
 
     def _repr_latex_(self) -> str | None:
         """The characteristic polynomial in the native parameters; None for one that fills pages."""
-        from tmsopt.models.latex import LATEX, Typeset, polynomial_text
+        from tmsopt.models.typeset import LATEX, Typeset, polynomial_text
 
         of = self.sets[0]
         found = fold(self.formulas[of.name], {p.name: Typeset(p.latex) for p in of.parameters}, LATEX)

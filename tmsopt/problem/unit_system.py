@@ -12,8 +12,7 @@ from tmsopt.models.expression import SIGN, Expression, parse_comparison, parse_v
 from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.units.dimensions import Dimension, dimension
-from tmsopt.problem.units.text import factor
+from tmsopt.problem.units import Dimension, dimension, factor
 from tmsopt.problem.validate import SMALLEST
 
 _PER_SECOND = "1/s"

@@ -1,6 +1,7 @@
 """The two-mass-skate bicycle (Kirillov 2018; Kooijman et al. 2011), dimensionless and in SI."""
 
 from collections.abc import Mapping
+from pkgutil import resolve_name
 from typing import Any
 
 from tmsopt.algebra.kinds import sqrt, tan
@@ -121,6 +122,7 @@ tms = Model(
     compact=compact_copo,
     pencil=_pencil,
     natural=True,
+    origin=(resolve_name, (f"{__name__}:tms",)),
     words=WORDS,
     omits="two point masses on skates, without wheels, rotational inertia or trail",
     conventions=CONVENTIONS,

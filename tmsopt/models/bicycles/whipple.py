@@ -5,6 +5,7 @@ in the same parameters, with the same roots per second.
 """
 
 from collections.abc import Mapping
+from pkgutil import resolve_name
 from typing import Any
 
 from tmsopt.models.bicycles.bicycle import WORDS, times
@@ -48,6 +49,7 @@ whipple = Model(
     algebraic=algebraic,
     polynomial=carvallo_whipple,
     pencil=_pencil,
+    origin=(resolve_name, (f"{__name__}:whipple",)),
     words=WORDS,
     conventions=CONVENTIONS,
     sketch=WHIPPLE,
