@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tmsopt import Problem
-from tmsopt.models import tms
-from tmsopt.problem import parse_value
+from tmsopt.models import parse_value, tms
 
 SEED = 2018
 

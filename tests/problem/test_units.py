@@ -17,7 +17,8 @@ from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
 import tmsopt
-from tmsopt.problem.units import USUAL, Dimension, by_pint, dimensions, factor, read, with_unit
+from tmsopt.models import parse_value
+from tmsopt.problem.units import USUAL, by_pint, dimension, factor, read, with_unit
 
 AT_ONCE = 1.0
 """Seconds; pint needs a third of one to start."""
@@ -251,11 +252,12 @@ def test_products_and_powers_are_read():
 
 def test_a_sum_of_unlike_units_has_none_whatever_is_added():
     """In any order: metres and kilograms added are neither, and no third summand gives its unit to all."""
-    metre, kilogram, none = Dimension.of("m"), Dimension.of("kg"), Dimension()
-    for parts in permutations((metre, kilogram, kilogram, none)):
-        assert sum(parts, 1.0).unit == "1"
-        assert dimensions.power(sum(parts, none), 0.5).unit == (sum(parts, none) * metre / 2.0).unit == "1"
-    assert (metre + none + metre).unit == "m"
+    units = {"metre": "m", "kilogram": "kg"}
+    for parts in permutations(("metre", "kilogram", "kilogram", "none", "1.0")):
+        total = " + ".join(parts)
+        for text in (total, f"sqrt({total})", f"({total})*metre/2.0"):
+            assert dimension(parse_value(text, None), units).unit == "1"
+    assert dimension(parse_value("metre + none + metre", None), units).unit == "m"
 
 
 @settings(max_examples=250, deadline=None, derandomize=True)

@@ -14,7 +14,8 @@ from helpers.rows import faults
 from hypothesis import given, settings, strategies as st
 
 import tmsopt
-from tmsopt.problem import ExpressionError, limit_of, with_limit
+from tmsopt.models import ExpressionError
+from tmsopt.problem import limit_of, with_limit
 from tmsopt.records import Column, Table
 from tmsopt.studies import (
     Row,

@@ -10,7 +10,7 @@ import numpy as np
 
 from tmsopt.analysis.steps import natural_step, step_within
 from tmsopt.errors import InputError
-from tmsopt.problem.expression import written_sides
+from tmsopt.models.expression import written_sides
 from tmsopt.problem.limit import limit_of, with_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from tmsopt.analysis.limits import is_physical
+from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import structure_in_words
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_QUANTITIES
 from tmsopt.problem.solution import Solution

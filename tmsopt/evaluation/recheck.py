@@ -13,10 +13,10 @@ from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.kinds import gradients
 from tmsopt.boundaries.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
+from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, roots_at
 from tmsopt.problem.verdict.meetings import is_crossing

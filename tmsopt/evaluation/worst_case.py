@@ -12,10 +12,10 @@ import numpy as np
 
 from tmsopt.algebra.intervals import Interval, ball, outwards
 from tmsopt.algebra.sequence import golden_steps
+from tmsopt.models.expression import Expression
 from tmsopt.problem.cases import Band, Case, Cover
 from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
 from tmsopt.problem.evaluate import evaluate
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Numbers, Table
 from tmsopt.roots import lienard_chipart, shift

@@ -19,7 +19,7 @@ from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.global_search.conditions import Ends, Sheet, complex_pieces, rotating_frame, sheet, sheets
 from tmsopt.global_search.pruning import Box, Puzzle, ends, prepared, prune
-from tmsopt.problem.expression import Expression
+from tmsopt.models.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
 from tmsopt.program.nlp import Scale, reaches_of, scale_of

@@ -17,8 +17,8 @@ from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.algebra.intervals import outwards, ranges
 from tmsopt.algebra.kinds import atan, quotient
 from tmsopt.models import Quantity, Values
+from tmsopt.models.expression import Expression
 from tmsopt.models.stated.pairs import Pair
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.roots import product as multiplied

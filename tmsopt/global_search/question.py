@@ -14,9 +14,9 @@ import numpy as np
 from tmsopt.algebra.formula import NotAccepted, formula, symbol
 from tmsopt.algebra.identity import is_linear
 from tmsopt.global_search.half_planes import Frame, bound_unknowns, compact, half_planes, sectors
+from tmsopt.models.expression import Expression
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import rewards_change_of
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.program.formulate import Builder, Lifting

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.guide.text import matrix, table, wrapped
-from tmsopt.problem.expression import COMPARISONS
+from tmsopt.models.expression import COMPARISONS
 from tmsopt.records import Printable, Table, plain
 from tmsopt.versions import SCHEMA
 

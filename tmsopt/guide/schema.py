@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from tmsopt.models import MODELS, Parameter, ParameterSet, controlled, gain_names
-from tmsopt.problem.expression import SIGN
+from tmsopt.models.expression import SIGN
 from tmsopt.problem.files import SHAPE as PROBLEM
 from tmsopt.problem.model_table import KEYS
 from tmsopt.roots.patterns.composed import pattern_names

@@ -1,10 +1,8 @@
 """The models that come with tmsopt, by name; a user's own may not take one of these."""
 
-import copyreg
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 from tmsopt.models.bicycles.feedback import FEEDBACK, names_of, native_name, with_feedback
 from tmsopt.models.bicycles.tms import STEERED as TMS, tms
@@ -63,15 +61,3 @@ def _controlled(name: str, names: tuple[str, ...]) -> Model:
 
 
 _STEERED = {steered.model.name: steered for steered in (TMS, WHIPPLE)}
-
-
-def _pickled(model: Model) -> Any:
-    """By name or origin where it has one: in another process it is that process's own, and no copy of this."""
-    if MODELS.get(model.name) is model:
-        return named, (model.name,)
-    if model.origin is not None:
-        return model.origin
-    return model.__reduce_ex__(2)
-
-
-copyreg.pickle(Model, _pickled)

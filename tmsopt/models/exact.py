@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +14,7 @@ from tmsopt.algebra.balls import DIGITS, Tilt, rational
 from tmsopt.algebra.formula import PI, Node, constant as node_of, fold, formula
 from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
-from tmsopt.models.expression import Expression, parse_value
+from tmsopt.models.expression import parse_value
 from tmsopt.models.model import Model, ParameterSet
 from tmsopt.records import Table
 
@@ -30,26 +30,25 @@ _DEGREES = re.compile(r"(.*?)\s*(?:deg|°)")
 
 @dataclass(frozen=True)
 class Exact:
-    """A constant of arithmetic, or so many degrees.
+    """A constant of arithmetic; equal to another that is written alike.
 
     Attributes:
-        value: of degrees, where `degrees`; an expression without names where it is irrational.
+        node: the number in a formula, an angle in radians.
+        text: such as ``8/3``, ``sqrt(2)`` or ``20 deg``.
     """
 
-    value: Fraction | Expression
-    degrees: bool = False
+    node: Node = field(compare=False)
+    text: str
+
+    @classmethod
+    def of(cls, x: Fraction) -> "Exact":
+        """A fraction."""
+        return cls(node_of(x), str(x))
 
     @property
     def fraction(self) -> Fraction | None:
         """The number as a fraction; None for degrees, and where it is irrational."""
-        return self.value if isinstance(self.value, Fraction) and not self.degrees else None
-
-    @property
-    def node(self) -> Node:
-        """The number, an angle in radians, in a formula."""
-        value = self.value
-        node: Node = node_of(value) if isinstance(value, Fraction) else fold(value.formula, {}, NODES)[0]
-        return node * PI / 180 if self.degrees else node
+        return self.node.fraction
 
     def ball(self) -> Any:
         """The number, an angle in radians, as a ball at the working precision."""
@@ -57,13 +56,13 @@ class Exact:
 
     def times(self, factor: Fraction) -> "Exact":
         """The product with a fraction."""
-        if isinstance(self.value, Fraction):
-            return Exact(self.value * factor)
-        return self if factor == 1 else Exact(parse_value(f"({self.value.text})*{factor}", ()))
+        if self.fraction is not None:
+            return Exact.of(self.fraction * factor)
+        return self if factor == 1 else Exact(self.node * factor, f"({self.text})*{factor}")
 
     def in_degrees(self) -> "Exact":
         """So many degrees."""
-        return Exact(self.value, degrees=bool(self.value))
+        return Exact(self.node * PI / 180, f"{self.text} deg") if self.fraction != 0 else self
 
     def __float__(self) -> float:
         if self.fraction is not None:
@@ -73,8 +72,7 @@ class Exact:
             return 0.0 if ball.contains(0) else _double(Fraction(str(rational(ball))))
 
     def __str__(self) -> str:
-        text = str(self.value) if isinstance(self.value, Fraction) else self.value.text
-        return f"{text} deg" if self.degrees else text
+        return self.text
 
 
 def constant(text: str) -> Exact:
@@ -83,24 +81,20 @@ def constant(text: str) -> Exact:
     Raises:
         ValueError: with the reason, for what is none, has no value or is beyond double precision.
     """
-    number: Any = None
-    expression = None
     try:
-        number = decimal(text)
+        exact = Exact.of(decimal(text))
     except (ValueError, ZeroDivisionError):
         expression = parse_value(text, (), "8/3")
+        exact = Exact(fold(expression.formula, {}, NODES)[0], expression.text)
         with flint.ctx.workdps(DIGITS):
-            number = fold(expression.formula, {}, BALLS)[0]
-        if isinstance(number, flint.fmpq):
-            number = Fraction(int(number.p), int(number.q))
-        elif number.is_finite():
-            number = expression
-        else:
+            found = fold(expression.formula, {}, BALLS)[0]
+        if isinstance(found, flint.fmpq):
+            exact = Exact.of(Fraction(int(found.p), int(found.q)))
+        elif not found.is_finite():
             raise ValueError(f"'{text}' has no value") from None
-    found = Exact(number)
-    if not math.isfinite(float(found)) or (float(found) == 0 and number not in (0, expression)):
+    if not math.isfinite(float(exact)) or (float(exact) == 0 and exact.fraction):
         raise ValueError(f"'{text}' is a number beyond double precision")
-    return found
+    return exact
 
 
 def number(x: float, text: str = "") -> Node:
@@ -217,7 +211,7 @@ def written(
     if wrong := table_faults("exact", {} if stated is None else stated, "{'zeta_B': '-1/3'}"):
         raise InputError(wrong)
     names = {n: n for n in of.names} | {f"tan({p.name})": p.name for p in of.parameters if p.tangent}
-    values = {n: Exact(decimal(float(parameters[n]))) for n in of.names}
+    values = {n: Exact.of(decimal(float(parameters[n]))) for n in of.names}
     values |= {n: number for n, text in typed.items() if (number := _parsed(text, angle=of[n].unit == "rad"))}
     tangents: dict[str, Exact] = {}
     faults = []
@@ -226,19 +220,16 @@ def written(
             faults.append(Fault(f"unknown parameter '{key}'; {suggest(key, names)}", ("exact", key)))
             continue
         name = names[key]
-        number = _parsed(given, angle=of[name].unit == "rad" and key == name)
+        angle, table = (of[name].unit == "rad", values) if key == name else (False, tangents)
+        number = _parsed(given, angle)
         if number is None:
-            faults.append(Fault(_accepted(given, key == name and of[name].unit == "rad"), ("exact", key)))
+            faults.append(Fault(_accepted(given, angle), ("exact", key)))
             continue
-        stored = math.tan(parameters[name]) if key != name else float(parameters[name])
+        stored = float(parameters[name]) if key == name else math.tan(parameters[name])
         if not math.isclose(float(number.ball()), stored, rel_tol=SAME, abs_tol=1e-300):
             message = f"found {number}, but the design has {stored!r}; give the exact form of the same number"
             faults.append(Fault(message, ("exact", key)))
-            continue
-        if key != name:
-            tangents[name] = number
-        else:
-            values[name] = number
+        table[name] = number
     if faults:
         raise InputError(faults)
     left = Table({n: v for n, v in values.items() if n not in tangents})
@@ -255,7 +246,7 @@ def _parsed(given: Any, angle: bool) -> Exact | None:
         if isinstance(given, flint.fmpq | flint.fmpz):
             fraction = rational(given) if isinstance(given, flint.fmpq) else flint.fmpq(given)
             given = Fraction(int(fraction.p), int(fraction.q))
-        return Exact(decimal(given))
+        return Exact.of(decimal(given))
     except (ValueError, TypeError, OverflowError):
         return None
 

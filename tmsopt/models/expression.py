@@ -6,10 +6,10 @@ import math
 import re
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -127,10 +127,9 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     Raises:
         ExpressionError: with what was found and what is accepted.
     """
-    body = _parse(_text(text))
-    if isinstance(body, ast.Compare):
+    if isinstance(_parse(_text(text)), ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is a comparison; accepted: a value, such as '{example}'")
-    return _in_names(_value, text, accepted)
+    return _in_names(_value(text), accepted)
 
 
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
@@ -139,32 +138,26 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     Raises:
         ExpressionError: with what was found and what is accepted.
     """
-    return _in_names(_comparison, _text(text), accepted)
+    return _in_names(_comparison(_text(text)), accepted)
 
 
-def _in_names(parse: Callable[..., Expression], text: str, accepted: Iterable[str] | None) -> Expression:
-    """The expression of a text, parsed once for all lists of names; the error is about the first fault of the text."""
-    if accepted is None:
-        return parse(text)
-    known = tuple(accepted)
-    try:
-        found = parse(text)
-    except ExpressionError:
-        return parse(text, known)
+def _in_names(found: Expression, accepted: Iterable[str] | None) -> Expression:
+    """An expression, which is parsed once for all lists of names, where all that it uses are accepted."""
+    known = found.names if accepted is None else tuple(accepted)
     for name in found.names:
         if name not in known:
-            raise UnknownName(text, name, known)
+            raise UnknownName(found.text, name, known)
     return found
 
 
 @lru_cache(maxsize=4096)
-def _value(text: str, accepted: tuple[str, ...] | None = None) -> Expression:
-    names, value = _read(_parse(text), text, accepted)
+def _value(text: str) -> Expression:
+    names, value = _read(_parse(text), text)
     return Expression(text, names, formula=formula([value], names))
 
 
 @lru_cache(maxsize=4096)
-def _comparison(text: str, accepted: tuple[str, ...] | None = None) -> Expression:
+def _comparison(text: str) -> Expression:
     body = _parse(text)
     if not isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
@@ -176,7 +169,7 @@ def _comparison(text: str, accepted: tuple[str, ...] | None = None) -> Expressio
     sign = COMPARISONS.get(type(body.ops[0]))
     if sign is None:
         raise ExpressionError(f"{_quoted(text)} compares with another sign than <=, >= or =={_advice(text)}")
-    sides = [_read(side, text, accepted) for side in (body.left, *body.comparators)]
+    sides = [_read(side, text) for side in (body.left, *body.comparators)]
     names = tuple(dict.fromkeys(name for found, _ in sides for name in found))
     if not names:
         raise ExpressionError(f"{_quoted(text)} uses no parameter or quantity, so nothing can satisfy or violate it")
@@ -252,9 +245,9 @@ def _joined(op: str, *parts: _Part) -> _Part:
     return _Part(made(op, *(p.node for p in parts)), DEGREES.operations[op](*(p.degree for p in parts)))
 
 
-def _read(body: ast.expr, text: str, accepted: Sequence[str] | None) -> tuple[tuple[str, ...], Node]:
+def _read(body: ast.expr, text: str) -> tuple[tuple[str, ...], Node]:
     """Names that a value uses, and its formula; raises where it is no accepted arithmetic, or too large to compute."""
-    parser = _Parser(text, accepted)
+    parser = _Parser(text)
     try:
         node = parser.read(body).node
         return tuple(parser.names), node
@@ -271,8 +264,8 @@ def _quoted(text: str) -> str:
 class _Parser:
     """Turns a parsed text into nodes, each name an input; discarded after one text."""
 
-    def __init__(self, text: str, accepted: Sequence[str] | None) -> None:
-        self.text, self.accepted = text, accepted
+    def __init__(self, text: str) -> None:
+        self.text = text
         self.names: dict[str, Node] = {}
 
     def read(self, node: ast.expr, depth: int = 0) -> _Part:  # noqa: PLR0911, PLR0912 - one case per kind
@@ -294,8 +287,6 @@ class _Parser:
                     raise ExpressionError(
                         f"{_quoted(text)} names the function {name} without argument; write {name}(…)"
                     )
-                if self.accepted is not None and name not in self.accepted:
-                    raise UnknownName(text, name, self.accepted)
                 return _Part(self.names.setdefault(name, symbol(name)), Degree())
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return self.read(operand, depth + 1)
@@ -329,11 +320,7 @@ class _Parser:
         """An operation on parts, of more than two one after the other."""
         parts = [self.read(operand, depth + 1) for operand in operands]
         try:
-            if len(parts) == 1:
-                return _Part(made(op, parts[0].node), DEGREES.operations[op](parts[0].degree))
-            return reduce(
-                lambda a, b: _Part(made(op, a.node, b.node), DEGREES.operations[op](a.degree, b.degree)), parts
-            )
+            return reduce(partial(_joined, op), parts) if len(parts) > 1 else _joined(op, *parts)
         except DegreeTooHigh as error:
             error.part = error.part or whole
             raise

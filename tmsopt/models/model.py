@@ -6,7 +6,7 @@ from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, SupportsIndex
 
 import flint
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from tmsopt.algebra.balls import as_ball
 from tmsopt.algebra.formula import Formula, fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS, kind_of
+from tmsopt.records import Table
 
 _BITS = 106  # the parameters' own roundings are all that widens a ball
 _EPSILON = 2.0**-53
@@ -215,7 +216,7 @@ class ParameterSet:
     rate: Computed | None = None
     root_unit: str = "1"
     torque: Computed | None = None
-    needs: Mapping[str, tuple[str, str]] = field(default_factory=dict, hash=False)
+    needs: Mapping[str, tuple[str, str]] = field(default=Table(), hash=False)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -230,9 +231,9 @@ class ParameterSet:
         return self._by_name[name]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Model:
-    """A dissipative system by its characteristic polynomial.
+    """A dissipative system by its characteristic polynomial; there is one of each in a process.
 
     Attributes:
         sets: parameter sets; the first is the native one.
@@ -267,25 +268,32 @@ class Model:
     name: str
     title: str
     degree: int
-    sets: tuple[ParameterSet, ...] = field(repr=False)
-    algebraic: Callable[[Mapping[str, Any]], dict[str, Any]] = field(repr=False)
-    polynomial: Callable[..., list[Any]] = field(repr=False)
-    quantities: tuple[Quantity, ...] = field(default=(), repr=False)
-    compact: Callable[..., list[Any]] | None = field(default=None, repr=False)
-    pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = field(default=None, repr=False)
-    feedback: Callable[[Mapping[str, Any]], Feedback] | None = field(default=None, repr=False)
+    sets: tuple[ParameterSet, ...]
+    algebraic: Callable[[Mapping[str, Any]], dict[str, Any]]
+    polynomial: Callable[..., list[Any]]
+    quantities: tuple[Quantity, ...] = ()
+    compact: Callable[..., list[Any]] | None = None
+    pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = None
+    feedback: Callable[[Mapping[str, Any]], Feedback] | None = None
     natural: bool = False
-    origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = field(default=None, repr=False)
-    statement: Mapping[str, Any] | None = field(default=None, repr=False, hash=False)
-    numbers: tuple[str, ...] = field(default=(), repr=False)
-    words: tuple[str, str] = field(default=("flutter", "divergence"), repr=False)
-    omits: str = field(default="", repr=False)
-    conventions: tuple[str, ...] = field(default=(), repr=False)
-    sketch: str = field(default="", repr=False)
-    absent: Mapping[str, str] = field(default_factory=dict, repr=False, hash=False)
-    carrier: float | None = field(default=None, repr=False)
-    carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = field(default=None, repr=False)
-    double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = field(default=None, repr=False)
+    origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = None
+    statement: Mapping[str, Any] | None = None
+    numbers: tuple[str, ...] = ()
+    words: tuple[str, str] = ("flutter", "divergence")
+    omits: str = ""
+    conventions: tuple[str, ...] = ()
+    sketch: str = ""
+    absent: Mapping[str, str] = Table()
+    carrier: float | None = None
+    carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = None
+    double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = None
+
+    def __repr__(self) -> str:
+        return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
+        """By its origin where it has one: in another process it is that process's own, and no copy of this."""
+        return self.origin or super().__reduce_ex__(protocol)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""
@@ -316,7 +324,7 @@ class Model:
 
     def _repr_latex_(self) -> str | None:
         """The characteristic polynomial in the native parameters; None for one that fills pages."""
-        from tmsopt.models.latex import LATEX, Typeset, polynomial_text
+        from tmsopt.models.typeset import LATEX, Typeset, polynomial_text
 
         of = self.sets[0]
         found = fold(self.formulas[of.name], {p.name: Typeset(p.latex) for p in of.parameters}, LATEX)

@@ -8,8 +8,8 @@ import numpy as np
 
 from tmsopt.algebra.formula import formula, symbol
 from tmsopt.models import Model, Quantity, Values
+from tmsopt.models.expression import Expression
 from tmsopt.problem.cases import Case
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.limit import limit_side
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES

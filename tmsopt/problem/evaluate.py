@@ -15,8 +15,8 @@ from tmsopt.algebra.arrays import on_arrays
 from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, Values
+from tmsopt.models.expression import Expression, ExpressionError
 from tmsopt.models.model import ROOTS
-from tmsopt.problem.expression import Expression, ExpressionError
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regular
 from tmsopt.roots import find_motion, roots

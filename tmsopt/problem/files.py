@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, StrictFloat, StrictInt, StrictStr
+from pydantic import Field, StrictInt, StrictStr
 
 from tmsopt.errors import Fault, InputError, short, suggest, visible
 from tmsopt.models import MODELS, Model, gain_names
@@ -27,70 +27,61 @@ _NO_PARAMETERS = "missing section [parameters]"
 class _FreeParameter(Section):
     """Bounds between which a free parameter may move."""
 
-    min: Number = Field(description="The least value.")
-    max: Number = Field(description="The greatest value.")
-    start: Number | None = Field(default=None, description="A value to start the search from, among others.")
+    min: Number
+    """The least value."""
+    max: Number
+    """The greatest value."""
+    start: Number | None = None
+    """A value to start the search from, among others."""
 
 
 class _Band(Section):
     """Every value between two, at all of which the design must do."""
 
-    min: Number = Field(description="The least value.")
-    max: Number = Field(description="The greatest value.")
-    points: StrictInt = Field(default=POINTS, description="How many values are looked at first, 2 to 99.")
+    min: Number
+    """The least value."""
+    max: Number
+    """The greatest value."""
+    points: StrictInt = POINTS
+    """How many values are looked at first, 2 to 99."""
 
 
 class _Objective(Section):
     """What is asked: minimize or maximize an expression, locate a pattern of roots, both, or a front of several."""
 
-    minimize: StrictStr | None = Field(
-        default=None, description='An expression to make small, such as "abscissa", the largest real part of the roots.'
-    )
-    maximize: StrictStr | None = Field(
-        default=None, description='An expression to make large, such as "damping_ratio".'
-    )
-    pareto: list[StrictStr] | None = Field(
-        default=None, description='Two or three expressions to minimise, such as ["abscissa", "-lambda_s"].'
-    )
-    locate: StrictStr | None = Field(
-        default=None, description='A pattern of roots to find, such as "EP4" (four equal roots) or "weave".'
-    )
+    minimize: StrictStr | None = None
+    """An expression to make small, such as "abscissa", the largest real part of the roots."""
+    maximize: StrictStr | None = None
+    """An expression to make large, such as "damping_ratio"."""
+    pareto: list[StrictStr] | None = None
+    """Two or three expressions to minimise, such as ["abscissa", "-lambda_s"]."""
+    locate: StrictStr | None = None
+    """A pattern of roots to find, such as "EP4" (four equal roots) or "weave"."""
 
 
 class _File(Section):
     """A design problem: which parameters are fixed, which are free, and what is asked of them."""
 
-    title: StrictStr = Field(default="", description="One line for reports.")
-    model: StrictStr | dict[str, Any] = Field(
-        default="tms",
-        description="The system: a name in quotes, or a table [model] with matrices or coefficients of your own.",
-    )
-    bicycle: StrictStr | None = Field(
-        default=None, description="A parameter file of BicycleParameters beside this one; [parameters] go before it."
-    )
-    parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr] = Field(
-        description='A number fixes, a table { min = …, max = … } frees; texts have units, such as "40 cm".'
-    )
-    feedback: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr] = Field(
-        default_factory=dict,
-        description="Gains of a controller, such as k_phidot against the lean rate, each as in [parameters].",
-    )
-    objective: _Objective = Field(
-        default_factory=_Objective, description="What is asked; a chart and a trace need nothing."
-    )
-    constraints: dict[str, StrictStr] = Field(
-        default_factory=dict,
-        description='Limits such as arm = "u_H >= 0.02", with <=, >= or ==; numbers in m, kg, s, rad and N.',
-    )
-    scenarios: dict[str, _Band | list[Number]] = Field(
-        default_factory=dict, description="Values at each of which the design must do: { min = …, max = … } or a list."
-    )
-    tolerances: dict[str, Number] = Field(
-        default_factory=dict, description="How far a parameter may be off either way; the worst product counts."
-    )
-    weights: dict[str, Number] = Field(
-        default_factory=dict, description="Size of a change that counts as 1 in radius, the robustness radius."
-    )
+    title: StrictStr = ""
+    """One line for reports."""
+    model: StrictStr | dict[str, Any] = "tms"
+    """The system: a name in quotes, or a table [model] with matrices or coefficients of your own."""
+    bicycle: StrictStr | None = None
+    """A parameter file of BicycleParameters beside this one; [parameters] go before it."""
+    parameters: dict[str, _FreeParameter | Number]
+    """A number fixes, a table { min = …, max = … } frees; texts have units, such as "40 cm"."""
+    feedback: dict[str, _FreeParameter | Number] = Field(default_factory=dict)
+    """Gains of a controller, such as k_phidot against the lean rate, each as in [parameters]."""
+    objective: _Objective = Field(default_factory=_Objective)
+    """What is asked; a chart and a trace need nothing."""
+    constraints: dict[str, StrictStr] = Field(default_factory=dict)
+    """Limits such as arm = "u_H >= 0.02", with <=, >= or ==; numbers in m, kg, s, rad and N."""
+    scenarios: dict[str, _Band | list[Number]] = Field(default_factory=dict)
+    """Values at each of which the design must do: { min = …, max = … } or a list."""
+    tolerances: dict[str, Number] = Field(default_factory=dict)
+    """How far a parameter may be off either way; the worst product counts."""
+    weights: dict[str, Number] = Field(default_factory=dict)
+    """Size of a change that counts as 1 in radius, the robustness radius."""
 
 
 SHAPE: type[Section] = _File

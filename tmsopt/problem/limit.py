@@ -2,7 +2,7 @@
 
 import re
 
-from tmsopt.problem.expression import SIGN, written_sides
+from tmsopt.models.expression import SIGN, written_sides
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 

@@ -1,15 +1,13 @@
 """The [model] table of a problem file: the user's own system, by matrices or coefficients written as expressions."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from tmsopt.errors import Fault, at_first, is_number, short, suggest, text_faults
-from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
-from tmsopt.models.stated.hamiltonian import complex_texts, from_pairs, text_entry
-from tmsopt.models.stated.pairs import Pair
-from tmsopt.models.stated.texts import Texts
-from tmsopt.models.stated.user_defined import square
+from tmsopt.models import Model, Unfit, from_coefficients, from_hamiltonian, from_matrices
+from tmsopt.models.model import Matrix
+from tmsopt.models.stated.texts import place, untexted
 
 _MATRICES = ("M", "D", "K", "A", "B", "C", "G", "H")
 KEYS = {
@@ -41,33 +39,35 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
     An entry is a number or an expression; each name in one is a parameter, unless it is one of ``[model.quantities]``,
     which may use one another.
     """
-    reader = _Reader(table)
+    faults: list[Fault] = []
+
+    def fault(message: str, *key: str) -> None:
+        faults.append(Fault(message, ("model", *key)))
+
     given = [key for key in (*_MATRICES, "coefficients") if key in table]
     advice = at_first(suggest)
     for key in table:
         if key not in KEYS:
-            reader.fault(f"unknown key {short(key)}; {advice(key, KEYS)}", key)
+            fault(f"unknown key {short(key)}; {advice(key, KEYS)}", key)
     name = table.get("name", "stated")
     if text_faults(name) or not name.strip():
-        reader.fault(f"found {short(name)}; accepted: a text of one line in quotes", "name")
+        fault(f"found {short(name)}; accepted: a text of one line in quotes", "name")
     if not given:
-        reader.fault(f"states no system; {_EXAMPLE}")
+        fault(f"states no system; {_EXAMPLE}")
     if "coefficients" in given and len(given) > 1:
-        reader.fault(f"stands beside {given[0]}; keep coefficients, or the matrices", "coefficients")
+        fault(f"stands beside {given[0]}; keep coefficients, or the matrices", "coefficients")
     if "H" in given and len(given) > 1:
         beside = next(key for key in given if key != "H")
-        reader.fault(f"stands beside {beside}; keep H, a complex system, or the matrices of a real one", "H")
-    reader.read_quantities()
-    entries = {key: reader.matrix(key) for key in given if key != "coefficients"}
-    row = reader.row(table["coefficients"], ("coefficients",)) if "coefficients" in given else []
-    quantities = {n: reader.texts.quantity(n) for n in reader.texts.written}
-    if reader.faults:
-        return reader.faults, None
+        fault(f"stands beside {beside}; keep H, a complex system, or the matrices of a real one", "H")
+    texts = _quantities(table.get("quantities", {}), fault)
+    entries, quantities = untexted({key: _rows(table[key], key, fault) for key in given}, texts, fault)
+    if faults:
+        return faults, None
     try:
         if "H" in entries:
-            return [], from_pairs(square("H", entries["H"]), name.strip(), quantities)
-        if row:
-            return [], from_coefficients(row, name=name.strip(), quantities=quantities)
+            return [], from_hamiltonian(entries["H"], name=name.strip(), quantities=quantities)
+        if "coefficients" in entries:
+            return [], from_coefficients(entries["coefficients"][0], name=name.strip(), quantities=quantities)
         return [], from_matrices(**entries, name=name.strip(), quantities=quantities)
     except Unfit as error:
         where, _, rest = error.message.partition(": ")
@@ -84,52 +84,33 @@ def _square(entries: Any) -> str:
     return f"write {short([entries[k : k + n] for k in range(0, n * n, n)])}; "
 
 
-class _Reader:
-    """Reads the entries and collects what is wrong; discarded after one table."""
+def _quantities(written: Any, fault: Callable[..., None]) -> dict[str, str]:
+    if not isinstance(written, dict):
+        fault(f"found {short(written)}; accepted: a table [model.quantities]", "quantities")
+        return {}
+    for name, text in written.items():
+        if not isinstance(text, str):
+            fault(f"found {short(text)}; accepted: an expression in quotes, such as 'k1/k2'", "quantities", name)
+    return {name: text for name, text in written.items() if isinstance(text, str)}
 
-    def __init__(self, table: Mapping[str, Any]) -> None:
-        self.table = table
-        self.faults: list[Fault] = []
-        self.texts = complex_texts(self.fault) if "H" in table else Texts(self.fault)
 
-    def fault(self, message: str, *key: str) -> None:
-        self.faults.append(Fault(message, ("model", *key)))
-
-    def matrix(self, key: str) -> list[list[Any]]:
-        rows = self.table[key]
-        if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
-            accepted = "accepted: rows in brackets, such as [['m', 0], [0, 'm']], each expression in quotes of its own"
-            self.fault(f"found {short(rows)}; {_square(rows)}{accepted}", key)
+def _rows(written: Any, key: str, fault: Callable[..., None]) -> Matrix:
+    """Rows of numbers and texts, 0 for an entry that is neither; the coefficients are one."""
+    rows = [written] if key == "coefficients" else written
+    if not isinstance(rows, list) or not rows or (rows is written and not all(isinstance(row, list) for row in rows)):
+        accepted = "accepted: rows in brackets, such as [['m', 0], [0, 'm']], each expression in quotes of its own"
+        fault(f"found {short(rows)}; {_square(rows)}{accepted}", key)
+        return []
+    for row in rows:
+        if not isinstance(row, list) or not row:
+            fault(f"found {short(row)}; {_DESCENDING}", key)
             return []
-        return [self.row(row, (key, str(k))) for k, row in enumerate(rows, start=1)]
+    return [[_entry(x, key, i, j, fault) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]
 
-    def row(self, entries: Any, place: tuple[str, ...]) -> list[Any]:
-        if not isinstance(entries, list) or not entries:
-            self.fault(f"found {short(entries)}; {_DESCENDING}", place[0])
-            return []
-        many = len(place) > 1
-        return [
-            self.entry(entry, place[0], f"row {place[1]}, column {k}" if many else f"entry {k}")
-            for k, entry in enumerate(entries, start=1)
-        ]
 
-    def entry(self, entry: Any, key: str, where: str) -> Any:
-        """One entry as a number or CasADi expression."""
-        if is_number(entry):
-            return Pair(entry) if key == "H" else entry
-        if not isinstance(entry, str):
-            self.fault(f"{where}: found {short(entry)}; accepted: a finite number, or an expression in quotes", key)
-            return Pair(0) if key == "H" else 0
-        return text_entry(self.texts, entry, where) if key == "H" else self.texts.entry(entry, key, where)
-
-    def read_quantities(self) -> None:
-        """The formulas of the quantities."""
-        written = self.table.get("quantities", {})
-        if not isinstance(written, dict):
-            self.fault(f"found {short(written)}; accepted: a table [model.quantities]", "quantities")
-            return
-        for name, text in written.items():
-            if not isinstance(text, str):
-                accepted = "an expression in quotes, such as 'k1/k2'"
-                self.fault(f"found {short(text)}; accepted: {accepted}", "quantities", name)
-        self.texts.read_quantities({n: text for n, text in written.items() if isinstance(text, str)})
+def _entry(x: Any, key: str, i: int, j: int, fault: Callable[..., None]) -> Any:
+    if is_number(x) or isinstance(x, str):
+        return x
+    where = place(key, i, j)
+    fault(f"{where}: found {short(x)}; accepted: a finite number, or an expression in quotes", key)
+    return 0

@@ -11,9 +11,9 @@ from tmsopt.algebra.kinds import BALLS
 from tmsopt.deprecated import read_from_posed
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.exact import number
+from tmsopt.models.expression import Expression, parse_comparison, parse_value
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.cases import Case, Scenario, first_cases
-from tmsopt.problem.expression import Expression, parse_comparison, parse_value
 from tmsopt.problem.normalise import normalise, settle
 from tmsopt.problem.quantities import (
     NO_RADIUS,
@@ -29,7 +29,7 @@ from tmsopt.roots import Pattern
 from tmsopt.versions import SCHEMA
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class Problem:
     """A design problem; see `load` for its file form.
 
@@ -67,41 +67,23 @@ class Problem:
     """
 
     model: Model
-    fixed: Mapping[str, float]
-    free: Mapping[str, tuple[float, float]]
-    constraints: Mapping[str, str]
-    minimize: str | None
-    maximize: str | None
-    locate: str | None
-    start: Mapping[str, float]
-    title: str
-    scenarios: Mapping[str, Scenario]
-    tolerances: Mapping[str, float]
-    weights: Mapping[str, float]
-    pareto: Sequence[str]
-    units: Mapping[str, str] = field(compare=False)
-    written: Mapping[str, Mapping[float, str]] = field(compare=False)
+    fixed: Mapping[str, Any] = Table()
+    free: Mapping[str, Any] = Table()
+    constraints: Mapping[str, str] = Table()
+    minimize: str | None = None
+    maximize: str | None = None
+    locate: str | None = None
+    start: Mapping[str, Any] = Table()
+    title: str = ""
+    scenarios: Mapping[str, Any] = Table()
+    tolerances: Mapping[str, Any] = Table()
+    weights: Mapping[str, Any] = Table()
+    pareto: Sequence[str] = ()
+    units: Mapping[str, str] = field(default=Table(), compare=False)
+    written: Mapping[str, Mapping[float, str]] = field(default=Table(), compare=False)
 
-    def __init__(
-        self,
-        model: Model,
-        fixed: Mapping[str, Any] = Table(),
-        free: Mapping[str, Any] = Table(),
-        constraints: Mapping[str, str] = Table(),
-        minimize: str | None = None,
-        maximize: str | None = None,
-        locate: str | None = None,
-        start: Mapping[str, Any] = Table(),
-        title: str = "",
-        scenarios: Mapping[str, Scenario | Sequence[Any] | Mapping[str, Any]] = Table(),
-        tolerances: Mapping[str, Any] = Table(),
-        weights: Mapping[str, Any] = Table(),
-        pareto: Sequence[str] = (),
-        units: Mapping[str, str] = Table(),
-        written: Mapping[str, Mapping[float, str]] = Table(),
-    ) -> None:
-        stated = locals()
-        vars(self).update(normalise(**{f.name: stated[f.name] for f in fields(self)}))
+    def __post_init__(self) -> None:
+        vars(self).update(normalise(**vars(self)))
 
     @cached_property
     def posed(self) -> "Posed":

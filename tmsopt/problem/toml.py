@@ -23,9 +23,9 @@ Number = StrictFloat | StrictInt | StrictStr
 
 
 class Section(BaseModel):
-    """A table of a file, in which no other key may stand."""
+    """A table of a file, in which no other key may stand; what stands under a field says what it is for."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
 
 S = TypeVar("S", bound=Section)

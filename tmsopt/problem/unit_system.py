@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.models import Parameter, Quantity
-from tmsopt.problem.expression import SIGN, Expression, dimension, parse_comparison, parse_value, written_sides
+from tmsopt.models.expression import SIGN, Expression, parse_comparison, parse_value, written_sides
 from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.units import Dimension, factor
+from tmsopt.problem.units import Dimension, dimension, factor
 from tmsopt.problem.validate import SMALLEST
 
 _PER_SECOND = "1/s"

@@ -6,11 +6,11 @@ from typing import Any
 
 from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
 from tmsopt.models import Model, ParameterSet
+from tmsopt.models.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.models.names import MEANT
 from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
 from tmsopt.problem.advice.names import example_of, unknown
 from tmsopt.problem.cases import Band, points_of
-from tmsopt.problem.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.problem.quantities import expand_names, root_names
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
@@ -143,20 +143,18 @@ def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Faul
 def _need_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     """Parameters that may differ from 0 where one that they need may be 0."""
     for name, (needed, otherwise) in of.needs.items():
-        try:
-            least = min(_reached(problem, of, needed))
-            some = any(value != 0 for value in _reached(problem, of, name))
-        except (TypeError, ValueError):
-            continue  # reported as a value
-        if some and not least > 0:
+        if min(_reached(problem, of, needed), default=1.0) <= 0 and any(_reached(problem, of, name)):
             message = f"{needed} may be 0 while {name} is not: {otherwise}; keep {needed} above 0, or leave {name} out"
             yield Fault(message, ("parameters", needed))
 
 
 def _reached(problem: Stated, of: ParameterSet, name: str) -> list[float]:
-    """The ends of what a parameter may be."""
-    given = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
-    return [float(x) for x in (given or (problem.fixed.get(name, of[name].default),))]
+    """The ends of what a parameter may be; none where they are no numbers, which is reported as a value."""
+    try:
+        given = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
+        return [float(x) for x in given or (problem.fixed.get(name, of[name].default),)]
+    except (TypeError, ValueError, OverflowError):
+        return []
 
 
 def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
@@ -165,11 +163,13 @@ def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
             yield from _scenario_faults(problem, of, name, scenario)
     for table, needed in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
         for name, value in getattr(problem, table).items():
-            if name in of.names and not _is_size(value, zero=table == "weights"):
+            if name not in of.names:
+                continue
+            if not _is_square(size := _number(value)) or size < 0 or (size == 0 and table == "tolerances"):
                 sizes = f"a number {needed}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
                 yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
-            elif table == "tolerances" and name in of.names:
-                yield from _room_faults(problem, of, name, float(value))
+            elif table == "tolerances":
+                yield from _room_faults(problem, of, name, size)
     if len(problem.tolerances) > MOST_TOLERANCES:
         message = f"{len(problem.tolerances)} tolerances; accepted: {MOST_TOLERANCES}, those that matter most"
         yield Fault(message, ("tolerances",))
@@ -195,12 +195,8 @@ def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any
 
 def _room_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
     """Faults of a tolerance that takes a parameter out of its physical range."""
-    given = problem.free.get(name) or points_of(problem.scenarios.get(name, ())) or (problem.fixed.get(name),)
-    try:
-        least, greatest = min(map(float, given)) - tolerance, max(map(float, given)) + tolerance
-    except (TypeError, ValueError):
-        return  # reported as a value
-    for value in (least, greatest):
+    ends = _reached(problem, of, name)
+    for value in (min(ends) - tolerance, max(ends) + tolerance) if ends else ():
         if value not in of[name].range:
             message = (
                 f"with the tolerance {tolerance:.6g}, {name} reaches {value:.6g}, which is not physical: "
@@ -209,12 +205,12 @@ def _room_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float)
             yield Fault(message, ("tolerances", name))
 
 
-def _is_size(value: Any, zero: bool) -> bool:
+def _number(value: Any) -> float:
+    """A number as it was stated; nan for what is none."""
     try:
-        number = math.nan if isinstance(value, bool | str) else float(value)
+        return math.nan if isinstance(value, bool | str) else float(value)
     except (TypeError, ValueError, OverflowError):
-        return False
-    return _is_square(number) and (number >= 0 if zero else number > 0)
+        return math.nan
 
 
 def _is_square(number: float) -> bool:
@@ -225,10 +221,7 @@ def _is_square(number: float) -> bool:
 def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]) -> Iterator[Fault]:
     parameter = of[name]
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    try:
-        number = math.nan if isinstance(value, bool | str) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = _number(value)
     if not math.isfinite(number):
         yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
     elif not _is_square(number):
@@ -243,9 +236,10 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
 
 def _objective_faults(problem: Stated) -> Iterator[Fault]:
     key = ("objective",)
-    if problem.minimize is not None and problem.maximize is not None:
+    asked = [sense for sense in ("minimize", "maximize") if getattr(problem, sense) is not None]
+    if len(asked) > 1:
         yield Fault("minimize and maximize together; keep one of them", key)
-    if problem.pareto and (problem.minimize is not None or problem.maximize is not None):
+    if problem.pareto and asked:
         yield Fault("pareto beside minimize or maximize; keep one of them", key)
     yield from _pareto_faults(problem.pareto)
     if problem.locate is not None:
@@ -255,9 +249,7 @@ def _objective_faults(problem: Stated) -> Iterator[Fault]:
 def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
     """What is wrong with the name of a pattern for the polynomials of a model."""
     try:
-        if not isinstance(name, str):
-            raise ValueError(f"{short(name)} is no pattern")
-        if len(name) > _LONGEST:
+        if not isinstance(name, str) or len(name) > _LONGEST:
             raise ValueError(f"{short(name)} is no pattern")
         known = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
         if known != name and known in patterns_of(model):
@@ -289,11 +281,10 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
         except ExpressionError as error:
             yield Fault(str(error), key)
 
-    for sense, text in (("minimize", problem.minimize), ("maximize", problem.maximize)):
-        if text is not None:
-            yield from parsed(parse_value, text, "objective", sense)
-    if isinstance(problem.pareto, Sequence) and not isinstance(problem.pareto, str):
-        for text in problem.pareto:
-            yield from parsed(parse_value, text, "objective", "pareto")
+    pareto = problem.pareto if isinstance(problem.pareto, Sequence) and not isinstance(problem.pareto, str) else ()
+    for sense, texts in (("minimize", [problem.minimize]), ("maximize", [problem.maximize]), ("pareto", pareto)):
+        for text in texts:
+            if text is not None or sense == "pareto":
+                yield from parsed(parse_value, text, "objective", sense)
     for name, text in problem.constraints.items():
         yield from parsed(parse_comparison, text, "constraints", name)

@@ -16,9 +16,9 @@ from tmsopt.algebra.formula import constant, depends_on, fold, formula, made, sy
 from tmsopt.algebra.intervals import Interval, ball, interval
 from tmsopt.algebra.kinds import INTERVALS
 from tmsopt.models import Quantity, Values, decimal
+from tmsopt.models.expression import Expression
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import demands_heavy_damping, depends_on_case, needs_two_sided_bounds, rewards_change_of
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Posed

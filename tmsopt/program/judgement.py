@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.models.expression import Expression
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.evaluate import coefficients_of, evaluate, roots_of
-from tmsopt.problem.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tmsopt.models import Values
-from tmsopt.problem.expression import Expression
+from tmsopt.models.expression import Expression
 from tmsopt.program.nlp import AddedVariable, Contact, Factor
 from tmsopt.records import Array
 from tmsopt.roots import product, shift

@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.algebra.krawczyk import Refused, slopes
 from tmsopt.global_search.conditions import others, values_at
 from tmsopt.models import Quantity
-from tmsopt.problem.expression import Expression
+from tmsopt.models.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
 from tmsopt.program.nlp import ordinary, reaches_of, scale_of

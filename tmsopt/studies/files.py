@@ -14,7 +14,7 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 from tmsopt.errors import LISTED, Fault, InputError, count_faults, is_number, short, suggest, visible
 from tmsopt.files import read_lines
 from tmsopt.models import Parameter, Quantity
-from tmsopt.problem.expression import written_sides
+from tmsopt.models.expression import written_sides
 from tmsopt.problem.files import as_solvable, problem_from_tables
 from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.problem import Posed, Problem

@@ -19,8 +19,8 @@ from tmsopt.errors import (
     table_faults,
     text_faults,
 )
+from tmsopt.models.expression import ExpressionError
 from tmsopt.problem.cases import Band
-from tmsopt.problem.expression import ExpressionError
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.limit import limit_of, with_limit

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, is_number, list_faults, refusal, short, suggest, text_faults
-from tmsopt.problem.expression import Expression
+from tmsopt.models.expression import Expression
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.continuation import Curve, Walk, between

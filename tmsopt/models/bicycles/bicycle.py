@@ -23,11 +23,6 @@ def omega0_equation(v: Mapping[str, Any], x: Any) -> Any:
     return x * x * x * x * v["a0"] - v["a4"]
 
 
-def nothing(v: Mapping[str, Any]) -> Any:
-    """0, which a mass is never less than."""
-    return 0
-
-
 def smaller_eigenvalue(first: Any, mixed: Any, second: Any, determinant: Any) -> Any:
     """Of a symmetric 2 × 2 matrix that is not negative, as 2 det/(tr + √(tr² − 4 det)).
 

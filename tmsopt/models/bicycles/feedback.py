@@ -6,7 +6,7 @@ lag each torque follows as lag T′ + T = −G (…), and its row is multiplied 
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from tmsopt.algebra.kinds import absolute, pi, quotient, sqrt
 from tmsopt.models.model import Computed, Feedback, Matrix, Model, Parameter, ParameterSet, Quantity, Range
@@ -14,14 +14,35 @@ from tmsopt.roots.polynomial import determinant
 
 LAG = "lag"
 _STATES = {"phi": "lean", "delta": "steer", "phidot": "lean rate", "deltadot": "steer rate"}
-_TORQUES = {"lean": "lean torque, of a rider or a flywheel,", "k": "steer torque"}
-_ROWS = {torque: row for row, torque in enumerate(_TORQUES)}
+_TORQUES = {"lean": "lean torque, of a rider or a flywheel,", "k": "steer torque"}  # of the rows of M, D, K
 _WRITTEN = ("phi", "phidot", "delta", "deltadot")
 _STEER = tuple(f"k_{x}" for x in _WRITTEN)
-_GAINS = {f"{torque}_{x}": (torque, x) for torque in ("k", "lean") for x in _WRITTEN}
 _SLOPE = "_v"  # of the gains that grow with the speed
 
-FEEDBACK = (*_GAINS, *(f"{n}{_SLOPE}" for n in _GAINS), LAG)
+
+class _Gain(NamedTuple):
+    torque: str
+    state: str
+    grows: str
+    """`_SLOPE` of one that is multiplied by the speed."""
+
+    @property
+    def row(self) -> int:
+        return list(_TORQUES).index(self.torque)
+
+    @property
+    def of_rate(self) -> bool:
+        return self.state.endswith("dot")
+
+
+_GAINS = {
+    f"{torque}_{x}{grows}": _Gain(torque, x, grows)
+    for grows in ("", _SLOPE)
+    for torque in ("k", "lean")
+    for x in _WRITTEN
+}
+
+FEEDBACK = (*_GAINS, LAG)
 """Names of [feedback], in SI."""
 
 _PASSIVE = ("v_weave", "v_capsize", "Fr_c", "v_c")
@@ -65,8 +86,8 @@ def size(name: str, p: Mapping[str, Any], rate: Computed, torque: Computed) -> A
     """How much of a name of [feedback] in SI a dimensionless one of 1 is."""
     if name == LAG:
         return 1 / rate(p)
-    found = torque(p) / rate(p) if "dot" in name else torque(p)
-    return found / sqrt(p["g"] * p["w"]) if name.endswith(_SLOPE) else found
+    found = torque(p) / rate(p) if _GAINS[name].of_rate else torque(p)
+    return found / sqrt(p["g"] * p["w"]) if _GAINS[name].grows else found
 
 
 def names_of(names: Iterable[str]) -> tuple[str, ...]:
@@ -79,38 +100,36 @@ def names_of(names: Iterable[str]) -> tuple[str, ...]:
 def with_feedback(of: Steered, names: tuple[str, ...]) -> Model:
     """The bicycle with the parameters of a controller, those of `names_of`."""
     base, lagged = of.model, LAG in names
-    driven = tuple(_ROWS[t] for t in _TORQUES if any(n.startswith(f"{t}_") for n in names))
+    listed = {n: _GAINS[n] for n in names if n != LAG}
+    driven = tuple(sorted({gain.row for gain in listed.values()}))
     in_si = base.sets[0].rate is not None  # the native set
 
     def native(name: str) -> str:
         return name if in_si else native_name(name)
 
-    def gain(p: Mapping[str, Any], torque: str, x: str) -> Any:
-        """Of the native parameters; None for one that is not there."""
-        slope, own = (native(n) if n in names else None for n in (f"{torque}_{x}{_SLOPE}", f"{torque}_{x}"))
-        parts = ([p[own]] if own else []) + ([p[slope] * p[of.speed]] if slope else [])
-        return sum(parts[1:], parts[0]) if parts else None
-
     def gains(p: Mapping[str, Any]) -> dict[tuple[int, str], Any]:
-        every = ((_ROWS[t], x, gain(p, t, x)) for t in _TORQUES for x in _STATES)
-        return {(row, x): g for row, x, g in every if g is not None}
+        """Row and state → the gain, of the native parameters."""
+        found: dict[tuple[int, str], Any] = {}
+        for n, gain in listed.items():
+            at, term = (gain.row, gain.state), p[native(n)] * p[of.speed] if gain.grows else p[native(n)]
+            found[at] = found[at] + term if at in found else term
+        return found
 
     def algebraic(p: Mapping[str, Any]) -> dict[str, Any]:
         known = base.algebraic(p)
-        own = {f"G_{row}_{x}": g for (row, x), g in gains(p).items()}
+        own = {f"G_{row}_{x}": gain for (row, x), gain in gains(p).items()}
         return {**known, **own, "h": sqrt(1 + known["T"] * known["T"])} | ({LAG: p[native(LAG)]} if lagged else {})
 
     def polynomial(**values: Any) -> list[Any]:
         M, D, K = of.matrices(values)
         angle, square = of.unit(values, values["h"])
         unit = ((1, angle), (angle, square))
-        held = {(row, x): values[n] for row in driven for x in _STATES if (n := f"G_{row}_{x}") in values}
         rows = [[[M[i][j], D[i][j], K[i][j]] for j in (0, 1)] for i in (0, 1)]
         for i in driven if lagged else ():
             rows[i] = [_followed(values[LAG], entry) for entry in rows[i]]
-        for (i, x), g in held.items():
-            entry = rows[i][j := int("delta" in x)]
-            entry[-2 if "dot" in x else -1] = entry[-2 if "dot" in x else -1] + g * unit[i][j]
+        for i, x in {(gain.row, gain.state) for gain in listed.values()}:
+            j, power = int("delta" in x), -2 if "dot" in x else -1
+            rows[i][j][power] = rows[i][j][power] + values[f"G_{i}_{x}"] * unit[i][j]
         return determinant(rows)
 
     def feedback(p: Mapping[str, Any]) -> Feedback:
@@ -152,10 +171,6 @@ def with_feedback(of: Steered, names: tuple[str, ...]) -> Model:
     )
 
 
-def _sum(A: Matrix, B: Matrix) -> Matrix:
-    return [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
-
-
 def _followed(lag: Any, entry: list[Any]) -> list[Any]:
     """(lag s + 1) times a polynomial of degree 2."""
     a, b, c = entry
@@ -165,24 +180,18 @@ def _followed(lag: Any, entry: list[Any]) -> list[Any]:
 def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven: tuple[int, ...]) -> tuple[Matrix, ...]:
     """I and −A of the states φ, δ, φ′, δ′ and the torques that follow."""
     (a, b), (c, d) = M
-    determinant = a * d - b * c
-    inverse = [
-        [quotient(d, determinant), quotient(-b, determinant)],
-        [quotient(-c, determinant), quotient(a, determinant)],
-    ]
-    size = 4 + len(driven)
-    minus: Matrix = [[0] * size for _ in range(size)]
-    minus[0][2] = minus[1][3] = -1
-    for i in (0, 1):
-        for j in (0, 1):
-            minus[2 + i][j] = inverse[i][0] * K[0][j] + inverse[i][1] * K[1][j]
-            minus[2 + i][2 + j] = inverse[i][0] * D[0][j] + inverse[i][1] * D[1][j]
-        for k, row in enumerate(driven):
-            minus[2 + i][4 + k] = -inverse[i][row]
-    for k, row in enumerate(driven):
-        minus[4 + k][:4] = [quotient(g, lag) for g in G[row]]
-        minus[4 + k][4 + k] = quotient(1, lag)
-    return [[int(i == j) for j in range(size)] for i in range(size)], minus
+    size = a * d - b * c
+    inverse = [[quotient(d, size), quotient(-b, size)], [quotient(-c, size), quotient(a, size)]]
+    forces = [[*stiff, *damped] for stiff, damped in zip(K, D, strict=True)]
+    still = [0] * len(driven)
+    minus = [[0, 0, -1, 0, *still], [0, 0, 0, -1, *still]]
+    for one, other in inverse:
+        moved = [one * x + other * y for x, y in zip(*forces, strict=True)]
+        minus.append([*moved, *(-(one, other)[row] for row in driven)])
+    for row in driven:
+        follows = (quotient(1, lag) if row == k else 0 for k in driven)
+        minus.append([*(quotient(g, lag) for g in G[row]), *follows])
+    return [[int(i == j) for j in range(len(minus))] for i in range(len(minus))], minus
 
 
 def _extended(
@@ -213,19 +222,19 @@ def _extended(
 def _unit(name: str) -> str:
     if name == LAG:
         return "s"
-    of_speed = name.endswith(_SLOPE)
-    return {True: "N s^2/rad" if of_speed else "N m s/rad", False: "N s/rad" if of_speed else "N m/rad"}["dot" in name]
+    gain = _GAINS[name]
+    return ("N s^2/rad" if gain.of_rate else "N s/rad") if gain.grows else "N m s/rad" if gain.of_rate else "N m/rad"
 
 
 def _parameter(name: str, unit: str, written: str) -> Parameter:
     if name == LAG:
         said = "time constant of the actuators" + (" per √(w/g)" if unit == "1" else "")
         return Parameter(written, unit, said, r"\tau", Range(lower=0.0, closed=False))
-    torque, x = _GAINS[name.removesuffix(_SLOPE)]
-    said = f"{_TORQUES[torque]} against the {_STATES[x]}" + (" and the speed" if name.endswith(_SLOPE) else "")
+    torque, x, grows = _GAINS[name]
+    said = f"{_TORQUES[torque]} against the {_STATES[x]}" + (" and the speed" if grows else "")
     dotted = rf"\dot\{x[:-3]}" if "dot" in x else rf"\{x}"
     symbol = r"\kappa" if written != name else "k" if torque == "k" else "l"
-    latex = rf"{symbol}_{{{dotted}{', v' if name.endswith(_SLOPE) else ''}}}"
+    latex = rf"{symbol}_{{{dotted}{', v' if grows else ''}}}"
     return Parameter(written, unit, said, latex, default=0.0)
 
 
@@ -233,8 +242,7 @@ def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: 
     """What the controller has to give, in SI."""
 
     def per_degree(v: Mapping[str, Any]) -> Any:
-        slope = v[f"k_phi{_SLOPE}"] * v["v"] if f"k_phi{_SLOPE}" in names else 0
-        gain = v["k_phi"] + slope
+        gain = v["k_phi"] + (v["k_phi_v"] * v["v"] if "k_phi_v" in names else 0)
         return gain * pi(gain) / 180
 
     def kicked(v: Mapping[str, Any]) -> Any:

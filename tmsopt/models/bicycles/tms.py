@@ -1,52 +1,31 @@
 """The two-mass-skate bicycle (Kirillov 2018; Kooijman et al. 2011), dimensionless and in SI."""
 
 from collections.abc import Mapping
+from pkgutil import resolve_name
 from typing import Any
-
-import numpy as np
 
 from tmsopt.algebra.kinds import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
 from tmsopt.models.bicycles.feedback import FEEDBACK, UNCONTROLLED, Steered, native_name, size
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
+from tmsopt.models.bicycles.tables import parameters, quantities, read_table
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
-from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
-from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
+from tmsopt.models.bicycles.tms_quantities import COMPUTED
+from tmsopt.models.model import Matrix, Model, ParameterSet
 
 __all__ = ["GRAVITY", "copo", "from_si", "matrices", "tms", "to_si"]
 
-GRAVITY = 9.81
+_TABLES = read_table("tms")
+
+GRAVITY: float = _TABLES["parameters"]["SI"]["g"]["default"]
 """Default g in m/s²."""
-
-_POSITIVE = Range(lower=0.0, closed=False)
-_NOT_NEGATIVE = Range(lower=0.0)
-_NOT_POSITIVE = Range(upper=0.0)
-_TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
-
-LAMBDA_S = Parameter(
-    "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True, sides=("reversed rake", "normal rake")
-)
 
 
 def _algebraic(p: Mapping[str, Any]) -> dict[str, Any]:
     return {name: p[name] for name in _NATIVE.names if name != "lambda_s"} | {"T": tan(p["lambda_s"])}
 
 
-_NATIVE = ParameterSet(
-    "dimensionless",
-    (
-        Parameter("Fr", "1", "Froude number v/√(g w)", r"\mathrm{Fr}", _NOT_NEGATIVE),
-        Parameter("mu", "1", "mass ratio m_H/m_B", r"\mu", _NOT_NEGATIVE, multiple_of="kg"),
-        Parameter("chi_B", "1", "rear frame centre of mass, forward of the rear contact", r"\chi_B", multiple_of="m"),
-        Parameter(
-            "chi_H", "1", "front assembly centre of mass, forward of the rear contact", r"\chi_H", multiple_of="m"
-        ),
-        Parameter("zeta_B", "1", "rear frame centre of mass, downward", r"\zeta_B", _NOT_POSITIVE, multiple_of="m"),
-        Parameter("zeta_H", "1", "front assembly centre of mass, downward", r"\zeta_H", _NOT_POSITIVE, multiple_of="m"),
-        LAMBDA_S,
-    ),
-    native=dict,
-)
+_NATIVE = ParameterSet("dimensionless", parameters(_TABLES["parameters"]["dimensionless"]), native=dict)
 
 
 def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
@@ -115,26 +94,17 @@ def _torque(p: Mapping[str, Any]) -> Any:
     return p["m_B"] * p["g"] * p["w"]
 
 
+_SI_QUANTITIES = quantities(_TABLES["quantities"]["SI"])
 _SI = ParameterSet(
     "SI",
-    (
-        Parameter("w", "m", "wheelbase", "w", _POSITIVE),
-        Parameter("v", "m/s", "forward speed", "v", _NOT_NEGATIVE, counterpart="Fr"),
-        Parameter("g", "m/s^2", "gravity", "g", _POSITIVE, default=GRAVITY),
-        LAMBDA_S,
-        Parameter("m_B", "kg", "mass of the rear frame", "m_B", _POSITIVE),
-        Parameter("x_B", "m", "rear frame centre of mass, forward of the rear contact", "x_B", counterpart="chi_B"),
-        Parameter("z_B", "m", "rear frame centre of mass, downward", "z_B", _NOT_POSITIVE, counterpart="zeta_B"),
-        Parameter("m_H", "kg", "mass of the front assembly", "m_H", _NOT_NEGATIVE, counterpart="mu"),
-        Parameter("x_H", "m", "front assembly centre of mass, forward of the rear contact", "x_H", counterpart="chi_H"),
-        Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE, counterpart="zeta_H"),
-    ),
+    parameters(_TABLES["parameters"]["SI"]),
     native=from_si,
-    quantities=(*SI_QUANTITIES, *times(_rate, "sqrt(g/w)")),
+    quantities=(*_SI_QUANTITIES, *times(_rate, "sqrt(g/w)")),
     rate=_rate,
     root_unit="√(g/w)",
     torque=_torque,
 )
+_IN_SI = {q.name: q for q in (*_SI_QUANTITIES, *quantities(_TABLES["quantities"]["shown"]))}
 
 _ABSENT = {
     "trail": "skates have no trail; the front mass stands off the steer axis by nu_H, in SI by u_H: write "
@@ -148,10 +118,11 @@ tms = Model(
     sets=(_NATIVE, _SI),
     algebraic=_algebraic,
     polynomial=copo,
-    quantities=NATIVE_QUANTITIES,
+    quantities=quantities(_TABLES["quantities"]["dimensionless"], COMPUTED, _IN_SI),
     compact=compact_copo,
     pencil=_pencil,
     natural=True,
+    origin=(resolve_name, (f"{__name__}:tms",)),
     words=WORDS,
     omits="two point masses on skates, without wheels, rotational inertia or trail",
     conventions=CONVENTIONS,

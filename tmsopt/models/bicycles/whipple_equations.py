@@ -6,10 +6,9 @@ instead of about their common centre, which a massless one has not. And a wheel 
 angular momentum at a speed of 1, beside its radius: then a wheel of no size is a number like any other.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
-Matrix = Sequence[Sequence[Any]]
+from tmsopt.models.model import Matrix
 
 
 def matrices(
@@ -38,7 +37,7 @@ def matrices(
     sine: Any,
     cosine: Any,
     turn: Any,
-) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
+) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     """M, C1, K0, K2 of M q″ + v C1 q′ + (g K0 + v² K2) q = 0, q = (lean, steer); nested lists, any numbers.
 
     Args:
@@ -80,6 +79,15 @@ def matrices(
     return M, C1, K0, K2
 
 
+def tangent_matrices(T: Any, w: Any, **bodies: Any) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """M, C1, K0 and K2 with T = tan λ, for a steer angle in units of cos λ/w.
+
+    Args:
+        bodies: the other lengths, masses, inertias and spins of `matrices`.
+    """
+    return matrices(w, **bodies, sine=w * T, cosine=w, turn=1)
+
+
 def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any, ...]:
     """The numbers b of det(M s² + v C1 s + g K0 + v² K2): a0, a1/v, the two of a2, of a3/v and of a4.
 
@@ -98,66 +106,15 @@ def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any,
     )
 
 
-def carvallo_whipple(
-    v: Any,
-    g: Any,
-    T: Any,
-    w: Any,
-    c: Any,
-    r_R: Any,
-    m_R: Any,
-    I_Rxx: Any,
-    S_R: Any,
-    x_B: Any,
-    z_B: Any,
-    m_B: Any,
-    I_Bxx: Any,
-    I_Bzz: Any,
-    I_Bxz: Any,
-    x_H: Any,
-    z_H: Any,
-    m_H: Any,
-    I_Hxx: Any,
-    I_Hzz: Any,
-    I_Hxz: Any,
-    r_F: Any,
-    m_F: Any,
-    I_Fxx: Any,
-    S_F: Any,
-) -> list[Any]:
+def carvallo_whipple(v: Any, g: Any, **of: Any) -> list[Any]:
     """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` alone.
 
     The factor is that of a steer angle in units of cos λ/w, in which the equations are polynomials in T and w.
+
+    Args:
+        of: the other algebraic parameters, those of `tangent_matrices`.
     """
-    b = powers_of_speed(
-        *matrices(
-            w=w,
-            c=c,
-            r_R=r_R,
-            m_R=m_R,
-            I_Rxx=I_Rxx,
-            S_R=S_R,
-            x_B=x_B,
-            z_B=z_B,
-            m_B=m_B,
-            I_Bxx=I_Bxx,
-            I_Bzz=I_Bzz,
-            I_Bxz=I_Bxz,
-            x_H=x_H,
-            z_H=z_H,
-            m_H=m_H,
-            I_Hxx=I_Hxx,
-            I_Hzz=I_Hzz,
-            I_Hxz=I_Hxz,
-            r_F=r_F,
-            m_F=m_F,
-            I_Fxx=I_Fxx,
-            S_F=S_F,
-            sine=w * T,
-            cosine=w,
-            turn=1,
-        )
-    )
+    b = powers_of_speed(*tangent_matrices(**of))
     v2 = v * v
     return [b[0], v * b[1], g * b[2] + v2 * b[3], v * (g * b[4] + v2 * b[5]), g * (g * b[6] + v2 * b[7])]
 

@@ -1,43 +1,21 @@
-"""Quantities derived from the parameters of the Carvallo–Whipple bicycle: speeds, loads, trail, spins."""
+"""Quantities of the Carvallo–Whipple bicycle that are no plain expressions; the others are in `whipple.toml`."""
 
 import math
 from collections.abc import Mapping
+from inspect import signature
 from typing import Any
 
-from tmsopt.algebra.kinds import both, choose, least, less, positive_part, quotient, ratio, sqrt, tan
-from tmsopt.models.bicycles.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
-from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed
-from tmsopt.models.model import Quantity, Range
+from tmsopt.algebra.kinds import both, choose, least, less, quotient, ratio, sqrt, tan
+from tmsopt.models.bicycles.bicycle import omega0, omega0_equation, smaller_eigenvalue
+from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed, tangent_matrices
+from tmsopt.models.model import Matrix
 
 Design = Mapping[str, Any]
 
-_NOT_NEGATIVE = Range(lower=0.0)
-_NOT_POSITIVE = Range(upper=0.0)
-
 _ABOVE = 1e300  # any square of a speed that counts is less
 
-_IN_MATRICES = (
-    "w",
-    "c",
-    "r_R",
-    "m_R",
-    "I_Rxx",
-    "x_B",
-    "z_B",
-    "m_B",
-    "I_Bxx",
-    "I_Bzz",
-    "I_Bxz",
-    "x_H",
-    "z_H",
-    "m_H",
-    "I_Hxx",
-    "I_Hzz",
-    "I_Hxz",
-    "r_F",
-    "m_F",
-    "I_Fxx",
-)
+IN_MATRICES = tuple(signature(matrices).parameters)[:-3]
+"""Algebraic parameters beside T, v and g: lengths, masses, inertias and spins."""
 
 
 def spin(I_yy: Any, r: Any) -> Any:
@@ -57,15 +35,15 @@ def spin(I_yy: Any, r: Any) -> Any:
 
 def algebraic(p: Design) -> dict[str, Any]:
     """The numbers in which the coefficients are polynomials: T = tan λ_s and the spins instead of I_yy."""
-    return {
-        **{name: p[name] for name in ("v", "g", *_IN_MATRICES)},
-        "T": tan(p["lambda_s"]),
-        "S_R": spin(p["I_Ryy"], p["r_R"]),
-        "S_F": spin(p["I_Fyy"], p["r_F"]),
-    }
+    return {"v": p["v"], "g": p["g"], "T": tan(p["lambda_s"]), **_bodies(p)}
 
 
-def canonical(p: Design) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
+def _bodies(p: Design) -> dict[str, Any]:
+    spins = {"S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"])}
+    return {name: p[name] for name in IN_MATRICES if name not in spins} | spins
+
+
+def canonical(p: Design) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no part in them), any numbers.
 
     Example:
@@ -76,9 +54,7 @@ def canonical(p: Design) -> tuple[list[list[Any]], list[list[Any]], list[list[An
     More: docs/how_to/import.md
     """
     sine, cosine = _sine_cosine(p)
-    bodies = {name: p[name] for name in _IN_MATRICES}
-    spins = {"S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"])}
-    return matrices(**bodies, **spins, sine=sine, cosine=cosine, turn=cosine / p["w"])
+    return matrices(**_bodies(p), sine=sine, cosine=cosine, turn=cosine / p["w"])
 
 
 def _sine_cosine(p: Design) -> tuple[Any, Any]:
@@ -90,15 +66,7 @@ def _sine_cosine(p: Design) -> tuple[Any, Any]:
 
 def _powers(v: Design) -> tuple[Any, ...]:
     """b0 … b7 of `powers_of_speed`, for a steer angle in units of w/cos λ_s."""
-    return powers_of_speed(*tangent_matrices(algebraic(v)))
-
-
-def tangent_matrices(
-    of: Mapping[str, Any],
-) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
-    """M, C1, K0 and K2 for algebraic parameters and a steer angle in units of w/cos λ_s."""
-    bodies = {name: of[name] for name in (*_IN_MATRICES, "S_R", "S_F")}
-    return matrices(**bodies, sine=of["w"] * of["T"], cosine=of["w"], turn=1)
+    return powers_of_speed(*tangent_matrices(tan(v["lambda_s"]), **_bodies(v)))
 
 
 def _v_capsize(v: Design) -> Any:
@@ -138,21 +106,6 @@ def _least(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
     return choose(less(found, _ABOVE), found, math.nan)
 
 
-def _z_T(v: Design) -> Any:
-    moment = v["m_B"] * v["z_B"] + v["m_H"] * v["z_H"] - v["m_R"] * v["r_R"] - v["m_F"] * v["r_F"]
-    return moment / v["m_T"]
-
-
-def _load_rear(v: Design) -> Any:
-    """1 − x_T/w with the subtraction inside the moments, so that a small load keeps its digits."""
-    w = v["w"]
-    return (v["m_R"] * w + v["m_B"] * (w - v["x_B"]) + v["m_H"] * (w - v["x_H"])) / (v["m_T"] * w)
-
-
-def _rear_lift(v: Design) -> Any:
-    return -v["load_rear"] * v["m_T"]
-
-
 def _fork_offset(v: Design) -> Any:
     sine, cosine = _sine_cosine(v)
     return v["r_F"] * sine - v["c"] * cosine
@@ -169,101 +122,16 @@ def _mass_margin(v: Design) -> Any:
     return smaller_eigenvalue(first, mixed, second, first * second - mixed * mixed)
 
 
-QUANTITIES = (
-    Quantity(
-        "omega0",
-        "1/s",
-        "−(a4/a0)^(1/4), the mean decay of the roots",
-        r"\omega_0",
-        omega0,
-        equation=omega0_equation,
-        range=_NOT_POSITIVE,
-    ),
-    Quantity("v_weave", "m/s", "least speed at which a pair of roots is imaginary", r"v_\mathrm{w}", _v_weave),
-    Quantity(
-        "v_capsize",
-        "m/s",
-        "speed at which a root is 0",
-        r"v_\mathrm{c}",
-        _v_capsize,
-        equation=_v_capsize_equation,
-        range=_NOT_NEGATIVE,
-    ),
-    Quantity(
-        "mechanical_trail",
-        "m",
-        "distance of the front contact from the steer axis",
-        r"c_m",
-        lambda v: v["c"] * _sine_cosine(v)[1],
-    ),
-    Quantity("fork_offset", "m", "distance of the front wheel centre from the steer axis", r"o_F", _fork_offset),
-    Quantity(
-        "u_H", "m", "distance of the handlebar's centre of mass from the steer axis, positive ahead of it", "u_H", _u_H
-    ),
-    Quantity(
-        "u_A",
-        "m",
-        "distance of the centre of mass of the front assembly from the steer axis",
-        "u_A",
-        lambda v: quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"]),
-    ),
-    Quantity("m_T", "kg", "mass of the whole bicycle", "m_T", lambda v: v["m_R"] + v["m_B"] + v["m_H"] + v["m_F"]),
-    Quantity(
-        "x_T",
-        "m",
-        "centre of mass of the whole bicycle, forward of the rear contact",
-        "x_T",
-        lambda v: (v["m_B"] * v["x_B"] + v["m_H"] * v["x_H"] + v["m_F"] * v["w"]) / v["m_T"],
-    ),
-    Quantity("z_T", "m", "centre of mass of the whole bicycle, downward", "z_T", _z_T),
-    Quantity(
-        "load_front",
-        "1",
-        "share of the weight on the front wheel, negative where it lifts",
-        r"N_F/(N_F + N_R)",
-        lambda v: v["x_T"] / v["w"],
-        share=True,
-    ),
-    Quantity(
-        "load_rear",
-        "1",
-        "share of the weight on the rear wheel, negative where it lifts",
-        r"N_R/(N_F + N_R)",
-        _load_rear,
-        share=True,
-    ),
-    Quantity(
-        "N_F",
-        "N",
-        "load on the front wheel at rest, negative where it lifts",
-        "N_F",
-        lambda v: v["load_front"] * v["m_T"] * v["g"],
-    ),
-    Quantity(
-        "N_R",
-        "N",
-        "load on the rear wheel at rest, negative where it lifts",
-        "N_R",
-        lambda v: v["load_rear"] * v["m_T"] * v["g"],
-    ),
-    Quantity(
-        "m_ballast_rear",
-        "kg",
-        "mass at the rear contact that keeps the rear wheel down",
-        r"m_\mathrm{ballast}",
-        lambda v: positive_part(_rear_lift(v)),
-        range=_NOT_NEGATIVE,
-        pieces=(nothing, _rear_lift),
-    ),
-    Quantity("S_R", "kg m", "spin of the rear wheel, I_Ryy/r_R", "S_R", lambda v: spin(v["I_Ryy"], v["r_R"])),
-    Quantity("S_F", "kg m", "spin of the front wheel, I_Fyy/r_F", "S_F", lambda v: spin(v["I_Fyy"], v["r_F"])),
-    Quantity(
-        "mass_margin",
-        "kg m^2",
-        "smallest eigenvalue of the mass matrix, 0 where it is singular",
-        r"\min\sigma(M)",
-        _mass_margin,
-        range=_NOT_NEGATIVE,
-    ),
-)
-"""Quantities of a design. A mass at the rear contact has no part in the lateral motion."""
+COMPUTED: Mapping[str, dict[str, Any]] = {
+    "omega0": {"value": omega0, "equation": omega0_equation},
+    "v_weave": {"value": _v_weave},
+    "v_capsize": {"value": _v_capsize, "equation": _v_capsize_equation},
+    "mechanical_trail": {"value": lambda v: v["c"] * _sine_cosine(v)[1]},
+    "fork_offset": {"value": _fork_offset},
+    "u_H": {"value": _u_H},
+    "u_A": {"value": lambda v: quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"])},
+    "S_R": {"value": lambda v: spin(v["I_Ryy"], v["r_R"])},
+    "S_F": {"value": lambda v: spin(v["I_Fyy"], v["r_F"])},
+    "mass_margin": {"value": _mass_margin},
+}
+"""What `whipple.toml` cannot state of its quantities."""

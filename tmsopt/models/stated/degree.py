@@ -73,11 +73,6 @@ class Degree:
         over, under = (self.over, self.under) if n >= 0 else (self.under, self.over)
         return Degree(math.ceil(abs(n) * over), math.ceil(abs(n) * under))
 
-    def __neg__(self) -> "Degree":
-        return self if self.number is None else _constant(-self.number)
-
-    __sub__ = __add__
-
 
 def _constant(number: Any) -> Degree:
     return Degree(0, 0, float(number))

@@ -3,16 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from tmsopt.errors import short
-from tmsopt.models.model import Matrix, Model
-from tmsopt.models.stated.equations import IMAGINARY
-from tmsopt.models.stated.pairs import BESIDE, PAIRS, Pair, as_written, pair, real_text
-from tmsopt.models.stated.texts import Texts, Unfit
+from tmsopt.models.model import Model
 from tmsopt.models.stated.user_defined import made, square
-
-_UNIT_NAMES = ("i", "j")
 
 
 def from_hamiltonian(H: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
@@ -40,49 +32,4 @@ def from_hamiltonian(H: Any, *, name: str = "stated", quantities: Mapping[str, A
 
     More: docs/explanation/exceptional_points.md
     """
-    rows = square("H", H.tolist() if isinstance(H, np.ndarray) and H.ndim == 2 else H)
-    derived = dict(quantities or {}) if isinstance(quantities or {}, Mapping) else {}
-    texts = complex_texts(_unfit, {n: x for n, x in derived.items() if not isinstance(x, str)})
-    texts.read_quantities({n: x for n, x in derived.items() if isinstance(x, str)})
-    entries = [
-        [_entry(texts, x, f"row {i}, column {j}") for j, x in enumerate(row, start=1)]
-        for i, row in enumerate(rows, start=1)
-    ]
-    return from_pairs(entries, name, {n: texts.quantity(n) for n in derived} if derived else quantities)
-
-
-def from_pairs(entries: list[list[Pair]], name: Any, quantities: Any) -> Model:
-    """The same for entries that are pairs."""
-    R: Matrix = [[x.re for x in row] for row in entries]
-    J: Matrix = [[x.im for x in row] for row in entries]
-    return made("hamiltonian", name, {"H": R, IMAGINARY: J}, quantities)
-
-
-def complex_texts(fault: Any, known: Mapping[str, Any] | None = None) -> Texts:
-    """A reader of texts with complex numbers; see `Texts`."""
-    return Texts(lambda message, *key: fault(as_written(message), *key), known, PAIRS, BESIDE)
-
-
-def text_entry(texts: Texts, text: str, where: str) -> Pair:
-    """One entry as a pair; 0 for one with a fault."""
-    known = set(texts.met)
-    found = pair(texts.entry(real_text(text), "H", where))
-    for taken in (n for n in _UNIT_NAMES if n in texts.met and n not in known):
-        texts.fault(f"{where}: '{taken}' would be a parameter; write the imaginary unit as 1j", "H")
-    return found
-
-
-def _entry(texts: Texts, x: Any, where: str) -> Pair:
-    if isinstance(x, str):
-        return text_entry(texts, x, where)
-    if isinstance(x, tuple):
-        if len(x) != 2:
-            raise Unfit("H", f"{where}: found {short(x)}; accepted: two, the real and the imaginary part")
-        return Pair(*x)
-    if isinstance(x, complex | np.complexfloating):
-        return Pair(float(x.real), float(x.imag))
-    return Pair(x)
-
-
-def _unfit(message: str, key: str, *name: str) -> None:
-    raise Unfit(key, ": ".join([*name, message]))
+    return made("hamiltonian", name, {"H": square("H", H)}, quantities)

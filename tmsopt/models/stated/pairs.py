@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from tmsopt.algebra.formula import Kind, constant, made
 from tmsopt.algebra.kinds import NODES
 from tmsopt.models.names import FUNCTIONS
@@ -72,6 +74,15 @@ def pair(x: Any) -> Pair:
     if isinstance(x, complex):
         return Pair(constant(x.real), constant(x.imag) if x.imag else 0)
     return x if isinstance(x, Pair) else Pair(constant(x))
+
+
+def as_pair(x: Any) -> Pair:
+    """An entry of a complex matrix, numbers and expressions as they are, as a pair."""
+    if isinstance(x, tuple):
+        return Pair(*x[:2])
+    if isinstance(x, complex | np.complexfloating):
+        return Pair(float(x.real), float(x.imag))
+    return x if isinstance(x, Pair) else Pair(x)
 
 
 def is_real(x: Pair) -> bool:

@@ -123,10 +123,15 @@ def _frequencies(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
     share = _shares(len(box))
     if len(box) <= _CORNERS:
         share = np.concatenate([share, np.array(list(product((0.0, 1.0), repeat=len(box))))])
-    columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in zip(matrix.names, box, share.T, strict=True)}
-    own = np.array([np.broadcast_to(np.asarray(x, dtype=float), len(share)) for x in values(matrix, columns)])
+    own = _sampled(matrix, box, share)
     H = (own[: n * n] + 1j * own[n * n :]).T.reshape(-1, n, n)
     return np.linalg.eigvals(H) if np.isfinite(H).all() else np.zeros(0)
+
+
+def _sampled(asked: Formula, box: Sequence[Interval], share: Array) -> Array:
+    """A formula at designs of a box, a row for each output and a column for each design."""
+    columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in zip(asked.names, box, share.T, strict=True)}
+    return np.array([np.broadcast_to(np.asarray(x, dtype=float), len(share)) for x in values(asked, columns)])
 
 
 def _shares(size: int) -> Array:
@@ -142,9 +147,7 @@ def _ranges(asked: Formula, box: Sequence[Interval]) -> list[Interval]:
             return found
     except NotAccepted:
         pass
-    places = zip(asked.names, box, _shares(len(box)).T, strict=True)
-    columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in places}
-    own = np.array([np.broadcast_to(x, _SAMPLE) for x in values(asked, columns)])
+    own = _sampled(asked, box, _shares(len(box)))
     own = np.where(np.isfinite(own), own, 0.0)
     low, high = own.min(axis=1), own.max(axis=1)
     size = (_WIDER - 1) * np.maximum(high - low, 0.0) / 2

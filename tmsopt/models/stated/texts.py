@@ -7,15 +7,18 @@ from typing import Any
 
 from tmsopt.algebra.formula import Kind, symbol
 from tmsopt.algebra.kinds import NODES
+from tmsopt.errors import short
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
+from tmsopt.models.stated.pairs import BESIDE, PAIRS, Pair, as_pair, as_written, pair, real_text
 
 MOST_QUANTITIES = 500
 """More take seconds to read."""
 
 _CIRCLES = 8  # that are listed
+_UNIT_NAMES = ("i", "j")
 
 
 class Unfit(ValueError):
@@ -143,20 +146,39 @@ class Texts:
         return expression
 
 
+def place(key: str, i: int, j: int) -> str:
+    """Where an entry is, in words."""
+    return f"entry {j}" if key == "coefficients" else f"row {i}, column {j}"
+
+
 def untexted(
     matrices: Mapping[str, Matrix], derived: Mapping[Any, Any], fault: Callable[..., None]
 ) -> tuple[dict[str, Matrix], dict[Any, Any]]:
-    """Texts in matrices and quantities as nodes."""
+    """Texts in matrices and quantities as nodes; entries of a complex H as pairs, whatever they are."""
     written = {n: x for n, x in derived.items() if isinstance(x, str)}
-    texts = Texts(fault, known={n: x for n, x in derived.items() if n not in written})
+    known, of_H = {n: x for n, x in derived.items() if n not in written}, "H" in matrices
+    texts = Texts(fault, known)
+    if of_H:
+        texts = Texts(lambda message, *key: fault(as_written(message), *key), known, PAIRS, BESIDE)
     texts.read_quantities(written)
 
     def entry(x: Any, n: str, i: int, j: int) -> Any:
-        where = f"entry {j}" if n == "coefficients" else f"row {i}, column {j}"
-        return texts.entry(x, n, where) if isinstance(x, str) else x
+        where = place(n, i, j)
+        if isinstance(x, str):
+            return pair_of(x, where) if of_H else texts.entry(x, n, where)
+        if of_H and isinstance(x, tuple) and len(x) != 2:
+            fault(f"{where}: found {short(x)}; accepted: two, the real and the imaginary part", n)
+        return as_pair(x) if of_H else x
+
+    def pair_of(text: str, where: str) -> Pair:
+        known = set(texts.met)
+        found = pair(texts.entry(real_text(text), "H", where))
+        for taken in (n for n in _UNIT_NAMES if n in texts.met and n not in known):
+            fault(f"{where}: '{taken}' would be a parameter; write the imaginary unit as 1j", "H")
+        return found
 
     read = {
         n: [[entry(x, n, i, j) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]
         for n, rows in matrices.items()
     }
-    return read, {n: texts.quantity(n) for n in derived}
+    return read, {n: texts.quantity(n) for n in derived if n in known or n in texts.written}

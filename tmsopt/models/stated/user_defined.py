@@ -24,7 +24,7 @@ from tmsopt.models.stated.degree import faulty
 from tmsopt.models.stated.equations import IMAGINARY, in_order, pencil, polynomial, whole
 from tmsopt.models.stated.pairs import complex_text
 from tmsopt.models.stated.real_form import carriers, complex_model
-from tmsopt.models.stated.texts import Unfit, untexted
+from tmsopt.models.stated.texts import Unfit, place, untexted
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
@@ -165,8 +165,11 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
     matrices, derived = untexted(
         matrices, {n: _node("quantities", n, x) for n, x in (quantities or {}).items()}, _unfit
     )
+    if kind == "hamiltonian":
+        H = matrices["H"]
+        matrices = {"H": [[x.re for x in row] for row in H], IMAGINARY: [[x.im for x in row] for row in H]}
     given = {
-        (n, f"entry {j}" if kind == "coefficients" else f"row {i}, column {j}"): x
+        (n, place(n, i, j)): x
         for n, rows in matrices.items()
         for i, row in enumerate(rows, start=1)
         for j, x in enumerate(row, start=1)
@@ -174,8 +177,8 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
     symbols = [
         x.name() for x in ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in given.values() if isinstance(x, ca.SX))))
     ]
-    entries = {place: _node(whole(place[0]), place[1], x) for place, x in given.items()}
-    names = formula(entries[place] for place in in_order(kind, entries)).names
+    entries = {at: _node(whole(at[0]), at[1], x) for at, x in given.items()}
+    names = formula(entries[at] for at in in_order(kind, entries)).names
     twice = {n for n in symbols if symbols.count(n) > 1}
     if twice:
         raise Unfit(key, f"has two symbols named {min(twice)}; make one and use it everywhere")

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tmsopt.problem.expression import written_sides
+from tmsopt.models.expression import written_sides
 from tmsopt.problem.limit import limit_of, with_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import unit_of

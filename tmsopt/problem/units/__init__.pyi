@@ -1,4 +1,4 @@
-from .dimensions import Dimension as Dimension
+from .dimensions import Dimension as Dimension, dimension as dimension
 from .readings import (
     Reading as Reading, decay_time as decay_time, frequencies as frequencies, growth_time as growth_time,
     reading as reading, readings as readings,

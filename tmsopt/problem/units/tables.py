@@ -40,7 +40,9 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
         if unit == "1" and sizes:
             unit = of[name].multiple_of or unit  # a tolerance of 5 mm is one of 0.005 wheelbases of 1 m
         try:
-            found, written, exact = read(value, unit) if isinstance(value, str) else (value, "", Exact(Fraction(value)))
+            found, written, exact = (
+                read(value, unit) if isinstance(value, str) else (value, "", Exact.of(Fraction(value)))
+            )
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)
         except OverflowError:  # a whole number that is no double

@@ -4,9 +4,9 @@ import math
 from collections.abc import Collection
 
 from tmsopt.evaluation.exclusion import known_bound
+from tmsopt.models.expression import SIGN
 from tmsopt.problem import limit_of, unit_of
 from tmsopt.problem.advice.remedies import Need, Relaxation
-from tmsopt.problem.expression import SIGN
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import dimension_of, limit_text

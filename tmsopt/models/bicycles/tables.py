@@ -1,0 +1,67 @@
+"""Parameters and quantities of a bicycle, as its TOML file lists them."""
+
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from math import pi
+from typing import Any
+
+from tmsopt.algebra.kinds import positive_part
+from tmsopt.models.expression import parse_value
+from tmsopt.models.model import Parameter, Quantity, Range
+from tmsopt.records import Table
+
+_RANGES = {
+    "": Range(),
+    "> 0": Range(lower=0.0, closed=False),
+    ">= 0": Range(lower=0.0),
+    "<= 0": Range(upper=0.0),
+}
+
+_TILT = Range(-pi / 2, pi / 2, closed=False)
+LAMBDA_S = Parameter(
+    "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True, sides=("reversed rake", "normal rake")
+)
+
+
+def read_table(name: str) -> dict[str, Any]:
+    """The tables of a file of this folder, by its name without the ending."""
+    return tomllib.loads((files(__package__) / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def parameters(rows: Mapping[str, Any]) -> tuple[Parameter, ...]:
+    """Parameters by name, each with the fields of `Parameter`; the symbol is the name where no other is given."""
+    return tuple(Parameter(name, **_fields(name, row)) if row else LAMBDA_S for name, row in rows.items())
+
+
+def quantities(
+    rows: Mapping[str, Any],
+    computed: Mapping[str, dict[str, Any]] = Table(),
+    counterparts: Mapping[str, Quantity] = Table(),
+) -> tuple[Quantity, ...]:
+    """Quantities by name, each with the fields of `Quantity`; formulas are expressions in parameters and quantities.
+
+    Where it lists a `positive_part`, the quantity is that of an expression.
+
+    Args:
+        computed: name → fields that no file can state.
+        counterparts: what some are in SI, by name.
+    """
+    found = []
+    for name, row in rows.items():
+        fields = _fields(name, row) | computed.get(name, {})
+        if "positive_part" in fields:
+            fields |= _positive_part(fields.pop("positive_part"))
+        elif isinstance(fields["value"], str):
+            fields["value"] = parse_value(fields["value"], None)
+        found.append(Quantity(name, **fields | {"counterpart": counterparts.get(fields.get("counterpart", ""))}))
+    return tuple(found)
+
+
+def _fields(name: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    return {"latex": name, **row, "range": _RANGES[row.get("range", "")]}
+
+
+def _positive_part(text: str) -> dict[str, Any]:
+    part = parse_value(text, None)
+    return {"value": lambda v: positive_part(part(v)), "pieces": (lambda v: 0, part)}
