@@ -21,7 +21,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from tmsopt import files
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, refusal
 from tmsopt.files import differences, from_json
 from tmsopt.studies.old_stores import about_of, columns_of, parts_of
 from tmsopt.studies.rows import BLOCK, SAVED, STATUSES, Part, column_of
@@ -304,7 +304,7 @@ def _described(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
     }
     if len(about["definition"]) > files.LARGEST_JSON:
         message = f"takes more than {files.LARGEST_JSON} characters to define; give the values in a CSV file"
-        raise InputError([Fault(message, ("study",))])
+        raise refusal(message, "study")
     return about, kept
 
 

@@ -14,19 +14,19 @@ from tmsopt.errors import (
     at_first,
     count_faults,
     list_faults,
+    refusal,
     short,
     suggest,
     table_faults,
     text_faults,
 )
-from tmsopt.problem.cases import Band
 from tmsopt.problem.expression import ExpressionError
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.limit import limit_of, with_limit
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.program.options import STARTS
-from tmsopt.records import Array, Column, Table
+from tmsopt.records import Array, Column, Table, plain
 from tmsopt.studies.sampling import MOST_ROWS, column_of_numbers, grid
 
 _SEEDS = 2**31
@@ -103,7 +103,7 @@ class Study:
         """
         if not 0 <= row < len(self):
             message = f"found {row}; accepted: 0 to {len(self) - 1}, for the study has {len(self)} rows"
-            raise InputError([Fault(message, ("row",))])
+            raise refusal(message, "row")
         return Table({name: float(column[row]) for name, column in self.columns.items()})
 
     def row_problem(self, row: int) -> Problem:
@@ -193,18 +193,8 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
 
 
 def _problem(problem: Posed) -> dict[str, Any]:
-    tables: dict[str, dict[str, Any]] = {
-        "fixed": dict(problem.fixed),
-        "free": {name: list(ends) for name, ends in problem.free.items()},
-        "constraints": dict(problem.constraints),
-        "scenarios": {
-            name: {"min": float(s.min), "max": float(s.max), "points": s.points} if isinstance(s, Band) else list(s)
-            for name, s in problem.scenarios.items()
-        },
-        "tolerances": dict(problem.tolerances),
-        "weights": dict(problem.weights),
-        "start": dict(problem.start),
-    }
+    names = ("fixed", "free", "constraints", "scenarios", "tolerances", "weights", "start")
+    tables = {name: plain(getattr(problem, name)) for name in names}
     asked = {sense: getattr(problem, sense) for sense in ("minimize", "maximize", "locate")}
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
