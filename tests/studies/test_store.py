@@ -483,6 +483,7 @@ def test_a_damaged_store_of_version_1_is_refused(path):
     for name, script in (
         ("solved", "UPDATE rows SET data = '[]'"),
         ("solved", "UPDATE columns SET doubles = x'00'"),
+        ("solved", "UPDATE columns SET doubles = x'0011'"),
         ("judged", "UPDATE blocks SET data = x'00'"),
         ("judged", "DELETE FROM about"),
     ):
