@@ -252,10 +252,9 @@ def _completed(
         try:
             with closing(_rows(study, left, executor, note)) as rows:
                 for row in rows:
-                    if lacks[row.number]:  # a block may be stored in part
-                        fresh.append(row)
-                        show(1)
-                    if fresh and time.perf_counter() - last >= _COMMIT:
+                    fresh.append(row)
+                    show(1)
+                    if time.perf_counter() - last >= _COMMIT:
                         keep(part_of(fresh))
                         fresh, last = [], time.perf_counter()
         finally:
@@ -285,9 +284,9 @@ def _rows(study: Study, left: set[int], executor: Executor, note: Note) -> Gener
                 for place, answer in answers:
                     unit = units[place]
                     if not isinstance(answer, Crash):
-                        yield from answer
+                        yield from (row for row in answer if row.number in left)  # a block may be stored in part
                     elif len(unit) > 1:
-                        taken_apart += [(number,) for number in unit]
+                        taken_apart += [(number,) for number in unit if number in left]
                     else:
                         note(f"row {unit[0]} is quarantined")
                         cause = f" ({answer.cause})" if answer.cause else ""
