@@ -4,6 +4,7 @@ import csv
 import math
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Set
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from os import PathLike
@@ -151,34 +152,33 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
         InputError: listing every fault with file, line and column.
     """
     file, faults = str(path), list[Fault]()
-    reader = csv.reader(
-        read_lines(file, "CSV file of numbers", LARGEST, LONGEST_LINE), strict=True, skipinitialspace=True
-    )
+    with closing(read_lines(file, "CSV file of numbers", LARGEST, LONGEST_LINE)) as lines:
+        reader = csv.reader(lines, strict=True, skipinitialspace=True)
 
-    def fault(message: str, *key: str) -> Fault:
-        return Fault(message, key).at(file, max(reader.line_num, 1))
+        def fault(message: str, *key: str) -> Fault:
+            return Fault(message, key).at(file, max(reader.line_num, 1))
 
-    try:
-        names = [name.strip() for name in next(reader, [])]
-        if wrong := [fault(message) for message in _header_faults(names)]:
-            raise InputError(wrong)
-        columns, units = [array("d") for _ in names], [unit_of(name) for name in names]
-        most = most_rows(len(names))
-        for cells in filter(None, reader):
-            if len(cells) != len(names):
-                faults.append(fault(f"found {len(cells)} cells; accepted: {len(names)}, with decimal points"))
-                continue
-            for column, name, unit, cell in zip(columns, names, units, cells, strict=True):
-                try:
-                    column.append(_cell(cell, unit))
-                except ValueError as error:
-                    faults.append(fault(str(error), name))
-            if len(columns[0]) > most:
-                raise InputError([fault(f"more than {most} rows; accepted: up to {most}")])
-            if len(faults) > _SHOWN:
-                raise InputError([*faults[:_SHOWN], fault("and more after these")])
-    except csv.Error as error:
-        raise InputError([fault(f"not CSV: {error}")]) from None
+        try:
+            names = [name.strip() for name in next(reader, [])]
+            if wrong := [fault(message) for message in _header_faults(names)]:
+                raise InputError(wrong)
+            columns, units = [array("d") for _ in names], [unit_of(name) for name in names]
+            most = most_rows(len(names))
+            for cells in filter(None, reader):
+                if len(cells) != len(names):
+                    faults.append(fault(f"found {len(cells)} cells; accepted: {len(names)}, with decimal points"))
+                    continue
+                for column, name, unit, cell in zip(columns, names, units, cells, strict=True):
+                    try:
+                        column.append(_cell(cell, unit))
+                    except ValueError as error:
+                        faults.append(fault(str(error), name))
+                if len(columns[0]) > most:
+                    raise InputError([fault(f"more than {most} rows; accepted: up to {most}")])
+                if len(faults) > _SHOWN:
+                    raise InputError([*faults[:_SHOWN], fault("and more after these")])
+        except csv.Error as error:
+            raise InputError([fault(f"not CSV: {error}")]) from None
     if not (faults or columns[0]):
         faults.append(fault("no rows below the names"))
     if faults:
