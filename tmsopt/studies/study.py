@@ -20,13 +20,14 @@ from tmsopt.errors import (
     table_faults,
     text_faults,
 )
+from tmsopt.problem.cases import Band
 from tmsopt.problem.expression import ExpressionError
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.limit import limit_of, with_limit
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.program.options import STARTS
-from tmsopt.records import Array, Column, Table, plain
+from tmsopt.records import Array, Column, Table
 from tmsopt.studies.sampling import MOST_ROWS, column_of_numbers, grid
 
 _SEEDS = 2**31
@@ -193,8 +194,13 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
 
 
 def _problem(problem: Posed) -> dict[str, Any]:
-    names = ("fixed", "free", "constraints", "scenarios", "tolerances", "weights", "start")
-    tables = {name: plain(getattr(problem, name)) for name in names}
+    names = ("fixed", "constraints", "tolerances", "weights", "start")
+    tables: dict[str, dict[str, Any]] = {name: dict(getattr(problem, name)) for name in names}
+    tables["free"] = {name: list(ends) for name, ends in problem.free.items()}
+    tables["scenarios"] = {
+        name: {"min": float(s.min), "max": float(s.max), "points": s.points} if isinstance(s, Band) else list(s)
+        for name, s in problem.scenarios.items()
+    }
     asked = {sense: getattr(problem, sense) for sense in ("minimize", "maximize", "locate")}
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
