@@ -9,7 +9,7 @@ import re
 import shutil
 import tempfile
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import islice
@@ -180,7 +180,7 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
         raise _not_text(file, kind, raw[error.start], raw[: error.start].count(b"\n") + 1) from None
 
 
-def read_lines(file: str, kind: str, largest: int, longest: int) -> Iterator[str]:
+def read_lines(file: str, kind: str, largest: int, longest: int) -> Generator[str]:
     """The lines of such a file with their ends, one after the other, none of more than `longest` characters.
 
     Raises:

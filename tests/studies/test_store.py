@@ -279,7 +279,7 @@ def test_other_versions_are_a_warning(path, monkeypatch):
     with view_store(path) as reading:
         opened_with = reading.about()["versions"]
     with open_store(path, STUDY) as opened:
-        assert opened.warnings == (f"tmsopt: {there} in the store, 0.9.9 now",)
+        assert opened.warnings == (f'tmsopt: "{there}" in the store, "0.9.9" now',)
 
 
 # Files that are no store, damage, and places that cannot be written
@@ -483,6 +483,7 @@ def test_a_damaged_store_of_version_1_is_refused(path):
     for name, script in (
         ("solved", "UPDATE rows SET data = '[]'"),
         ("solved", "UPDATE columns SET doubles = x'00'"),
+        ("solved", "UPDATE columns SET doubles = x'0011'"),
         ("judged", "UPDATE blocks SET data = x'00'"),
         ("judged", "DELETE FROM about"),
     ):

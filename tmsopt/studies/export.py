@@ -8,9 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from tmsopt.errors import Fault, InputError, import_optional
+from tmsopt.errors import Fault, InputError, import_optional, refusal
 from tmsopt.files import cell, headed, netcdf_errors, write_atomic
 from tmsopt.progress import Listener, Steps, start_steps
 from tmsopt.records import frame
@@ -54,10 +52,10 @@ def check_export(path: Path) -> None:
     """
     if _ending(path) not in FORMATS:
         accepted = ", ".join(f".{e}" for e in FORMATS)
-        raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {accepted}", ("export",))])
+        raise refusal(f"found '{path}'; accepted: a file name ending in {accepted}", "export")
     if (path.exists() and not path.is_file()) or not path.parent.is_dir():
         problem = "is no regular file" if path.exists() else "is in a folder that does not exist"
-        raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", ("export",))])
+        raise refusal(f"'{path}' {problem}; give the path of a file to write", "export")
     for module in FORMATS[_ending(path)][1]:
         import_optional(module, "export to a .csv file")
 
@@ -80,7 +78,7 @@ def _csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps |
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(cell(headed(head, units.get(_bare(head), ""))) for head in rows.headers)
         for columns in _blocks(rows, steps):
-            writer.writerows(zip(*map(_cells, columns.values()), strict=True))
+            writer.writerows(map(_cell, line) for line in zip(*(c.tolist() for c in columns.values()), strict=True))
 
 
 def _bare(header: str) -> str:
@@ -90,11 +88,11 @@ def _bare(header: str) -> str:
     return re.sub(r"\.(min|max|limit)$", "", header)
 
 
-def _cells(column: Any) -> list[Any]:
-    if column.dtype.kind == "f":
-        values = column.filled(np.nan)
-        return list(np.where(np.isnan(values), "", values.astype(object)))
-    return [str(value).lower() if isinstance(value, bool) else cell(value) for value in column.tolist()]
+def _cell(value: Any) -> Any:
+    """A blank for nan."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return None if value != value else cell(value)  # noqa: PLR0124
 
 
 def _parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:

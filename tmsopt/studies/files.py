@@ -4,7 +4,9 @@ import csv
 import math
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Set
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,12 +15,11 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 
 from tmsopt.errors import LISTED, Fault, InputError, count_faults, is_number, short, suggest, visible
 from tmsopt.files import read_lines
-from tmsopt.models import Parameter, Quantity
-from tmsopt.models.expression import written_sides
 from tmsopt.problem.files import as_solvable, problem_from_tables
 from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.toml import Key, Number, Page, Section, read_page, validate_tables, within
+from tmsopt.problem.unit_system import dimension_of, si_units
 from tmsopt.problem.units import TABLES, numbers, with_unit
 from tmsopt.program.options import STARTS
 from tmsopt.records import Column
@@ -54,33 +55,26 @@ _VARIED = {
 
 
 def unit_of(problem: Posed, name: str) -> str:
-    """The unit in which what varies is a number; empty where that is not known."""
-    of, (stem, _, end) = problem.parameter_set, name.rpartition(".")
-    named: tuple[Quantity | Parameter, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
-    known = {each.name: each.unit for each in named}
-    limited = end == "limit" and stem in problem.constraints
-    names = written_sides(problem.constraints[stem]) if limited else (name, stem)
-    return next((known[n] for n in names if n in known), "")
+    """The unit in which what varies is a number; 1 where it has none."""
+    stem, _, end = name.rpartition(".")
+    return dimension_of(problem, stem).unit if end == "limit" else si_units(problem).get(stem or name, "1")
 
 
-def _entries(table: Mapping[str, Any]) -> dict[str, tuple[Key, Any]]:
-    """Name → its place and what is written there; ``trail.limit = …`` without quotes is a table in TOML."""
-    found: dict[str, tuple[Key, Any]] = {}
+def _entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
+    """Each name, its place and what is written there; ``trail.limit = …`` without quotes is a table in TOML."""
     for name, spec in table.items():
         if isinstance(spec, Mapping) and any(isinstance(inner, list | Mapping) for inner in spec.values()):
-            found |= {f"{name}.{end}": (("vary", name, end), inner) for end, inner in spec.items()}
+            yield from ((f"{name}.{end}", ("vary", name, end), inner) for end, inner in spec.items())
         else:
-            found[name] = (("vary", name), spec)
-    return found
+            yield name, ("vary", name), spec
 
 
 def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
     """Name → list of numbers, `Span` of a sample, or span and points of an axis; adds what is wrong to `faults`."""
-    entries, method, read = _entries(written.vary), written.study.method, {}
-    if not entries:
+    method, read, wrong_with = written.study.method, {}, name_faults(problem)
+    if not written.vary:
         faults.append(Fault(f"nothing varies; write what does under [vary], such as mu = {_VARIED[method]}", ("vary",)))
-    wrong_with = name_faults(problem)
-    for name, (key, spec) in entries.items():
+    for name, key, spec in _entries(written.vary):
         if wrong := wrong_with(name):
             faults.append(Fault(wrong, key))
         elif isinstance(spec, list) and spec and method in ("grid", "list"):
@@ -95,55 +89,54 @@ def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> di
 
 def _range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
     """A span; of a grid with the number of its points."""
-    found, needed = list[Fault](), {"min": "…", "max": "…"} | ({"points": "10"} if method == "grid" else {})
-    for end in (end for end in spec if end not in (*needed, "log")):
-        message = f"unknown key {short(end)} of {name}; {suggest(end, (*needed, 'log'))}"
-        if end == "points":
-            message = "points are those of a grid; a sample has rows, under [study]"
-        found.append(Fault(message, (*key, end)))
+    needed, hint = {"min": "…", "max": "…"}, "; a sample has rows, under [study]"
+    if method == "grid":
+        needed, hint = needed | {"points": "10"}, ""
     example = ", ".join(f"{end} = {value}" for end, value in needed.items())
-    missing = [end for end in needed if end not in spec]
-    found += [Fault(f"missing {end} of {name}; write {name} = {{ {example} }}", key) for end in missing]
+    found = [
+        Fault(f"missing {end} of {name}; write {name} = {{ {example} }}", key) for end in needed if end not in spec
+    ]
+    for end in (end for end in spec if end not in (*needed, "log")):
+        message = f"unknown key {short(end)} of {name}; {suggest(end, (*needed, 'log'))}{hint}"
+        found.append(Fault(message, (*key, end)))
     low, high = (_number(spec.get(end, 0.0), unit, (*key, end), found) for end in ("min", "max"))
     log, count = spec.get("log", False), spec.get("points", 2)
     if not isinstance(log, bool):
         found.append(Fault(f"found {short(log)}; accepted: true or false", (*key, "log")))
     found += [replace(f, key=(*key, "points")) for f in count_faults("points", count, 2, MOST_ROWS)]
     span = Span(low, high, log)
-    faults += found or [Fault(f.message, key) for f in span_faults(name, span)]
+    faults += found or [replace(f, key=key) for f in span_faults(name, span)]
     return (span, count) if method == "grid" else span
 
 
 def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
     """A number, or a text with a unit; 0 and a fault for anything else."""
-    try:
-        if isinstance(value, str):
-            if len(faults) > LISTED:  # no unit is looked up where it is only counted
-                raise ValueError("accepted: as above")
-            if not unit:
-                raise ValueError(f"found {short(value)}; accepted: a number without quotes, as in the constraint")
+    if is_number(value):
+        return float(value)
+    message = f"found {short(value)}; accepted: a finite number"
+    if isinstance(value, str) and len(faults) <= LISTED:  # no unit is looked up where it is only counted
+        try:
             return with_unit(value, unit)
-        if is_number(value):
-            return float(value)
-        raise ValueError(f"found {short(value)}; accepted: a finite number")
-    except ValueError as error:
-        faults.append(Fault(str(error), key))
-        return 0.0
+        except ValueError as error:
+            message = str(error)
+    faults.append(Fault(message, key))
+    return 0.0
 
 
 def _rows(read: Mapping[str, Any], options: "_Options") -> dict[str, Any]:
     """What a study has of the rows that are written so: its columns, and what else there is to say."""
-    method, rows, seed = options.method, options.rows or 0, options.seed
-    if method == "list":
-        return {"columns": read}
-    if method == "latin_hypercube":
-        return {"columns": latin_hypercube(read, rows, seed)}
-    if method == "sobol":
-        return {"columns": sobol(read, rows, seed), "notes": tuple(filter(None, [sobol_note(rows)]))}
-    sizes = {name: axis[1] if isinstance(axis, tuple) else len(axis) for name, axis in read.items()}
-    check_size(list(sizes.values()))
-    axes = {name: axis[0].points(axis[1]) if isinstance(axis, tuple) else axis for name, axis in read.items()}
-    return {"columns": grid(axes), "grid_shape": sizes}
+    rows = options.rows or 0
+    match options.method:
+        case "latin_hypercube":
+            return {"columns": latin_hypercube(read, rows, options.seed)}
+        case "sobol":
+            return {"columns": sobol(read, rows, options.seed), "notes": list(filter(None, [sobol_note(rows)]))}
+        case "grid":
+            sizes = {name: axis[1] if isinstance(axis, tuple) else len(axis) for name, axis in read.items()}
+            check_size(list(sizes.values()))
+            axes = {name: axis[0].points(axis[1]) if isinstance(axis, tuple) else axis for name, axis in read.items()}
+            return {"columns": grid(axes), "grid_shape": sizes}
+    return {"columns": read}
 
 
 def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda name: "") -> dict[str, Column]:
@@ -159,55 +152,56 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
         InputError: listing every fault with file, line and column.
     """
     file, faults = str(path), list[Fault]()
-    lines = read_lines(file, "CSV file of numbers", LARGEST, LONGEST_LINE)
-    reader = csv.reader(lines, strict=True, skipinitialspace=True)
-    try:
-        names = [name.strip() for name in next(reader, [])]
-        if found := list(_header_faults(names)):
-            raise InputError([f.at(file, 1) for f in found])
-        columns, units = [array("d") for _ in names], [unit_of(name) for name in names]
-        most = most_rows(len(names))
-        for cells in filter(None, reader):
-            each = zip(columns, names, units, cells, strict=False) if len(cells) == len(names) else ()
-            if not each:
-                message = f"found {len(cells)} cells; accepted: {len(names)}, one per column, with decimal points"
-                faults.append(Fault(message).at(file, reader.line_num))
-            for column, name, unit, cell in each:
-                try:
-                    column.append(_cell(cell, unit))
-                except ValueError as error:
-                    faults.append(Fault(str(error), (name,)).at(file, reader.line_num))
-            if len(columns[0]) > most:
-                faults = [Fault(f"more than {most} rows; accepted: up to {most}").at(file, reader.line_num)]
-                break
-            if len(faults) > _SHOWN:
-                faults[_SHOWN:] = [Fault("and more after these").at(file, reader.line_num)]
-                break
-    except csv.Error as error:
-        raise InputError([Fault(f"not CSV: {error}").at(file, reader.line_num)]) from None
-    if not faults and not columns[0]:
-        faults.append(Fault("no rows below the names").at(file, 1))
+    with closing(read_lines(file, "CSV file of numbers", LARGEST, LONGEST_LINE)) as lines:
+        reader = csv.reader(lines, strict=True, skipinitialspace=True)
+
+        def fault(message: str, *key: str) -> Fault:
+            return Fault(message, key).at(file, max(reader.line_num, 1))
+
+        try:
+            names = [name.strip() for name in next(reader, [])]
+            if wrong := [fault(message) for message in _header_faults(names)]:
+                raise InputError(wrong)
+            columns, units = [array("d") for _ in names], [unit_of(name) for name in names]
+            most = most_rows(len(names))
+            for cells in filter(None, reader):
+                if len(cells) != len(names):
+                    faults.append(fault(f"found {len(cells)} cells; accepted: {len(names)}, with decimal points"))
+                    continue
+                for column, name, unit, cell in zip(columns, names, units, cells, strict=True):
+                    try:
+                        column.append(_cell(cell, unit))
+                    except ValueError as error:
+                        faults.append(fault(str(error), name))
+                if len(columns[0]) > most:
+                    raise InputError([fault(f"more than {most} rows; accepted: up to {most}")])
+                if len(faults) > _SHOWN:
+                    raise InputError([*faults[:_SHOWN], fault("and more after these")])
+        except csv.Error as error:
+            raise InputError([fault(f"not CSV: {error}")]) from None
+    if not (faults or columns[0]):
+        faults.append(fault("no rows below the names"))
     if faults:
         raise InputError(faults)
     return {name: Column(columns.pop(0)) for name in names}
 
 
-def _header_faults(names: list[str]) -> Iterator[Fault]:
+def _header_faults(names: list[str]) -> Iterator[str]:
     header, example = ",".join(names), "accepted: names of what varies, separated by commas, such as: mu,lambda_s.max"
     if not header:
-        yield Fault(f"the first line is empty; {example}")
+        yield f"the first line is empty; {example}"
     elif mark := next((word for mark, word in ((";", "semicolons"), ("\t", "tabs")) if mark in header), ""):
-        yield Fault(f"columns separated by {mark}; separate them by commas, with decimal points in the numbers")
+        yield f"columns separated by {mark}; separate them by commas, with decimal points in the numbers"
     elif len(names) > MOST_COLUMNS:
-        yield Fault(f"found {len(names)} columns; accepted: up to {MOST_COLUMNS}")
+        yield f"found {len(names)} columns; accepted: up to {MOST_COLUMNS}"
     else:
         for number, name in enumerate(names, start=1):
             if not name:
-                yield Fault(f"column {number} has no name; {example}")
+                yield f"column {number} has no name; {example}"
             elif name in names[: number - 1]:
-                yield Fault(f"{short(name)} names two columns; leave one out")
+                yield f"{short(name)} names two columns; leave one out"
             elif math.isfinite(_float(name)):
-                yield Fault(f"found the number {name[:60]} for the name of column {number}; {example}")
+                yield f"found the number {name[:60]} for the name of column {number}; {example}"
 
 
 def _float(cell: str) -> float:
@@ -226,17 +220,21 @@ def _cell(cell: str, unit: str) -> float:
     """
     if math.isfinite(number := _float(cell)):
         return number
-    if unit and cell.strip():
-        return with_unit(cell, unit)
-    raise ValueError(f"found {short(cell)}; accepted: a finite number" if cell.strip() else _EMPTY)
+    if not cell.strip():
+        raise ValueError("an empty cell; accepted: a number in every cell")
+    if not unit:
+        raise ValueError(f"found {short(cell)}; accepted: a finite number")
+    return with_unit(cell, unit)
 
 
-_EMPTY = "an empty cell; accepted: a number in every cell"
-_OWN = {"rows": ("latin_hypercube", "sobol", "monte_carlo"), "csv": ("csv",), "distribution": ("monte_carlo",)}
-"""Keys of [study] that only some methods have."""
-
-_NEEDED = {"rows": "1024", "csv": '"rows.csv"'}
-"""Those that they need, each with an example."""
+_GOES_WITH: Mapping[Key, tuple[tuple[str, ...], str]] = {
+    ("study", "rows"): (("latin_hypercube", "sobol", "monte_carlo"), "rows = 1024"),
+    ("study", "csv"): (("csv",), 'csv = "rows.csv"'),
+    ("study", "distribution"): (("monte_carlo",), ""),
+    ("vary",): (tuple(_VARIED), ""),
+    ("tolerances",): (("monte_carlo",), ""),
+}
+"""Keys that only some methods have; and what to write where they need them."""
 
 _ACCEPTED = {
     "title": "a text in quotes",
@@ -339,36 +337,34 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
     problem = _problem(page, title, faults)
     if written is None or problem is None:
         raise page.error(faults)
-    options = written.study
-    common: dict[str, Any] = {"title": written.title.strip() or title, "seed": options.seed, "starts": options.starts}
-    common |= {"problem": problem, "report": options.report}
+    options, posed = written.study, problem.posed
     faults += [
         *_method_faults(written, {f.key for f in faults}),
-        *within("study", _option_faults(options, problem.posed)),
+        *within("study", common_faults(posed, options.seed, options.starts, options.report)),
     ]
-    wrong = {f.key for f in faults} & {("study", "method"), ("study", "csv"), ("vary",)}
     read: dict[str, Any] = {}
     if options.method == "monte_carlo":
-        tables = {table: written.tolerances if table == "tolerances" else {} for table in TABLES}
-        read, _, _, unreadable = numbers(tables, problem.posed.parameter_set)
-        faults += unreadable
-    elif options.method == "csv" and not wrong:
-        read = _read_rows(page, options.csv or "", problem.posed, faults)
-    elif not wrong:
-        read = _read_vary(problem.posed, written, faults)
+        given = dict[str, Any].fromkeys(TABLES) | {"tolerances": written.tolerances}
+        tables, _, _, unreadable = numbers(given, posed.parameter_set)
+        read, faults = tables["tolerances"], faults + unreadable
+    elif options.method == "csv" and options.csv:
+        read = _read_rows(page, options.csv, posed, faults)
+    elif options.method in _VARIED:
+        read = _read_vary(posed, written, faults)
     if faults:
         raise page.error(faults)
+    common: dict[str, Any] = {"problem": problem, "title": written.title.strip() or title, "seed": options.seed}
+    common |= {"starts": options.starts, "report": options.report}
     try:
         if options.method == "monte_carlo":
             distribution = options.distribution or DISTRIBUTIONS[0]
-            return Sampling(rows=options.rows or 0, distribution=distribution, tolerances=read["tolerances"], **common)
-        given = {"columns": read} if options.method == "csv" else _rows(read, options)
-        return Study(**common, **given, warm=options.warm, method=options.method)
+            return Sampling(rows=options.rows or 0, distribution=distribution, tolerances=read, **common)
+        return Study(warm=options.warm, method=options.method, **_rows(read, options), **common)
     except InputError as error:
-        places = {"columns": ("vary",), "ranges": ("vary",), "rows": ("study", "rows")}
-        raise page.error(
-            [replace(f, key=(*places.get(f.key[0], f.key[:1]), *f.key[1:])) for f in error.faults]
-        ) from None
+        places: dict[str, Key] = {"columns": ("vary",), "ranges": ("vary",)}
+        places |= {key: ("study", key) for key in ("rows", "distribution")}
+        placed = [replace(f, key=(*places.get(f.key[0], f.key[:1]), *f.key[1:])) for f in error.faults]
+        raise page.error(placed) from None
 
 
 def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
@@ -394,48 +390,32 @@ def _named(name: str, error: InputError, key: Key) -> list[Fault]:
 
 def _read_rows(page: Page, name: str, problem: Posed, faults: list[Fault]) -> dict[str, Column]:
     """The columns of a CSV file that a study names; adds what is wrong with them to `faults`."""
-    file, columns = str(Path(page.file).parent / name), dict[str, Column]()
+    file, wrong_with = str(Path(page.file).parent / name), name_faults(problem)
     try:
-        columns = read_csv(file, lambda column: unit_of(problem, column))
+        columns = read_csv(file, partial(unit_of, problem))
     except InputError as error:
         faults += _named(name, error, ("study", "csv"))
-    wrong_with = name_faults(problem)
-    unknown = {column: wrong_with(column) for column in columns}
-    faults += [Fault(text, (column,)).at(file, 1) for column, text in unknown.items() if text]
+        return {}
+    faults += [Fault(wrong, (column,)).at(file, 1) for column in columns if (wrong := wrong_with(column))]
     return columns
 
 
 def _method_faults(written: _StudyFile, reported: Set[Key]) -> Iterator[Fault]:
     """Keys and sections that do not go with the method, or that it needs."""
-    options, method = written.study, written.study.method
+    method = written.study.method
     if method not in METHODS:
         yield Fault(f"unknown method {short(method)}; {suggest(method, METHODS)}", ("study", "method"))
         return
-    for key, methods in _OWN.items():
-        given = getattr(options, key) is not None
+    for key, (methods, example) in _GOES_WITH.items():
+        given = getattr(written.study if key[1:] else written, key[-1]) not in (None, {})
         if given and method not in methods:
-            message = f'{key} does not go with method = "{method}"; it is for {" ".join(methods)}'
-            yield Fault(message, ("study", key))
-        elif not given and method in methods and key in _NEEDED and ("study", key) not in reported:
-            message = f'missing {key}, which method = "{method}" needs; write e.g. {key} = {_NEEDED[key]}'
+            name = key[-1] if key[1:] else f"[{key[0]}]"
+            yield Fault(f'{name} does not go with method = "{method}"; it is for {" ".join(methods)}', key)
+        elif example and method in methods and not given and key not in reported:
+            message = f'missing {key[-1]}, which method = "{method}" needs; write e.g. {example}'
             yield Fault(message, ("study", "method"))
-    if method in ("csv", "monte_carlo") and written.vary:
-        instead = "the names in the CSV file say" if method == "csv" else "the tolerances of the problem say"
-        yield Fault(f'[vary] does not go with method = "{method}": {instead} what varies', ("vary",))
-    if method != "monte_carlo" and written.tolerances:
-        message = "[tolerances] of a study are those that monte_carlo draws from; others belong to the problem"
-        yield Fault(message, ("tolerances",))
-    if method == "monte_carlo" and options.warm:
+    if method == "monte_carlo" and written.study.warm:
         yield Fault("nothing is free in a Monte Carlo study, so nothing starts warm; leave it out", ("study", "warm"))
-
-
-def _option_faults(options: _Options, problem: Posed) -> Iterator[Fault]:
-    if options.rows is not None:
-        yield from count_faults("rows", options.rows, 1, MOST_ROWS)
-    if options.distribution not in (None, *DISTRIBUTIONS):
-        message = f"unknown distribution {short(options.distribution)}; {suggest(options.distribution, DISTRIBUTIONS)}"
-        yield Fault(message, ("distribution",))
-    yield from common_faults(problem, options.seed, options.starts, options.report)
 
 
 def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:

@@ -75,7 +75,6 @@ class Sampling:
         if found:
             raise InputError(found)
         object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
-        object.__setattr__(self, "report", tuple(text.strip() for text in self.report))
 
 
 def planned(asked: Study | Sampling, progress: Listener | None = None) -> Study:

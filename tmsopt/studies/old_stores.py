@@ -51,7 +51,10 @@ def parts_of(old: sqlite3.Connection) -> Generator[Part]:
 def _unpacked(count: int, doubles: bytes) -> bytes:
     """A column of the study; a few bytes may say that they are many more."""
     stream = zlib.decompressobj()
-    values = stream.decompress(doubles, 8 * count + 1)
+    try:
+        values = stream.decompress(doubles, 8 * count + 1)
+    except zlib.error as error:
+        raise ValueError(str(error)) from error
     if len(values) != 8 * count or not stream.eof:
         raise ValueError(f"no {count} numbers")
     return values

@@ -88,12 +88,11 @@ class Row:
     @property
     def identity(self) -> str:
         """Everything but `seconds` and `host`, as text."""
-        kept = {name: value for name, value in self.to_json().items() if name not in ("seconds", "host")}
-        return json.dumps(kept, sort_keys=True)
+        return json.dumps(self.to_json() | {"seconds": None, "host": None}, sort_keys=True)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: None is nan, or no bound; other infinities are text, ``"-inf"``."""
-        made = {f.name: _to_json(f.type(getattr(self, f.name)), _ABSENT.get(f.name, math.nan)) for f in _FIELDS}
+        made = {f.name: _to_json(f.type(getattr(self, f.name)), f.default) for f in _FIELDS}
         return made | {"stable": self.stable}
 
     @staticmethod
@@ -104,8 +103,8 @@ class Row:
             ValueError: for data that no row becomes.
         """
         try:
-            given = [(f, _from_json(data[f.name], _ABSENT.get(f.name, math.nan))) for f in _FIELDS if f.name in data]
-            row = Row(**{f.name: f.type(value) for f, value in given})
+            given = {f: _from_json(data[f.name]) for f in _FIELDS if data.get(f.name) is not None}
+            row = Row(**{f.name: f.type(value) for f, value in given.items()})
         except (AttributeError, OverflowError, TypeError) as error:
             raise ValueError(f"{error}") from error
         if row.status not in STATUSES:
@@ -114,10 +113,9 @@ class Row:
 
 
 _FIELDS: Sequence[Any] = fields(Row)
-_ABSENT = {"bound": -math.inf, "gap": math.inf}
 
 
-def _to_json(value: Any, absent: float = math.nan) -> Any:
+def _to_json(value: Any, absent: Any = math.nan) -> Any:
     if isinstance(value, Mapping):
         return {name: _to_json(number) for name, number in value.items()}
     if not isinstance(value, float) or math.isfinite(value):
@@ -125,10 +123,10 @@ def _to_json(value: Any, absent: float = math.nan) -> Any:
     return None if math.isnan(value) or value == absent else str(value)
 
 
-def _from_json(value: Any, absent: float = math.nan) -> Any:
-    if isinstance(value, Mapping):
-        return {name: float(_from_json(number)) for name, number in value.items()}
-    return absent if value is None else value
+def _from_json(value: Any) -> Any:
+    if not isinstance(value, Mapping):
+        return value
+    return {name: math.nan if number is None else float(number) for name, number in value.items()}
 
 
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
@@ -174,8 +172,7 @@ def column_of(values: Sequence[Any], kind: type) -> NDArray[Any]:
 
 def blank(count: int) -> Part:
     """So many rows that say nothing."""
-    row = Row(0, 0, Table(), "")
-    return {name: column_of([getattr(row, name)], kind).repeat(count) for name, kind in SAVED.items()}
+    return {name: column.repeat(count) for name, column in part_of([Row(0, 0, Table(), "")]).items()}
 
 
 def part_of(rows: Sequence[Row]) -> Part:
@@ -291,24 +288,22 @@ class RowTable(Sequence[Row]):
 
     def column(self, head: str, at: slice = slice(None)) -> Any:
         """One column of the rows at some places, as a masked array: a row without a value is masked."""
-        name, key = self.headers[head]
-        numbers = self.numbers[at]
+        (name, key), numbers, study = self.headers[head], self.numbers[at], self.study
         values = self._kept[head][at] if head in self._kept else np.full(len(numbers), np.nan)
-        absent: Any = np.zeros(len(numbers), dtype=bool)
+        absent: Any = False
         match name:
             case "seed":
-                values = column_of([self.study.seed_of(number) for number in numbers.tolist()], int)
+                values = column_of([study.seed_of(number) for number in numbers.tolist()], int)
             case "cause":
                 values = self._causes[at]
             case "stable":
                 ideal, realised = self._kept["abscissa"][at], self._kept["abscissa_realised"][at]
                 values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)
-            case "varied":
-                values = np.asarray(self.study.columns[key])[numbers]
-            case "parameters":
-                columns, fixed = self.study.columns, self.study.problem.fixed
-                given = np.asarray(columns[key])[numbers] if key in columns else fixed.get(key, np.nan)
-                values, absent = np.where(np.isnan(values), given, values), self._unsolved[at]
+            case "varied" | "parameters":
+                varied = key in study.columns
+                given = np.asarray(study.columns[key])[numbers] if varied else study.problem.fixed.get(key, np.nan)
+                values = np.where(np.isnan(values), given, values)
+                absent = self._unsolved[at] & (name == "parameters")
             case "reports":
                 absent = self._unsolved[at]
             case "laws" | "violations":

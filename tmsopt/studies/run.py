@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
+from tmsopt.errors import Fault, InputError, call_faults, count_faults, refusal, short, suggest
 from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, processes, silent
 from tmsopt.files import path_of
 from tmsopt.problem.unit_system import units_of
@@ -22,7 +22,7 @@ from tmsopt.studies.monte_carlo import Sampling, check_unchanged, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.rows import Part, Row, RowTable, part_of
 from tmsopt.studies.solving import Solver, applies, judged
-from tmsopt.studies.store import Store, open_store, view_store
+from tmsopt.studies.store import Store, open_store, refuse, view_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 from tmsopt.versions import SCHEMA
@@ -80,7 +80,7 @@ class Results(Printable):
             InputError: for a name that no row has.
         """
         if name not in self.rows.headers:
-            raise InputError([Fault(f"no column '{name}'; {suggest(name, self.rows.headers)}", ("column",))])
+            raise refusal(f"no column '{name}'; {suggest(name, self.rows.headers)}", "column")
         return self.rows.values(name)
 
     @property
@@ -104,8 +104,7 @@ class Results(Printable):
         """
         made: Dataset | None = gridded(self.rows)
         if made is None:
-            message = f"the {len(self.rows)} rows fill no grid; use to_frame"
-            raise InputError([Fault(message, ("study",))])
+            raise refusal(f"the {len(self.rows)} rows fill no grid; use to_frame", "study")
         return made
 
     def to_json(self, table: bool = True) -> dict[str, Any]:
@@ -194,7 +193,7 @@ def _held(study: Study, store: Store) -> list[Part]:
     for number in (number for part in parts for number in part["number"][[0, -1]].tolist()):
         if not 0 <= number < len(study):
             advice = f"--fresh moves the store aside, Store.forget([{number}]) removes the row"
-            raise InputError([Fault(f"row {number} is not of this study; {advice}", file=str(store.path))])
+            raise refuse(store.path, f"row {number} is not of this study; {advice}")
     return parts
 
 
@@ -253,10 +252,9 @@ def _completed(
         try:
             with closing(_rows(study, left, executor, note)) as rows:
                 for row in rows:
-                    if lacks[row.number]:  # a block may be stored in part
-                        fresh.append(row)
-                        show(1)
-                    if fresh and time.perf_counter() - last >= _COMMIT:
+                    fresh.append(row)
+                    show(1)
+                    if time.perf_counter() - last >= _COMMIT:
                         keep(part_of(fresh))
                         fresh, last = [], time.perf_counter()
         finally:
@@ -286,9 +284,9 @@ def _rows(study: Study, left: set[int], executor: Executor, note: Note) -> Gener
                 for place, answer in answers:
                     unit = units[place]
                     if not isinstance(answer, Crash):
-                        yield from answer
+                        yield from (row for row in answer if row.number in left)  # a block may be stored in part
                     elif len(unit) > 1:
-                        taken_apart += [(number,) for number in unit]
+                        taken_apart += [(number,) for number in unit if number in left]
                     else:
                         note(f"row {unit[0]} is quarantined")
                         cause = f" ({answer.cause})" if answer.cause else ""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError, count_faults, short, table_faults
+from tmsopt.errors import Fault, InputError, count_faults, is_number, refusal, short, table_faults
 from tmsopt.records import Array, Column
 
 MOST_ROWS = 10_000_000
@@ -65,7 +65,7 @@ def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
         numbers = column_of_numbers(values)
         if numbers is None or not numbers.size:
             message = f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]"
-            raise InputError([Fault(message, (name,))])
+            raise refusal(message, name)
         lists.append(numbers)
     check_size([len(numbers) for numbers in lists])
     crossed = np.meshgrid(*lists, indexing="ij")
@@ -89,9 +89,7 @@ def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict
     More: docs/reference/study_file.md
     """
     spans = _spans(ranges, rows, seed)
-    from scipy.stats import qmc
-
-    return _placed(spans, qmc.LatinHypercube(len(spans), **_stream(qmc.LatinHypercube, seed)).random(rows))
+    return _placed(spans, _sampler("LatinHypercube", spans, seed).random(rows))
 
 
 def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
@@ -111,10 +109,7 @@ def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Colu
     More: docs/reference/study_file.md
     """
     spans = _spans(ranges, rows, seed)
-    from scipy.stats import qmc
-
-    whole = qmc.Sobol(len(spans), scramble=True, **_stream(qmc.Sobol, seed)).random_base2(math.ceil(math.log2(rows)))
-    return _placed(spans, whole[:rows])
+    return _placed(spans, _sampler("Sobol", spans, seed).random_base2(math.ceil(math.log2(rows)))[:rows])
 
 
 def sobol_note(rows: int) -> str:
@@ -138,19 +133,17 @@ def check_size(sizes: Sequence[int]) -> None:
     """
     if math.prod(sizes) > (most := most_rows(len(sizes))):
         found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
-        raise InputError([Fault(f"found {found}; accepted: up to {most}; take fewer points", ("columns",))])
+        raise refusal(f"found {found}; accepted: up to {most}; take fewer points", "columns")
 
 
 def span_faults(name: str, span: Span) -> Iterator[Fault]:
     """What is wrong with a range."""
     key = ("ranges", name)
-    try:
-        low, high = float(span.low), float(span.high)
-    except (TypeError, ValueError, OverflowError):
-        low = high = math.nan
-    if not (math.isfinite(low) and math.isfinite(high)):
+    if not (is_number(span.low) and is_number(span.high)):
         yield Fault(f"found {short(span.low)} to {short(span.high)}; accepted: finite numbers", key)
-    elif low > high:
+        return
+    low, high = float(span.low), float(span.high)
+    if low > high:
         yield Fault(f"min = {low:.6g} is greater than max = {high:.6g}; swap them", key)
     elif span.log and not (low > 0 or high < 0):
         yield Fault(f"log from {low:.6g} to {high:.6g}; accepted: both ends positive, or both negative", key)
@@ -187,10 +180,13 @@ def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
     return spans
 
 
-def _stream(sampler: Any, seed: int) -> dict[str, Any]:
-    """The sampler's argument for random numbers, which SciPy 1.15 renamed."""
-    name = "rng" if "rng" in inspect.signature(sampler).parameters else "seed"
-    return {name: np.random.default_rng(seed)}
+def _sampler(name: str, spans: Mapping[str, Span], seed: int) -> Any:
+    """One of SciPy, whose argument for random numbers 1.15 renamed."""
+    from scipy.stats import qmc
+
+    kind = getattr(qmc, name)
+    stream = "rng" if "rng" in inspect.signature(kind).parameters else "seed"
+    return kind(len(spans), **{stream: np.random.default_rng(seed)})
 
 
 def _placed(spans: Mapping[str, Span], shares: Array) -> dict[str, Column]:

@@ -52,7 +52,7 @@ def solve_row(study: Study, number: int) -> SolvedRow:
 
 @dataclass(frozen=True)
 class Solver:
-    """Solves rows of one study; what it has built stays with it and is not pickled.
+    """Solves rows of one study.
 
     A unit is one row, or with warm starts a whole block of neighbours: rows of a part of a block are solved as if the
     study were cold.
@@ -74,9 +74,6 @@ class Solver:
     def lost(self, number: int, cause: str) -> Row:
         """A row that ended its worker."""
         return self._row(number, status="quarantined", cause=cause)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"study": self.study}
 
     def _block(self, numbers: Sequence[int]) -> list[SolvedRow]:
         """Both ends from many starts, the others from their neighbours and from afar; back again where that is better.

@@ -21,7 +21,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from tmsopt import files
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, refusal
 from tmsopt.files import differences, from_json
 from tmsopt.studies.old_stores import about_of, columns_of, parts_of
 from tmsopt.studies.rows import BLOCK, SAVED, STATUSES, Part, column_of
@@ -108,9 +108,9 @@ class Store:
             store that was there before.
     """
 
-    def __init__(self, path: Path, connection: sqlite3.Connection, lock: FileLock | None = None) -> None:
+    def __init__(self, path: Path, connection: sqlite3.Connection, ending: ExitStack, session: int = 0) -> None:
         self.path, self.warnings = path, tuple[str, ...]()
-        self._connection, self._session, self._lock = connection, 0, lock
+        self._connection, self._ending, self._session = connection, ending, session
 
     def __enter__(self) -> Self:
         return self
@@ -120,14 +120,7 @@ class Store:
 
     def close(self) -> None:
         """Close the file, and give up the right to write it; a second time does nothing."""
-        if self._session:
-            with suppress(sqlite3.Error):  # on a full disk there is a better error than this one
-                self._connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (_now(), self._session))
-                self._connection.execute("PRAGMA journal_mode=DELETE")  # one plain file, unless somebody reads it
-        lock, self._session, self._lock = self._lock, 0, None
-        self._connection.close()
-        if lock is not None:
-            _release(lock)
+        self._ending.close()
 
     def add(self, part: Part) -> None:
         """Keep rows; when it returns they are safe from ``kill -9``. A row that is there stays as it is.
@@ -245,13 +238,15 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
         connection = undo.enter_context(closing(_connect(path, "rw")))
         connection.execute("PRAGMA journal_mode=WAL")
         connection.execute("PRAGMA synchronous=NORMAL")  # safe from kill -9
-        store, today = Store(path, connection, lock), _versions()
-        earlier = [session["versions"] for session in store.sessions() if session["rows"] > 0]
-        store.warnings = tuple(dict.fromkeys([line for then in earlier for line in _changed(then, today)] + moved))
+        today = _versions()
         line = (_now(), os.getpid(), platform.node(), json.dumps(today))
         query = "INSERT INTO sessions (started, pid, host, versions) VALUES (?, ?, ?, ?)"
-        store._session = connection.execute(query, line).lastrowid or 0
-        undo.pop_all()
+        session = connection.execute(query, line).lastrowid or 0
+        undo.callback(_end, connection, session)
+        store = Store(path, connection, undo, session)
+        earlier = [then["versions"] for then in store.sessions() if then["rows"] > 0]
+        changed = [line for then in earlier for line in differences(then, today, ("in the store", "now"))]
+        store.warnings, store._ending = tuple(dict.fromkeys(changed + moved)), undo.pop_all()
         return store
 
 
@@ -268,11 +263,9 @@ def view_store(path: Path | str) -> Store:
         connection = undo.enter_context(closing(_connect(path, "ro")))
         _check_content(connection, path)
         if schema < SCHEMA:
-            copy = sqlite3.connect(":memory:", isolation_level=None)
-            _copy(connection, copy)
-            return Store(path, copy)
-        undo.pop_all()
-        return Store(path, connection)
+            old, connection = connection, undo.enter_context(closing(sqlite3.connect(":memory:", isolation_level=None)))
+            _copy(old, connection)
+        return Store(path, connection, undo.pop_all())
 
 
 def check_same(path: Path | str, study: Study) -> None:
@@ -311,7 +304,7 @@ def _described(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
     }
     if len(about["definition"]) > files.LARGEST_JSON:
         message = f"takes more than {files.LARGEST_JSON} characters to define; give the values in a CSV file"
-        raise InputError([Fault(message, ("study",))])
+        raise refusal(message, "study")
     return about, kept
 
 
@@ -325,7 +318,7 @@ def _create(connection: sqlite3.Connection, about: Mapping[str, str], kept: Mapp
 def _copy(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
     """Copy a store of an earlier version to an empty database."""
     _create(new, about_of(old), columns_of(old))
-    store = Store(Path("copy"), new)
+    store = Store(Path("copy"), new, ExitStack())
     with closing(parts_of(old)) as parts:
         for part in parts:
             store.add(part)
@@ -338,6 +331,12 @@ def _written(path: Path) -> Iterator[sqlite3.Connection]:
     """An empty database that takes the place of a path if all went well; the lock must be held."""
     with files.write_atomic(path, locked=True) as place, closing(_connect(place, "rwc")) as connection:
         yield connection
+
+
+def _end(connection: sqlite3.Connection, session: int) -> None:
+    with suppress(sqlite3.Error):  # on a full disk there is a better error than this one
+        connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (_now(), session))
+        connection.execute("PRAGMA journal_mode=DELETE")  # one plain file, unless somebody reads it
 
 
 def _release(lock: FileLock) -> None:
@@ -416,12 +415,3 @@ def _versions() -> dict[str, str]:
     """Of tmsopt, Python, the libraries that solve, and IPOPT where its file tells; nothing is imported for it."""
     found = {"python": platform.python_version(), **installed(_PACKAGES), "ipopt": ipopt()}
     return {name: version or "unknown" for name, version in found.items()}
-
-
-def _changed(then: Mapping[str, str], today: Mapping[str, str]) -> list[str]:
-    """One line for each version that differs."""
-    return [
-        f"{name}: {then.get(name, 'unknown')} in the store, {today.get(name, 'unknown')} now"
-        for name in dict.fromkeys([*then, *today])
-        if then.get(name, "unknown") != today.get(name, "unknown")
-    ]

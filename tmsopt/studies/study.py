@@ -14,6 +14,7 @@ from tmsopt.errors import (
     at_first,
     count_faults,
     list_faults,
+    refusal,
     short,
     suggest,
     table_faults,
@@ -103,7 +104,7 @@ class Study:
         """
         if not 0 <= row < len(self):
             message = f"found {row}; accepted: 0 to {len(self) - 1}, for the study has {len(self)} rows"
-            raise InputError([Fault(message, ("row",))])
+            raise refusal(message, "row")
         return Table({name: float(column[row]) for name, column in self.columns.items()})
 
     def row_problem(self, row: int) -> Problem:
@@ -193,17 +194,12 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
 
 
 def _problem(problem: Posed) -> dict[str, Any]:
-    tables: dict[str, dict[str, Any]] = {
-        "fixed": dict(problem.fixed),
-        "free": {name: list(ends) for name, ends in problem.free.items()},
-        "constraints": dict(problem.constraints),
-        "scenarios": {
-            name: {"min": float(s.min), "max": float(s.max), "points": s.points} if isinstance(s, Band) else list(s)
-            for name, s in problem.scenarios.items()
-        },
-        "tolerances": dict(problem.tolerances),
-        "weights": dict(problem.weights),
-        "start": dict(problem.start),
+    names = ("fixed", "constraints", "tolerances", "weights", "start")
+    tables: dict[str, dict[str, Any]] = {name: dict(getattr(problem, name)) for name in names}
+    tables["free"] = {name: list(ends) for name, ends in problem.free.items()}
+    tables["scenarios"] = {
+        name: {"min": float(s.min), "max": float(s.max), "points": s.points} if isinstance(s, Band) else list(s)
+        for name, s in problem.scenarios.items()
     }
     asked = {sense: getattr(problem, sense) for sense in ("minimize", "maximize", "locate")}
     return {

@@ -122,8 +122,9 @@ def summary(rows: RowTable) -> Summary:
     values = {name: rows.values(name) for name in ("objective", "abscissa")}
     counts, optimal = Counter(status.tolist()), status == "optimal"
     clocked = _clocked(rows, values)
-    ranked = np.flatnonzero(optimal & np.isfinite(judged := clocked.get("objective", values["objective"])))
-    best = rows[int(ranked[np.argmin(problem.posed.sign * judged[ranked])])] if ranked.size else None
+    judged = problem.posed.sign * clocked.get("objective", values["objective"])
+    ranked = np.where(optimal & np.isfinite(judged), judged, np.inf)
+    best = rows[int(np.argmin(ranked))] if np.isfinite(ranked).any() else None
     spreads = [{n: ends for n, x in some.items() if (ends := _ends(x[optimal]))} for some in (values, clocked)]
     in_seconds: dict[str, tuple[float, ...]] = dict(spreads[1])
     product = None
@@ -185,4 +186,4 @@ def yield_of(rows: RowTable) -> Yield:
 
 def _quantiles(abscissa: Array) -> tuple[float, ...]:
     known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa))
-    return tuple(float(known[max(math.ceil(q * len(known)) - 1, 0)]) for q in QUANTILES if len(known))
+    return tuple(float(known[math.ceil(q * len(known)) - 1]) for q in QUANTILES if len(known))
