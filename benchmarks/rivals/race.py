@@ -97,7 +97,7 @@ class Heat:
         if not run.moments:
             return np.inf
         found = run.moments[-1].parameters
-        return max(abs(found[n] - self.design[n]) / (hi - lo) for n, (lo, hi) in self.problem.free.items())
+        return max(abs(found[n] - self.design[n]) / (hi - lo) for n, (lo, hi) in self.problem.posed.free.items())
 
     def ratio(self, run: Run, tolerance: float) -> float:
         """Time of a run over ours until both are within a tolerance; inf where the run never is."""

@@ -121,7 +121,7 @@ def _draw(rng: np.random.Generator, count: int) -> _Draw:
     if "chi_H" in fixed and rng.random() < 0.35:
         fixed["chi_H"] = 1.0
     problem = Problem(model=tms, fixed=fixed, free=boxes, minimize="abscissa")
-    return _Draw(problem, {n: rng.uniform(*ends, _SPREAD) for n, ends in problem.free.items()})
+    return _Draw(problem, {n: rng.uniform(*ends, _SPREAD) for n, ends in problem.posed.free.items()})
 
 
 def drawn_box(rng: np.random.Generator, name: str, ends: Box) -> Box:

@@ -59,7 +59,7 @@ def charted(across: int, layers: tuple[str, ...]) -> dict[str, Any]:
 def grid_coefficients(points: int) -> Array:
     """Coefficients of a square grid of designs of the plane, shape (points, 5)."""
     across = int(np.ceil(np.sqrt(points)))
-    grid = np.meshgrid(*(np.linspace(*ends, across) for ends in PLANE.free.values()))
+    grid = np.meshgrid(*(np.linspace(*ends, across) for ends in PLANE.posed.free.values()))
     columns = {n: g.ravel()[:points] for n, g in zip(PLANE.free, grid, strict=True)}
     return np.stack(np.broadcast_arrays(*tms.coefficients({**PLANE.fixed, **columns})), axis=-1)
 

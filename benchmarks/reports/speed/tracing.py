@@ -76,7 +76,7 @@ def _by_contour() -> Result:
     from matplotlib.figure import Figure
 
     began = time.perf_counter()
-    Fr, tilt = np.meshgrid(np.linspace(*PLANE.free["Fr"], 800), np.linspace(*PLANE.free["lambda_s"], 600))
+    Fr, tilt = np.meshgrid(np.linspace(*PLANE.posed.free["Fr"], 800), np.linspace(*PLANE.posed.free["lambda_s"], 600))
     values = discriminant(copo(Fr, 0.1, np.sqrt(2), 1.0, ZETA_B, ZETA_H, np.tan(tilt)))
     lines = Figure().subplots().contour(Fr, tilt, values, levels=[0.0])
     points = np.concatenate([p.vertices for p in lines.get_paths()])
