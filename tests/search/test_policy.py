@@ -4,6 +4,7 @@ What is minimised is f − 1, the root of s + 1 − f, with f = x⁴/4 − x²/2
 """
 
 from dataclasses import FrozenInstanceError, fields, replace
+from importlib import import_module
 
 import casadi as ca
 import numpy as np
@@ -14,9 +15,8 @@ from benchmarks.suites import hard_problem
 from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients
 from tmsopt.search import begin_search
-from tmsopt.search.accept import check_end, is_better
-from tmsopt.search.policy import search_again
-from tmsopt.search.state import Fallback
+
+accepting, driver, states = (import_module(f"tmsopt.search.{name}") for name in ("accept", "policy", "state"))
 
 x = ca.SX.sym("x")
 LEFT, _, RIGHT = sorted(np.roots([1, 0, -1, 0.1]).real.tolist())
@@ -87,16 +87,16 @@ def test_the_best_end_is_accepted_whatever_their_order():
 
 def test_of_two_ends_as_good_the_converged_one_is_better():
     state = begun()
-    whole = check_end(state, POLICY.local(state, tmsopt.Start({"x": -1.3})))
+    whole = accepting.check_end(state, POLICY.local(state, tmsopt.Start({"x": -1.3})))
     lower = replace(whole.checked, objective=whole.checked.objective - 1e-14)
     run = replace(whole.end.run, status="Maximum_Iterations_Exceeded")
     stopped = replace(
         whole, end=replace(whole.end, run=run), point=replace(whole.point, stationarity=1.0), checked=lower
     )
-    assert is_better(state.problem, whole, stopped)
-    assert not is_better(state.problem, stopped, whole)
+    assert accepting.is_better(state.problem, whole, stopped)
+    assert not accepting.is_better(state.problem, stopped, whole)
     better = replace(stopped, checked=replace(lower, objective=whole.checked.objective - 1e-9))
-    assert is_better(state.problem, better, whole)
+    assert accepting.is_better(state.problem, better, whole)
 
 
 def test_one_end_is_not_enough():
@@ -222,11 +222,11 @@ def test_a_rescue_of_ones_own_steps_in_after_the_loop():
 def test_a_better_end_takes_the_place_of_a_fallback_and_a_worse_one_does_not():
     state = begun()
     right = POLICY.accept(replace(state, ends=(POLICY.local(state, tmsopt.Start({"x": 0.9})),)))
-    told = replace(right, fallback=Fallback({"x": 0.0}, "no optimum"))
-    same = search_again(told, POLICY, [tmsopt.Start({"x": 0.8})])
+    told = replace(right, fallback=states.Fallback({"x": 0.0}, "no optimum"))
+    same = driver.search_again(told, POLICY, [tmsopt.Start({"x": 0.8})])
     assert same.fallback == told.fallback
     assert same.best == right.best
-    left = search_again(told, POLICY, [tmsopt.Start({"x": -1.3})])
+    left = driver.search_again(told, POLICY, [tmsopt.Start({"x": -1.3})])
     assert left.fallback is None
     assert left.best.parameters["x"] == pytest.approx(LEFT, abs=1e-9)
     assert len(left.ends) == left.accepted == 2

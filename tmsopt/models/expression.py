@@ -40,7 +40,17 @@ _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and c
 
 
 class ExpressionError(ValueError):
-    """An expression that cannot be used, with the reason."""
+    """An expression that cannot be used, with the reason.
+
+    Example:
+        >>> try:
+        ...     tmsopt.models.parse_value("mu <= 1", ["mu"], example="mu")
+        ... except tmsopt.models.ExpressionError as error:
+        ...     print(error)
+        'mu <= 1' is a comparison; accepted: a value, such as 'mu'
+
+    More: docs/reference/problem_file.md
+    """
 
 
 class UnknownName(ExpressionError):
@@ -59,6 +69,12 @@ class Expression:
         text: as written.
         names: parameters and quantities that it uses, in order of appearance.
         comparison: ``<=``, ``>=`` or ``==`` for a constraint, empty for a plain value.
+
+    Example:
+        >>> tmsopt.models.parse_value("mu/3 + 1", ["mu"])({"mu": 6.0})
+        3.0
+
+    More: docs/reference/problem_file.md
     """
 
     text: str
@@ -126,6 +142,12 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
 
     Raises:
         ExpressionError: with what was found and what is accepted.
+
+    Example:
+        >>> tmsopt.models.parse_value("x_H - x_B", None).names
+        ('x_H', 'x_B')
+
+    More: docs/reference/problem_file.md
     """
     if isinstance(_parse(_text(text)), ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is a comparison; accepted: a value, such as '{example}'")
@@ -137,6 +159,12 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
 
     Raises:
         ExpressionError: with what was found and what is accepted.
+
+    Example:
+        >>> tmsopt.models.parse_comparison("mu <= 2", ["mu"])({"mu": 6.0})  # left minus right
+        4.0
+
+    More: docs/reference/problem_file.md
     """
     return _in_names(_comparison(_text(text)), accepted)
 
