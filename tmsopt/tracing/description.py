@@ -12,7 +12,7 @@ from tmsopt.roots import Pattern, pattern as pattern_of
 from tmsopt.tracing.branch import Branch, EventPoint
 from tmsopt.tracing.continuation import CLOSED, End, Walk
 from tmsopt.tracing.equations import Traced, prepare
-from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, points_of, refine
+from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, refine
 from tmsopt.tracing.points import Points, roots_along
 from tmsopt.tracing.solving import project
 
@@ -50,14 +50,14 @@ def describe(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Itera
 def find_events(ready: Traced, walked: Walk, events: Sequence[Event]) -> tuple[Walk, list[Happened]]:
     """A walk with its events among its points, and at which rows they are."""
     walked = refine(ready, walked, events)
-    groups = list(_groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free)))
+    groups = _groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free))
     rows, walked = insert(walked, [group[0] for group in groups])
     return walked, [(row, event) for row, group in zip(rows, groups, strict=True) for event in _named(group, events)]
 
 
 def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch:
     """A walk in the parameters of the problem."""
-    problem, pattern, points = ready.problem, ready.pattern, points_of(ready, walked)
+    problem, pattern, points = ready.problem, ready.pattern, Points(ready, walked.y, walked.t)
     if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a quadratic factor: exact, or it scatters by 1e-8
         b, c = (points.x[:, ready.unknowns.stop - k] for k in (2, 1))
         for row in {row for row, event in happened if "EP" in event.name}:
@@ -107,17 +107,15 @@ def _eigenfrequency(points: Points) -> dict[str, Array] | None:
     return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
 
 
-def _groups(found: Sequence[Found], free: int) -> Iterator[list[Found]]:
+def _groups(found: Sequence[Found], free: int) -> list[list[Found]]:
     """Events along the curve, those at one place together, the first of the list first: it says where that is."""
-    group: list[int] = []
+    groups: list[list[int]] = []
     for k in sorted(range(len(found)), key=lambda k: (found[k].after, found[k].s)):
-        apart = np.abs(found[k].y - found[group[-1]].y) if group else np.zeros(1)
+        apart = np.abs(found[k].y - found[groups[-1][-1]].y) if groups else np.array([np.inf])
         if apart.max() > TOGETHER * (1 + np.abs(found[k].y).max()) and apart[:free].max() > _SAME_DESIGN:
-            yield [found[i] for i in sorted(group)]
-            group = []
-        group.append(k)
-    if group:
-        yield [found[i] for i in sorted(group)]
+            groups.append([])
+        groups[-1].append(k)
+    return [[found[k] for k in sorted(group)] for group in groups]
 
 
 def _named(group: Sequence[Found], events: Sequence[Event]) -> Iterator[Event]:
@@ -159,7 +157,7 @@ def _natural_tangent(points: Points) -> Array:
 def _trim(ready: Traced, walked: Walk) -> Walk:
     """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
     with np.errstate(all="ignore"):
-        good = np.flatnonzero(points_of(ready, walked).residual <= _FITTING)
+        good = np.flatnonzero(Points(ready, walked.y, walked.t).residual <= _FITTING)
     if walked.closed or not good.size:
         return walked
     inside = slice(int(good[0]), int(good[-1]) + 1)
@@ -189,10 +187,10 @@ def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> list[Found]:
 
     near = [f for f in found if f.event.name == "EP4"]
     if marks:
-        value = height(points_of(ready, walked))
+        value = height(Points(ready, walked.y, walked.t))
         least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
         named = [f for f in found if f.event.name in marks]
-        near += [f for f in named if height(Points(ready, f.y[None] * ready.on.scale, f.t[None]))[0] < _LOW]
+        near += [f for f in named if height(Points(ready, f.y[None], f.t[None]))[0] < _LOW]
         near += [Found(_EP4, walked.y[k], walked.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
     exact = [e for f in near if (e := _exact_EP4(ready, walked, f)) is not None]
     return [*exact, *found]
@@ -207,7 +205,7 @@ def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
     end = project(special.on.evaluate, np.array([*start[:free], *guess]) / unit)
     if end is None or np.abs(end[:free] - found.y[:free]).max() > _NEAR:
         return None
-    if Points(special, end[None] * unit, found.t[None]).residual[0] > _EXACT:
+    if Points(special, end[None], found.t[None]).residual[0] > _EXACT:
         return None  # a section next to an EP4, not through it
     exact = found.y.copy()
     exact[:free] = end[:free]

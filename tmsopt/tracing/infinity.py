@@ -6,6 +6,7 @@ roots are stable, and heavy damping where they are real and negative.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice
 
 import casadi as ca
@@ -20,7 +21,7 @@ from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.tracing.continuation import Curve, Walk, curve
 from tmsopt.tracing.equations import design_at, limits_of, sizes, symbols_of
-from tmsopt.tracing.events import Event, Found, has_turned, insert, locate_zeros
+from tmsopt.tracing.events import Event, Found, insert, locate_zeros
 from tmsopt.tracing.points import margins
 from tmsopt.tracing.seeds import Line, unexplained, walk_new
 from tmsopt.tracing.solving import projected, rows_of
@@ -95,11 +96,8 @@ def _judged(
     vanishing = bool(np.all(np.abs(values(walked.y)[:, -2]) <= _NOTHING * usual))
     found: list[Found] = []
     for k, (name, column) in enumerate(tests(walked.y)):
-
-        def at(y: Array, t: Array, k: int = k) -> Array:
-            return tests(y)[k][1]
-
-        found += locate_zeros(on, walked, at, np.flatnonzero(has_turned(column)), Event(name, tests))
+        event = Event(name, partial(lambda k, tested: tested[k][1], k))
+        found += locate_zeros(on, walked, lambda y, t: tests(y), event, column)
     found.sort(key=lambda f: (f.after, f.s, f.event.name))
     rows, walked = insert(walked, found)
     apart = np.append(True, np.any(np.diff(walked.y, axis=0) != 0, axis=1))  # else a zero at a point that was there
