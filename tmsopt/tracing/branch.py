@@ -222,6 +222,11 @@ class BranchPoint:
     events: tuple[str, ...] = ()
 
 
+def table_at(columns: Mapping[str, Array], row: int) -> Table[float]:
+    """The numbers in a row of columns."""
+    return Table({name: float(column[row]) for name, column in columns.items()})
+
+
 def name_unknowns(pattern: str, unknowns: Mapping[str, Array], parameters: Iterable[str]) -> dict[str, Array]:
     """Unknowns by names of their own: a parameter may have the name of one, such as a damping c."""
     return {f"{pattern}.{name}" if name in parameters else name: column for name, column in unknowns.items()}

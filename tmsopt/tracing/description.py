@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from tmsopt.records import Array, Table
+from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of
-from tmsopt.tracing.branch import Branch, EventPoint
+from tmsopt.tracing.branch import Branch, EventPoint, table_at
 from tmsopt.tracing.continuation import CLOSED, End, Walk
 from tmsopt.tracing.equations import Traced, prepare
 from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, refine
@@ -74,7 +74,7 @@ def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Br
         named += [(row, "end", describe_end(ready, end)) for row, end in ends]
     off, columns = points.residual, points.parameters
     found = [
-        EventPoint(name, detail, Table({n: float(c[row]) for n, c in columns.items()}), row, float(off[row]))
+        EventPoint(name, detail, table_at(columns, row), row, float(off[row]))
         for row, name, detail in sorted(named, key=lambda n: n[0])
     ]
     steps = np.diff(walked.y, axis=0)[:, : len(problem.free)]

@@ -4,7 +4,7 @@ A boundary is not read off a grid: each arc is a traced root pattern, cut where 
 the imaginary axis, or real.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import nearest_two
-from tmsopt.tracing.branch import Branch
+from tmsopt.tracing.branch import Branch, table_at
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
 from tmsopt.tracing.equations import coefficients
 from tmsopt.tracing.infinity import Infinity, through_infinity
@@ -54,7 +54,7 @@ class Corner:
 
     name: str
     detail: str
-    parameters: dict[str, float]
+    parameters: Mapping[str, float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -145,7 +145,7 @@ def _changes(curve: Infinity, corners: bool = False) -> Iterator[Corner]:
     for row, what in curve.changes.items():
         if not corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
             name, detail = (f"infinity and {what}", "a0 = 0") if what != "infinity" else ("infinity", "a0 = a1 = 0")
-            yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
+            yield Corner(name, detail, table_at(curve.parameters, row))
 
 
 def _pieces(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
