@@ -14,7 +14,7 @@ from tmsopt.tracing.continuation import CLOSED, End, Walk
 from tmsopt.tracing.equations import Traced, prepare
 from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, refine
 from tmsopt.tracing.points import Points, roots_along
-from tmsopt.tracing.solving import project
+from tmsopt.tracing.solving import projected
 
 _NEAR = 1e-3  # distance within which an EP4 is looked for near an EP3 and a 2EP2
 _LOW = 1e-2  # of the marks next to a place where they may touch 0: they grow with the square of a step of 0.1
@@ -82,7 +82,7 @@ def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Br
         pattern=str(problem.locate),
         parameters=columns,
         unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
-        tangent=dict(zip(problem.free, _natural_tangent(points).T, strict=True)),
+        tangent=_natural_tangent(points),
         arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
         kinds=kinds,
         stable=points.stable,
@@ -144,14 +144,12 @@ def _beside(name: str, names: set[str]) -> str:
     return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
 
 
-def _natural_tangent(points: Points) -> Array:
+def _natural_tangent(points: Points) -> dict[str, Array]:
     """Derivative of the free parameters by the arclength in widths of the box."""
-    problem, t, scale = points.ready.problem, points.t, points.ready.on.scale
+    problem, along = points.ready.problem, points.t * points.ready.on.scale / (points.speed[:, None] + 1e-300)
     of = problem.parameter_set
-    slopes = [1 / (1 + v**2) if of[n].tangent else 1.0 + 0 * v for n, v in zip(problem.free, points.x.T, strict=False)]
-    along = t[:, : len(slopes)]
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    return np.asarray(along * scale[: len(slopes)] * np.transpose(slopes) / (size + 1e-300))
+    columns = zip(problem.free, along.T, points.x.T, strict=False)
+    return {n: dv / (1 + v**2) if of[n].tangent else dv for n, dv, v in columns}
 
 
 def _trim(ready: Traced, walked: Walk) -> Walk:
@@ -180,20 +178,14 @@ def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> list[Found]:
 
     On a curve of EP2 it is where EP3 and 2EP2 vanish at once: in a section through it they only touch 0.
     """
-    marks = ("EP3", "2EP2") if ready.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*ready.pattern.marks} else ()
-
-    def height(points: Points) -> Array:
-        return np.asarray(sum(np.abs(points.mark(name)) for name in marks))
-
     near = [f for f in found if f.event.name == "EP4"]
-    if marks:
-        value = height(Points(ready, walked.y, walked.t))
-        least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
-        named = [f for f in found if f.event.name in marks]
-        near += [f for f in named if height(Points(ready, f.y[None], f.t[None]))[0] < _LOW]
-        near += [Found(_EP4, walked.y[k], walked.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
-    exact = [e for f in near if (e := _exact_EP4(ready, walked, f)) is not None]
-    return [*exact, *found]
+    if ready.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*ready.pattern.marks}:
+        _, whole = insert(walked, found)
+        points = Points(ready, whole.y, whole.t)
+        height = np.abs(points.mark("EP3")) + np.abs(points.mark("2EP2"))
+        least = (height[1:-1] <= height[:-2]) & (height[1:-1] <= height[2:]) & (height[1:-1] < _LOW)
+        near += [Found(_EP4, whole.y[k], whole.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
+    return [*filter(None, (_exact_EP4(ready, walked, f) for f in near)), *found]
 
 
 def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
@@ -202,8 +194,8 @@ def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
     free, special = len(problem.free), prepare(problem.derive(constraints={}), pattern_of("EP4", problem.model.degree))
     start, unit = found.y * scale, special.on.scale
     guess = _converted(pattern, start[ready.unknowns], special.pattern)
-    end = project(special.on.evaluate, np.array([*start[:free], *guess]) / unit)
-    if end is None or np.abs(end[:free] - found.y[:free]).max() > _NEAR:
+    (end,) = projected(special.on.evaluate, np.array([[*start[:free], *guess]]) / unit, [None])
+    if not np.abs(end[:free] - found.y[:free]).max() <= _NEAR:  # nan where nothing is found
         return None
     if Points(special, end[None], found.t[None]).residual[0] > _EXACT:
         return None  # a section next to an EP4, not through it
