@@ -63,8 +63,7 @@ def through_infinity(problem: Posed, step: float, starts: int, seed: int) -> Ite
     usual = float(sizes(problem)[-1])
     lines: list[Line] = []
     for walked in walk_new(on, problem, _points(problem, on, starts, seed, lines), (step, _MOST), [], lines):
-        x_on, bounds, changes = _judged(on, walked, rest, usual)
-        yield Infinity(design_at(problem, x_on), *bounds, changes)
+        yield _judged(problem, on, walked, rest, usual)
 
 
 def _points(problem: Posed, on: Curve, starts: int, seed: int, lines: Sequence[Mapping[str, Array]]) -> Iterator[Array]:
@@ -77,10 +76,8 @@ def _points(problem: Posed, on: Curve, starts: int, seed: int, lines: Sequence[M
         yield y[np.all((on.lower <= y) & (y <= on.upper), axis=1)]  # not where it is nan
 
 
-def _judged(
-    on: Curve, walked: Walk, rest: ca.Function, usual: float
-) -> tuple[Array, tuple[Truth, Truth, Truth], dict[int, str]]:
-    """Points with every change among them, what each segment between them bounds, and what changes at which row."""
+def _judged(problem: Posed, on: Curve, walked: Walk, rest: ca.Function, usual: float) -> Infinity:
+    """The curve with every change among its points."""
 
     def values(y: Array) -> Array:
         return rows_of(rest, y * on.scale)[0]
@@ -101,11 +98,11 @@ def _judged(
     found.sort(key=lambda f: (f.after, f.s, f.event.name))
     rows, walked = insert(walked, found)
     apart = np.append(True, np.any(np.diff(walked.y, axis=0) != 0, axis=1))  # else a zero at a point that was there
-    points, numbers = walked.y[apart], np.cumsum(apart) - 1
+    points, numbers = walked.y[apart], (np.cumsum(apart) - 1)[rows].tolist()
     bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
-    named = {int(numbers[row]): f.event.name for row, f in zip(rows, found, strict=True)}
-    changes = {row: name for row, name in named.items() if any(b[row - 1] != b[row] for b in bounds)}
-    return points * on.scale, bounds, changes
+    named = zip(numbers, [f.event.name for f in found], strict=True)
+    changes = {row: name for row, name in named if any(b[row - 1] != b[row] for b in bounds)}
+    return Infinity(design_at(problem, points * on.scale), *bounds, changes)
 
 
 def _classes(v: Array, vanishing: bool) -> tuple[Truth, Truth, Truth]:
