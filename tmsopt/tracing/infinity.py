@@ -4,7 +4,7 @@ On one side of such a curve a large root is negative, on the other positive: it 
 roots are stable, and heavy damping where they are real and negative.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice
@@ -15,18 +15,19 @@ import numpy as np
 from tmsopt.models import Values
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import variables_of
+from tmsopt.program.nlp import scale_of
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.tracing.continuation import Curve, Walk, curve
-from tmsopt.tracing.equations import design_at, limits_of, sizes, symbols_of
+from tmsopt.tracing.equations import design_at, limits_of
 from tmsopt.tracing.events import Event, Found, insert, locate_zeros
 from tmsopt.tracing.points import margins
-from tmsopt.tracing.seeds import Line, unexplained, walk_new
+from tmsopt.tracing.seeds import unexplained, walk_new
 from tmsopt.tracing.solving import projected, rows_of
 
-_NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
+_NOTHING = 1e-12  # of the largest coefficient: a constant term this small all along the curve vanishes with a0
 _MOST = 10**6
 
 
@@ -51,32 +52,31 @@ class Infinity:
 
 def through_infinity(problem: Posed, step: float, starts: int, seed: int) -> Iterator[Infinity]:
     """Every curve a0 = 0 found in the box of a problem with two free parameters."""
-    x = ca.SX.sym("x", 2)
-    of = problem.parameter_set
-    a = Values(problem.model, of, problem.ordered(symbols_of(problem, ca.vertsplit(x)))).coefficients
+    x, of = ca.SX.sym("x", 2), problem.parameter_set
+    design = {n: ca.atan(v) if of[n].tangent else v for n, v in zip(problem.free, ca.vertsplit(x), strict=True)}
+    a = scale_of(problem).scaled(Values(problem.model, of, problem.ordered(design)).coefficients)
     if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
         return
     lower, upper = limits_of(problem)
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], along))])
-    usual = float(sizes(problem)[-1])
-    lines: list[Line] = []
-    for walked in walk_new(on, problem, _points(problem, on, starts, seed, lines), (step, _MOST), [], lines):
-        yield _judged(problem, on, walked, rest, usual)
+    walks: list[Walk] = []
+    walk_new(on, _points(problem, on, starts, seed, walks), (step, _MOST), walks)
+    yield from (_judged(problem, on, walked, rest) for walked in walks)
 
 
-def _points(problem: Posed, on: Curve, starts: int, seed: int, lines: Sequence[Mapping[str, Array]]) -> Iterator[Array]:
+def _points(problem: Posed, on: Curve, starts: int, seed: int, walks: Sequence[Walk]) -> Iterator[Array]:
     """Points of the curve in the box, from designs spread over it, then from a grid where no line is yet."""
     spots = list(islice(spread(problem, seed), starts))
-    missed = ([d] for d in unexplained(problem, lambda a: a[0], lines))
+    missed = ([d] for d in unexplained(problem, on, lambda a: a[0], walks))
     for designs in chain([spots] if spots else [], missed):
         at = np.array([variables_of(problem, d) for d in designs]) / on.scale
         y = projected(on.evaluate, at, [k % 2 for k in range(len(at))])
         yield y[np.all((on.lower <= y) & (y <= on.upper), axis=1)]  # not where it is nan
 
 
-def _judged(problem: Posed, on: Curve, walked: Walk, rest: ca.Function, usual: float) -> Infinity:
+def _judged(problem: Posed, on: Curve, walked: Walk, rest: ca.Function) -> Infinity:
     """The curve with every change among its points."""
 
     def values(y: Array) -> Array:
@@ -90,7 +90,8 @@ def _judged(problem: Posed, on: Curve, walked: Walk, rest: ca.Function, usual: f
         found += [("EP2", meeting(c))] if len(c) > 2 else []
         return [("infinity", c[0]), *found, *([("capsize", v[:, -1])] if vanishing else [])]
 
-    vanishing = bool(np.all(np.abs(values(walked.y)[:, -2]) <= _NOTHING * usual))
+    size = np.abs(values(walked.y)[:, :-1])
+    vanishing = bool(np.all(size[:, -1] <= _NOTHING * size.max(axis=1)))
     found: list[Found] = []
     for k, (name, column) in enumerate(tests(walked.y)):
         event = Event(name, partial(lambda k, tested: tested[k][1], k))

@@ -11,11 +11,8 @@ from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
 from tmsopt.tracing.continuation import INFINITE, Curve, Walk, both_ways, contains
-from tmsopt.tracing.equations import Traced, coefficients, design_at, starting_points
+from tmsopt.tracing.equations import Traced, coefficients, design_at
 from tmsopt.tracing.solving import projected, rows_of
-
-Line = dict[str, Array]
-"""Free parameters along a curve."""
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
@@ -33,9 +30,9 @@ _BLOCK = 256  # points whose distances from a line are found at once
 
 
 def unexplained(
-    problem: Posed, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]]
+    problem: Posed, on: Curve, test: Callable[[Sequence[Any]], Any], walks: Sequence[Walk]
 ) -> Iterator[dict[str, float]]:
-    """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile.
+    """Designs by which a function of the coefficients changes sign, far from every walk; `walks` may grow meanwhile.
 
     They are middles of the edges of a grid over the box, and the function does not count where it is nan. Those between
     which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
@@ -55,16 +52,16 @@ def unexplained(
             middles.append(np.argwhere(kept) + np.array([(1 - axis) / 2, axis / 2]))
         left = np.concatenate(middles) / (points - 1)
         np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
-        vain, known, seen = 0, len(lines), 0
+        vain, known, seen = 0, len(walks), 0
         while len(left) and (vain < _PATIENCE or not last):
-            for line in lines[seen:]:
-                at = np.stack([line[n] for n in problem.free], axis=-1)
-                left = left[apart(left, (at - low) / (high - low), 1 / (points - 1))]
-            seen = len(lines)
+            for walked in walks[seen:]:
+                line = np.stack([*design_at(problem, walked.y * on.scale).values()], axis=-1)
+                left = left[apart(left, (line - low) / (high - low), 1 / (points - 1))]
+            seen = len(walks)
             if len(left):
                 yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
                 left = left[1:]
-                vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
+                vain, known = (vain + 1 if len(walks) == known else 0), len(walks)
 
 
 def apart(points: Array, line: Array, distance: float) -> Truth:
@@ -80,35 +77,26 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
     return far
 
 
-def walk_new(
-    on: Curve,
-    problem: Posed,
-    seeds: Iterable[Iterable[Array]],
-    how: tuple[float, int],
-    walks: list[Walk],
-    lines: list[Line],
-) -> Iterator[Walk]:
-    """Curves through some of many points, shape (points, n + 1) each; `walks` and their `lines` in the box grow."""
+def walk_new(on: Curve, seeds: Iterable[Iterable[Array]], how: tuple[float, int], walks: list[Walk]) -> None:
+    """Walk the curves through some of many points, shape (points, n + 1) each, that are on none of the `walks` yet."""
     for y in chain.from_iterable(seeds):
         if not any(contains(on, known, y) for known in walks) and (found := both_ways(on, y, *how)) is not None:
             walks.append(found)
-            lines.append(design_at(problem, found.y * on.scale))
-            yield found
 
 
 def seeds(
-    ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], lines: Sequence[Mapping[str, Array]]
+    ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], walks: Sequence[Walk]
 ) -> Iterator[tuple[int, list[Array]]]:
     """Points of the pattern's curve in the box, found from each of many designs, and the number of these.
 
-    Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `lines`
+    Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `walks`
     grows meanwhile.
     """
     problem = ready.problem
     free = len(problem.free)
     given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
     yield from ((0, found) for found in _near(ready, given, [None] * len(given)))
-    vain, known, count = 0, len(lines), 0
+    vain, known, count = 0, len(walks), 0
     ways = cycle([None, *range(free)])
     designs = spread(problem, seed)
     while count < (starts if _swept(ready) else _ROUNDS * starts):
@@ -117,7 +105,7 @@ def seeds(
                 return
             count += 1
             yield count, found
-            vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
+            vain, known = (vain + 1 if len(walks) == known else 0), len(walks)
 
 
 def _swept(ready: Traced) -> bool:
@@ -125,10 +113,10 @@ def _swept(ready: Traced) -> bool:
     return ready.pattern.test is not None and len(ready.problem.free) == 2
 
 
-def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, list[Array]]]:
-    """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
+def missed(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
+    """Points of the curve where a test function of the pattern changes sign over a grid, off the walks so far."""
     if ready.pattern.test is not None and _swept(ready):
-        for design in unexplained(ready.problem, ready.pattern.test, lines):
+        for design in unexplained(ready.problem, ready.on, ready.pattern.test, walks):
             yield 0, _near(ready, [design], most=1)[0]
 
 
@@ -157,14 +145,13 @@ def _near(
 ) -> list[list[Array]]:
     """Points of the curve in the box near each design, not too far out, from the best guesses, one variable held."""
     on, free = ready.on, len(ready.problem.free)
-    tried = starting_points(ready.nlp, ready.problem, designs)
+    tried = [ready.starts(design) for design in designs]
     if most == 1:
-        tried = [sorted(t, key=lambda x: np.abs(rows_of(on.evaluate, x[None] / on.scale)[0]).max()) for t in tried]
-    tried = [t[:most] for t in tried]
-    if not any(tried):
+        tried = [sorted(t, key=lambda y: np.abs(rows_of(on.evaluate, y[None])[0]).max()) for t in tried]
+    owner = [k for k, points in enumerate(tried) for _ in points[:most]]
+    if not owner:
         return [[] for _ in designs]
-    owner = [k for k, points in enumerate(tried) for _ in points]
-    y = projected(on.evaluate, np.concatenate([t for t in tried if t]) / on.scale, [held[k] for k in owner])
+    y = projected(on.evaluate, np.array([y for points in tried for y in points[:most]]), [held[k] for k in owner])
     inside = np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12), axis=1)  # not where it is nan
     inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, on.lower, on.upper)
