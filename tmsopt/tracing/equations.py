@@ -18,6 +18,7 @@ from tmsopt.program.starts import completions, spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots import Pattern
 from tmsopt.tracing.continuation import Curve, curve
+from tmsopt.tracing.solving import rows_of
 
 _SAMPLE = 32  # designs by which sizes are judged
 _VANISHED = 1e-9
@@ -51,9 +52,10 @@ class Traced:
         size = np.abs(a) / self.nlp.unit ** np.arange(a.shape[-1])
         return np.asarray(size[..., 0] > _VANISHED * size.max(axis=-1))
 
-    def starts(self, design: Mapping[str, float]) -> list[Array]:
-        """All variables at a design, in units of the scale, for every guess of the pattern's unknowns."""
-        return [x * self.unit / self.on.scale for x in completions(self.nlp, self.problem, design)]
+    def starts(self, design: Mapping[str, float], best: bool) -> list[Array]:
+        """All variables at a design, in units of the scale, for each guess of the unknowns; the best first if asked."""
+        every = [x * self.unit / self.on.scale for x in completions(self.nlp, self.problem, design)]
+        return sorted(every, key=lambda y: best and np.abs(rows_of(self.on.evaluate, y[None])[0]).max())
 
 
 def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
