@@ -147,12 +147,22 @@ def test_a_function_that_gives_no_number_is_named(function, words):
         ([HALF, Event("x", 3)], "events.1: found"),
         ([Event("two\nlines", HALF.function)], "events.0.name"),
         ([Event(3, HALF.function)], "events.0.name: found 3; accepted: a text"),
+        *[
+            ([Event(n, HALF.function)], f"events.0.name: found '{n}', which tmsopt")
+            for n in ("fold", "EP4", "2EP2", "end")
+        ],
     ],
 )
 def test_what_is_no_event_is_refused(events, words):
     for verb in (tmsopt.trace, tmsopt.continue_from):
         with pytest.raises(InputError, match=words):
             verb(EP_SET, events=events)
+
+
+def test_the_detail_of_an_event_decides_nothing():
+    noted = Event("half", HALF.function, detail="stability changes")  # which weave and capsize say of theirs
+    (found,) = by_name(tmsopt.trace(EP_SET, events=[noted], **FEW), "half")
+    assert found.parameters["lambda_s"] == pytest.approx(0.5, abs=EXACT)
 
 
 # By hand

@@ -1,6 +1,6 @@
 from .branch import Branch as Branch, BranchPoint as BranchPoint, EventPoint as EventPoint, Trace as Trace
 from .continuation import (
-    CurvePoint as CurvePoint, CurveSteps as CurveSteps, End as End, both_ways as both_ways, curve as curve,
+    CurvePoint as CurvePoint, End as End, both_ways as both_ways, curve as curve, follow as follow,
     tangent_at as tangent_at, walk as walk,
 )
 from .domain import Domain as Domain, domain as domain

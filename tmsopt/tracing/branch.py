@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tmsopt.files import write_csv
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.unit_system import units_of
-from tmsopt.records import Array, Table, Tabular, plain
+from tmsopt.records import Array, Table, Tabular, Truth, plain
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,8 @@ class EventPoint:
     """A point of a branch where something happens.
 
     Attributes:
-        name: ``EP4``, ``EP3``, ``2EP2``, ``double zero``, ``weave``, ``capsize``, ``fold``, ``constraint`` or ``end``.
+        name: ``EP4``, ``EP3``, ``2EP2``, ``double zero``, ``weave``, ``capsize``, ``fold``, ``constraint`` or ``end``,
+            or that of a `tmsopt.Event` of the user; one that stops a branch is at its end, and where the next begins.
         detail: in words, e.g. which parameter folds or which limit ends the branch.
         parameters: every parameter of the design there.
         index: row of the branch.
@@ -75,9 +76,9 @@ class Branch(Tabular):
     tangent: Mapping[str, Array]
     arclength: Array
     kinds: NDArray[np.str_]
-    stable: NDArray[np.bool_]
-    heavily_damped: NDArray[np.bool_]
-    satisfied: NDArray[np.bool_]
+    stable: Truth
+    heavily_damped: Truth
+    satisfied: Truth
     abscissa: Array
     events: tuple[EventPoint, ...]
     closed: bool
@@ -97,29 +98,29 @@ class Branch(Tabular):
         marks: dict[int, list[str]] = {}
         for event in self.events:
             marks.setdefault(event.index, []).append(f"{event.name}: {event.detail}" if event.detail else event.name)
-        for k in range(len(self)):
-            yield {
-                "arclength": float(self.arclength[k]),
-                **{name: float(column[k]) for name, column in self.parameters.items()},
-                **{f"d_{name}": float(column[k]) for name, column in self.tangent.items()},
-                **{n: float(c[k]) for n, c in name_unknowns(self.pattern, self.told, self.parameters).items()},
-                "abscissa": float(self.abscissa[k]),
-                "kind": str(self.kinds[k]),
-                "stable": bool(self.stable[k]),
-                "heavily_damped": bool(self.heavily_damped[k]),
-                "constraints": bool(self.satisfied[k]),
-                "event": "; ".join(marks.get(k, [])),
-            }
+        columns: dict[str, NDArray[Any]] = {
+            "arclength": self.arclength,
+            **self.parameters,
+            **{f"d_{name}": column for name, column in self.tangent.items()},
+            **name_unknowns(self.pattern, self.told, self.parameters),
+            "abscissa": self.abscissa,
+            "kind": self.kinds,
+            "stable": self.stable,
+            "heavily_damped": self.heavily_damped,
+            "constraints": self.satisfied,
+        }
+        for k, row in enumerate(zip(*(column.tolist() for column in columns.values()), strict=True)):
+            yield dict(zip(columns, row, strict=True)) | {"event": "; ".join(marks.get(k, []))}
 
     def to_json(self) -> dict[str, Any]:
         """Columns and events; numbers that do not exist are null."""
-        columns: dict[str, list[Any]] = {}
-        for row in self.records():
-            for name, value in row.items():
-                columns.setdefault(name, []).append(value)
-        found = plain(self, "pattern closed") | {"points": len(self), "residual": self.residual}
-        events = [plain(event, "name detail index parameters") for event in self.events]
-        return found | {"events": events, "columns": plain(columns)}
+        rows = list(self.records())
+        return plain(self, "pattern closed") | {
+            "points": len(self),
+            "residual": self.residual,
+            "events": [plain(event, "name detail index parameters") for event in self.events],
+            "columns": plain({name: [row[name] for row in rows] for name in rows[0]}),
+        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -220,6 +221,11 @@ class BranchPoint:
     stable: bool
     abscissa: float
     events: tuple[str, ...] = ()
+
+
+def table_at(columns: Mapping[str, Array], row: int) -> Table[float]:
+    """The numbers in a row of columns."""
+    return Table({name: float(column[row]) for name, column in columns.items()})
 
 
 def name_unknowns(pattern: str, unknowns: Mapping[str, Array], parameters: Iterable[str]) -> dict[str, Array]:

@@ -3,11 +3,11 @@
 Keller's method: predict along the tangent, correct by Newton's method on F = 0 and a fixed arclength. Predictor,
 three corrections and the new tangent are one CasADi function of scalar operations, so that a point costs one call.
 
-`CurveSteps` is an iterator of the points: a consumer may stop, or turn round. A `Walk` is made from it.
+`follow` gives the points one by one: a consumer may stop, or turn round. A `Walk` is made from them.
 """
 
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
@@ -125,59 +125,24 @@ def tangent_at(on: Curve, y: Array) -> Array:
     Raises:
         ValueError: where the equations do not determine a direction.
     """
-    jacobian = evaluated(on.evaluate, y[None])[1][0]
-    singular = np.linalg.svd(_even(_even(jacobian, 0), 1), compute_uv=False)
-    rows = np.linalg.svd(jacobian)[2]
+    jacobian = even = evaluated(on.evaluate, y[None])[1][0]
+    for axis in (0, 1):  # norms of 1: units, which differ by much beside infinity, do not make it look singular
+        norm = np.linalg.norm(even, axis=axis, keepdims=True)
+        even = even / np.where(norm > 0, norm, 1.0)
+    singular = np.linalg.svd(even, compute_uv=False)
     if singular[-1] <= _ISOLATED * singular[0]:
         raise ValueError("the equations leave more than a curve here")
-    return np.asarray(rows[-1])
+    return np.asarray(np.linalg.svd(jacobian)[2][-1])
 
 
-def _even(matrix: Array, axis: int) -> Array:
-    """Columns or rows of norm 1, so that units, which differ by much beside infinity, do not make it look singular."""
-    norm = np.linalg.norm(matrix, axis=axis, keepdims=True)
-    return np.asarray(matrix / np.where(norm > 0, norm, 1.0))
-
-
-class CurveSteps(Iterator[CurvePoint]):
-    """Iterator of the points of a curve that follow one of them, in the direction of its tangent.
-
-    Attributes:
-        point: the last one, at first the one to begin at.
-        end: why there are no more; None while there are.
-    """
-
-    end: End | None
-
-    def __init__(self, on: Curve, start: CurvePoint, step: float) -> None:
-        self.on, self.step = on, step
-        self._begin(start)
-
-    def _begin(self, start: CurvePoint) -> None:
-        self.point, self.end = start, None
-        self._points = _follow(self.on, start.y, start.t, self.step)
-
-    def __next__(self) -> CurvePoint:
-        try:
-            self.point = next(self._points)
-        except StopIteration as stop:
-            self.end = self.end or stop.value
-            raise
-        return self.point
-
-    def reverse(self) -> None:
-        """Turn round at the last point."""
-        self._begin(CurvePoint(self.point.y, -self.point.t))
-
-
-def _follow(on: Curve, y: Array, t: Array, step: float) -> Generator[CurvePoint, None, End]:
-    """The points after y in the direction t, until a limit, a closed loop or infinity; the end is returned."""
+def follow(on: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
+    """The points after a start in the direction of its tangent, until a limit, a closed loop or infinity; then why."""
 
     def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
         new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
         return new[0], tangent[0], *checks[0].tolist()
 
-    start, count, step_from = CurvePoint(y, t), 1, MappedFunction(on.advance, 1)
+    y, t, count, step_from = start.y, start.t, 1, MappedFunction(on.advance, 1)
     s, reach = step / 4, advance(y, t, 0.0)[6]
     while True:
         s = min(s, step * reach)
@@ -187,25 +152,26 @@ def _follow(on: Curve, y: Array, t: Array, step: float) -> Generator[CurvePoint,
                 break  # nan does not come here
             s /= 2
             if s < _SMALLEST:
-                return End(INFINITE if np.abs(y).max() > _FADING else SINGULAR)
+                yield End(INFINITE if np.abs(y).max() > _FADING else SINGULAR)
+                return
         if count > 2 and 0 < ahead <= s and far <= 2 * s and _alike(advance(y, t, ahead)[0], start.y):
-            yield start
-            return End(CLOSED)
+            yield from (start, End(CLOSED))
+            return
         if slack < 0 and not _along(on, new, tangent):
-            last, end = _at_limit(on, y, t, s)
-            yield last
-            return end
+            yield from _at_limit(on, y, t, s, new)
+            return
         yield CurvePoint(new, tangent)
         if largest > _FAR:
-            return End(INFINITE)
+            yield End(INFINITE)
+            return
         y, t, s, count = new, tangent, s * _GROWTH, count + 1
 
 
 def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
     """Follow the curve from y in the direction t until it ends, or there are `most` points."""
-    steps = CurveSteps(on, CurvePoint(y, t), step)
-    points = [steps.point, *islice(steps, most - 1)]
-    end = steps.end or End(f"stopped after {most} points")
+    start = CurvePoint(y, t)
+    points: list[Any] = [start, *islice(follow(on, start, step), most - 1)]
+    end = points.pop() if isinstance(points[-1], End) else End(f"stopped after {most} points")
     return Walk(np.array([p.y for p in points]), np.array([p.t for p in points]), (End("start"), end))
 
 
@@ -216,14 +182,12 @@ def both_ways(on: Curve, y: Array, step: float, most: int) -> Walk | None:
         t = tangent_at(on, y)
     except ValueError:
         return None
-    ahead = walk(on, y, t, step, most)
-    if not ahead.closed:
+    whole = walk(on, y, t, step, most)
+    if not whole.closed:
         back = walk(on, y, -t, step, most)
-        if len(ahead.y) + len(back.y) < 4:
-            return None
-        points, tangents = np.concatenate([back.y[::-1], ahead.y[1:]]), np.concatenate([-back.t[::-1], ahead.t[1:]])
-        ahead = Walk(points, tangents, (back.ends[1], ahead.ends[1]))
-    return replace(ahead, seconds=time.perf_counter() - began)
+        points, tangents = (np.concatenate(x) for x in ([back.y[:0:-1], whole.y], [-back.t[:0:-1], whole.t]))
+        whole = Walk(points, tangents, (back.ends[1], whole.ends[1]))
+    return replace(whole, seconds=time.perf_counter() - began) if len(whole.y) > 2 else None
 
 
 def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
@@ -254,18 +218,14 @@ def _along(on: Curve, y: Array, t: Array) -> bool:
     return bool(np.all(beyond[over] <= _EDGE) and np.all(np.abs(t[over]) <= _EDGE))
 
 
-def _at_limit(on: Curve, y: Array, t: Array, s: float) -> tuple[CurvePoint, End]:
-    """The first point within a step that lies on a limit, on it exactly."""
-
-    def points(shares: Array) -> tuple[Array, Array]:
-        return between(on, np.tile(y, (len(shares), 1)), np.tile(t, (len(shares), 1)), shares)
-
-    beyond = points(np.array([s]))[0][0]
+def _at_limit(on: Curve, y: Array, t: Array, s: float, beyond: Array) -> tuple[CurvePoint, End]:
+    """The first point before one that lies beyond limits, a step s further, that is on a limit, on it exactly."""
     limits = np.clip(beyond, on.lower, on.upper)
     k = np.flatnonzero(limits != beyond)
-    shares = crossings(lambda r: points(r)[0][range(len(k)), k] - limits[k], np.full(len(k), s))
-    shares = np.nan_to_num(shares)  # nan: it is beyond the limit already
-    first = k[int(np.argmin(shares))]
-    (last,), (tangent,) = points(shares[[np.argmin(shares)]])
+    here, along = np.tile(y, (len(k), 1)), np.tile(t, (len(k), 1))
+    lengths = crossings(lambda r: between(on, here, along, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s))
+    lengths = np.nan_to_num(lengths)  # nan: it is beyond the limit already
+    first = k[np.argmin(lengths)]
+    (last,), (tangent,) = between(on, y[None], t[None], lengths.min(keepdims=True))
     last[first] = limits[first]
     return CurvePoint(last, tangent), End("max" if beyond[first] > limits[first] else "min", int(first))

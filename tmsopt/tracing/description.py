@@ -7,14 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from tmsopt.records import Array, Table
+from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of
-from tmsopt.tracing.branch import Branch, EventPoint
+from tmsopt.tracing.branch import Branch, EventPoint, table_at
 from tmsopt.tracing.continuation import CLOSED, End, Walk
 from tmsopt.tracing.equations import Traced, prepare
-from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, points_of, refine
+from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, refine
 from tmsopt.tracing.points import Points, roots_along
-from tmsopt.tracing.solving import project
+from tmsopt.tracing.solving import projected
 
 _NEAR = 1e-3  # distance within which an EP4 is looked for near an EP3 and a 2EP2
 _LOW = 1e-2  # of the marks next to a place where they may touch 0: they grow with the square of a step of 0.1
@@ -50,14 +50,14 @@ def describe(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Itera
 def find_events(ready: Traced, walked: Walk, events: Sequence[Event]) -> tuple[Walk, list[Happened]]:
     """A walk with its events among its points, and at which rows they are."""
     walked = refine(ready, walked, events)
-    groups = list(_groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free)))
+    groups = _groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free))
     rows, walked = insert(walked, [group[0] for group in groups])
     return walked, [(row, event) for row, group in zip(rows, groups, strict=True) for event in _named(group, events)]
 
 
 def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch:
     """A walk in the parameters of the problem."""
-    problem, pattern, points = ready.problem, ready.pattern, points_of(ready, walked)
+    problem, pattern, points = ready.problem, ready.pattern, Points(ready, walked.y, walked.t)
     if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a quadratic factor: exact, or it scatters by 1e-8
         b, c = (points.x[:, ready.unknowns.stop - k] for k in (2, 1))
         for row in {row for row, event in happened if "EP" in event.name}:
@@ -74,7 +74,7 @@ def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Br
         named += [(row, "end", describe_end(ready, end)) for row, end in ends]
     off, columns = points.residual, points.parameters
     found = [
-        EventPoint(name, detail, Table({n: float(c[row]) for n, c in columns.items()}), row, float(off[row]))
+        EventPoint(name, detail, table_at(columns, row), row, float(off[row]))
         for row, name, detail in sorted(named, key=lambda n: n[0])
     ]
     steps = np.diff(walked.y, axis=0)[:, : len(problem.free)]
@@ -82,7 +82,7 @@ def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Br
         pattern=str(problem.locate),
         parameters=columns,
         unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
-        tangent=dict(zip(problem.free, _natural_tangent(points).T, strict=True)),
+        tangent=_natural_tangent(points),
         arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
         kinds=kinds,
         stable=points.stable,
@@ -107,17 +107,15 @@ def _eigenfrequency(points: Points) -> dict[str, Array] | None:
     return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
 
 
-def _groups(found: Sequence[Found], free: int) -> Iterator[list[Found]]:
+def _groups(found: Sequence[Found], free: int) -> list[list[Found]]:
     """Events along the curve, those at one place together, the first of the list first: it says where that is."""
-    group: list[int] = []
+    groups: list[list[int]] = []
     for k in sorted(range(len(found)), key=lambda k: (found[k].after, found[k].s)):
-        apart = np.abs(found[k].y - found[group[-1]].y) if group else np.zeros(1)
+        apart = np.abs(found[k].y - found[groups[-1][-1]].y) if groups else np.array([np.inf])
         if apart.max() > TOGETHER * (1 + np.abs(found[k].y).max()) and apart[:free].max() > _SAME_DESIGN:
-            yield [found[i] for i in sorted(group)]
-            group = []
-        group.append(k)
-    if group:
-        yield [found[i] for i in sorted(group)]
+            groups.append([])
+        groups[-1].append(k)
+    return [[found[k] for k in sorted(group)] for group in groups]
 
 
 def _named(group: Sequence[Found], events: Sequence[Event]) -> Iterator[Event]:
@@ -146,20 +144,18 @@ def _beside(name: str, names: set[str]) -> str:
     return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
 
 
-def _natural_tangent(points: Points) -> Array:
+def _natural_tangent(points: Points) -> dict[str, Array]:
     """Derivative of the free parameters by the arclength in widths of the box."""
-    problem, t, scale = points.ready.problem, points.t, points.ready.on.scale
+    problem, along = points.ready.problem, points.t * points.ready.on.scale / (points.speed[:, None] + 1e-300)
     of = problem.parameter_set
-    slopes = [1 / (1 + v**2) if of[n].tangent else 1.0 + 0 * v for n, v in zip(problem.free, points.x.T, strict=False)]
-    along = t[:, : len(slopes)]
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    return np.asarray(along * scale[: len(slopes)] * np.transpose(slopes) / (size + 1e-300))
+    columns = zip(problem.free, along.T, points.x.T, strict=False)
+    return {n: dv / (1 + v**2) if of[n].tangent else dv for n, dv, v in columns}
 
 
 def _trim(ready: Traced, walked: Walk) -> Walk:
     """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
     with np.errstate(all="ignore"):
-        good = np.flatnonzero(points_of(ready, walked).residual <= _FITTING)
+        good = np.flatnonzero(Points(ready, walked.y, walked.t).residual <= _FITTING)
     if walked.closed or not good.size:
         return walked
     inside = slice(int(good[0]), int(good[-1]) + 1)
@@ -182,20 +178,14 @@ def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> list[Found]:
 
     On a curve of EP2 it is where EP3 and 2EP2 vanish at once: in a section through it they only touch 0.
     """
-    marks = ("EP3", "2EP2") if ready.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*ready.pattern.marks} else ()
-
-    def height(points: Points) -> Array:
-        return np.asarray(sum(np.abs(points.mark(name)) for name in marks))
-
     near = [f for f in found if f.event.name == "EP4"]
-    if marks:
-        value = height(points_of(ready, walked))
-        least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
-        named = [f for f in found if f.event.name in marks]
-        near += [f for f in named if height(Points(ready, f.y[None] * ready.on.scale, f.t[None]))[0] < _LOW]
-        near += [Found(_EP4, walked.y[k], walked.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
-    exact = [e for f in near if (e := _exact_EP4(ready, walked, f)) is not None]
-    return [*exact, *found]
+    if ready.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*ready.pattern.marks}:
+        _, whole = insert(walked, found)
+        points = Points(ready, whole.y, whole.t)
+        height = np.abs(points.mark("EP3")) + np.abs(points.mark("2EP2"))
+        least = (height[1:-1] <= height[:-2]) & (height[1:-1] <= height[2:]) & (height[1:-1] < _LOW)
+        near += [Found(_EP4, whole.y[k], whole.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
+    return [*filter(None, (_exact_EP4(ready, walked, f) for f in near)), *found]
 
 
 def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
@@ -204,10 +194,10 @@ def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
     free, special = len(problem.free), prepare(problem.derive(constraints={}), pattern_of("EP4", problem.model.degree))
     start, unit = found.y * scale, special.on.scale
     guess = _converted(pattern, start[ready.unknowns], special.pattern)
-    end = project(special.on.evaluate, np.array([*start[:free], *guess]) / unit)
-    if end is None or np.abs(end[:free] - found.y[:free]).max() > _NEAR:
+    (end,) = projected(special.on.evaluate, np.array([[*start[:free], *guess]]) / unit, [None])
+    if not np.abs(end[:free] - found.y[:free]).max() <= _NEAR:  # nan where nothing is found
         return None
-    if Points(special, end[None] * unit, found.t[None]).residual[0] > _EXACT:
+    if Points(special, end[None], found.t[None]).residual[0] > _EXACT:
         return None  # a section next to an EP4, not through it
     exact = found.y.copy()
     exact[:free] = end[:free]

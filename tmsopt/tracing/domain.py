@@ -4,7 +4,7 @@ A boundary is not read off a grid: each arc is a traced root pattern, cut where 
 the imaginary axis, or real.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import nearest_two
-from tmsopt.tracing.branch import Branch
+from tmsopt.tracing.branch import Branch, table_at
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
 from tmsopt.tracing.equations import coefficients
 from tmsopt.tracing.infinity import Infinity, through_infinity
@@ -54,7 +54,7 @@ class Corner:
 
     name: str
     detail: str
-    parameters: dict[str, float]
+    parameters: Mapping[str, float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -106,19 +106,18 @@ def domain(
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
     how: dict[str, Any] = {"step": step, "starts": starts, "seed": seed, "progress": progress}
     bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
-    found: dict[str, list[Branch]] = {"capsize": [], "EP2": []}
-    found |= {name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)] for name in bounding}
+    found = {name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)] for name in bounding}
     start_steps(progress, "looking for corners")
     infinite = list(through_infinity(plane, step, starts, seed))
     at_infinity = [c for curve in infinite for c in _changes(curve)]
 
     def arcs(names: Sequence[str], bounds: Callable[[Branch], Truth], beyond: str) -> tuple[Arc, ...]:
-        traced = (arc for n in names for b in found[n] for arc in _pieces(b, bounds(b), plane, at_infinity))
+        traced = (arc for n in names for b in found.get(n, ()) for arc in _pieces(b, bounds(b), plane, at_infinity))
         runs = ((curve.parameters, *run) for curve in infinite for run in _runs(getattr(curve, beyond)))
         ends = (Arc("infinity", {n: x[start : stop + 1] for n, x in p.items()}) for p, start, stop in runs)
         return (*traced, *ends)
 
-    corners = [c for name in ("weave", "capsize", "EP2") for b in found[name] for c in _corners(b, plane)]
+    corners = [c for branches in found.values() for b in branches for c in _corners(b, plane)]
     corners += [c for curve in infinite for c in _changes(curve, corners=True)]
     return Domain(
         stability=arcs(("weave", "capsize"), lambda b: _bounds(b, plane), "stable"),
@@ -130,8 +129,8 @@ def domain(
 
 def _in_edge(branch: Branch, problem: Posed) -> bool:
     """Whether a branch lies in an edge of the box, which bounds the picture anyway: it has one side only."""
-    limits = ((n, limit, high - low) for n, (low, high) in problem.free.items() for limit in (low, high))
-    return any(bool(np.all(np.abs(branch.parameters[n] - limit) <= _EDGE * width)) for n, limit, width in limits)
+    limits = ((branch.parameters[n], limit, np.ptp(ends)) for n, ends in problem.free.items() for limit in ends)
+    return any(np.abs(column - limit).max() <= _EDGE * width for column, limit, width in limits)
 
 
 def _runs(inside: Truth) -> list[tuple[int, int]]:
@@ -145,33 +144,26 @@ def _changes(curve: Infinity, corners: bool = False) -> Iterator[Corner]:
     for row, what in curve.changes.items():
         if not corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
             name, detail = (f"infinity and {what}", "a0 = 0") if what != "infinity" else ("infinity", "a0 = a1 = 0")
-            yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
+            yield Corner(name, detail, table_at(curve.parameters, row))
 
 
 def _pieces(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
     """Runs of points that bound a domain; the events at their ends belong to them, and a corner beyond an end."""
-    marked, beyond = inside.copy(), dict[int, list[Corner]]()
+    marked, beyond = inside.copy(), dict[int, Corner]()
     for event in branch.events:
         k = event.index
         if event.name != "end":
             marked[k] = bool(inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)])
         elif event.detail.startswith((INFINITE, SINGULAR)) and at_infinity:
-            widths = ((n, high - low) for n, (low, high) in problem.free.items())
-            shares = {
-                n: [abs(event.parameters[n] - c.parameters[n]) / width for c in at_infinity] for n, width in widths
-            }
-            apart = np.max(list(shares.values()), axis=0)
-            beyond[k] = [at_infinity[int(apart.argmin())]] if apart.min() <= _CLOSE else []
+            here, widths = event.parameters, {n: high - low for n, (low, high) in problem.free.items()}
+            apart = [max(abs(here[n] - c.parameters[n]) / w for n, w in widths.items()) for c in at_infinity]
+            if min(apart) <= _CLOSE:
+                beyond[k] = at_infinity[int(np.argmin(apart))]
     for start, stop in _runs(marked):
         if stop - start > 1:
-            before, after = ([c.parameters for c in beyond.get(k, ())] for k in (start, stop - 1))
-            yield Arc(
-                branch.pattern,
-                {
-                    n: np.array([*(p[n] for p in before), *branch.parameters[n][start:stop], *(p[n] for p in after)])
-                    for n in problem.free
-                },
-            )
+            before, after = ([beyond[k].parameters] if k in beyond else [] for k in (start, stop - 1))
+            columns = {n: [p[n] for p in before] + [*branch.parameters[n][start:stop]] for n in problem.free}
+            yield Arc(branch.pattern, {n: np.array(c + [p[n] for p in after]) for n, c in columns.items()})
 
 
 def _bounds(branch: Branch, problem: Posed) -> Truth:
@@ -200,8 +192,8 @@ def _parts(branch: Branch) -> Truth:
     """Where one side has a positive real root and the other, unstable too, has none."""
     rest = _rest(branch)
     found = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
-    if len(rest) > 1 and np.any(found):
-        found[found] = real_roots(np.stack(np.broadcast_arrays(*rest), axis=-1)[found])[1] == 0
+    if len(rest) > 1:
+        found[found] = real_roots(np.stack(rest, axis=-1)[found])[1] == 0
     return np.asarray(found)
 
 

@@ -1,6 +1,6 @@
 """A problem made ready to be traced: its pattern's equations as a curve, in units of its coefficients over the box."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
@@ -14,20 +14,14 @@ from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import matching, variables_of
 from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import spread
+from tmsopt.program.starts import completions, spread
 from tmsopt.records import Array, Truth
-from tmsopt.roots import Pattern, roots
+from tmsopt.roots import Pattern
 from tmsopt.tracing.continuation import Curve, curve
+from tmsopt.tracing.solving import rows_of
 
 _SAMPLE = 32  # designs by which sizes are judged
 _VANISHED = 1e-9
-
-
-def sizes(problem: Posed) -> Array:
-    """Median sizes of the coefficients over the box of the free parameters; 0 of one that is mostly 0 there."""
-    a = np.abs(_coefficients(problem, list(islice(spread(problem, 0), _SAMPLE))))
-    a = a[np.all(np.isfinite(a), axis=1)]
-    return np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1)
 
 
 def coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
@@ -36,34 +30,32 @@ def coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
     return np.stack(a, axis=-1).astype(float)
 
 
-def _coefficients(problem: Posed, designs: Sequence[Mapping[str, float]]) -> Array:
-    """Coefficients of a list of designs, with a parameter or more."""
-    with np.errstate(all="ignore"):
-        return coefficients(problem, {n: np.array([d[n] for d in designs]) for n in problem.free})
-
-
 @dataclass(frozen=True)
 class Traced:
     """A problem made ready for tracing one pattern.
 
     Attributes:
         problem: with the pattern to locate and every constraint.
+        unit: of the variables of the NLP, in natural units.
         unknowns: where the unknowns of the pattern stand among the variables.
-        size: of the coefficients over the box.
     """
 
     problem: Posed
     pattern: Pattern
     nlp: NLP
     on: Curve
+    unit: Array
     unknowns: slice
-    size: Array
 
     def leads(self, a: Array) -> Truth:
         """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit; a of shape (…, n + 1)."""
-        known = self.size > 0
-        share = np.abs(a[..., known]) / self.size[known]
-        return np.asarray(np.abs(a[..., 0]) > _VANISHED * self.size[0] * share.max(axis=-1, initial=0.0))
+        size = np.abs(a) / self.nlp.unit ** np.arange(a.shape[-1])
+        return np.asarray(size[..., 0] > _VANISHED * size.max(axis=-1))
+
+    def starts(self, design: Mapping[str, float], best: bool) -> list[Array]:
+        """All variables at a design, in units of the scale, for each guess of the unknowns; the best first if asked."""
+        every = [x * self.unit / self.on.scale for x in completions(self.nlp, self.problem, design)]
+        return sorted(every, key=lambda y: best and np.abs(rows_of(self.on.evaluate, y[None])[0]).max())
 
 
 def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
@@ -86,17 +78,10 @@ def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = starting_points(nlp, problem, list(islice(spread(problem, 0), _SAMPLE)))
-    if known := [points[0] for points in sample if points]:
-        scale[free:] = np.clip(np.median(np.abs(known), axis=0), 0.1 * unit, 1e3 * unit)[free:]
-    on = curve(x, ca.vertcat(*rows), scale, lower, upper)
-    return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
-
-
-def symbols_of(problem: Posed, x: Sequence[Any]) -> dict[str, Any]:
-    """Free parameters for traced variables that are CasADi expressions."""
-    of = problem.parameter_set
-    return {n: ca.atan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)}
+    sample = (next(completions(nlp, problem, design), None) for design in islice(spread(problem, 0), _SAMPLE))
+    if known := [guess for guess in sample if guess is not None]:
+        scale[free:] = (unit * np.clip(np.median(np.abs(known), axis=0), 0.1, 1e3))[free:]
+    return Traced(problem, pattern, nlp, curve(x, ca.vertcat(*rows), scale, lower, upper), unit, unknowns)
 
 
 def design_at(problem: Posed, x: Array) -> dict[str, Any]:
@@ -110,17 +95,3 @@ def limits_of(problem: Posed) -> tuple[Array, Array]:
     sides = zip(*problem.free.values(), strict=True)
     low, high = (np.array(variables_of(problem, dict(zip(problem.free, side, strict=True)))) for side in sides)
     return low, high
-
-
-def starting_points(nlp: NLP, problem: Posed, designs: Sequence[Mapping[str, float]]) -> list[list[Array]]:
-    """All variables at each design, for every guess of the pattern's unknowns; none where it has no polynomial."""
-    a = _coefficients(problem, designs)
-    proper = np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0)
-    found: list[list[Array]] = [[] for _ in designs]
-    for k, z in zip(np.flatnonzero(proper).tolist(), roots(a[proper]) if np.any(proper) else (), strict=True):
-        values = [problem.values(problem.ordered(designs[k]))] if len(nlp.lifts) > 1 else []
-        # the pattern's guesses are of the roots themselves, all others in the unit of the NLP
-        first, *others = (lift.guess(values, [z / nlp.unit if j else z]) for j, lift in enumerate(nlp.lifts))
-        rest = [x for guesses in others for x in (guesses or [[np.nan]])[0]]
-        found[k] = [np.array([*variables_of(problem, designs[k]), *guess, *rest]) for guess in first]
-    return found

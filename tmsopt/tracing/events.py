@@ -4,16 +4,15 @@ What the package looks for and what a user looks for are `Event`s alike. Between
 zeros: where it comes near 0, `refine` adds the point at which it is nearest.
 """
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, is_number, list_faults, refusal, short, suggest, text_faults
-from tmsopt.models.expression import Expression
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.continuation import Curve, Walk, between
@@ -27,6 +26,7 @@ TOGETHER = 1e-6
 CHANGES = "stability changes"
 """Detail of the events that count only where they change it."""
 
+_OWN = r"weave|capsize|fold|constraint|end|(double|\d+-fold) zero|\d*C?EP\d\S*"  # names of events of the package
 _DIP = 0.5
 """Share of a small value that a parabola must fall further by, for its least to be looked for between the steps."""
 _ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as beside a singular point it may
@@ -84,8 +84,11 @@ def check_events(events: Any) -> list[Event]:
             faults.append(
                 Fault(f"found {short(event)}; accepted: an Event of a name and a function", ("events", f"{k}"))
             )
-        else:
-            faults += text_faults(event.name, "events", f"{k}", "name")
+        elif wrong := text_faults(event.name, "events", f"{k}", "name"):
+            faults += wrong
+        elif re.fullmatch(_OWN, event.name):
+            message = f"found '{event.name}', which tmsopt calls an event of its own; accepted: another name"
+            faults.append(Fault(message, ("events", f"{k}", "name")))
     if faults:
         raise InputError(faults)
     return [replace(event, function=partial(_each, event)) for event in events]
@@ -135,12 +138,6 @@ def events_of(points: Points) -> Iterator[Event]:
     def margin(number: int, k: int, points: Points) -> Any:
         return margins(pattern.remaining(points.unknowns)[number])[k]
 
-    def slope(k: int, points: Points) -> Any:  # by the arclength in the parameters: the unknowns may move much faster
-        return points.t[:, k] / (np.linalg.norm(points.t[:, : len(problem.free)], axis=1) + 1e-300)
-
-    def excess(condition: Expression, points: Points) -> Any:
-        return condition(points.values)
-
     for name in pattern.marks:
         yield Event(name, partial(Points.mark, name=name))
     if pattern.form == "EP2" and "2EP2" in points.special:
@@ -150,33 +147,33 @@ def events_of(points: Points) -> Iterator[Event]:
         for k in range(len(margins(factor))):  # the first quantity is the constant term
             yield Event("weave" if k else "capsize", partial(margin, number, k), detail=CHANGES)
     for k, parameter in enumerate(problem.free):
-        yield Event("fold", partial(slope, k), detail=parameter)
+        # by the arclength in the parameters: the unknowns may move much faster
+        yield Event("fold", partial(lambda k, p: p.t[:, k] / (p.speed + 1e-300), k), detail=parameter)
     for name, condition in problem.conditions.items():
         if not condition.equality:
-            yield Event("constraint", partial(excess, condition), detail=name)
+            yield Event("constraint", partial(lambda c, p: c(p.values), condition), detail=name)
 
 
 def locate(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Iterator[Found]:
     """Every zero of an event of the package, and of others, between the rows that show its change of sign."""
-    points = points_of(ready, walked)
+    points, free = Points(ready, walked.y, walked.t), list(ready.problem.free)
     for event, values in _live(points, events):
-        rows = np.flatnonzero(has_turned(values))
-        if event.detail == CHANGES:
-            rows = rows[points.stable[rows] != points.stable[rows + 1]]
-        for found in locate_zeros(ready.on, walked, partial(_at, ready, event), rows, event):
-            free = [*ready.problem.free]
-            if event.name != "fold" or _turns(walked, found.after, found.y, free.index(event.detail)):
+        for found in locate_zeros(ready.on, walked, partial(Points, ready), event, values):
+            y, row = found.y, found.after
+            changes = event.name not in ("weave", "capsize") or points.stable[row] != points.stable[row + 1]
+            if changes and (event.name != "fold" or _turns(walked, row, y, free.index(event.detail))):
                 yield found
 
 
 def locate_zeros(
-    on: Curve, walked: Walk, value: Callable[[Array, Array], Array], rows: NDArray[np.intp], event: Event
+    on: Curve, walked: Walk, at: Callable[[Array, Array], Any], event: Event, values: Array
 ) -> Iterator[Found]:
-    """Where a function of points y and tangents t is 0 between each of some rows and the next, on the curve."""
+    """Zeros of an event between rows where its values change sign; its function takes what `at` makes of y and t."""
+    rows = np.flatnonzero(has_turned(values))
     here, along = walked.y[rows], walked.t[rows]
     ends = np.sum(along * (walked.y[rows + 1] - here), axis=1)
     if rows.size:
-        s = crossings(lambda s: value(*between(on, here, along, s)), ends)
+        s = crossings(lambda s: event.function(at(*between(on, here, along, s))), ends)
         real = np.isfinite(s)  # else a jump through infinity, noise, or nan
         found = zip(*between(on, here[real], along[real], s[real]), rows[real].tolist(), s[real].tolist(), strict=True)
         for y, t, row, length in found:
@@ -199,7 +196,7 @@ def refine(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Walk:
     steps = np.sum(walked.t[:-1] * np.diff(walked.y, axis=0), axis=1)
     before, after = steps[:-1], steps[1:]
     added: dict[tuple[int, float], Found] = {}
-    for event, value in _live(points_of(ready, walked), events):
+    for event, value in _live(Points(ready, walked.y, walked.t), events):
         side = np.sign(value[1:-1])
         left, here, right = side * value[:-2], side * value[1:-1], side * value[2:]
         with np.errstate(all="ignore"):  # slope and second derivative of the parabola through three values
@@ -210,7 +207,7 @@ def refine(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Walk:
             row = walked.y[[k + 1]], walked.t[[k + 1]]
 
             def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:
-                return sign * float(_at(ready, event, *between(ready.on, *row, np.array([s])))[0])
+                return sign * float(event.function(Points(ready, *between(ready.on, *row, np.array([s]))))[0])
 
             from scipy.optimize import minimize_scalar  # a fifth of a second, paid only where it is needed
 
@@ -225,17 +222,9 @@ def refine(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Walk:
 
 def insert(walked: Walk, found: Sequence[Found]) -> tuple[list[int], Walk]:
     """Rows of what was found, in order, and the walk with it among its points."""
-    y, t, rows = list(walked.y), list(walked.t), []
-    for shift, event in enumerate(found, 1):
-        rows.append(event.after + shift)
-        y.insert(rows[-1], event.y)
-        t.insert(rows[-1], event.t)
-    return rows, replace(walked, y=np.array(y), t=np.array(t))
-
-
-def points_of(ready: Traced, walked: Walk) -> Points:
-    """The points of a walk."""
-    return Points(ready, walked.y * ready.on.scale, walked.t)
+    order = np.argsort([*range(len(walked.y)), *(f.after + 0.5 for f in found)], kind="stable")
+    y, t = np.array([*walked.y, *(f.y for f in found)]), np.array([*walked.t, *(f.t for f in found)])
+    return np.flatnonzero(order >= len(walked.y)).tolist(), replace(walked, y=y[order], t=t[order])
 
 
 def _live(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Array]]:
@@ -245,12 +234,6 @@ def _live(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Arra
         value = points.column(event.function(points))
         if event.name not in special and (event.name != "fold" or np.abs(value).max() > NOTHING):
             yield event, value
-
-
-def _at(ready: Traced, event: Event, y: Array, t: Array) -> Array:
-    """The function of an event at points of the curve."""
-    points = Points(ready, y * ready.on.scale, t)
-    return np.array(points.column(event.function(points)))
 
 
 def _turns(walked: Walk, i: int, y: Array, k: int) -> bool:

@@ -4,8 +4,9 @@ On one side of such a curve a large root is negative, on the other positive: it 
 roots are stable, and heavy damping where they are real and negative.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice
 
 import casadi as ca
@@ -14,18 +15,19 @@ import numpy as np
 from tmsopt.models import Values
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import variables_of
+from tmsopt.program.nlp import scale_of
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.tracing.continuation import Curve, Walk, curve
-from tmsopt.tracing.equations import design_at, limits_of, sizes, symbols_of
-from tmsopt.tracing.events import Event, Found, has_turned, insert, locate_zeros
+from tmsopt.tracing.equations import design_at, limits_of
+from tmsopt.tracing.events import Event, Found, insert, locate_zeros
 from tmsopt.tracing.points import margins
-from tmsopt.tracing.seeds import Line, unexplained, walk_new
+from tmsopt.tracing.seeds import unexplained, walk_new
 from tmsopt.tracing.solving import projected, rows_of
 
-_NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
+_NOTHING = 1e-12  # of the largest coefficient: a constant term this small all along the curve vanishes with a0
 _MOST = 10**6
 
 
@@ -50,36 +52,32 @@ class Infinity:
 
 def through_infinity(problem: Posed, step: float, starts: int, seed: int) -> Iterator[Infinity]:
     """Every curve a0 = 0 found in the box of a problem with two free parameters."""
-    x = ca.SX.sym("x", 2)
-    of = problem.parameter_set
-    a = Values(problem.model, of, problem.ordered(symbols_of(problem, ca.vertsplit(x)))).coefficients
+    x, of = ca.SX.sym("x", 2), problem.parameter_set
+    design = {n: ca.atan(v) if of[n].tangent else v for n, v in zip(problem.free, ca.vertsplit(x), strict=True)}
+    a = scale_of(problem).scaled(Values(problem.model, of, problem.ordered(design)).coefficients)
     if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
         return
     lower, upper = limits_of(problem)
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], along))])
-    usual = float(sizes(problem)[-1])
-    lines: list[Line] = []
-    for walked in walk_new(on, problem, _points(problem, on, starts, seed, lines), (step, _MOST), [], lines):
-        x_on, bounds, changes = _judged(on, walked, rest, usual)
-        yield Infinity(design_at(problem, x_on), *bounds, changes)
+    walks: list[Walk] = []
+    walk_new(on, _points(problem, on, starts, seed, walks), (step, _MOST), walks)
+    yield from (_judged(problem, on, walked, rest) for walked in walks)
 
 
-def _points(problem: Posed, on: Curve, starts: int, seed: int, lines: Sequence[Mapping[str, Array]]) -> Iterator[Array]:
+def _points(problem: Posed, on: Curve, starts: int, seed: int, walks: Sequence[Walk]) -> Iterator[Array]:
     """Points of the curve in the box, from designs spread over it, then from a grid where no line is yet."""
     spots = list(islice(spread(problem, seed), starts))
-    missed = ([d] for d in unexplained(problem, lambda a: a[0], lines))
+    missed = ([d] for d in unexplained(problem, on, lambda a: a[0], walks))
     for designs in chain([spots] if spots else [], missed):
         at = np.array([variables_of(problem, d) for d in designs]) / on.scale
         y = projected(on.evaluate, at, [k % 2 for k in range(len(at))])
         yield y[np.all((on.lower <= y) & (y <= on.upper), axis=1)]  # not where it is nan
 
 
-def _judged(
-    on: Curve, walked: Walk, rest: ca.Function, usual: float
-) -> tuple[Array, tuple[Truth, Truth, Truth], dict[int, str]]:
-    """Points with every change among them, what each segment between them bounds, and what changes at which row."""
+def _judged(problem: Posed, on: Curve, walked: Walk, rest: ca.Function) -> Infinity:
+    """The curve with every change among its points."""
 
     def values(y: Array) -> Array:
         return rows_of(rest, y * on.scale)[0]
@@ -92,22 +90,20 @@ def _judged(
         found += [("EP2", meeting(c))] if len(c) > 2 else []
         return [("infinity", c[0]), *found, *([("capsize", v[:, -1])] if vanishing else [])]
 
-    vanishing = bool(np.all(np.abs(values(walked.y)[:, -2]) <= _NOTHING * usual))
+    size = np.abs(values(walked.y)[:, :-1])
+    vanishing = bool(np.all(size[:, -1] <= _NOTHING * size.max(axis=1)))
     found: list[Found] = []
     for k, (name, column) in enumerate(tests(walked.y)):
-
-        def at(y: Array, t: Array, k: int = k) -> Array:
-            return tests(y)[k][1]
-
-        found += locate_zeros(on, walked, at, np.flatnonzero(has_turned(column)), Event(name, tests))
+        event = Event(name, partial(lambda k, tested: tested[k][1], k))
+        found += locate_zeros(on, walked, lambda y, t: tests(y), event, column)
     found.sort(key=lambda f: (f.after, f.s, f.event.name))
     rows, walked = insert(walked, found)
     apart = np.append(True, np.any(np.diff(walked.y, axis=0) != 0, axis=1))  # else a zero at a point that was there
-    points, numbers = walked.y[apart], np.cumsum(apart) - 1
+    points, numbers = walked.y[apart], (np.cumsum(apart) - 1)[rows].tolist()
     bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
-    named = {int(numbers[row]): f.event.name for row, f in zip(rows, found, strict=True)}
-    changes = {row: name for row, name in named.items() if any(b[row - 1] != b[row] for b in bounds)}
-    return points * on.scale, bounds, changes
+    named = zip(numbers, [f.event.name for f in found], strict=True)
+    changes = {row: name for row, name in named if any(b[row - 1] != b[row] for b in bounds)}
+    return Infinity(design_at(problem, points * on.scale), *bounds, changes)
 
 
 def _classes(v: Array, vanishing: bool) -> tuple[Truth, Truth, Truth]:

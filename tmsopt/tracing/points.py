@@ -1,19 +1,19 @@
 """Points along a traced curve: parameters, quantities, unknowns of the pattern, stability."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from tmsopt.models import Values
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import lienard_chipart, roots
 from tmsopt.roots.meetings import CLOSED, balance
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.tracing.branch import name_unknowns
-from tmsopt.tracing.equations import Traced
+from tmsopt.tracing.equations import Traced, design_at
 
 NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
 
@@ -23,43 +23,49 @@ _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e
 
 @dataclass(frozen=True)
 class Points:
-    """Points x of a traced curve in natural units, and its tangents t, both of shape (n, variables)."""
+    """Points y of a traced curve, in units of its scale, and its tangents t, both of shape (n, variables)."""
 
     ready: Traced
-    x: Array
+    y: Array
     t: Array
 
     def __len__(self) -> int:
-        return len(self.x)
+        return len(self.y)
+
+    @cached_property
+    def x(self) -> Array:
+        """The points in natural units."""
+        return np.asarray(self.y * self.ready.on.scale)
 
     @property
     def unknowns(self) -> list[Array]:
         """Those of the pattern, shape (n,) each."""
         return list(self.x[:, self.ready.unknowns].T)
 
+    @property
+    def speed(self) -> Array:
+        """How fast the free parameters move along the curve, in units of the scale."""
+        return np.asarray(np.linalg.norm(self.t[:, : len(self.ready.problem.free)], axis=1))
+
     @cached_property
     def parameters(self) -> dict[str, Array]:
         """Every parameter of the problem, shape (n,) each."""
         problem = self.ready.problem
-        of = problem.parameter_set
-        free = {
-            n: _within(np.arctan(v) if of[n].tangent else v, *problem.free[n])
-            for n, v in zip(problem.free, self.x.T, strict=False)
-        }
+        free = {n: _within(v, *problem.free[n]) for n, v in design_at(problem, self.x).items()}
         return {n: np.array(np.broadcast_to(v, len(self)), dtype=float) for n, v in problem.ordered(free).items()}
 
     @cached_property
     def values(self) -> Values:
         """Quantities; those of the roots come from the factors, where multiple roots are exact."""
         z = roots_along(self.ready.pattern.factors(self.unknowns), len(self))
-        formulas = {
-            "abscissa": lambda _: z.real.max(axis=-1),
-            "damping_ratio": lambda _: np.min(-z.real / (np.abs(z) + 1e-300), axis=-1),
-            ANGULAR_FREQUENCY: lambda _: z.imag.max(axis=-1),
-        }
-        extra = [*(replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS]
         problem = self.ready.problem
-        return Values(problem.model, problem.parameter_set, self.parameters, extra=extra)
+        return Values(problem.model, problem.parameter_set, self.parameters, extra=(NO_RADIUS,)).with_known(
+            {
+                "abscissa": z.real.max(axis=-1),
+                "damping_ratio": np.min(-z.real / (np.abs(z) + 1e-300), axis=-1),
+                ANGULAR_FREQUENCY: z.imag.max(axis=-1),
+            }
+        )
 
     def __getitem__(self, name: str) -> Array:
         """A parameter, a quantity of the model or of the roots, or an unknown of the pattern, shape (n,)."""
@@ -90,11 +96,9 @@ class Points:
     @property
     def satisfied(self) -> Truth:
         """Where every inequality constraint holds."""
-        inside = np.ones(len(self), dtype=bool)
-        for condition in self.ready.problem.conditions.values():
-            if not condition.equality:
-                inside &= condition.holds(self.column(condition(self.values)))
-        return inside
+        limits = [c for c in self.ready.problem.conditions.values() if not c.equality]
+        held = [self.column(True), *(c.holds(self.column(c(self.values))) for c in limits)]
+        return np.asarray(np.all(held, axis=0))
 
     @property
     def residual(self) -> Array:
@@ -103,11 +107,10 @@ class Points:
         a0 = self.column(self.values.coefficients[0])
         unit = self.column(mean_size(monic))
         unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots come to 0, that of the curve
-        worst = np.zeros(len(self))
-        for k, (a, c) in enumerate(zip(self.values.coefficients, monic, strict=True)):
-            size = np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k
-            worst = np.maximum(worst, np.abs(a - a0 * c) / np.where(size == 0, 1.0, size))  # 0: roots that are all 0
-        return worst
+        pairs = enumerate(zip(self.values.coefficients, monic, strict=True))
+        terms = [(a - a0 * c, np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k) for k, (a, c) in pairs]
+        # a size of 0: roots that are all 0
+        return np.asarray(np.max([np.abs(off) / np.where(size == 0, 1.0, size) for off, size in terms], axis=0))
 
     @property
     def special(self) -> list[str]:

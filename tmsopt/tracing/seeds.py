@@ -11,11 +11,8 @@ from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
 from tmsopt.tracing.continuation import INFINITE, Curve, Walk, both_ways, contains
-from tmsopt.tracing.equations import Traced, coefficients, design_at, starting_points
-from tmsopt.tracing.solving import projected, rows_of
-
-Line = dict[str, Array]
-"""Free parameters along a curve."""
+from tmsopt.tracing.equations import Traced, coefficients, design_at
+from tmsopt.tracing.solving import projected
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
@@ -33,9 +30,9 @@ _BLOCK = 256  # points whose distances from a line are found at once
 
 
 def unexplained(
-    problem: Posed, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]]
+    problem: Posed, on: Curve, test: Callable[[Sequence[Any]], Any], walks: Sequence[Walk]
 ) -> Iterator[dict[str, float]]:
-    """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile.
+    """Designs by which a function of the coefficients changes sign, far from every walk; `walks` may grow meanwhile.
 
     They are middles of the edges of a grid over the box, and the function does not count where it is nan. Those between
     which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
@@ -46,78 +43,64 @@ def unexplained(
     with np.errstate(all="ignore"):
         a = coefficients(problem, dict(zip(problem.free, np.moveaxis(low + grid * (high - low), -1, 0), strict=True)))
         value = np.broadcast_to(np.asarray(test(list(np.moveaxis(a, -1, 0))), dtype=float), grid.shape[:2])
-    alone = np.array_equal(value, a[..., 0], equal_nan=True)
     for last in (False, True):
         middles = []
         for axis in (0, 1):
             turns, through = (np.nan_to_num(np.diff(np.sign(v), axis=axis)) != 0 for v in (value, a[..., 0]))
-            kept = turns & (through == last) if not alone else turns & (not last)
-            middles.append(np.argwhere(kept) + np.array([(1 - axis) / 2, axis / 2]))
+            middles.append(np.argwhere(turns & (through == last)) + np.eye(2)[axis] / 2)
         left = np.concatenate(middles) / (points - 1)
         np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
-        vain, known, seen = 0, len(lines), 0
+        vain = seen = 0
         while len(left) and (vain < _PATIENCE or not last):
-            for line in lines[seen:]:
-                at = np.stack([line[n] for n in problem.free], axis=-1)
-                left = left[apart(left, (at - low) / (high - low), 1 / (points - 1))]
-            seen = len(lines)
+            vain = vain + 1 if seen == len(walks) else 0
+            for walked in walks[seen:]:
+                line = np.stack([*design_at(problem, walked.y * on.scale).values()], axis=-1)
+                left = left[apart(left, (line - low) / (high - low), 1 / (points - 1))]
+            seen = len(walks)
             if len(left):
                 yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
                 left = left[1:]
-                vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
 def apart(points: Array, line: Array, distance: float) -> Truth:
     """Which of the points, shape (n, 2), are further than a distance from a polyline of shape (m, 2)."""
-    start, along = line[:-1], np.diff(line, axis=0)
-    length = np.maximum(np.sum(along**2, axis=1), 1e-300)
-    far = np.ones(len(points), dtype=bool)
-    for k in range(0, len(points), _BLOCK):
-        offset = points[k : k + _BLOCK, None] - start
-        share = np.clip(np.sum(offset * along, axis=2) / length, 0, 1)
-        nearest = np.min(np.sum((offset - share[..., None] * along) ** 2, axis=2), axis=1)
-        far[k : k + _BLOCK] = nearest > distance**2
-    return far
+    start, along, far = line[:-1] @ (1, 1j), np.diff(line, axis=0) @ (1, 1j) + 1e-300, []  # in the complex plane
+    for block in np.array_split(points @ (1, 1j), len(points) // _BLOCK + 1):
+        offset = block[:, None] - start
+        share = np.clip((offset / along).real, 0, 1)
+        far.append(np.abs(offset - share * along).min(axis=1) > distance)
+    return np.concatenate(far)
 
 
-def walk_new(
-    on: Curve,
-    problem: Posed,
-    seeds: Iterable[Iterable[Array]],
-    how: tuple[float, int],
-    walks: list[Walk],
-    lines: list[Line],
-) -> Iterator[Walk]:
-    """Curves through some of many points, shape (points, n + 1) each; `walks` and their `lines` in the box grow."""
+def walk_new(on: Curve, seeds: Iterable[Iterable[Array]], how: tuple[float, int], walks: list[Walk]) -> None:
+    """Walk the curves through some of many points, shape (points, n + 1) each, that are on none of the `walks` yet."""
     for y in chain.from_iterable(seeds):
         if not any(contains(on, known, y) for known in walks) and (found := both_ways(on, y, *how)) is not None:
             walks.append(found)
-            lines.append(design_at(problem, found.y * on.scale))
-            yield found
 
 
 def seeds(
-    ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], lines: Sequence[Mapping[str, Array]]
+    ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], walks: Sequence[Walk]
 ) -> Iterator[tuple[int, list[Array]]]:
     """Points of the pattern's curve in the box, found from each of many designs, and the number of these.
 
-    Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `lines`
+    Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `walks`
     grows meanwhile.
     """
     problem = ready.problem
     free = len(problem.free)
     given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
-    yield from ((0, found) for found in _near(ready, given, [None] * len(given)))
-    vain, known, count = 0, len(lines), 0
+    yield from ((0, found) for found in _near(ready, given, [None] * len(given), _GUESSES))
+    vain, known, count = 0, len(walks), 0
     ways = cycle([None, *range(free)])
     designs = spread(problem, seed)
     while count < (starts if _swept(ready) else _ROUNDS * starts):
-        for found in _near(ready, list(islice(designs, starts)), list(islice(ways, starts))):
+        for found in _near(ready, list(islice(designs, starts)), list(islice(ways, starts)), _GUESSES):
             if vain >= starts:
                 return
             count += 1
             yield count, found
-            vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
+            vain, known = (vain + 1 if len(walks) == known else 0), len(walks)
 
 
 def _swept(ready: Traced) -> bool:
@@ -125,11 +108,11 @@ def _swept(ready: Traced) -> bool:
     return ready.pattern.test is not None and len(ready.problem.free) == 2
 
 
-def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, list[Array]]]:
-    """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
+def missed(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
+    """Points of the curve where a test function of the pattern changes sign over a grid, off the walks so far."""
     if ready.pattern.test is not None and _swept(ready):
-        for design in unexplained(ready.problem, ready.pattern.test, lines):
-            yield 0, _near(ready, [design], most=1)[0]
+        for design in unexplained(ready.problem, ready.on, ready.pattern.test, walks):
+            yield 0, _near(ready, [design])[0]
 
 
 def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
@@ -144,27 +127,24 @@ def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int,
             if end.reason != INFINITE:
                 continue
             size = np.abs(y[:, free:]).max(axis=1)
-            begin = int(np.flatnonzero(size < _BACK)[-1]) if np.any(size < _BACK) else 0
+            begin = np.max(np.flatnonzero(size < _BACK), initial=0)
             if begin < len(y) - 2:
                 (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
                 limit = (far - weight * here) / (1 - weight)
                 x = (2 * limit - here) * ready.on.scale[:free]
-                yield 0, _near(ready, [{n: float(v) for n, v in design_at(ready.problem, x).items()}], most=1)[0]
+                yield 0, _near(ready, [design_at(ready.problem, x)])[0]
 
 
 def _near(
-    ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None] = (None,), most: int = _GUESSES
+    ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None] = (None,), most: int = 1
 ) -> list[list[Array]]:
     """Points of the curve in the box near each design, not too far out, from the best guesses, one variable held."""
     on, free = ready.on, len(ready.problem.free)
-    tried = starting_points(ready.nlp, ready.problem, designs)
-    if most == 1:
-        tried = [sorted(t, key=lambda x: np.abs(rows_of(on.evaluate, x[None] / on.scale)[0]).max()) for t in tried]
-    tried = [t[:most] for t in tried]
-    if not any(tried):
+    tried = [(k, y) for k, design in enumerate(designs) for y in ready.starts(design, best=most == 1)[:most]]
+    if not tried:
         return [[] for _ in designs]
-    owner = [k for k, points in enumerate(tried) for _ in points]
-    y = projected(on.evaluate, np.concatenate([t for t in tried if t]) / on.scale, [held[k] for k in owner])
+    owner = [k for k, _ in tried]
+    y = projected(on.evaluate, np.array([y for _, y in tried]), [held[k] for k in owner])
     inside = np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12), axis=1)  # not where it is nan
     inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, on.lower, on.upper)

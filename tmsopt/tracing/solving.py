@@ -12,28 +12,23 @@ from tmsopt.records import Array
 
 _SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
 _DAMPING = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step, the first that helps is taken
+_STEPS = 40  # of Gauss–Newton at most
 _FINE = 1e-17  # of an interval: a zero at 0 up to rounding has no relative accuracy
 _AT_END = 1e-6  # of the value at one end of an interval: a value so small at the other is a zero there
 _EPS = 4 * np.finfo(float).eps
 _HALVINGS = 100  # steps towards a zero at most
 
 
-def project(system: ca.Function, y: Array, held: int | None = None, steps: int = 40) -> Array | None:
-    """A solution near y by damped Gauss–Newton, optionally with one variable held; None if not found.
+@np.errstate(over="ignore")
+def projected(system: ca.Function, y: Array, held: Sequence[int | None]) -> Array:
+    """Solutions near the rows of y by damped Gauss–Newton, in each a variable held or none; nan where none is found.
 
     `system` gives the equations, any number of them, and their Jacobian.
     """
-    found = projected(system, y[None], [held], steps)[0]
-    return None if np.isnan(found[0]) else found
-
-
-@np.errstate(over="ignore")
-def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: int = 40) -> Array:
-    """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
     y, found = y.copy(), np.full(y.shape, np.nan)
     moving = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
     rows: NDArray[np.intp] = np.arange(len(y))
-    for _ in range(steps):
+    for _ in range(_STEPS):
         value, jacobian = evaluated(system, y[rows])
         proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
         rows, value, jacobian = rows[proper], value[proper], jacobian[proper]

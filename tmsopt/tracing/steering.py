@@ -1,15 +1,14 @@
 """One curve followed by hand: an iterator of its points, which a user stops, turns round and listens to."""
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from tmsopt.errors import refusal
 from tmsopt.problem import Solution
 from tmsopt.problem.files import Given, pose
-from tmsopt.records import Table
-from tmsopt.tracing.branch import BranchPoint
-from tmsopt.tracing.continuation import CLOSED, CurvePoint, CurveSteps, End, Walk, tangent_at
+from tmsopt.tracing.branch import BranchPoint, table_at
+from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, follow, tangent_at
 from tmsopt.tracing.description import describe_end, find_events, make_branch
 from tmsopt.tracing.equations import Traced, prepare
 from tmsopt.tracing.events import TOGETHER, Event, check_events
@@ -89,30 +88,24 @@ class Continuation(Iterator[BranchPoint]):
 
     def __init__(self, ready: Traced, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
         self._ready, self._step, self._events = ready, step, events
-        self._sign, self._arclength, self._last = 1, 0.0, start
-        self._begin(start, fresh=True)
+        self._sign, self._arclength, self._last, self.end = 1, 0.0, start, ""
+        self._points = self._follow(start, fresh=True)
 
     def __next__(self) -> BranchPoint:
-        try:
-            self._last, point = next(self._points)
-        except StopIteration as stop:
-            self.end = self.end or stop.value
-            raise
-        self._arclength = point.arclength
-        return point
+        return next(self._points)
 
     def reverse(self) -> None:
         """Turn round at the last point: the next one lies behind it."""
-        self._sign = -self._sign
-        self._begin(CurvePoint(self._last.y, -self._last.t), fresh=False)
+        self._sign, self.end = -self._sign, ""
+        self._points = self._follow(CurvePoint(self._last.y, -self._last.t), fresh=False)
 
-    def _begin(self, start: CurvePoint, fresh: bool) -> None:
-        self.end, self._points = "", self._follow(start, fresh)
-
-    def _follow(self, start: CurvePoint, fresh: bool) -> Generator[tuple[CurvePoint, BranchPoint], None, str]:
-        """Points from the next on, or from the start on where it is `fresh`; why there are no more is returned."""
-        steps, behind = CurveSteps(self._ready.on, start, self._step), [start]
-        for new in steps:
+    def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
+        """Points from the next on, or from the start on where it is `fresh`; then it is said why there are no more."""
+        behind = [start]
+        for new in follow(self._ready.on, start, self._step):
+            if isinstance(new, End):
+                self.end = describe_end(self._ready, new) or CLOSED
+                return
             y, t = (np.array([getattr(p, name) for p in (*behind, new)]) for name in "yt")
             walked, happened = find_events(self._ready, Walk(y, t, (End(""), End(""))), self._events)
             branch, arclength = make_branch(self._ready, walked, happened), self._arclength
@@ -121,23 +114,19 @@ class Continuation(Iterator[BranchPoint]):
                 events = [event for at, event in happened if at == row]
                 again = len(behind) == 1 and np.abs(walked.y[row] - start.y).max() <= TOGETHER  # it turned round there
                 if (events and not again) or row == len(walked.y) - 1 or (fresh and row == first):
-                    columns = (branch.parameters, branch.unknowns, branch.tangent)
-                    parameters, unknowns, tangent = (Table({n: float(c[row]) for n, c in m.items()}) for m in columns)
-                    yield (
-                        CurvePoint(walked.y[row], walked.t[row]),
-                        BranchPoint(
-                            parameters,
-                            unknowns,
-                            tangent,
-                            arclength + self._sign * float(branch.arclength[row] - branch.arclength[first]),
-                            str(branch.kinds[row]),
-                            bool(branch.stable[row]),
-                            float(branch.abscissa[row]),
-                            tuple(event.name for event in events),
-                        ),
+                    self._last = CurvePoint(walked.y[row], walked.t[row])
+                    self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])
+                    yield BranchPoint(
+                        table_at(branch.parameters, row),
+                        table_at(branch.unknowns, row),
+                        table_at(branch.tangent, row),
+                        self._arclength,
+                        str(branch.kinds[row]),
+                        bool(branch.stable[row]),
+                        float(branch.abscissa[row]),
+                        tuple(event.name for event in events),
                     )
                     if stop := [event.name for event in events if event.stop]:
-                        return stop[0]
+                        self.end = stop[0]
+                        return
             behind, fresh = [behind[-1], new], False
-        assert steps.end is not None
-        return CLOSED if steps.end.reason == CLOSED else describe_end(self._ready, steps.end)

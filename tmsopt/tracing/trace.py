@@ -32,7 +32,7 @@ from tmsopt.tracing.continuation import SINGULAR, Walk
 from tmsopt.tracing.description import describe
 from tmsopt.tracing.equations import prepare
 from tmsopt.tracing.events import Event, check_events
-from tmsopt.tracing.seeds import Line, beyond_infinity, missed, seeds, walk_new
+from tmsopt.tracing.seeds import beyond_infinity, missed, seeds, walk_new
 
 STARTS = 48
 STEP = 0.005
@@ -83,20 +83,18 @@ def trace(
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
     ready = prepare(problem)
     walks: list[Walk] = []
-    lines: list[Line] = []
     tried = 0
 
     def points() -> Iterator[list[Array]]:
         nonlocal tried
-        for source in (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks)):
+        for source in (seeds(ready, starts, seed, through, walks), missed(ready, walks), beyond_infinity(ready, walks)):
             for count, found in source:
                 tried = max(tried, count)
                 if steps:
                     steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
                 yield found
 
-    for _ in walk_new(ready.on, problem, points(), (step, most), walks, lines):
-        pass
+    walk_new(ready.on, points(), (step, most), walks)
     with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
         branches = [b for w in walks for b in describe(ready, w, own) if b.residual <= _MET]  # not where it is nan
     branches.sort(key=lambda b: -float(b.arclength[-1]))
