@@ -178,7 +178,8 @@ def _designs_beside(state: SearchState, design: Mapping[str, float], objective: 
     towards = np.concatenate([state.sample.refined.u[: tuning.appealed], random])
     seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
     close = (seen.violation == 0) & (np.abs(seen.worth - objective) <= tuning.edge * (1 + abs(objective)))
-    return box.designs(seen.take(np.flatnonzero(close)[: tuning.kept]))
+    rows = np.flatnonzero(close)  # from far to near: far ones may be worth less, of near ones rounding decides
+    return box.designs(seen.take(rows[:: max(len(rows) // tuning.kept, 1)]))
 
 
 def keep_rival(state: SearchState, policy: Policy) -> SearchState:
