@@ -371,7 +371,7 @@ def kind_of(*numbers: Any) -> Kind:
 def values(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
     """The outputs of a formula for numbers of whatever kind; nan and inf of floats come without a warning."""
     with np.errstate(all="ignore"):
-        return fold(formula, given, kind_of(*(given[name] for name in formula.names if name in given)))
+        return fold(formula, given, kind_of(*[given[name] for name in formula.names if name in given]))
 
 
 # Operations of formulas, on numbers of any kind.

@@ -75,7 +75,7 @@ def certified_numbers(
                 expected = last or math.isnan(before.get(key, math.nan))
                 if number is not None and (expected or not math.isnan(number)):
                     numbers[key] = number
-        if roots is not None and all(key in numbers for key, *_ in balls):
+        if roots is not None and numbers.keys() >= {key for key, *_ in balls}:
             break
     # At the very end of where a quantity exists, as Fr_c = 0, rounding of the parameters alone may carry it beyond.
     exist = {key: x for key, x in numbers.items() if not (math.isnan(x) and math.isfinite(before.get(key, math.nan)))}
@@ -199,7 +199,7 @@ def _shown(model: Model, roots: _Several) -> _Several:
 
 
 def _assembled(model: Model, checked: Evaluation, numbers: Mapping[_Key, float]) -> Certified:
-    count = sum(key[0] == "roots" and key[2] == "multiplicity" for key in numbers)
+    count = len([key for key in numbers if key[0] == "roots" and key[2] == "multiplicity"])
     parts = [[numbers.get(("roots", k, part), math.nan) for part in ("re", "im", "multiplicity")] for k in range(count)]
     roots = [Root(re, im, int(m)) for re, im, m in parts] if not np.isnan(parts).any() else []
     si: dict[str, Reading] = {}

@@ -116,7 +116,7 @@ class Expression:
     @property
     def equality(self) -> bool:
         """Whether a comparison allows one value alone, so that it takes away a degree of freedom."""
-        return self.allowed[0] == self.allowed[1]
+        return self.comparison == "=="
 
     @property
     def allowed(self) -> tuple[float, float]:
@@ -126,7 +126,7 @@ class Expression:
     @property
     def sign(self) -> float:
         """−1 where left minus right is better the greater it is; else 1, for values and equalities too."""
-        return -1.0 if self.allowed == (0.0, math.inf) else 1.0
+        return -1.0 if self.comparison == ">=" else 1.0
 
     def excess(self, difference: Any) -> Any:
         """By how much left minus right, a number or an array of them, is beyond what a comparison allows."""

@@ -34,7 +34,7 @@ Stated = Any
 
 def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
     """The parameter set that most of the names belong to, the native one when in doubt."""
-    return max(model.sets, key=lambda s: sum(n in s.names for n in names))
+    return max(model.sets, key=lambda s: len(names.keys() & set(s.names)))
 
 
 _TABLES = {

@@ -53,8 +53,8 @@ def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
     """The end, or that of a run which keeps to the start, or does not, where the start was better than the end."""
     if state.sample is None or not best.feasible:
         return best
-    box = state.sample.box
-    seen = box.look(box.space.points(start.design)[None])
+    box, known = state.sample.box, start.row >= 0
+    seen = state.sample.leaders.take(np.array([start.row])) if known else box.look(box.space.points(start.design)[None])
     if seen.violation[0] > 0 or seen.worth[0] >= best.objective - state.tuning.same:
         return best
     kept = run_once(state, start, "far" if start.near else "near")

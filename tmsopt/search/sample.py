@@ -139,10 +139,11 @@ class Box:
             local: designs looked at around each, in each round.
         """
         kept, rng, local, size = start, self.stream("refine"), local or self.tuning.local, self.space.size
-        rows = np.arange(len(kept))
-        for reach in (reaches or self.tuning.reaches) if len(kept) else ():
-            steps = rng.standard_normal((len(kept), local, size))
-            steps[:, ::2] *= rng.random((len(kept), (local + 1) // 2, size)) < 0.5  # not in all directions
+        count = len(kept)
+        rows = np.arange(count)
+        for reach in (reaches or self.tuning.reaches) if count else ():
+            steps = rng.standard_normal((count, local, size))
+            steps[:, ::2] *= rng.random((count, (local + 1) // 2, size)) < 0.5  # not in all directions
             near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, size))
             both, of = kept.joined(near), np.concatenate([rows, np.repeat(rows, local)])
             order = np.lexsort((both.worth, both.violation, of))

@@ -5,7 +5,7 @@ method on the factors. The few that this leaves beyond 5e-14 have roots far apar
 take companion eigenvalues, in a unit near the largest root.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -130,9 +130,9 @@ def columns(*coefficients: ArrayLike) -> tuple[Columns, tuple[int, ...]]:
     return (flat[0], flat[1], flat[2], flat[3], flat[4]), shape
 
 
-def make_blocks(size: int) -> Iterator[slice]:
+def make_blocks(size: int) -> list[slice]:
     """Parts of arrays that stay in the cache between two operations."""
-    return (slice(first, first + _BLOCK) for first in range(0, size, _BLOCK))
+    return [slice(first, first + _BLOCK) for first in range(0, size, _BLOCK)]
 
 
 def _fill(results: Sequence[Array], a: Columns, finish: Callable[..., tuple[Array, Array]]) -> int:
