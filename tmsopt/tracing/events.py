@@ -78,12 +78,11 @@ def check_events(events: Any) -> list[Event]:
     """
     faults = list_faults("events", events, "[tmsopt.Event('Fr is 3', lambda p: p['Fr'] - 3)]")
     for k, event in enumerate(() if faults else events):
-        if not isinstance(event, Event) or not callable(event.function):
-            faults.append(
-                Fault(f"found {short(event)}; accepted: an Event of a name and a function", ("events", f"{k}"))
-            )
-        else:
+        if isinstance(event, Event) and callable(event.function):
             faults += text_faults(event.name, "events", f"{k}", "name")
+        else:
+            message = f"found {short(event)}; accepted: an Event of a name and a function"
+            faults.append(Fault(message, ("events", f"{k}")))
     if faults:
         raise InputError(faults)
     return [replace(event, function=partial(_each, event)) for event in events]
@@ -179,10 +178,8 @@ def locate_zeros(
 def has_turned(value: Array) -> Truth:
     """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
     sign = np.sign(value)
-    if np.any(sign):
-        sign[0] = sign[0] or sign[np.flatnonzero(sign)[0]]
-    for k in range(1, len(sign)):
-        sign[k] = sign[k] or sign[k - 1]
+    if (known := np.flatnonzero(sign)).size:
+        sign = sign[known[np.maximum(np.searchsorted(known, range(len(sign)), side="right") - 1, 0)]]
     return np.asarray(sign[1:] * sign[:-1] < 0)
 
 
@@ -236,9 +233,6 @@ def _turns(walked: Walk, i: int, y: Array, k: int) -> bool:
 
     Where the equations are singular the tangent alone may say so.
     """
-    last = len(walked.y) - 1
-    for before, after in ((i, i + 1), (max(i - 1, 0), min(i + 2, last))):
-        back, ahead = walked.y[[before, after], k] - y[k]
-        if back * ahead > 0 and min(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])):
-            return True
-    return False
+    rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walked.y) - 1)
+    back, ahead = walked.y[rows, k] - y[k]
+    return bool(np.any((back * ahead > 0) & (np.minimum(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])))))
