@@ -7,10 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from tmsopt.problem.verdict.meetings import is_crossing
+from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of
 from tmsopt.tracing.branch import Branch, EventPoint, table_at
-from tmsopt.tracing.continuation import CLOSED, End, Walk
+from tmsopt.tracing.continuation import CLOSED, SINGULAR, End, Walk
 from tmsopt.tracing.equations import Traced, prepare
 from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, refine
 from tmsopt.tracing.points import Points, roots_along
@@ -68,11 +70,12 @@ def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Br
     for row, event in happened:
         if event.name in pattern.marks or event.name == "EP4":
             kinds[row] = event.name
-    named = [(row, event.name, event.detail) for row, event in happened]
-    if not walked.closed:
-        ends = zip((0, len(points) - 1), walked.ends, strict=True)
-        named += [(row, "end", describe_end(ready, end)) for row, end in ends]
     off, columns = points.residual, points.parameters
+    named = [(row, event.name, event.detail) for row, event in happened]
+    for row, end in () if walked.closed else zip((0, len(points) - 1), walked.ends, strict=True):
+        # a curve may be singular where roots meet and eigenvectors do not
+        crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
+        named.append((row, "end", CROSSING if crossed else describe_end(ready, end)))
     found = [
         EventPoint(name, detail, table_at(columns, row), row, float(off[row]))
         for row, name, detail in sorted(named, key=lambda n: n[0])

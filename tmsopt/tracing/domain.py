@@ -104,9 +104,9 @@ def domain(
     More: docs/how_to/charts.md
     """
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
-    how: dict[str, Any] = {"step": step, "starts": starts, "seed": seed, "progress": progress}
     bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
-    found = {name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)] for name in bounding}
+    traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in bounding)
+    found = {traced.pattern: [b for b in traced.branches if not _in_edge(b, plane)] for traced in traces}
     start_steps(progress, "looking for corners")
     infinite = list(through_infinity(plane, step, starts, seed))
     at_infinity = [c for curve in infinite for c in _changes(curve)]

@@ -184,10 +184,8 @@ def locate_zeros(
 def has_turned(value: Array) -> Truth:
     """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
     sign = np.sign(value)
-    if np.any(sign):
-        sign[0] = sign[0] or sign[np.flatnonzero(sign)[0]]
-    for k in range(1, len(sign)):
-        sign[k] = sign[k] or sign[k - 1]
+    if (known := np.flatnonzero(sign)).size:
+        sign = sign[known[np.maximum(np.searchsorted(known, range(len(sign)), side="right") - 1, 0)]]
     return np.asarray(sign[1:] * sign[:-1] < 0)
 
 
@@ -241,9 +239,6 @@ def _turns(walked: Walk, i: int, y: Array, k: int) -> bool:
 
     Where the equations are singular the tangent alone may say so.
     """
-    last = len(walked.y) - 1
-    for before, after in ((i, i + 1), (max(i - 1, 0), min(i + 2, last))):
-        back, ahead = walked.y[[before, after], k] - y[k]
-        if back * ahead > 0 and min(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])):
-            return True
-    return False
+    rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walked.y) - 1)
+    back, ahead = walked.y[rows, k] - y[k]
+    return bool(np.any((back * ahead > 0) & (np.minimum(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])))))

@@ -106,9 +106,9 @@ class MappedFunction:
         buffer, self._trigger = _mapped(function, count).buffer()
         self._buffer = buffer  # kept alive with the memory that it points to
         for k, memory in enumerate(self._taken):
-            buffer.set_arg(k, memoryview(memory.data))
+            buffer.set_arg(k, memory.data)
         for k, memory in enumerate(self._given):
-            buffer.set_res(k, memoryview(memory.data))
+            buffer.set_res(k, memory.data)
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """The results, a row each; as many as there are arguments."""

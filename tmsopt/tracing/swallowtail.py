@@ -7,6 +7,7 @@ where the root is triple (EP3) and meets itself where a second pair is double (2
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -163,12 +164,9 @@ def _parts(problem: Posed, first: float) -> Parts:
 def _is_affine(problem: Posed) -> bool:
     first = float(np.mean(next(iter(problem.free.values()))))
     A, B, C = _parts(problem, first)
-    for x, y in ((2.0, 3.0), (-1.0, 0.5)):
-        predicted = A + x * B + y * C
-        leeway = 1e-9 * np.abs(predicted).max()
-        if not np.allclose(_polynomials(problem, [(first, x, y)])[0], predicted, rtol=1e-9, atol=leeway):
-            return False
-    return True
+    predicted = np.array([A + 2 * B + 3 * C, A - B + C / 2])
+    found = _polynomials(problem, [(first, 2.0, 3.0), (first, -1.0, 0.5)])
+    return bool(np.all(np.abs(found - predicted) <= 1e-9 * np.abs(predicted).max(axis=1, keepdims=True)))
 
 
 def _on_surface(parts: Parts, r: Array) -> tuple[Array, Array]:
@@ -196,10 +194,7 @@ def _cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
     values = tests(scan)
     for k, kind in enumerate(("box", "EP3", "2EP2")):
         rows = np.flatnonzero(has_turned(values[k]))
-
-        def value(s: Array, k: int = k, here: Array = scan[rows]) -> Array:
-            return tests(here + s)[k]
-
+        value = partial(lambda k, here, s: tests(here + s)[k], k, scan[rows])
         cuts += [(float(r), kind) for r in scan[rows] + crossings(value, np.diff(scan)[rows])]
     ends = [r for r in (scan[0], scan[-1]) if values[0][r == scan][0] > 0]
     cuts = sorted([*cuts, *((float(r), "box") for r in ends)])

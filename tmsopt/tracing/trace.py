@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from tmsopt.errors import (
     count_faults,
     is_number,
     list_faults,
+    refusal,
     short,
     suggest,
     table_faults,
@@ -23,12 +23,10 @@ from tmsopt.models.user_spectrum import pattern_of, patterns_of
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.verdict.meetings import is_crossing
-from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
-from tmsopt.tracing.branch import Branch, EventPoint, Trace
-from tmsopt.tracing.continuation import SINGULAR, Walk
+from tmsopt.tracing.branch import Trace
+from tmsopt.tracing.continuation import Walk
 from tmsopt.tracing.description import describe
 from tmsopt.tracing.equations import prepare
 from tmsopt.tracing.events import Event, check_events
@@ -98,20 +96,8 @@ def trace(
     with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
         branches = [b for w in walks for b in describe(ready, w, own) if b.residual <= _MET]  # not where it is nan
     branches.sort(key=lambda b: -float(b.arclength[-1]))
-    ordered = tuple(_with_crossings(b, problem) for b in branches)
     seconds = time.perf_counter() - began
-    return Trace(problem.problem, str(problem.locate), ordered, tried, seconds, sum(w.seconds for w in walks))
-
-
-def _with_crossings(branch: Branch, problem: Posed) -> Branch:
-    """The branch, with a word at singular ends where roots meet and eigenvectors do not."""
-
-    def is_crossed(event: EventPoint) -> bool:
-        singular = event.name == "end" and event.detail == SINGULAR
-        return singular and is_crossing(problem, pattern_of(problem.model, branch.pattern), event.parameters)
-
-    events = (replace(e, detail=CROSSING) if is_crossed(e) else e for e in branch.events)
-    return replace(branch, events=tuple(events))
+    return Trace(problem.problem, str(problem.locate), tuple(branches), tried, seconds, sum(w.seconds for w in walks))
 
 
 def locate_pattern(problem: Posed, name: str | None) -> Posed:
@@ -120,13 +106,13 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
     names = patterns_of(problem.model)
     if name is None:
         message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(names)}"
-        raise InputError([Fault(message, ("objective", "locate"))])
+        raise refusal(message, "objective", "locate")
     try:
         name = pattern_of(problem.model, str(name)).name
     except ValueError as error:
         why = "" if str(error).endswith("is no pattern") else f": {error}"
         message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
-        raise InputError([Fault(message, ("objective", "locate"))]) from error
+        raise refusal(message, "objective", "locate") from error
     asked = problem.derive(locate=name, minimize=None, maximize=None)
     count = degrees_of_freedom(asked)
     if count.count != 1:
@@ -136,12 +122,12 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
             if count.count < 1
             else f"fix {count.count - 1} of them, or add as many == constraints"
         )
-        conditions = f"{count.conditions} condition{'s' if count.conditions != 1 else ''}"
+        conditions = f"{count.conditions} condition{'s' * (count.conditions != 1)}"
         message = (
             f"a curve of {name} takes {needed} free parameters ({conditions} and one to move along), "
             f"and {count.free} {'is' if count.free == 1 else 'are'} free ({free}); {advice}"
         )
-        raise InputError([Fault(message, ("parameters",))])
+        raise refusal(message, "parameters")
     return asked
 
 
