@@ -88,7 +88,7 @@ class Problem:
     @cached_property
     def posed(self) -> "Posed":
         """The problem as it is solved, found once."""
-        found = Posed(**self.__getstate__())
+        found = Posed(**_stated(self))
         vars(found).update(problem=self)
         return found
 
@@ -99,8 +99,7 @@ class Problem:
             return read_from_posed(self, name)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What was stated, without what is kept of it."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return _stated(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,13 +127,13 @@ class Posed:
 
         `dataclasses.replace` is not for this class: it leaves out what follows from the fields.
         """
-        return Posed(**settle(**{f.name: getattr(self, f.name) for f in fields(self)} | changes))
+        return Posed(**settle(**_stated(self) | changes))
 
     @cached_property
     def problem(self) -> Problem:
         """The problem as a user would state it."""
         found = object.__new__(Problem)
-        vars(found).update(self.__getstate__(), posed=self)
+        vars(found).update(_stated(self), posed=self)
         return found
 
     @cached_property
@@ -163,8 +162,7 @@ class Posed:
         return any(name in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What was stated: what follows from it is found anew, and cannot always be pickled."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return _stated(self)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
@@ -184,9 +182,8 @@ class Posed:
     @property
     def sense(self) -> str:
         """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` when nothing is asked."""
-        asked = {"minimize": self.minimize is not None, "maximize": self.maximize is not None}
-        asked |= {"pareto": bool(self.pareto), "locate": bool(self.locate), "evaluate": True}
-        return next(sense for sense, stated in asked.items() if stated)
+        asked = (n for n in ("minimize", "maximize", "pareto", "locate") if getattr(self, n) not in (None, "", ()))
+        return next(asked, "evaluate")
 
     @property
     def sign(self) -> float:
@@ -254,6 +251,11 @@ class Posed:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
         complete = {**self.fixed, **values}
         return {name: complete[name] for name in self.parameter_set.names}
+
+
+def _stated(record: Problem | Posed) -> dict[str, Any]:
+    """What was stated: what follows from it is found anew, and cannot always be pickled."""
+    return {f.name: getattr(record, f.name) for f in fields(record)}
 
 
 def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:
