@@ -8,14 +8,15 @@ from tmsopt.algebra.kinds import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
 from tmsopt.models.bicycles.feedback import FEEDBACK, UNCONTROLLED, Steered, native_name, size
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
-from tmsopt.models.bicycles.tables import parameters, quantities, read_table
+from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import COMPUTED
 from tmsopt.models.model import Matrix, Model, ParameterSet
+from tmsopt.models.tables import read_table
 
 __all__ = ["GRAVITY", "copo", "from_si", "matrices", "tms", "to_si"]
 
-_TABLES = read_table("tms")
+_TABLES = read_table("bicycles/tms")
 
 GRAVITY: float = _TABLES["parameters"]["SI"]["g"]["default"]
 """Default g in m/s²."""
