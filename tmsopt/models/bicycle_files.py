@@ -8,7 +8,7 @@ them: ``lam`` is lambda_s, ``IFyy`` is I_Fyy. ``IByy`` and ``IHyy`` have no part
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
 
 from tmsopt.errors import Fault, InputError, at_first, short, suggest, visible
@@ -62,8 +62,8 @@ class Bicycle:
 
     name: str
     parameters: Table[float]
-    uncertainties: Table[float] = field(default_factory=Table)
-    others: Table[float] = field(default_factory=Table)
+    uncertainties: Table[float] = Table()
+    others: Table[float] = Table()
 
     def tolerances(self, deviations: float = 2.0, most: int = 8) -> dict[str, float]:
         """Tolerances of a problem: so many standard deviations of the parameters that are least certain, relatively."""

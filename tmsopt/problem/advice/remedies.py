@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tmsopt.models.expression import written_sides
@@ -32,10 +32,10 @@ class Relaxation:
             stability is wanted the answer is stable. The smallest change comes first; none where none was found.
     """
 
-    parameters: Table[float] = field(default_factory=Table)
-    amounts: Table[float] = field(default_factory=Table)
+    parameters: Table[float] = Table()
+    amounts: Table[float] = Table()
     conflict: tuple[str, ...] = ()
-    alone: Table[float] = field(default_factory=Table)
+    alone: Table[float] = Table()
     irreducible: bool = False
     remedies: tuple[Table[str], ...] = ()
 
@@ -61,7 +61,7 @@ class Need:
     value: float
     most: bool
     looked: tuple[float, float]
-    design: Table[float] = field(default_factory=Table)
+    design: Table[float] = Table()
     shown: float = math.nan
 
     @property
