@@ -18,6 +18,7 @@ from .model import (
     Values as Values, in_words_of as in_words_of, words_of as words_of,
 )
 from .names import CONSTANTS as CONSTANTS, FUNCTIONS as FUNCTIONS, TAKEN as TAKEN, latex as latex
-from .stated.hamiltonian import from_hamiltonian as from_hamiltonian
 from .stated.texts import Unfit as Unfit
-from .stated.user_defined import from_coefficients as from_coefficients, from_matrices as from_matrices
+from .stated.user_defined import (
+    from_coefficients as from_coefficients, from_hamiltonian as from_hamiltonian, from_matrices as from_matrices,
+)

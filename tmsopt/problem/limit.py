@@ -8,7 +8,7 @@ from tmsopt.models.expression import SIGN, written_sides
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
-class Limit(NamedTuple):
+class WrittenLimit(NamedTuple):
     """A number on one side of a comparison, and the text before and behind it."""
 
     before: str
@@ -20,7 +20,7 @@ class Limit(NamedTuple):
         return f"{self.before}{number}{self.behind}"
 
 
-def split_limit(text: str) -> Limit | None:
+def split_limit(text: str) -> WrittenLimit | None:
     """The number on one side of a comparison; None where neither side is a number and nothing else.
 
     Raises:
@@ -29,7 +29,7 @@ def split_limit(text: str) -> Limit | None:
     left, sign, right = written_sides(text)
     for before, side, behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
         if _NUMBER.fullmatch(_close(side)):
-            return Limit(before, float(_close(side)), behind)
+            return WrittenLimit(before, float(_close(side)), behind)
     return None
 
 

@@ -42,7 +42,7 @@ def quantities(
     """
     found = []
     for name, row in rows.items():
-        fields = _fields(name, row) | computed.get(name, {})
+        fields = {"value": row.get("stands_for")} | _fields(name, row) | computed.get(name, {})
         if "positive_part" in fields:
             fields |= _positive_part(fields.pop("positive_part"))
         elif isinstance(fields["value"], str):
