@@ -117,7 +117,10 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     if missing:
         raw = " These are the raw measurements; make the Benchmark file with that program." if "hbb" in reported else ""
         faults.append(Fault(f"missing: {', '.join(missing)}.{raw}", file=str(path)))
-    faults += [f.at(str(path), 0) for f in _range_faults(found)]
+    for name, value in found.items():
+        if value not in (whole := _OF[name]).range:
+            message = f"{_WRITTEN[name]} = {value:.6g} is not physical; {whole.meaning} is {whole.range}"
+            faults.append(Fault(message, file=str(path)))
     if faults:
         raise InputError(faults)
     ordered = {n: found[n] for n in _OF.names if n in found}
@@ -212,12 +215,6 @@ def _numbers(written: str) -> tuple[float, float] | None:
     if not all(map(math.isfinite, (*values, *offs))):
         return None
     return sum(values) / len(values), math.hypot(*offs) / len(values)
-
-
-def _range_faults(found: Mapping[str, float]) -> Iterator[Fault]:
-    for name, value in found.items():
-        if value not in _OF[name].range:
-            yield Fault(f"{_WRITTEN[name]} = {value:.6g} is not physical; {_OF[name].meaning} is {_OF[name].range}")
 
 
 def _decimal(value: float) -> str:

@@ -146,10 +146,10 @@ def _dependencies(model: Model, set_name: str, expression: Expression) -> frozen
     """Parameters that an expression depends on, directly or through quantities other than those of the roots."""
     of = model.parameter_set(set_name)
     extra = (*ROOT_QUANTITIES, NO_RADIUS)
-    values = Values(model, of, {name: symbol(name) for name in of.names}, extra=extra, lift=_stand_in)
+
+    def stand_in(quantity: Quantity, values: Values) -> Any:
+        """In place of a quantity of the roots, itself."""
+        return symbol(quantity.name) if quantity.name in ROOT_NAMES else None
+
+    values = Values(model, of, {name: symbol(name) for name in of.names}, extra=extra, lift=stand_in)
     return frozenset(formula([expression(values)]).inputs) & frozenset(of.names)
-
-
-def _stand_in(quantity: Quantity, values: Values) -> Any:
-    """In place of a quantity of the roots, itself."""
-    return symbol(quantity.name) if quantity.name in ROOT_NAMES else None
