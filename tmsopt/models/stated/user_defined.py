@@ -362,18 +362,12 @@ def _node(key: str, where: Any, value: Any) -> Any:
         inputs = ca.symvar(entry := ca.densify(ca.SX(value)))
         names = [x.name() for x in inputs]
         return nodes_of_casadi(ca.Function("entry", [ca.vertcat(ca.SX(0, 1), *inputs)], [entry]), names)[0]
-    number = _number(key, where, value)
-    return constant(Fraction(value) if isinstance(value, Rational) else number)
-
-
-def _number(key: str, where: str, value: Any) -> float:
-    known = isinstance(value, Real) and not isinstance(value, bool)
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise Unfit(key, f"{where}: found {short(value)}; {_ACCEPTED}")
     try:
-        number = float(value) if known else math.nan
+        number = float(value)
     except OverflowError:
         number = math.inf
-    if known and not math.isfinite(number):
+    if not math.isfinite(number):
         raise Unfit(key, f"{where}: is {number}; {_FINITE}")
-    if not known:
-        raise Unfit(key, f"{where}: found {short(value)}; {_ACCEPTED}")
-    return number
+    return constant(Fraction(value) if isinstance(value, Rational) else number)
