@@ -29,7 +29,7 @@ from tmsopt.roots import Pattern
 from tmsopt.versions import SCHEMA
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Problem:
     """A design problem; see `load` for its file form.
 
@@ -67,23 +67,41 @@ class Problem:
     """
 
     model: Model
-    fixed: Mapping[str, Any] = Table()
-    free: Mapping[str, Any] = Table()
-    constraints: Mapping[str, str] = Table()
-    minimize: str | None = None
-    maximize: str | None = None
-    locate: str | None = None
-    start: Mapping[str, Any] = Table()
-    title: str = ""
-    scenarios: Mapping[str, Any] = Table()
-    tolerances: Mapping[str, Any] = Table()
-    weights: Mapping[str, Any] = Table()
-    pareto: Sequence[str] = ()
-    units: Mapping[str, str] = field(default=Table(), compare=False)
-    written: Mapping[str, Mapping[float, str]] = field(default=Table(), compare=False)
+    fixed: Mapping[str, float]
+    free: Mapping[str, tuple[float, float]]
+    constraints: Mapping[str, str]
+    minimize: str | None
+    maximize: str | None
+    locate: str | None
+    start: Mapping[str, float]
+    title: str
+    scenarios: Mapping[str, Scenario]
+    tolerances: Mapping[str, float]
+    weights: Mapping[str, float]
+    pareto: Sequence[str]
+    units: Mapping[str, str] = field(compare=False)
+    written: Mapping[str, Mapping[float, str]] = field(compare=False)
 
-    def __post_init__(self) -> None:
-        vars(self).update(normalise(**vars(self)))
+    def __init__(
+        self,
+        model: Model,
+        fixed: Mapping[str, Any] = Table(),
+        free: Mapping[str, Any] = Table(),
+        constraints: Mapping[str, str] = Table(),
+        minimize: str | None = None,
+        maximize: str | None = None,
+        locate: str | None = None,
+        start: Mapping[str, Any] = Table(),
+        title: str = "",
+        scenarios: Mapping[str, Scenario | Sequence[Any] | Mapping[str, Any]] = Table(),
+        tolerances: Mapping[str, Any] = Table(),
+        weights: Mapping[str, Any] = Table(),
+        pareto: Sequence[str] = (),
+        units: Mapping[str, str] = Table(),
+        written: Mapping[str, Mapping[float, str]] = Table(),
+    ) -> None:
+        stated = locals()
+        vars(self).update(normalise(**{f.name: stated[f.name] for f in fields(self)}))
 
     @cached_property
     def posed(self) -> "Posed":
