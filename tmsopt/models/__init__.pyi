@@ -8,10 +8,6 @@ from .bicycles.whipple import whipple as whipple
 from .bicycles.whipple_quantities import canonical as canonical, spin as spin
 from .built_in import MODELS as MODELS, controlled as controlled, gain_names as gain_names, named as named
 from .exact import decimal as decimal
-from .expression import (
-    Expression as Expression, ExpressionError as ExpressionError, parse_comparison as parse_comparison,
-    parse_value as parse_value,
-)
 from .inertia import INERTIAS as INERTIAS, inertia_margin as inertia_margin
 from .model import (
     Model as Model, Parameter as Parameter, ParameterSet as ParameterSet, Quantity as Quantity, Range as Range,
