@@ -293,7 +293,7 @@ class Model:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
-        """By its origin: in another process it is that process's own, and no copy of this; but for a changed bicycle."""
+        """By its origin: in another process it is that process's own, no copy of this; but for a changed bicycle."""
         origin = self.origin
         known = origin and (origin[0] is not resolve_name or resolve_name(*origin[1]) is self)
         return origin if known else super().__reduce_ex__(protocol)
