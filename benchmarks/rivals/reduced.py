@@ -8,7 +8,8 @@ import numpy as np
 
 from benchmarks.judges import NOWHERE, difference, eigenvalues, evaluated
 from tmsopt import Problem
-from tmsopt.models import copo, parse_value, tms
+from tmsopt.models import copo, tms
+from tmsopt.problem import parse_value
 from tmsopt.records import Array
 
 Watch = Callable[[Array, Array], None]

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tmsopt import Problem
-from tmsopt.models import parse_value, tms
+from tmsopt.models import tms
+from tmsopt.problem import parse_value
 
 SEED = 2018
 

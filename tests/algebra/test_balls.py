@@ -12,7 +12,8 @@ from helpers.designs import designs
 from mpmath import mp
 
 from tmsopt.algebra import BALLS, exact
-from tmsopt.models import FUNCTIONS, Values, parse_comparison, parse_value, tms, to_si
+from tmsopt.models import FUNCTIONS, Values, tms, to_si
+from tmsopt.problem import parse_comparison, parse_value
 
 kinds = import_module("tmsopt.algebra.kinds")
 absolute, greater, lesser, magnitude, positive_part, quotient, sqrt, tan = (

@@ -22,7 +22,7 @@ from tmsopt.algebra import (
     trace,
     values,
 )
-from tmsopt.models import parse_value
+from tmsopt.problem import parse_value
 
 as_double, gradients = (getattr(import_module("tmsopt.algebra.kinds"), n) for n in ("as_double", "gradients"))
 formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))

@@ -12,7 +12,7 @@ import pytest
 
 import tmsopt
 from tmsopt.guide import schema_text
-from tmsopt.models import parse_value
+from tmsopt.problem import parse_value
 
 PROBLEMS = sorted(Path("problems").glob("*.toml"))
 BUILT_IN = ("tms", "whipple")

@@ -12,8 +12,8 @@ import pytest
 from benchmarks.suites import TEMPLATES
 from tmsopt.algebra import NotAccepted, from_casadi, on_arrays
 from tmsopt.errors import InputError
-from tmsopt.models import Quantity, Values, from_coefficients, parse_comparison, tms
-from tmsopt.problem import NO_RADIUS, Problem, array_function
+from tmsopt.models import Quantity, Values, from_coefficients, tms
+from tmsopt.problem import NO_RADIUS, Problem, array_function, parse_comparison
 from tmsopt.roots import roots
 
 arrays, Bounded = import_module("tmsopt.algebra.arrays"), import_module("tmsopt.algebra.rounding").Bounded

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings, strategies as st
 from mpmath import mp
 
-from tmsopt.models import ExpressionError, parse_comparison, parse_value
+from tmsopt.problem import ExpressionError, parse_comparison, parse_value
 
 NAMES = ("Fr", "mu", "zeta_B", "a0", "lambda_s", "abscissa")
 

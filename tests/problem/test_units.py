@@ -17,7 +17,7 @@ from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
 import tmsopt
-from tmsopt.models import parse_value
+from tmsopt.problem import parse_value
 from tmsopt.problem.units import USUAL, by_pint, dimension, factor, read, with_unit
 
 AT_ONCE = 1.0

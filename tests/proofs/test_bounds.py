@@ -11,7 +11,7 @@ import pytest
 
 from tmsopt.algebra import EVERYTHING, NotAccepted, ball, from_casadi, interval, ranges, root_bound
 from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
-from tmsopt.models import parse_value
+from tmsopt.problem import parse_value
 from tmsopt.program import NLP
 from tmsopt.roots import product
 

@@ -14,8 +14,7 @@ from helpers.rows import faults
 from hypothesis import given, settings, strategies as st
 
 import tmsopt
-from tmsopt.models import ExpressionError
-from tmsopt.problem import limit_of, with_limit
+from tmsopt.problem import ExpressionError, limit_of, with_limit
 from tmsopt.records import Column, Table
 from tmsopt.studies import (
     Row,

@@ -8,16 +8,13 @@ from .bicycles.whipple import whipple as whipple
 from .bicycles.whipple_quantities import canonical as canonical, spin as spin
 from .built_in import MODELS as MODELS, controlled as controlled, gain_names as gain_names, named as named
 from .exact import decimal as decimal
-from .expression import (
-    Expression as Expression, ExpressionError as ExpressionError, parse_comparison as parse_comparison,
-    parse_value as parse_value,
-)
 from .inertia import INERTIAS as INERTIAS, inertia_margin as inertia_margin
 from .model import (
     Model as Model, Parameter as Parameter, ParameterSet as ParameterSet, Quantity as Quantity, Range as Range,
     Values as Values, in_words_of as in_words_of, words_of as words_of,
 )
 from .names import CONSTANTS as CONSTANTS, FUNCTIONS as FUNCTIONS, TAKEN as TAKEN, latex as latex
-from .stated.hamiltonian import from_hamiltonian as from_hamiltonian
 from .stated.texts import Unfit as Unfit
-from .stated.user_defined import from_coefficients as from_coefficients, from_matrices as from_matrices
+from .stated.user_defined import (
+    from_coefficients as from_coefficients, from_hamiltonian as from_hamiltonian, from_matrices as from_matrices,
+)

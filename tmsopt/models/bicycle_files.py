@@ -8,7 +8,7 @@ them: ``lam`` is lambda_s, ``IFyy`` is I_Fyy. ``IByy`` and ``IHyy`` have no part
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
 
 from tmsopt.errors import Fault, InputError, at_first, short, suggest, visible
@@ -62,8 +62,8 @@ class Bicycle:
 
     name: str
     parameters: Table[float]
-    uncertainties: Table[float] = field(default_factory=Table)
-    others: Table[float] = field(default_factory=Table)
+    uncertainties: Table[float] = Table()
+    others: Table[float] = Table()
 
     def tolerances(self, deviations: float = 2.0, most: int = 8) -> dict[str, float]:
         """Tolerances of a problem: so many standard deviations of the parameters that are least certain, relatively."""
@@ -91,7 +91,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     file = path_of(path, "a file of bicycle parameters")
     kind = "YAML" if file.suffix.lower() in _YAML else "TXT"
     text = read_text(str(path), f"{kind} file of bicycle parameters")
-    entries = list(_yaml(text) if kind == "YAML" else _lines(text))
+    entries = list(_entries(text, kind == "YAML"))
     faults, found, off, others = [], {}, {}, {}
     advice = at_first(suggest)
     for number, name, written in entries:
@@ -117,7 +117,10 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     if missing:
         raw = " These are the raw measurements; make the Benchmark file with that program." if "hbb" in reported else ""
         faults.append(Fault(f"missing: {', '.join(missing)}.{raw}", file=str(path)))
-    faults += [f.at(str(path), 0) for f in _range_faults(found)]
+    for name, value in found.items():
+        if value not in (whole := _OF[name]).range:
+            message = f"{_WRITTEN[name]} = {value:.6g} is not physical; {whole.meaning} is {whole.range}"
+            faults.append(Fault(message, file=str(path)))
     if faults:
         raise InputError(faults)
     ordered = {n: found[n] for n in _OF.names if n in found}
@@ -184,31 +187,21 @@ def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _lines(text: str) -> Iterator[tuple[int, str, str]]:
-    """Line number, name and what is written of each line that says something."""
-    for number, line in enumerate(text.splitlines(), start=1):
-        said = line.split("#", 1)[0].strip()
-        if said:
-            name, _, written = said.partition("=")
-            yield number, name.strip(), written.strip()
+def _entries(text: str, in_yaml: bool) -> Iterator[tuple[int, str, str]]:
+    """Line number, name and what is written of each line that says something.
 
-
-def _yaml(text: str) -> Iterator[tuple[int, str, str]]:
-    """The numbers of the two layouts that occur: under ``values:``, or all at the top; no YAML beyond these."""
-    table, top = "values", not re.search(r"^values\s*:", text, re.MULTILINE)
-    section = ""
+    Of YAML the two layouts that occur: numbers under ``values:``, or all at the top.
+    """
+    nested, section = in_yaml and re.search(r"^values\s*:", text, re.MULTILINE), ""
     for number, line in enumerate(text.splitlines(), start=1):
-        said = re.split(r"(?:^|\s)#", line, maxsplit=1)[0].rstrip()
-        if not said:
-            continue
-        name, _, written = said.strip().partition(":")
-        if said[0].isspace():
-            if section == table:
-                yield number, name.strip(), written.strip()
-            continue
-        section = name.strip()
-        if top or section == "parameterization":
-            yield number, section, written.strip()
+        said = re.split(r"(?:^|\s)#" if in_yaml else "#", line, maxsplit=1)[0].rstrip()
+        name, _, written = (part.strip() for part in said.partition(":" if in_yaml else "="))
+        if in_yaml and said[:1].isspace():
+            told = section == "values"
+        elif said:
+            section, told = name, not nested or name == "parameterization"
+        if said.strip() and told:
+            yield number, name, written
 
 
 def _numbers(written: str) -> tuple[float, float] | None:
@@ -222,12 +215,6 @@ def _numbers(written: str) -> tuple[float, float] | None:
     if not all(map(math.isfinite, (*values, *offs))):
         return None
     return sum(values) / len(values), math.hypot(*offs) / len(values)
-
-
-def _range_faults(found: Mapping[str, float]) -> Iterator[Fault]:
-    for name, value in found.items():
-        if value not in _OF[name].range:
-            yield Fault(f"{_WRITTEN[name]} = {value:.6g} is not physical; {_OF[name].meaning} is {_OF[name].range}")
 
 
 def _decimal(value: float) -> str:

@@ -5,11 +5,12 @@ from dataclasses import replace
 from functools import cache
 
 from tmsopt.models.bicycles.feedback import FEEDBACK, names_of, native_name, with_feedback
-from tmsopt.models.bicycles.tms import STEERED as TMS, tms
-from tmsopt.models.bicycles.whipple import STEERED as WHIPPLE, whipple
+from tmsopt.models.bicycles.tms import STEERED as TMS
+from tmsopt.models.bicycles.whipple import STEERED as WHIPPLE
 from tmsopt.models.model import Model
 
-MODELS = {model.name: model for model in (tms, whipple)}
+_STEERED = {steered.model.name: steered for steered in (TMS, WHIPPLE)}
+MODELS = {name: steered.model for name, steered in _STEERED.items()}
 """Models that a problem file can name."""
 
 
@@ -58,6 +59,3 @@ def _controlled(name: str, names: tuple[str, ...]) -> Model:
     if not names:
         return MODELS[name]
     return replace(with_feedback(_STEERED[name], names), origin=(_controlled, (name, names)))
-
-
-_STEERED = {steered.model.name: steered for steered in (TMS, WHIPPLE)}

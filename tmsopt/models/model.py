@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
+from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Any, SupportsIndex
 
@@ -292,8 +293,10 @@ class Model:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
-        """By its origin where it has one: in another process it is that process's own, and no copy of this."""
-        return self.origin or super().__reduce_ex__(protocol)
+        """By its origin: in another process it is that process's own, no copy of this; but for a changed bicycle."""
+        origin = self.origin
+        known = origin and (origin[0] is not resolve_name or resolve_name(*origin[1]) is self)
+        return origin if known else super().__reduce_ex__(protocol)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""

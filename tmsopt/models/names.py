@@ -8,6 +8,7 @@ from typing import Any
 
 from tmsopt.algebra.formula import Constant, Formula, Kind, fold
 from tmsopt.algebra.kinds import FLOATS, as_double
+from tmsopt.models.tables import read_table
 
 FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
 CONSTANTS = ("pi",)
@@ -16,23 +17,14 @@ CONSTANTS = ("pi",)
 TAKEN = ("abscissa", "damping_ratio", "angular_frequency", "radius", "structure", "objective", *CONSTANTS, *FUNCTIONS)
 """Names that an expression of a problem uses for something else."""
 
-OUTSIDE = (
-    "a delay exp(-s*tau), as any nonlinear eigenproblem, is outside of what tmsopt does; approximate it by states "
-    "(Padé: x(t - tau) = w - x with w' = (4*x - 2*w)/tau)"
-)
+_WORDS = read_table("advice")
+OUTSIDE: str = _WORDS["outside"]
+MEANT = {name: meant.format(outside=OUTSIDE) for name, meant in _WORDS["names"].items()}
+"""Names that may stand for more than a parameter → what to do then."""
+
 _EIGENVALUE = (
     f"is the eigenvalue, on which no entry depends: its powers are coefficients, or go in M, D and K, and {OUTSIDE}"
 )
-
-MEANT = {
-    "s": f"if s is the eigenvalue: {OUTSIDE}",
-    "t": "if t is the time: a system that changes with time is outside of what tmsopt does; write its average",
-    "z": "if z is that of discrete time: write p((1 + s)/(1 - s))*(1 - s)**n, whose roots are left where |z| < 1",
-    "omega": f"if omega is the eigenfrequency: {OUTSIDE}",
-    "e": "if e is Euler's number: write exp(1)",
-    **dict.fromkeys(("i", "I", "j"), "if it is the imaginary unit: write 1j, in [model] H, for matrices are real"),
-}
-"""Names that may stand for more than a parameter → what to do then."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _GREEK = re.compile(

@@ -1,5 +1,9 @@
 from .advice.remedies import Relaxation as Relaxation, moved_limits as moved_limits, with_limits as with_limits
 from .cases import Band as Band, Case as Case
+from .expression import (
+    Expression as Expression, ExpressionError as ExpressionError, parse_comparison as parse_comparison,
+    parse_value as parse_value,
+)
 from .evaluate import array_function as array_function, evaluate as evaluate
 from .files import Given as Given, load as load, as_solvable as as_solvable, pose as pose
 from .freedom import degrees_of_freedom as degrees_of_freedom

@@ -17,6 +17,9 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT
 WORSE_DIRECTION = {"abscissa": 1.0, "damping_ratio": -1.0, ANGULAR_FREQUENCY: 1.0}
 """Direction in which a root quantity gets worse; its factors bound it from that side alone."""
 
+_EXTREME = {"abscissa": 1.0, "damping_ratio": -1.0, RADIUS: -1.0}
+"""The same of which there cannot be too much of the one and too little of the other."""
+
 STABLE = "every root left of the axis"
 """The name of a constraint that a problem does not state."""
 
@@ -82,12 +85,22 @@ def stability_wanted(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
     return {STABLE: f"abscissa <= {0.0 - least!r}"}
 
 
-def only_worsens(problem: Posed, name: str, worse: float) -> bool:
+def _only_worsens(problem: Posed, name: str, worse: float) -> bool:
     """Whether the objective gets better as a quantity gets worse, and at no design as it gets better."""
     goal = problem.objective
     if goal is None or name not in goal.names:
         return False
     return _falls(problem, problem.sign, goal, name, worse) and not _falls(problem, problem.sign, goal, name, -worse)
+
+
+def sense_notes(problem: Posed) -> tuple[str, ...]:
+    """That an objective gets better only as stability gets worse, and what asks for the opposite."""
+    text = (problem.minimize or problem.maximize or "").strip()
+    if not problem.free or not any(_only_worsens(problem, name, worse) for name, worse in _EXTREME.items()):
+        return ()
+    opposite = {"minimize": "maximize", "maximize": "minimize"}[problem.sense]
+    other = f'{opposite} = "{text}"'
+    return (f"{problem.sense} {text} asks for the least stable design; {other} asks for the most stable one",)
 
 
 def demands_heavy_damping(problem: Posed) -> bool:
@@ -133,10 +146,10 @@ def _dependencies(model: Model, set_name: str, expression: Expression) -> frozen
     """Parameters that an expression depends on, directly or through quantities other than those of the roots."""
     of = model.parameter_set(set_name)
     extra = (*ROOT_QUANTITIES, NO_RADIUS)
-    values = Values(model, of, {name: symbol(name) for name in of.names}, extra=extra, lift=_stand_in)
+
+    def stand_in(quantity: Quantity, values: Values) -> Any:
+        """In place of a quantity of the roots, itself."""
+        return symbol(quantity.name) if quantity.name in ROOT_NAMES else None
+
+    values = Values(model, of, {name: symbol(name) for name in of.names}, extra=extra, lift=stand_in)
     return frozenset(formula([expression(values)]).inputs) & frozenset(of.names)
-
-
-def _stand_in(quantity: Quantity, values: Values) -> Any:
-    """In place of a quantity of the roots, itself."""
-    return symbol(quantity.name) if quantity.name in ROOT_NAMES else None

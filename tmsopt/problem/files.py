@@ -238,44 +238,47 @@ def _model(written: Any) -> tuple[list[Fault], Model | None]:
     return ([Fault(unknown, ("model",))] if model is None else []), model
 
 
-def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:  # noqa: PLR0911, PLR0912 - one per case
+_ENTRIES: Mapping[str, tuple[type[Section], str]] = {
+    "parameters": (_FreeParameter, "{ min = …, max = … }"),
+    "scenarios": (_Band, "{ min = …, max = …, points = 7 }"),
+}
+"""Table → shape of its entries that are tables, and one of them."""
+
+_ACCEPTED = {
+    "model": "the name of a model in quotes, or a table [model]",
+    "parameters": "a number, a text with a unit such as '5 deg', or { min = …, max = …, start = … }",
+    "scenarios": "{ min = …, max = …, points = … }, or a list of values such as [1, 2.5]",
+    "feedback": "a table of gains, such as k_phidot = -20",
+    **dict.fromkeys(("tolerances", "weights"), "a number, or a text with a unit such as '5 mm'"),
+    "pareto": "two or three texts, such as ['abscissa', 'Fr']",
+    "constraints": "a comparison in quotes, such as 'nu_H >= 0.02'",
+}
+"""Table or key → what it takes."""
+
+
+def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
     """One pydantic complaint in the words of the problem file."""
     tags = ("_FreeParameter", "_Band", "float", "int", "str", "dict[str,any]")
     key = tuple(str(k) for k in where if k not in tags)
     match key:
         case (section,) if kind == "extra_forbidden":
             return Fault(f"unknown key {short(section)}; {unknown_key(section, _File.model_fields)}", key)
-        case ("model",):
-            return Fault(f"found {short(found)}; accepted: the name of a model in quotes, or a table [model]", key)
-        case ("parameters",) if kind == "missing":
-            return Fault(_NO_PARAMETERS, key)
-        case ("parameters", name, end) if kind == "extra_forbidden":
-            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _FreeParameter.model_fields)}", key)
-        case ("parameters", name, end) if kind == "missing":
-            return Fault(f"missing {end} of {name}; write {name} = {{ min = …, max = … }}", key)
-        case ("parameters", _, *_):
-            accepted = "a number, a text with a unit such as '5 deg', or { min = …, max = …, start = … }"
-            return Fault(f"found {short(found)}; accepted: {accepted}", key[:3])
         case ("objective", sense, *_) if kind == "extra_forbidden":
             return Fault(f"unknown key {short(sense)}; {unknown_key(sense, _Objective.model_fields, 'objective')}", key)
-        case ("scenarios", name, end, *_) if kind == "extra_forbidden":
-            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _Band.model_fields)}", key)
-        case ("scenarios", name, end) if kind == "missing":
-            return Fault(f"missing {end} of {name}; write {name} = {{ min = …, max = …, points = 7 }}", key)
-        case ("scenarios", _, *_):
-            accepted = "{ min = …, max = …, points = … }, or a list of values such as [1, 2.5]"
-            return Fault(f"found {short(found)}; accepted: {accepted}", key[:2])
-        case ("feedback",):
-            return Fault(f"found {short(found)}; accepted: a table of gains, such as k_phidot = -20", key)
-        case (("tolerances" | "weights"), _, *_):
-            return Fault(f"found {short(found)}; accepted: a number, or a text with a unit such as '5 mm'", key[:2])
-        case ("objective", "pareto", *_):
-            return Fault(f"found {short(found)}; accepted: two or three texts, such as ['abscissa', 'Fr']", key[:2])
-        case ("constraints", *_):
-            return Fault(f"found {short(found)}; accepted: a comparison in quotes, such as 'nu_H >= 0.02'", key)
-        case _:
-            table = key[0] in ("parameters", "objective", *VARIATIONS)
-            return Fault(f"found {short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key)
+        case ("parameters",) if kind == "missing":
+            return Fault(_NO_PARAMETERS, key)
+        case ("parameters" | "scenarios" as table, name, end, *_) if kind == "extra_forbidden":
+            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _ENTRIES[table][0].model_fields)}", key)
+        case ("parameters" | "scenarios" as table, name, end) if kind == "missing":
+            return Fault(f"missing {end} of {name}; write {name} = {_ENTRIES[table][1]}", key)
+    section, *inner = key
+    is_table = section in ("parameters", "objective", *VARIATIONS)
+    accepted = "a table" if is_table else "a text in quotes"
+    if inner or not is_table:
+        accepted = _ACCEPTED.get("pareto" if inner[:1] == ["pareto"] else section, accepted)
+    return Fault(
+        f"found {short(found)}; accepted: {accepted}", key[: 3 if section in ("parameters", "constraints") else 2]
+    )
 
 
 def _tables(written: _File) -> dict[str, Any]:

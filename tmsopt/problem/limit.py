@@ -1,20 +1,42 @@
 """The number that a constraint compares with: 0.02 in ``nu_H >= 0.02``."""
 
 import re
+from typing import NamedTuple
 
 from tmsopt.models.expression import SIGN, written_sides
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
-def limit_of(text: str) -> float | None:
+class WrittenLimit(NamedTuple):
+    """A number on one side of a comparison, and the text before and behind it."""
+
+    before: str
+    value: float
+    behind: str
+
+    def written(self, number: str) -> str:
+        """The same comparison with another number."""
+        return f"{self.before}{number}{self.behind}"
+
+
+def split_limit(text: str) -> WrittenLimit | None:
     """The number on one side of a comparison; None where neither side is a number and nothing else.
 
     Raises:
         ExpressionError: for a text that does not parse.
     """
-    left, _, right = written_sides(text)
-    return next((float(_close(side)) for side in (left, right) if _NUMBER.fullmatch(_close(side))), None)
+    left, sign, right = written_sides(text)
+    for before, side, behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
+        if _NUMBER.fullmatch(_close(side)):
+            return WrittenLimit(before, float(_close(side)), behind)
+    return None
+
+
+def limit_of(text: str) -> float | None:
+    """That number alone."""
+    limit = split_limit(text)
+    return None if limit is None else limit.value
 
 
 def limit_side(text: str, name: str) -> int:
@@ -35,12 +57,10 @@ def with_limit(text: str, value: float) -> str:
     Raises:
         ValueError: where neither side is a number.
     """
-    if limit_of(text) is None:
+    limit = split_limit(text)
+    if limit is None:
         raise ValueError(f"'{text}' compares two expressions; accepted: a number on one side")
-    left, sign, right = written_sides(text)
-    if _NUMBER.fullmatch(_close(left)):
-        return f"{float(value)!r} {sign} {right}"
-    return f"{left} {sign} {float(value)!r}"
+    return limit.written(repr(float(value)))
 
 
 def _close(side: str) -> str:

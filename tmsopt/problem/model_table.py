@@ -25,6 +25,12 @@ KEYS = {
 }
 """Keys of the table → meaning."""
 
+_ALONE = {
+    "coefficients": "coefficients, or the matrices",
+    "H": "H, a complex system, or the matrices of a real one",
+}
+"""Keys that state a system without others."""
+
 _DESCENDING = "accepted: expressions in brackets, by descending powers of s, such as ['1', 'c', 'k']"
 
 _EXAMPLE = (
@@ -54,11 +60,9 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
         fault(f"found {short(name)}; accepted: a text of one line in quotes", "name")
     if not given:
         fault(f"states no system; {_EXAMPLE}")
-    if "coefficients" in given and len(given) > 1:
-        fault(f"stands beside {given[0]}; keep coefficients, or the matrices", "coefficients")
-    if "H" in given and len(given) > 1:
-        beside = next(key for key in given if key != "H")
-        fault(f"stands beside {beside}; keep H, a complex system, or the matrices of a real one", "H")
+    for alone, kept in _ALONE.items():
+        if alone in given and (beside := [key for key in given if key != alone]):
+            fault(f"stands beside {beside[0]}; keep {kept}", alone)
     texts = _quantities(table.get("quantities", {}), fault)
     entries, quantities = untexted({key: _rows(table[key], key, fault) for key in given}, texts, fault)
     if faults:

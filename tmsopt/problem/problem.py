@@ -29,7 +29,7 @@ from tmsopt.roots import Pattern
 from tmsopt.versions import SCHEMA
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Problem:
     """A design problem; see `load` for its file form.
 
@@ -67,28 +67,46 @@ class Problem:
     """
 
     model: Model
-    fixed: Mapping[str, Any] = Table()
-    free: Mapping[str, Any] = Table()
-    constraints: Mapping[str, str] = Table()
-    minimize: str | None = None
-    maximize: str | None = None
-    locate: str | None = None
-    start: Mapping[str, Any] = Table()
-    title: str = ""
-    scenarios: Mapping[str, Any] = Table()
-    tolerances: Mapping[str, Any] = Table()
-    weights: Mapping[str, Any] = Table()
-    pareto: Sequence[str] = ()
-    units: Mapping[str, str] = field(default=Table(), compare=False)
-    written: Mapping[str, Mapping[float, str]] = field(default=Table(), compare=False)
+    fixed: Mapping[str, float]
+    free: Mapping[str, tuple[float, float]]
+    constraints: Mapping[str, str]
+    minimize: str | None
+    maximize: str | None
+    locate: str | None
+    start: Mapping[str, float]
+    title: str
+    scenarios: Mapping[str, Scenario]
+    tolerances: Mapping[str, float]
+    weights: Mapping[str, float]
+    pareto: Sequence[str]
+    units: Mapping[str, str] = field(compare=False)
+    written: Mapping[str, Mapping[float, str]] = field(compare=False)
 
-    def __post_init__(self) -> None:
-        vars(self).update(normalise(**vars(self)))
+    def __init__(
+        self,
+        model: Model,
+        fixed: Mapping[str, Any] = Table(),
+        free: Mapping[str, Any] = Table(),
+        constraints: Mapping[str, str] = Table(),
+        minimize: str | None = None,
+        maximize: str | None = None,
+        locate: str | None = None,
+        start: Mapping[str, Any] = Table(),
+        title: str = "",
+        scenarios: Mapping[str, Scenario | Sequence[Any] | Mapping[str, Any]] = Table(),
+        tolerances: Mapping[str, Any] = Table(),
+        weights: Mapping[str, Any] = Table(),
+        pareto: Sequence[str] = (),
+        units: Mapping[str, str] = Table(),
+        written: Mapping[str, Mapping[float, str]] = Table(),
+    ) -> None:
+        stated = locals()
+        vars(self).update(normalise(**{f.name: stated[f.name] for f in fields(self)}))
 
     @cached_property
     def posed(self) -> "Posed":
         """The problem as it is solved, found once."""
-        found = Posed(**self.__getstate__())
+        found = Posed(**_stated(self))
         vars(found).update(problem=self)
         return found
 
@@ -99,8 +117,7 @@ class Problem:
             return read_from_posed(self, name)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What was stated, without what is kept of it."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return _stated(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,13 +145,13 @@ class Posed:
 
         `dataclasses.replace` is not for this class: it leaves out what follows from the fields.
         """
-        return Posed(**settle(**{f.name: getattr(self, f.name) for f in fields(self)} | changes))
+        return Posed(**settle(**_stated(self) | changes))
 
     @cached_property
     def problem(self) -> Problem:
         """The problem as a user would state it."""
         found = object.__new__(Problem)
-        vars(found).update(self.__getstate__(), posed=self)
+        vars(found).update(_stated(self), posed=self)
         return found
 
     @cached_property
@@ -163,8 +180,7 @@ class Posed:
         return any(name in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What was stated: what follows from it is found anew, and cannot always be pickled."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return _stated(self)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
@@ -184,9 +200,8 @@ class Posed:
     @property
     def sense(self) -> str:
         """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` when nothing is asked."""
-        asked = {"minimize": self.minimize is not None, "maximize": self.maximize is not None}
-        asked |= {"pareto": bool(self.pareto), "locate": bool(self.locate), "evaluate": True}
-        return next(sense for sense, stated in asked.items() if stated)
+        asked = (n for n in ("minimize", "maximize", "pareto", "locate") if getattr(self, n) not in (None, "", ()))
+        return next(asked, "evaluate")
 
     @property
     def sign(self) -> float:
@@ -254,6 +269,11 @@ class Posed:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
         complete = {**self.fixed, **values}
         return {name: complete[name] for name in self.parameter_set.names}
+
+
+def _stated(record: Problem | Posed) -> dict[str, Any]:
+    """What was stated: what follows from it is found anew, and cannot always be pickled."""
+    return {f.name: getattr(record, f.name) for f in fields(record)}
 
 
 def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:

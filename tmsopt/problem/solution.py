@@ -1,7 +1,7 @@
 """The solution of a design problem as data."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.models import inertia_margin
@@ -134,14 +134,14 @@ class Solution(Printable):
     dimensionless: Table[float]
     formulation: str
     freedom: Freedom
-    missed: Table[float] = field(default_factory=Table)
+    missed: Table[float] = Table()
     branches: tuple[OtherBranch, ...] = ()
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
     worst: Case | None = None
     least_damped: Case | None = None
     fastest: Case | None = None
     cover: Cover | None = None
-    sides: Table[float] = field(default_factory=Table)
+    sides: Table[float] = Table()
     relaxation: Relaxation | None = None
     need: Need | None = None
     stable_elsewhere: bool | None = None
@@ -151,7 +151,7 @@ class Solution(Printable):
     edge_is_exact: bool = False
     multiple_as_rounded: bool = False
     without_best: bool = False
-    si: Table[Reading] = field(default_factory=Table)
+    si: Table[Reading] = Table()
 
     @property
     def stability(self) -> StabilityVerdict:

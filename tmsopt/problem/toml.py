@@ -96,7 +96,8 @@ def validate_tables(
         except ValidationError as error:
             complaints = error.errors(include_url=False, include_context=False)
             found = [explain(d["loc"], d["type"], d["input"]) for d in complaints[:_EXPLAINED]]
-            found += _unexplained(d["loc"] for d in complaints[_EXPLAINED:])
+            rest = dict.fromkeys(tuple(map(str, d["loc"][:2])) for d in complaints[_EXPLAINED:])
+            found += [Fault("accepted: what the other faults say", key) for key in rest]
             deepest: dict[Key, int] = {}
             for fault in found:
                 deepest[fault.key[:2]] = max(len(fault.key), deepest.get(fault.key[:2], 0))
@@ -105,11 +106,6 @@ def validate_tables(
                     faults.setdefault(fault.key, fault)
         pruned = _without(pruned, {key[:2] for key in faults})
     return list(faults.values()), None
-
-
-def _unexplained(places: Iterable[tuple[int | str, ...]]) -> list[Fault]:
-    keys = dict.fromkeys(tuple(map(str, where[:2])) for where in places)
-    return [Fault("accepted: what the other faults say", key) for key in keys]
 
 
 def within(section: str, faults: Iterable[Fault]) -> list[Fault]:

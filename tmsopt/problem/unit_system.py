@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.models import Parameter, Quantity
-from tmsopt.models.expression import SIGN, Expression, parse_comparison, parse_value, written_sides
-from tmsopt.problem.limit import limit_of
+from tmsopt.models.expression import SIGN, Expression, parse_comparison, parse_value
+from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.units import Dimension, dimension, factor
@@ -134,20 +134,8 @@ def limit_text(problem: Posed, name: str) -> str:
             else ""
         )
     text, unit = problem.constraints[name], unit_of(problem, name)
-    value = limit_of(text)
-    if value is None or not unit.text:
-        return text
-    left, sign, right = written_sides(text)
-    shown = unit.show(value, 9)
-    return f"{left} {sign} {shown}" if _is_number(right) else f"{shown} {sign} {right}"
-
-
-def _is_number(side: str) -> bool:
-    try:
-        float("".join(side.split()))
-    except ValueError:
-        return False
-    return True
+    limit = split_limit(text)
+    return limit.written(unit.show(limit.value, 9)) if limit and unit.text else text
 
 
 def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:

@@ -241,7 +241,12 @@ def _objective_faults(problem: Stated) -> Iterator[Fault]:
         yield Fault("minimize and maximize together; keep one of them", key)
     if problem.pareto and asked:
         yield Fault("pareto beside minimize or maximize; keep one of them", key)
-    yield from _pareto_faults(problem.pareto)
+    texts = problem.pareto
+    listed = isinstance(texts, Sequence) and not isinstance(texts, str)
+    if not listed or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
+        accepted = "two or three different expressions to minimise, such as ['abscissa', 'Fr', '-lambda_s']"
+        message = f"found {short(texts)}; accepted: {accepted}, where a minus sign maximises"
+        yield Fault(message, ("objective", "pareto"))
     if problem.locate is not None:
         yield from pattern_faults(problem.locate, problem.model, (*key, "locate"))
 
@@ -259,13 +264,6 @@ def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fa
     except ValueError as error:
         joined = ", or several, joined by +" if model.degree > 4 else ""
         yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{joined}", key)
-
-
-def _pareto_faults(texts: Any) -> Iterator[Fault]:
-    accepted = "accepted: two or three different expressions to minimise, such as ['abscissa', 'Fr', '-lambda_s']"
-    listed = isinstance(texts, Sequence) and not isinstance(texts, str)
-    if not listed or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
-        yield Fault(f"found {short(texts)}; {accepted}, where a minus sign maximises", ("objective", "pareto"))
 
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:

@@ -14,7 +14,7 @@ from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.evaluation.stored import held, missed_note
 from tmsopt.evaluation.worst_case import cover
 from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, user_structure_name, without_rounding
-from tmsopt.problem.advice.senses import sense_notes
+from tmsopt.problem.dependence import sense_notes
 from tmsopt.problem.files import Given, as_solvable
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed

@@ -4,8 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.algebra.kinds import choose, less, pi, quotient, sqrt, tan
-from tmsopt.models.model import Computed, Quantity, Range
+from tmsopt.algebra.kinds import choose, less, quotient, sqrt, tan
+from tmsopt.models.bicycles.tables import quantities
+from tmsopt.models.model import Computed, Quantity
+from tmsopt.models.tables import read_table
 
 WORDS = "weave", "capsize"
 """What a bicycle does beyond a pair on the imaginary axis, and beyond a root 0."""
@@ -50,40 +52,11 @@ def times(rate: Computed, written: str) -> tuple[Quantity, ...]:
     Args:
         rate: how many 1/s a rate of 1 is, and the same as the expression that is written.
     """
-    decay = f"-(abscissa*{written})"
-    return (
-        Quantity(
-            "decay_rate",
-            "1/s",
-            "how fast the slowest part of a disturbance dies out",
-            r"-\alpha",
-            lambda v: -_of_roots(v, "abscissa") * rate(v),
-            aside=True,
-            stands_for=f"({decay})",
-        ),
-        Quantity(
-            "decay_time",
-            "s",
-            "in which the slowest part of a disturbance falls to 1/e",
-            r"\tau",
-            lambda v: choose(less(a := _of_roots(v, "abscissa"), 0), quotient(1, -a * rate(v)), math.nan),
-            range=Range(lower=0.0),
-            aside=True,
-            stands_for=f"(1/max({decay}, 0))",
-        ),
-        Quantity(
-            "frequency",
-            "Hz",
-            "of the fastest oscillation, 0 where nothing oscillates",
-            "f",
-            lambda v: _of_roots(v, "angular_frequency") * rate(v) / (2 * pi(rate(v))),
-            range=Range(lower=0.0),
-            aside=True,
-            stands_for=f"(angular_frequency*{written}/(2*pi))",
-        ),
-    )
 
+    def decay_time(v: Mapping[str, Any]) -> Any:
+        abscissa = v["abscissa"]
+        return choose(less(abscissa, 0), quotient(1, -abscissa * rate(v)), math.nan)
 
-def _of_roots(v: Mapping[str, Any], name: str) -> Any:
-    """A quantity of the roots, where these are known; else nan."""
-    return v.get(name, math.nan)
+    rows = read_table("bicycles/times").items()
+    told = {name: {**row, "stands_for": row["stands_for"].format(rate=written)} for name, row in rows}
+    return quantities(told, {"decay_time": {"value": decay_time}})

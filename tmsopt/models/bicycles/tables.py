@@ -1,8 +1,6 @@
 """Parameters and quantities of a bicycle, as its TOML file lists them."""
 
-import tomllib
 from collections.abc import Mapping
-from importlib.resources import files
 from math import pi
 from typing import Any
 
@@ -22,11 +20,6 @@ _TILT = Range(-pi / 2, pi / 2, closed=False)
 LAMBDA_S = Parameter(
     "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True, sides=("reversed rake", "normal rake")
 )
-
-
-def read_table(name: str) -> dict[str, Any]:
-    """The tables of a file of this folder, by its name without the ending."""
-    return tomllib.loads((files(__package__) / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def parameters(rows: Mapping[str, Any]) -> tuple[Parameter, ...]:
@@ -49,7 +42,7 @@ def quantities(
     """
     found = []
     for name, row in rows.items():
-        fields = _fields(name, row) | computed.get(name, {})
+        fields = {"value": row.get("stands_for")} | _fields(name, row) | computed.get(name, {})
         if "positive_part" in fields:
             fields |= _positive_part(fields.pop("positive_part"))
         elif isinstance(fields["value"], str):

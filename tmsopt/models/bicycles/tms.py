@@ -8,21 +8,23 @@ from tmsopt.algebra.kinds import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
 from tmsopt.models.bicycles.feedback import FEEDBACK, UNCONTROLLED, Steered, native_name, size
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
-from tmsopt.models.bicycles.tables import parameters, quantities, read_table
+from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import COMPUTED
 from tmsopt.models.model import Matrix, Model, ParameterSet
+from tmsopt.models.tables import read_table
 
 __all__ = ["GRAVITY", "copo", "from_si", "matrices", "tms", "to_si"]
 
-_TABLES = read_table("tms")
+_TABLES = read_table("bicycles/tms")
 
 GRAVITY: float = _TABLES["parameters"]["SI"]["g"]["default"]
 """Default g in m/s²."""
 
 
-def _algebraic(p: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: p[name] for name in _NATIVE.names if name != "lambda_s"} | {"T": tan(p["lambda_s"])}
+def _upright(p: Mapping[str, Any]) -> dict[str, Any]:
+    """The native parameters but the tilt."""
+    return {name: p[name] for name in _NATIVE.names if name != "lambda_s"}
 
 
 _NATIVE = ParameterSet("dimensionless", parameters(_TABLES["parameters"]["dimensionless"]), native=dict)
@@ -80,8 +82,7 @@ def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
     """M, V, P from tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
-    dimensions = {name: p[name] for name in _NATIVE.names if name != "lambda_s"}
-    return matrices(**dimensions, sine=T * cosine, cosine=cosine)
+    return matrices(**_upright(p), sine=T * cosine, cosine=cosine)
 
 
 def _rate(p: Mapping[str, Any]) -> Any:
@@ -116,7 +117,7 @@ tms = Model(
     title="two-mass-skate bicycle",
     degree=4,
     sets=(_NATIVE, _SI),
-    algebraic=_algebraic,
+    algebraic=lambda p: {**_upright(p), "T": tan(p["lambda_s"])},
     polynomial=copo,
     quantities=quantities(_TABLES["quantities"]["dimensionless"], COMPUTED, _IN_SI),
     compact=compact_copo,
@@ -134,7 +135,7 @@ tms = Model(
 
 def _steered(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
     """M, V, P for a steer angle in units of 1/cos λ_s."""
-    return matrices(**{name: p[name] for name in _NATIVE.names if name != "lambda_s"}, sine=p["T"], cosine=1)
+    return matrices(**_upright(p), sine=p["T"], cosine=1)
 
 
 STEERED = Steered(tms, _steered, unit=lambda p, h: (h, 1 + p["T"] * p["T"]), speed="Fr")

@@ -11,12 +11,13 @@ from typing import Any
 from tmsopt.models.bicycles.bicycle import WORDS, times
 from tmsopt.models.bicycles.feedback import UNCONTROLLED, Steered
 from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
-from tmsopt.models.bicycles.tables import parameters, quantities, read_table
+from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, tangent_matrices
 from tmsopt.models.bicycles.whipple_quantities import COMPUTED, IN_MATRICES, algebraic, canonical
 from tmsopt.models.model import Matrix, Model, ParameterSet
+from tmsopt.models.tables import read_table
 
-_TABLES = read_table("whipple")
+_TABLES = read_table("bicycles/whipple")
 _NO_RADIUS = "a wheel without radius would turn infinitely fast"
 
 _SI = ParameterSet(

@@ -89,16 +89,15 @@ def carriers(entries: Sequence[Node]) -> Callable[[Mapping[str, Interval]], tupl
     """
     n = math.isqrt(len(entries) // 2)
     R, J = (np.array(part, dtype=object).reshape(n, n) for part in (entries[: n * n], entries[n * n :]))
-    off = [(i, j) for i in range(n) for j in range(n) if i != j]
-    even = [(R[i, j] + R[j, i]) / 2 for i, j in off], [(J[i, j] - J[j, i]) / 2 for i, j in off]
-    odd = [(J[i, j] + J[j, i]) / 2 for i, j in off], [(R[i, j] - R[j, i]) / 2 for i, j in off]
-    every = [*R.diagonal(), *J.diagonal(), *even[0], *even[1], *odd[0], *odd[1]]
+    off = ~np.eye(n, dtype=bool)
+    beside = [x for P in (R + R.T, J - J.T, J + J.T, R - R.T) for x in (P / 2)[off]]
+    every = [*R.diagonal(), *J.diagonal(), *beside]
     matrix = formula(entries)
     names, asked = matrix.names, formula(every, matrix.names)
 
     def bounds(box: Mapping[str, Interval]) -> tuple[float, float]:
         found = np.array(_ranges(asked, [box[name] for name in names]))
-        discs = np.split(np.abs(found[2 * n :]).max(axis=1), 4) if off else [np.zeros(0)] * 4
+        discs = np.split(np.abs(found[2 * n :]).max(axis=1), 4) if beside else [np.zeros(0)] * 4
         ends = []
         for diagonal, re, im in ((found[:n], *discs[:2]), (found[n : 2 * n], *discs[2:])):
             reach = np.hypot(re, im).reshape(n, -1).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Models of any system that a user states: by its matrices, or by its characteristic polynomial."""
+"""Models of any system that a user states: by its matrices, its characteristic polynomial, or a complex H."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, number_text, spelled, unusable
-from tmsopt.models.stated.closed_loop import check_loop, closed
+from tmsopt.models.stated.closed_loop import LOOP, check_loop, closed
 from tmsopt.models.stated.degree import faulty
 from tmsopt.models.stated.equations import IMAGINARY, in_order, pencil, polynomial, whole
 from tmsopt.models.stated.pairs import complex_text
@@ -73,20 +73,17 @@ def from_matrices(
 
     More: docs/tutorials/own_system.md
     """
-    if A is not None:
-        if M is not None or D is not None or K is not None:
-            raise Unfit("A", "stands beside M, D or K; give either A, or M and K with D")
-        matrices: dict[str, Matrix] = {"A": square("A", A)}
-    else:
-        missing = [n for n, value in (("M", M), ("K", K)) if value is None]
-        if missing:
-            raise Unfit(missing[0], "is missing; give M and K (and D), or A, or coefficients")
-        matrices = {n: square(n, value) for n, value in (("M", M), ("D", D), ("K", K)) if value is not None}
-        sizes = {n: len(rows) for n, rows in matrices.items()}
-        for n, size in sizes.items():
-            if size != sizes["M"]:
-                raise Unfit(n, f"is {size} × {size}, and M is {sizes['M']} × {sizes['M']}; give all the same size")
-    matrices |= {n: _rectangular(n, value) for n, value in (("B", B), ("C", C), ("G", G)) if value is not None}
+    every = {"A": A, "M": M, "D": D, "K": K, "B": B, "C": C, "G": G}
+    given = {n: value for n, value in every.items() if value is not None}
+    if "A" in given and not given.keys().isdisjoint("MDK"):
+        raise Unfit("A", "stands beside M, D or K; give either A, or M and K with D")
+    for n in () if "A" in given else ("M", "K"):
+        if n not in given:
+            raise Unfit(n, "is missing; give M and K (and D), or A, or coefficients")
+    matrices = {n: _rectangular(n, value) if n in LOOP else square(n, value) for n, value in given.items()}
+    for n, size in ((n, len(rows)) for n, rows in matrices.items() if n in ("D", "K")):
+        if size != (most := len(matrices["M"])):
+            raise Unfit(n, f"is {size} × {size}, and M is {most} × {most}; give all the same size")
     check_loop({n: (len(rows), len(rows[0])) for n, rows in matrices.items()})
     return made("matrices", name, matrices, quantities)
 
@@ -109,6 +106,34 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Ma
         found = "no list" if row is None else f"{len(row)} entries" if row else "none"
         raise Unfit("coefficients", f"found {found}; accepted: from 2 to {MOST['coefficients'] + 1}, descending")
     return made("coefficients", name, {"coefficients": [row]}, quantities)
+
+
+def from_hamiltonian(H: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
+    """A model of ψ′ = −i H ψ with a complex matrix H, told by its eigenfrequencies ω = i s.
+
+    Everything is said of H: ``EP2`` is one of H, the ``abscissa`` is the greatest Im ω, gain less loss, and
+    multiplicities are those of H. Inside, the polynomial is that of the real system of twice the size,
+    A = [[J, R], [−R, J]] of H + Ω = R + i J, with a carrier Ω that a `Problem` chooses for its ranges.
+
+    Args:
+        H: square, up to 6 × 6, as nested lists or a NumPy array. An entry is a number, complex too, text as in a
+            problem file such as ``"w - 1j*g"`` or ``"k*exp(1j*phi)"``, an SX, or a tuple of two SX, real and imaginary
+            part. Names stand for real parameters.
+        name, quantities: see `from_matrices`; quantities are real.
+
+    Raises:
+        Unfit: as `from_matrices`.
+
+    Example:
+        >>> dimer = tmsopt.models.from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])  # two lossy modes
+        >>> free = {"d": (-1, 1), "k": (0.1, 2)}
+        >>> found = tmsopt.solve(tmsopt.Problem(dimer, fixed={"g1": 1.0, "g2": 0.2}, free=free, locate="EP2"))
+        >>> found.structure, f"{found.parameters['k']:.6f}"  # an EP2 of H at |g1 - g2|/2
+        ('EP2', '0.400000')
+
+    More: docs/explanation/exceptional_points.md
+    """
+    return made("hamiltonian", name, {"H": square("H", H)}, quantities)
 
 
 def _listed(value: Any) -> list[Any] | None:
@@ -337,18 +362,12 @@ def _node(key: str, where: Any, value: Any) -> Any:
         inputs = ca.symvar(entry := ca.densify(ca.SX(value)))
         names = [x.name() for x in inputs]
         return nodes_of_casadi(ca.Function("entry", [ca.vertcat(ca.SX(0, 1), *inputs)], [entry]), names)[0]
-    number = _number(key, where, value)
-    return constant(Fraction(value) if isinstance(value, Rational) else number)
-
-
-def _number(key: str, where: str, value: Any) -> float:
-    known = isinstance(value, Real) and not isinstance(value, bool)
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise Unfit(key, f"{where}: found {short(value)}; {_ACCEPTED}")
     try:
-        number = float(value) if known else math.nan
+        number = float(value)
     except OverflowError:
         number = math.inf
-    if known and not math.isfinite(number):
+    if not math.isfinite(number):
         raise Unfit(key, f"{where}: is {number}; {_FINITE}")
-    if not known:
-        raise Unfit(key, f"{where}: found {short(value)}; {_ACCEPTED}")
-    return number
+    return constant(Fraction(value) if isinstance(value, Rational) else number)

@@ -6,29 +6,13 @@ from operator import itemgetter
 
 from tmsopt.errors import nearest, suggest
 from tmsopt.models import MODELS, Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.tables import read_table
 from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 
 _NEAR = 0.7  # of a misspelt word; what is less alike is looked for among the meanings first
 
 _USUAL = ((1.0, 0.5, 2.0), (-1.0, -2.0, -0.5), (0.5, 0.2, 1.0))  # a value with a range about it, the first that fits
-
-_SENSE = "minimize or maximize"
-_KEYS = {
-    "objective": {
-        **dict.fromkeys(("optimise", "optimize", "goal", "objective", "target", "function"), _SENSE),
-        **dict.fromkeys(("pattern", "find"), "locate"),
-        "min": "minimize",
-        "max": "maximize",
-    },
-    "": {
-        **dict.fromkeys(("goal", "goals", "target", "optimise", "optimize", "minimise", "maximise"), "objective"),
-        **dict.fromkeys(("minimize", "maximize", "locate", "pareto"), "objective"),
-        **dict.fromkeys(("limits", "bounds"), "constraints"),
-        **dict.fromkeys(("variables", "params"), "parameters"),
-    },
-}
-"""Section → word that others use for one of its keys → that key."""
 
 
 def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity]:
@@ -85,8 +69,8 @@ def example_of(parameter: Parameter) -> tuple[str, str]:
     return f"{parameter.name} = {value}", f"{parameter.name} = {{ min = {low:g}, max = {high:g} }}"
 
 
-def unknown_key(key: str, accepted: Mapping[str, object], section: str = "") -> str:
+def unknown_key(key: str, accepted: Mapping[str, object], section: str = "file") -> str:
     """What to write for a key that a section, or the file itself, does not have."""
-    meant = _KEYS.get(section, {}).get(key.lower())
-    written = f"write {meant if section else f'[{meant}]'}; " if meant else ""
+    meant = read_table("advice")["keys"][section].get(key.lower())
+    written = f"write {f'[{meant}]' if section == 'file' else meant}; " if meant else ""
     return written + suggest(key, accepted)

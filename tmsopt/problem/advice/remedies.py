@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tmsopt.models.expression import written_sides
-from tmsopt.problem.limit import limit_of, with_limit
+from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import unit_of
 from tmsopt.records import Table, plain
@@ -32,10 +32,10 @@ class Relaxation:
             stability is wanted the answer is stable. The smallest change comes first; none where none was found.
     """
 
-    parameters: Table[float] = field(default_factory=Table)
-    amounts: Table[float] = field(default_factory=Table)
+    parameters: Table[float] = Table()
+    amounts: Table[float] = Table()
     conflict: tuple[str, ...] = ()
-    alone: Table[float] = field(default_factory=Table)
+    alone: Table[float] = Table()
     irreducible: bool = False
     remedies: tuple[Table[str], ...] = ()
 
@@ -61,7 +61,7 @@ class Need:
     value: float
     most: bool
     looked: tuple[float, float]
-    design: Table[float] = field(default_factory=Table)
+    design: Table[float] = Table()
     shown: float = math.nan
 
     @property
@@ -114,11 +114,11 @@ def _moved(problem: Posed, name: str, amount: float, digits: int) -> str:
         new = rounded_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
         return f"{new:.{DIGITS}g} {unit.text}".rstrip()
     text = problem.constraints[name]
-    (left, sign, right), limit = written_sides(text), limit_of(text)
+    left, sign, right = written_sides(text)
+    limit = split_limit(text)
     if limit is None:
         more = rounded_outwards(abs(amount), True, digits)
         return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {more:.{DIGITS}g}"
-    on_right = with_limit(text, 0.5) == f"{left} {sign} 0.5"
-    change = -amount if (on_right and sign == ">=") or (not on_right and sign != ">=") else amount
-    new = rounded_outwards(limit + change, change > 0, digits) if abs(limit + change) > _LEFT * abs(limit) else 0.0
-    return f"{left} {sign} {new:.{DIGITS}g}" if on_right else f"{new:.{DIGITS}g} {sign} {right}"
+    change = -amount if (sign == ">=") == bool(limit.before) else amount
+    new, left_of_it = limit.value + change, _LEFT * abs(limit.value)
+    return limit.written(f"{rounded_outwards(new, change > 0, digits) if abs(new) > left_of_it else 0.0:.{DIGITS}g}")

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from tmsopt.models.exact import Exact, constant
+from tmsopt.models.tables import read_table
 
 LONGEST = 80
 """Characters of a number with its unit."""
@@ -23,28 +24,8 @@ could keep a parser busy for ever."""
 
 _OF_TWO = "write its parts as two parameters, kr + 1j*ki in H"
 
-_EXAMPLES = {
-    "1": "a number, or one in quotes such as '8/3' or 'sqrt(2)/2'",
-    "rad": "'5 deg', '0.1 rad' or 'pi/6 rad'",
-    "m": "'40 cm' or '1.2 m'",
-    "kg": "'10 kg' or '500 g'",
-    "m/s": "'15 km/h' or '4 m/s'",
-    "m/s^2": "'9.81 m/s^2'",
-    "s": "'50 ms' or '0.05 s'",
-    "N m/rad": "'20 N m/rad'",
-}
-
-USUAL: Mapping[str, Mapping[str, float]] = {
-    "m": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "inch": 0.0254, "ft": 0.3048},
-    "kg": {"kg": 1.0, "g": 0.001, "t": 1000.0, "lb": 0.4535923700000001},  # as pint has it
-    "m/s": {"m/s": 1.0, "km/h": 5 / 18, "cm/s": 0.01, "ft/s": 0.3048, "mph": 0.44704},
-    "m/s^2": dict.fromkeys(("m/s^2", "m/s**2"), 1.0) | {"cm/s^2": 0.01},
-    "rad": {"rad": 1.0, "mrad": 0.001} | dict.fromkeys(("deg", "degree", "degrees"), math.pi / 180),
-    "s": {"s": 1.0, "ms": 0.001},
-    "N m/rad": {"N m/rad": 1.0},
-    "N m s/rad": {"N m s/rad": 1.0},
-    "kg m^2": {"kg m^2": 1.0, "kg*m^2": 1.0, "kg cm^2": 0.0001},
-}
+_UNITS = read_table("units")
+USUAL: Mapping[str, Mapping[str, float]] = _UNITS["usual"]
 """By unit, how many of it one of another is: those that are written every day, for which pint need not be loaded."""
 
 
@@ -70,7 +51,7 @@ def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0
     Raises:
         ValueError: likewise.
     """
-    accepted = f"accepted: {_EXAMPLES.get(unit, unit)}"
+    accepted = f"accepted: {_UNITS['examples'].get(unit, unit)}"
     if unit != "1":
         accepted += f", or a number without quotes in {unit}"
     if len(text) > LONGEST:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import flint
 import numpy as np
@@ -77,15 +76,19 @@ def every_meeting(
 
 
 def _beside(one: MultipleRoot, other: MultipleRoot) -> bool:
-    size = abs(complex(one.re, one.im)) + abs(complex(other.re, other.im))
-    return abs(complex(one.re - other.re, one.im - other.im)) <= _NEAR * (size or 1.0)
+    a, b = _number(one), _number(other)
+    return abs(a - b) <= _NEAR * (abs(a) + abs(b) or 1.0)
+
+
+def _number(root: Root | MultipleRoot) -> complex:
+    return complex(root.re, root.im)
 
 
 def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
     """The parameters at which located roots cross beside a design: sharper than coefficients see them."""
     roots = _located(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
-    found, _ = _crossed(problem, parameters, complex(root.re, root.im), root.multiplicity, _unit(root, roots))
+    found, _ = _crossed(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
     return {n: min(max(found[n], low), high) for n, (low, high) in problem.free.items()}
 
 
@@ -97,7 +100,7 @@ def _meeting(
         return MultipleRoot(told.re, told.im, k, None, k)
     of = problem.parameter_set
     unit = _unit(root, roots)
-    at, s = _crossed(problem, parameters, complex(root.re, root.im), k, unit)
+    at, s = _crossed(problem, parameters, _number(root), k, unit)
     matrices = pencil(of.native({n: flint.arb(x) for n, x in at.items()}))
     found = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK, unit)
     partial = found.partial or (k - found.geometric + 1,)
@@ -106,7 +109,7 @@ def _meeting(
 
 def _unit(root: Root, roots: Sequence[Root]) -> float:
     """The size of a root in which matrices are weighed."""
-    return max(abs(complex(root.re, root.im)), _UNIT * max(abs(complex(r.re, r.im)) for r in roots)) or 1.0
+    return max(abs(_number(root)), _UNIT * max(abs(_number(r)) for r in roots)) or 1.0
 
 
 def _crossed(
@@ -119,13 +122,15 @@ def _crossed(
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
     widths = np.array([problem.free[n][1] - problem.free[n][0] for n in free])
-    at = [np.array(P, dtype=float) for P in _matrices(problem, parameters)]
-    size, scale = equilibrated(at, unit)
+    size, scale = equilibrated(_matrices(problem, parameters), unit)
     scale = scale / np.linalg.norm(size * scale, 2)  # held, lest it jumps as entries change
 
+    def moved(x: Array) -> dict[str, float]:
+        return {**parameters, **dict(zip(free, x.tolist(), strict=True))}
+
     def weighed(x: Array, z: complex) -> Complex:
-        matrices = _matrices(problem, {**parameters, **dict(zip(free, x.tolist(), strict=True))})
-        whole = sum(np.array(P, dtype=float) * z ** (len(matrices) - 1 - j) for j, P in enumerate(matrices))
+        matrices = _matrices(problem, moved(x))
+        whole = sum(P * z ** (len(matrices) - 1 - j) for j, P in enumerate(matrices))
         return np.asarray(scale * whole, dtype=complex)
 
     for count in range(k, 1, -1):
@@ -135,7 +140,7 @@ def _crossed(
             if count > len(values) or values[-count] > _CLOSE:
                 break
             if values[-count] <= _MET:
-                return {**parameters, **dict(zip(free, x.tolist(), strict=True))}, z
+                return moved(x), z
             step = _step(weighed, x, widths, z, unit, left[:, -count:], right[-count:])
             x, z = x + widths * step[:-2], z + unit * complex(*step[-2:])
             if (np.abs(x - [parameters[n] for n in free]) > _REACH * widths).any():
@@ -143,9 +148,10 @@ def _crossed(
     return parameters, s
 
 
-def _matrices(problem: Posed, parameters: Mapping[str, float]) -> Sequence[Any]:
+def _matrices(problem: Posed, parameters: Mapping[str, float]) -> list[Array]:
     assert problem.model.pencil is not None
-    return problem.model.pencil(problem.parameter_set.native(dict(parameters)))
+    found = problem.model.pencil(problem.parameter_set.native(dict(parameters)))
+    return [np.array(P, dtype=float) for P in found]
 
 
 def _step(

@@ -63,13 +63,8 @@ def power_of_t(longest: int) -> str:
     return "" if longest < 2 else "t" if longest == 2 else f"t^{longest - 1}"
 
 
-def longest_chain(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int:
-    """Length of the longest Jordan chain on the rightmost line; 1 for simple roots."""
-    return longest_on_line(meetings, abscissa, largest) or 1
-
-
 def longest_on_line(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int | None:
-    """The same; None where no root on the rightmost line is multiple."""
+    """Length of the longest Jordan chain on the rightmost line; None where no root on it is multiple."""
     return max((m.longest for m in meetings if m.re >= abscissa - _LINE * largest), default=None)
 
 
@@ -111,7 +106,7 @@ def stability(
     told = min(_TIMES * abs(ends[0] - ends[1]), _FAINT * largest)
     if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > told:
         return StabilityVerdict(STABLE if max(ends) < 0 else UNSTABLE)
-    growth = power_of_t(longest_chain(meetings, ends[0], largest))
+    growth = power_of_t(longest_on_line(meetings, ends[0], largest) or 1)
     return StabilityVerdict(GROWING if growth else EDGE if "infinity" in edges else MARGINAL, growth)
 
 

@@ -1,0 +1,12 @@
+"""Tables of this package that are files of their own."""
+
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+
+@cache
+def read_table(name: str) -> dict[str, Any]:
+    """The tables of a TOML file, such as ``advice`` or ``bicycles/tms``."""
+    return tomllib.loads((files(__package__) / f"{name}.toml").read_text(encoding="utf-8"))
