@@ -22,7 +22,8 @@ from benchmarks.suites.varied_designs import varied_problem
 from benchmarks.timing import over_processes
 
 _STATUSES = ("optimal", "infeasible", "not_converged")
-_DROPPED = """Gone on 2026-11-28, with how often they stepped in on these problems: multiple roots (654; kept where sectors
+_DROPPED = """\
+Gone on 2026-11-28, with how often they stepped in on these problems: multiple roots (654; kept where sectors
 and half-planes meet), through a0 = 0 (248), ideal roots (55), opposite faces (5), attained ends (2), and the
 least abscissa as a start. One by now: start kept (59), off the edge (48) and nudge (12), as *aside*;
 unbounded (15) and runaway (6), in the judgement of an end. Stages by now: restarts, basins, designs sought
