@@ -38,7 +38,7 @@ def check_end(state: SearchState, end: LocalEnd) -> CheckedEnd:
 
 
 def check_again(state: SearchState, trial: CheckedEnd) -> CheckedEnd:
-    """The end that another stage accepts, whatever it says of it: inside the box, and rechecked."""
+    """An end inside the box and rechecked, whatever a stage or a rescue says of it."""
     inside = {n: min(max(trial.parameters[n], low), high) for n, (low, high) in state.part.free.items()}
     parameters = state.problem.ordered(inside)
     return replace(trial, parameters=parameters, checked=recheck(state.problem, parameters, trial.end.nlp.cases))

@@ -21,7 +21,7 @@ from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import designs, initial_point
 from tmsopt.records import Array, Table
 from tmsopt.roots import Root
-from tmsopt.search.accept import claim_matches, has_converged
+from tmsopt.search.accept import check_again, claim_matches, has_converged
 from tmsopt.search.newton import solutions
 from tmsopt.search.state import CheckedEnd, SearchState
 from tmsopt.search.tuning import Tuning
@@ -75,7 +75,7 @@ def found(state: SearchState, starts: Starts, cases: Sequence[Case] | None = Non
     """The best of a search with its status, in the given cases or those of its program; None without a feasible one."""
     if state.best is None:
         return None
-    problem, trial = state.problem, state.best
+    problem, trial = state.problem, check_again(state, state.best)
     parameters, nlp = trial.parameters, trial.end.nlp
     checked = trial.checked if cases is None else recheck(problem, parameters, cases)
     counted = degrees_of_freedom(problem)

@@ -11,7 +11,7 @@ from typing import Any
 from tmsopt.errors import Fault, InputError, refusal, short, suggest
 from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
-from tmsopt.search.accept import accept_best, check_again, is_better
+from tmsopt.search.accept import is_better
 from tmsopt.search.sample import Sample
 from tmsopt.search.starts import is_led
 from tmsopt.search.state import LocalEnd, SearchState, Start
@@ -107,7 +107,7 @@ def search(state: SearchState, policy: Policy) -> SearchState:
         state = replace(state, tuning=policy.tuning)
         state = replace(state, sample=state.sample or policy.sample(state))
         begin(state.options.progress, "searching", "start")
-        state = accept(policy, try_starts(state, policy.starts(state), policy))
+        state = policy.accept(try_starts(state, policy.starts(state), policy))
         for rescue in policy.rescues:
             if not state.interrupted and rescue.applies(state):
                 state = rescue.run(state, policy)
@@ -131,20 +131,12 @@ def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most
     return state
 
 
-def accept(policy: Policy, state: SearchState) -> SearchState:
-    """The state with the best of its ends; what a stage of the user's accepts is rechecked."""
-    state = policy.accept(state)
-    if state.best is None or policy.accept is accept_best:
-        return state
-    return replace(state, best=check_again(state, state.best))
-
-
 def search_again(
     state: SearchState, policy: Policy, starts: Iterable[Start] | None = None, nlp: NLP | None = None, most: int = 0
 ) -> SearchState:
     """The search with more starts, perhaps on another program: their ends are added, and the better design is kept."""
     own = state.with_program(nlp or state.nlp)
-    own = accept(policy, try_starts(own, policy.starts(own) if starts is None else starts, policy, most))
+    own = policy.accept(try_starts(own, policy.starts(own) if starts is None else starts, policy, most))
     ends = (*state.ends, *own.ends)
     better = own.best and (state.best is None or is_better(state.problem, own.best, state.best))
     if better:

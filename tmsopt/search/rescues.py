@@ -21,7 +21,7 @@ from tmsopt.search.accept import check_end, claim_matches, is_better, is_sound
 from tmsopt.search.enough import distinct_ends
 from tmsopt.search.local import run_once
 from tmsopt.search.outcome import KEPT, mass_advice, runs_away
-from tmsopt.search.policy import Policy, Rescue, accept, search_again, try_all, try_starts
+from tmsopt.search.policy import Policy, Rescue, search_again, try_all, try_starts
 from tmsopt.search.sample import Looked, draw_box, sample_box
 from tmsopt.search.starts import sample_starts
 from tmsopt.search.state import CheckedEnd, Fallback, SearchState, Start
@@ -252,7 +252,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
             own = state.with_program(replace(nlp, row_lower=lower))
             own = try_starts(own, [Start(state.design_at(reached))], try_all(policy))
-        own = accept(policy, own)
+        own = policy.accept(own)
         if own.best is None or own.best.checked.violations or is_merged(own.best):
             near = best is not None and runs_away(best.checked.structure.roots, tuning.far_root)
             if best is not None and near and singular and reached.objective < least_worth(state):

@@ -14,7 +14,7 @@ from tmsopt.records import Table
 from tmsopt.search.accept import is_better
 from tmsopt.search.enough import count_starts, distinct_ends
 from tmsopt.search.outcome import Outcome, found, listed_cases
-from tmsopt.search.policy import Policy, accept, search, try_starts
+from tmsopt.search.policy import Policy, search, try_starts
 from tmsopt.search.radius import RADIUS_POLICY
 from tmsopt.search.state import CheckedEnd, SearchState, Start, same_objective
 
@@ -43,11 +43,11 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
         ours = [best.parameters] if best is trial else [best.parameters, trial.parameters]
         leaders = _apart(problem, [*ours, *_leaders(state)], tuning.alike_designs)
         state = state.with_program(formulate(state.part, (*trial.end.nlp.cases, *more)))
-        state = accept(policy, try_starts(state, (Start(d) for d in leaders), every))
+        state = policy.accept(try_starts(state, (Start(d) for d in leaders), every))
         if _is_lost(state, leaders):
-            state = accept(policy, try_starts(state, (Start(d, near=False) for d in leaders), every))
+            state = policy.accept(try_starts(state, (Start(d, near=False) for d in leaders), every))
             if not problem.asks_radius and _is_lost(state, leaders):
-                state = accept(policy, try_starts(state, policy.starts(state), policy))
+                state = policy.accept(try_starts(state, policy.starts(state), policy))
         if state.interrupted:
             break
     if state.best is None:

@@ -16,7 +16,7 @@ from tmsopt.progress import begin
 from tmsopt.search.accept import accept_best
 from tmsopt.search.enough import count_starts
 from tmsopt.search.outcome import Outcome, as_it_is, beats, found, mass_advice, runs_away
-from tmsopt.search.policy import Policy, accept, try_all, try_starts
+from tmsopt.search.policy import Policy, try_all, try_starts
 from tmsopt.search.remedies.changes import relax
 from tmsopt.search.remedies.needs import irreducible, steady
 from tmsopt.search.search import POLICY, search_whole
@@ -52,7 +52,7 @@ def explain_none(problem: Posed, states: Sequence[SearchState], policy: Policy) 
         status, note = "infeasible", f"{none} satisfies all constraints"
     else:
         whole = SearchState(problem, problem, formulate(problem, problem.cases), options, policy.tuning)
-        whole = accept(policy, try_starts(whole, (Start(design, near) for near in (True, False)), try_all(policy)))
+        whole = policy.accept(try_starts(whole, (Start(design, near) for near in (True, False)), try_all(policy)))
         if outcome := found(whole, Starts(tried + 2, len(whole.feasible), 1, runs=2)):
             return outcome
         advice = f"try more starts, give one, or {mass_advice(problem)}"
