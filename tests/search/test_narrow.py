@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import tmsopt
+from benchmarks.suites import hard_problem
+from benchmarks.suites.narrow_optima import hidden, references
 
 TRIPLE = """[model]
 M = [[1, 0], [0, 1]]
@@ -51,3 +53,24 @@ def test_a_well_of_exponentials_beside_zero_is_found(seed, tmp_path):
     path = tmp_path / "well.toml"
     path.write_text(WELL, encoding="utf-8")
     assert tmsopt.solve(path, seed=seed).value == pytest.approx(-2.5, abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [78, 179])  # a root at 0 beside a double pair; a start that its run leaves
+def test_an_optimum_is_not_lost_after_it_was_met(number, tmp_path):
+    """The best of 60,000 designs, polished by SciPy on the eigenvalues, is no better."""
+    path = tmp_path / "hidden.toml"
+    path.write_text(hidden(number).text, encoding="utf-8")
+    found = tmsopt.solve(path, stability=0.0)
+    sign = found.problem.posed.sign
+    assert sign * found.value <= sign * references()[number].value + 1e-7
+
+
+@pytest.mark.slow
+def test_ends_that_claim_more_do_not_hide_the_one_that_is_what_it_claims():
+    """A damping ratio is to be 0.0557, which two of three optima only claim; a root of the third is 0."""
+    found = tmsopt.solve(hard_problem(175, 3))
+    roots = np.roots([float(a) for a in found.problem.posed.values(found.parameters).coefficients])
+    swinging = roots[np.abs(roots.imag) > 1e-3]
+    assert -swinging.real / np.abs(swinging) == pytest.approx(0.0557, abs=1e-8)
+    assert np.all(roots.real <= 1e-9)
