@@ -120,7 +120,7 @@ Examples:
   python -m benchmarks --quick             small sizes, a few minutes, kept nowhere
   python -m benchmarks --only a,growth     two of them
   python -m benchmarks --only solve        a long one: 200 random designs beside SciPy
-  python -m benchmarks --only hard --without appeals
+  python -m benchmarks --only hard --without aside
   python -m benchmarks --output mine.md    kept in another file
 
 Every ratio compares times of the same run. Other load on the machine spoils them: each section says how much there was.

@@ -202,8 +202,8 @@ def test_rescues_are_left_out_by_name():
     for name in names:
         assert [rescue.name for rescue in POLICY.without(name).rescues] == [n for n in names if n != name]
         assert POLICY.without(name).tuning == POLICY.tuning
-    with pytest.raises(InputError, match="no rescue is called 'apeals'; did you mean 'appeals'"):
-        POLICY.without("apeals")
+    with pytest.raises(InputError, match="no rescue is called 'asid'; did you mean 'aside'"):
+        POLICY.without("asid")
 
 
 def test_a_rescue_of_ones_own_steps_in_after_the_loop():

@@ -253,7 +253,7 @@ def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
     points = [box.space.points(design) for design in state.designs]
     apart = [u for u in points if np.abs(u - own).max() > tuning.same_design]
     for design in box.designs(
-        box.look(np.array(apart).reshape(-1, box.space.size)).better(least).best(tuning.appealed)
+        box.look(np.array(apart).reshape(-1, box.space.size)).better(least).best(tuning.rivals_seen)
     ):
         other = as_it_is(problem, design, BEATEN)
         merged = abs(other.checked.structure.abscissa - other.checked.realised)  # what merging roots may gain

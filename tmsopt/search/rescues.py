@@ -9,11 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tmsopt.evaluation.bound import bounded
 from tmsopt.evaluation.digits import certified_numbers
-from tmsopt.global_search.signs import none_stable
 from tmsopt.models.user_spectrum import full_patterns
-from tmsopt.problem.dependence import STABLE, WORSE_DIRECTION
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.program.formulate import formulate, matching
 from tmsopt.program.starts import designs
@@ -22,7 +19,7 @@ from tmsopt.search.enough import distinct_ends
 from tmsopt.search.local import run_once
 from tmsopt.search.outcome import KEPT, mass_advice, runs_away
 from tmsopt.search.policy import Policy, Rescue, search_again, try_all, try_starts
-from tmsopt.search.sample import Looked, draw_box, sample_box
+from tmsopt.search.sample import Looked, sample_box
 from tmsopt.search.starts import sample_starts
 from tmsopt.search.state import CheckedEnd, Fallback, SearchState, Start
 
@@ -83,15 +80,6 @@ def maximises_damping(state: SearchState) -> bool:
     return (state.problem.maximize or "").strip() == "damping_ratio"
 
 
-def leave_plateau(state: SearchState, policy: Policy) -> SearchState:
-    """Starts at designs of least abscissa: the damping ratio is −1 until no root is positive."""
-    problem, part = (p.derive(minimize="abscissa", maximize=None) for p in (state.problem, state.part))
-    other = replace(state.with_program(formulate(part, state.nlp.cases)), problem=problem, part=part)
-    other = try_starts(other, policy.starts(other), policy, state.tuning.fewer)
-    leads = [Start(state.design_at(end)) for end in distinct_ends(other.ends)]
-    return search_again(state, try_all(policy), leads)
-
-
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
     """Exceptional points nearest to other starts, where roots only cross nearest to the first."""
     part = state.part
@@ -123,20 +111,6 @@ def least_worth(state: SearchState, lost: float | None = None) -> float:
         return math.inf
     worth = state.problem.sign * best.checked.objective
     return worth - lost * (best.end.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
-
-
-def appeal(state: SearchState, policy: Policy) -> SearchState:
-    """Starts from designs that are better than the best end, as long as that helps."""
-    for _ in range(state.tuning.appeals):
-        rivals = rivals_of(state)
-        if not rivals or not state.sample:
-            break
-        before = state.best
-        starts = (Start(design) for design in state.sample.box.designs(rivals.best(state.tuning.appealed)))
-        state = search_again(state, try_all(policy), starts)
-        if state.best is before:
-            break
-    return state
 
 
 def claims_more(state: SearchState) -> bool:
@@ -175,7 +149,7 @@ def _designs_beside(state: SearchState, design: Mapping[str, float], objective: 
     box, tuning = state.sample.box, state.tuning
     own = box.space.points(design)
     random = box.stream("aside").random((tuning.towards, len(own)))
-    towards = np.concatenate([state.sample.refined.u[: tuning.appealed], random])
+    towards = np.concatenate([state.sample.refined.u[: tuning.rivals_seen], random])
     seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
     close = (seen.violation == 0) & (np.abs(seen.worth - objective) <= tuning.edge * (1 + abs(objective)))
     rows = np.flatnonzero(close)  # from far to near: far ones may be worth less, of near ones rounding decides
@@ -283,48 +257,6 @@ def is_merged(trial: CheckedEnd) -> bool:
     return abs(ideal - stored) > trial.tuning.merged * abs(ideal)
 
 
-# Stability
-
-
-def wants_stability(state: SearchState) -> bool:
-    """Whether no stable design was found though the objective or a constraint is about the roots."""
-    problem, best = state.problem, state.best
-    if best is None or state.sample is None or state.stable_elsewhere or best.checked.structure.abscissa < 0:
-        return False
-    asked = (problem.objective, *problem.conditions.values())
-    return any(set(WORSE_DIRECTION) & set(e.names) for e in asked if e) and not none_stable(state.part)
-
-
-def search_stable(state: SearchState, policy: Policy) -> SearchState:
-    """Starts from designs sought for their stability alone; and all the others, where there is any such."""
-    assert state.sample is not None
-    part, tuning, seed = state.part, state.tuning, state.options.seed + 1
-    limits = {**part.constraints, STABLE: "abscissa <= 0"}
-    asked = part.derive(minimize="abscissa", maximize=None, constraints=limits)
-    if bounded(part):  # without limits the boldest designs show whether any is near the axis
-        box = draw_box(asked.derive(constraints={}), seed, tuning)
-        if not np.any(box.refine(box.look(state.sample.boldest.u)).worth < 0):
-            return state
-    sample = sample_box(asked, seed, tuning)
-    found = [(sample.refined, True), (sample.boldest, False)]
-    stable = [(seen.take(np.flatnonzero(seen.worth < 0)[: tuning.stable]), near) for seen, near in found]
-    starts = [Start(design, near) for seen, near in stable for design in sample.box.designs(seen)]
-    if not starts:
-        return state
-    others = [start for start in policy.starts(state) if start not in [end.start for end in state.ends]]
-    state = search_again(state, try_all(policy), starts)
-    if state.best and state.best.checked.structure.abscissa < 0:
-        return state
-    return search_again(state, replace(policy, enough=_is_stable_or_hopeless), others)
-
-
-def _is_stable_or_hopeless(state: SearchState) -> bool:
-    """Whether a start ended left of the axis, where that is the goal, or too many ended nowhere."""
-    last = state.ends[-1]
-    left = bounded(state.part) and last.feasible and last.objective < 0
-    return left or len(state.ends) - len(state.feasible) >= 2 * state.tuning.hopeless
-
-
 RESCUES = (
     Rescue(
         "other chains",
@@ -336,13 +268,10 @@ RESCUES = (
         ),
         search_other_chains,
     ),
-    Rescue("off plateau", "", lambda s: s.best is None and maximises_damping(s), leave_plateau),
     Rescue("real roots", "hard 3", is_mixed, search_real_roots),
     Rescue("positive roots", "hard 7, systems 1, variety 4", may_have_positive_roots, search_positive_roots),
-    Rescue("appeals", "", lambda s: bool(rivals_of(s)), appeal),
     Rescue("aside", "narrow 14, hard 4, variety 1", claims_more, move_aside),
     Rescue("infinity", "hard 9", is_open, search_singular),
-    Rescue("stability", "", wants_stability, search_stable),
     Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.fallback is None, keep_rival),
 )
 """In the order in which they are asked."""

@@ -150,13 +150,9 @@ def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[Found]:
         begin(states[0].options.progress, "looking at designs")
         states = [replace(state, sample=policy.sample(state)) for state in states]
     found: dict[str, Found] = {}
-    stable = False
     for state in sorted(states, key=lambda state: state.sample.first if state.sample else (0.0, 0.0)):
-        end, outcome = search_part(replace(state, stable_elsewhere=stable), policy)
-        found[state.side] = end, outcome
-        checked = outcome.checked if outcome else None
-        stable |= checked is not None and not checked.violations and checked.structure.abscissa < 0
-        if end.interrupted:
+        found[state.side] = search_part(state, policy)
+        if found[state.side][0].interrupted:
             break
     return [found[state.side] for state in states if state.side in found]
 

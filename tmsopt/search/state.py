@@ -144,7 +144,6 @@ class SearchState:
         ends: where starts ended, in order.
         accepted: how many of these were considered for `best`.
         best: the best of these that passed the recheck, or that fails it least.
-        stable_elsewhere: whether another part of the box is known to have a stable design.
         fallback: the design to be given in place of `best`, which is no optimum either.
         interrupted: whether the user ended the search.
 
@@ -172,7 +171,6 @@ class SearchState:
     ends: tuple[LocalEnd, ...] = ()
     accepted: int = 0
     best: CheckedEnd | None = None
-    stable_elsewhere: bool = False
     fallback: Fallback | None = None
     interrupted: bool = False
 

@@ -102,8 +102,9 @@ class Tuning:
     leads: int = number(3, "designs", "with roots of full multiplicity that are started from", "hard")
     leadless: int = number(4, "starts", "that led to none, after which no more are tried", "hard")
     chains: int = number(16, "starts", "for an exceptional point where the nearest one is a crossing", "statements")
-    appeals: int = number(8, "times", "that better designs are started from", "hard")
-    appealed: int = number(2, "designs", "that are started from each time", "hard")
+    rivals_seen: int = number(
+        2, "designs", "better than the best end, towards which others lie", "hard"
+    )
     lost: float = number(1e-7, "relative", "difference of the objective that makes a design better", "hard")
     asides: int = number(3, "optima", "the best that ends claim, beside which designs are looked for", "hard")
     hairs: tuple[float, ...] = number(
@@ -131,7 +132,6 @@ class Tuning:
     runaway: float = number(1e7, "times the middle root", "size of a root at infinity in all but name", "hard")
     endless: float = number(1e6, "spreads of the objective", "beyond which it has no lower bound", "hard")
     merged: float = number(2e-3, "relative", "more than roots next to a 4-fold one are off in doubles", "hard")
-    stable: int = number(16, "designs", "sought for stability that are started from, of either kind", "random")
 
     # Cases, radius
     rounds: int = number(12, "times", "that cases are added; each shrinks the worst one to its square", "variety")

@@ -106,7 +106,7 @@ def _reached(problem: Posed, options: Options, names: Sequence[str]) -> tuple[Ma
     kept = problem.derive(constraints={n: text for n, text in problem.constraints.items() if n in names}, pareto=())
     if kept.objective and (RADIUS in kept.objective.names or not (kept.pattern or set(names) & {*kept.asked_of_roots})):
         kept = kept.derive(minimize=None, maximize=None)
-    states = [replace(s, stable_elsewhere=True) for s in begin_search(kept, options)]
+    states = begin_search(kept, options)
     about = kept.asked_of_roots or kept.pattern
     if about and any(seen.singular for s in states if (seen := POLICY.sample(s) or s.limits_sample)):
         return None, False
