@@ -46,14 +46,16 @@ def with_led(state: SearchState, end: LocalEnd) -> LocalEnd:
     """An end with the designs of the sample, not led before, from which a straight way falls to it."""
     if not (state.sample and end.feasible and state.part.objective) or state.options.exhaustive:
         return end
-    if is_proven(state, end):
-        return end
     tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
+    place = box.space.points(state.design_at(end))
+    known = (box.space.points(state.design_at(other)) for other in state.feasible)
+    if is_proven(state, end) or any(np.abs(place - other).max() <= tuning.same for other in known):
+        return end  # there are no more starts, or the ways to this design have been looked at
     left = [row for row in state.left if row != end.start.row]
     seen, near = leaders.take(np.array(left, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
     if not left:
         return end
-    place, shares = box.space.points(state.design_at(end)), np.arange(1, 8)[:, None] / 8
+    shares = np.arange(1, 8)[:, None] / 8
     way = box.look((seen.u[:, None] + shares * (place - seen.u[:, None])).reshape(-1, box.space.size))
     worth, violation = (x.reshape(len(left), -1) for x in (way.worth, way.violation))
     gain = seen.worth - end.objective
