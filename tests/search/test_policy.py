@@ -206,6 +206,22 @@ def test_rescues_are_left_out_by_name():
         POLICY.without("asid")
 
 
+def test_a_start_may_leave_out_parameters():
+    """They are where the problem starts, or in the middle."""
+    local, seen = POLICY.local, []
+
+    def noted(state, start):
+        seen.append(dict(start.design))
+        return local(state, start)
+
+    policy = replace(POLICY, starts=lambda state: iter([tmsopt.Start({"m": 3.0})]), local=noted)
+    asked = tmsopt.Problem(
+        from_coefficients(["m", "c", 1]), free={"m": (1, 4), "c": (0, 4)}, start={"c": 3.5}, minimize="abscissa"
+    )
+    tmsopt.solve(asked, policy=policy, throw=False)
+    assert seen[0] == {"m": 3.0, "c": 3.5}
+
+
 def test_a_rescue_of_ones_own_steps_in_after_the_loop():
     """The starts know the right well alone; the rescue starts on the left."""
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tmsopt.errors import Fault, InputError, refusal, short, suggest
+from tmsopt.program.formulate import middle
 from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
 from tmsopt.search.accept import is_better
@@ -119,8 +120,9 @@ def search(state: SearchState, policy: Policy) -> SearchState:
 def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most: int = 0) -> SearchState:
     """The state after these starts, as far as they are needed."""
     most = most or state.options.starts
+    whole = (replace(start, design={**middle(state.part), **start.design}) for start in starts)
     try:
-        for tried, start in enumerate((s for s in starts if not is_led(state, s)), start=1):
+        for tried, start in enumerate((s for s in whole if not is_led(state, s)), start=1):
             state = replace(state, ends=(*state.ends, policy.local(state, start)))
             if state.options.progress:
                 state.options.progress(tried, most, state.so_far)

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tmsopt.program.formulate import middle
 from tmsopt.program.starts import designs
 from tmsopt.search.enough import is_proven
 from tmsopt.search.sample import Sample, sample_box
@@ -23,9 +22,9 @@ def propose_starts(state: SearchState) -> Iterator[Start]:
     """Starts in their order: the best refined design, the boldest one, the next refined one, and so on."""
     part = state.part
     if state.options.near:
-        yield Start({**middle(part), **state.options.near})
+        yield Start(state.options.near)
     if part.start:
-        yield Start(middle(part))
+        yield Start(part.start)
     yield from (Start(design) for design in state.extra if state.holds(design))
     if state.sample:
         yield from sample_starts(state.sample)

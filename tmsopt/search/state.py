@@ -24,6 +24,7 @@ class Start:
     """A design to start from.
 
     Attributes:
+        design: free parameters; one that is left out is at the start of the problem, or in the middle of its range.
         near: whether it may be close to an optimum.
         row: of the sample's designs; -1 for another one.
 
