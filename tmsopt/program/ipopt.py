@@ -78,7 +78,7 @@ class Point:
     rounding: float = 0.0
 
 
-def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterations: int = 80) -> Callable[..., Run]:
+def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterations: int = 150) -> Callable[..., Run]:
     """A solver of one NLP: start, and other limits if wanted → run.
 
     `start` says what to expect of starts: ``far`` from a solution, ``exact`` in the equations, or ``near`` a solution.
@@ -119,7 +119,7 @@ def _solver(
         "calc_lam_p": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
-        "ipopt.tol": 1e-9,
+        "ipopt.tol": 1e-12,
         "ipopt.bound_relax_factor": 0.0,
         "ipopt.obj_scaling_factor": objective,
         **dict(asked),
