@@ -24,7 +24,6 @@ from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
 from tmsopt.program.boundary_points import lift_displacements, lift_feet
-from tmsopt.program.flat import remove_even_powers
 from tmsopt.program.kinks import epigraph_form
 from tmsopt.program.lifts import (
     Lifted,
@@ -77,9 +76,7 @@ def formulate(
     """
     located = matching(problem, cases=cases) if problem.pattern else None
     nlp = located or abscissa(problem, cases, elastic, damping_ratio, lead)
-    return epigraph_form(
-        nlp if elastic else remove_even_powers(nlp, problem.constraints), needs_two_sided_bounds(problem)
-    )
+    return epigraph_form(nlp, needs_two_sided_bounds(problem))
 
 
 def abscissa(
