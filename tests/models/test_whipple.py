@@ -241,7 +241,7 @@ def test_crossings_of_small_polynomials():
     ]
     assert found.stable == ((0, 5),)
     assert found.heavily_damped == ((2, 5),)
-    mirrored = crossings([one, [0], y], -1, None)
+    mirrored = crossings([one, [0], y], -1, math.inf)
     assert mirrored.always == ("weave",)
     assert {c.kind for c in mirrored.found} == {"capsize", "EP2"}
     # (s² + 2s + 5)² + y: complex pairs that meet; y s + 1: a root that comes back from infinity

@@ -6,9 +6,10 @@ of the discriminant. These are isolated in ball arithmetic, so that none is miss
 that hold for every y, such as a root 0, are split off before.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import prod
+from itertools import pairwise
 from typing import Any
 
 import flint
@@ -79,19 +80,15 @@ class Crossings:
     zeros: int = 0
 
 
-def crossings(
-    coefficients: Sequence[Polynomial], lower: Any, upper: Any | None, bands_alone: bool = False
-) -> Crossings:
-    """All crossings with lower < y < upper, in exact numbers; without an upper end where that is None.
+def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_alone: bool = False) -> Crossings:
+    """All crossings with lower < y < upper, in exact numbers; without an upper end where that is inf.
 
     Args:
         coefficients: of the polynomial in s, descending, each a polynomial in y.
         bands_alone: what roots do where bands end, which takes most of the time, is not looked at.
     """
-    lower, upper = rational(lower), None if upper is None else rational(upper)
-    degree = len(coefficients) - 1
-    terms = {(degree - k, j): x for k, c in enumerate(coefficients) for j, x in enumerate(map(rational, c))}
-    p = _RING.from_dict({powers: x for powers, x in terms.items() if x != 0})
+    lower, upper = rational(lower), None if upper == math.inf else rational(upper)
+    p = _bivariate([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
     a, split = _rows(p), _split(p)
     places = {kind: _real_places(q, lower, upper) for kind, q in _conditions(a, split).items() if not q.is_zero()}
     named = {} if bands_alone else places
@@ -104,7 +101,7 @@ def crossings(
     marginal = [any(lasting.values()) and _marginal(split, middle) for _, _, middle in cells]
     kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
     changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
-    always = {"infinity": len(a) <= degree} | lasting
+    always = {"infinity": len(a) < len(coefficients)} | lasting
     return Crossings(
         tuple(Crossing(float(y), kind, root, first, changed[float(y)]) for y, kind, root, first in found),
         _bands(cells, [stable for stable, _ in states]),
@@ -115,20 +112,16 @@ def crossings(
     )
 
 
-def told(model: Model, found: Crossings) -> Crossings:
+def user_crossings(model: Model, found: Crossings) -> Crossings:
     """Crossings of the polynomial as the user reads them: of a complex system those of its eigenfrequencies."""
     if model.carrier is None:
         return found
-    return replace(found, found=each_told(model, found.found), heavily_damped=())
-
-
-def each_told(model: Model, found: Iterable[Crossing]) -> tuple[Crossing, ...]:
-    """The same of single ones."""
-    if model.carrier is None:
-        return tuple(found)
-    own = [c for c in found if c.kind not in ("capsize", "infinity")]
-    roots = [user_roots(model, [replace(c.root, im=-c.root.im)])[0] for c in own]
-    return tuple(replace(c, kind=user_structure_name(model, c.kind), root=z) for c, z in zip(own, roots, strict=True))
+    own = tuple(
+        replace(c, kind=user_structure_name(model, c.kind), root=user_roots(model, [replace(c.root, im=-c.root.im)])[0])
+        for c in found.found
+        if c.kind not in ("capsize", "infinity")
+    )
+    return replace(found, found=own, heavily_damped=())
 
 
 @dataclass(frozen=True)
@@ -156,7 +149,7 @@ def _split(p: Any) -> _Split:
     zeros = int(min(power for power, _ in p.monoms()))
     p /= _S**zeros
     factors = [(f, times) for f, times in p.factor_squarefree()[1] if f.degrees()[0] > 0]
-    once = prod((f for f, _ in factors), start=_S**0)
+    once = math.prod((f for f, _ in factors), start=_S**0)
     mirrored = once.gcd(once.compose(-_S, _Y))
     repeats_mirrored = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
     rest, single = _rows(once / mirrored), _rows(once * _S if zeros else once)
@@ -177,17 +170,15 @@ def _conditions(a: Sequence[Any], split: _Split) -> dict[str, Any]:
 
 def _bivariate(rows: Sequence[Any]) -> Any:
     """A polynomial in s and y from its coefficients, ascending in s."""
-    terms = {(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row.coeffs())}
-    return _RING.from_dict({powers: x for powers, x in terms.items() if x != 0})
+    return _RING.from_dict({(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row.coeffs())})
 
 
 def _rows(p: Any) -> list[Any]:
     """Coefficients of a polynomial in s and y, descending in s, as polynomials in y."""
-    degree, width = p.degrees()
-    rows = [[flint.fmpq(0)] * (width + 1) for _ in range(degree + 1)]
+    rows = [flint.fmpq_poly() for _ in range(p.degrees()[0] + 1)]
     for (i, j), value in p.to_dict().items():
-        rows[degree - i][j] = value
-    return [flint.fmpq_poly(row) for row in rows]
+        rows[-1 - i][j] = value
+    return rows
 
 
 def _at(rows: Sequence[Any], y: Any) -> list[Any]:
@@ -213,7 +204,7 @@ def _marginal(split: _Split, y: Any) -> bool:
 def _named(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
     """What is at a place: kind, root, whether rightmost. A mirrored pair that is real is nothing."""
     if kind == "infinity":
-        yield kind, Root(float("nan"), 0.0), False
+        yield kind, Root(math.nan, 0.0), False
         return
     coefficients = _finite_part(_at(a, y))
     size = _size(a, y, coefficients)
@@ -283,10 +274,9 @@ def _state(coefficients: Sequence[Any]) -> tuple[bool, bool]:
 
 def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
     """The gaps between marks: both ends, and a number between them."""
-    ends = [lower, *marks]
-    for low, high in zip(ends, [*marks, upper], strict=True):
+    for low, high in pairwise([lower, *marks, upper]):
         if high is None:
-            yield float(low), float("inf"), low + 1 + abs(low)
+            yield float(low), math.inf, low + 1 + abs(low)
         else:
             yield float(low), float(high), (low + high) / 2
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.algebra.balls import exact
-from tmsopt.dynamics.crossings import Crossing, Stretch, crossings, each_told, told
+from tmsopt.dynamics.crossings import Crossing, Crossings, Stretch, crossings, user_crossings
 from tmsopt.dynamics.modes import Mode, modes
 from tmsopt.dynamics.speeds import coefficients_over, speed_of
-from tmsopt.errors import Fault, InputError, is_number, short, suggest
+from tmsopt.dynamics.system import is_bicycle
+from tmsopt.errors import InputError, is_number, refusal, short, suggest
 from tmsopt.models import Model, Parameter, ParameterSet, Values
 from tmsopt.models.user_spectrum import user_root_array
 from tmsopt.problem.files import Given
@@ -120,25 +120,25 @@ def growth(
     design = solved_first(design, progress)
     start_steps(progress, "following the roots")
     if not (end is None or (is_number(end) and end != 0)):
-        raise InputError([Fault(f"found {short(end)}; accepted: a number other than 0", ("end",))])
+        raise refusal(f"found {short(end)}; accepted: a number other than 0", "end")
     of, parameters, name = _written(design, over)
     model = design.problem.model
     known = f"{name}_c" in model.quantity_names(of)
     at, critical = parameters[name], float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
     speed = name in SPEEDS
     low, high = _ends(design, name, end, at)
+    is_open, is_polynomial = speed and end is None, True
     try:
         a = coefficients_over(design.problem.posed, of, parameters, name)
-        met = told(model, crossings(a, exact(low), None if speed and end is None else exact(high)))
-    except InputError:  # no polynomials in it
-        met = None
-    if speed and end is None and met is not None:
-        high = _last(met.found, at)
-    if met is not None:
-        events = tuple(c for c in met.found if low < c.at < high)
-    else:
+        met = crossings(a, low, math.inf if is_open else high)
+    except InputError:
+        is_open = is_polynomial = False
         steps = np.linspace(low, high, _POINTS)
-        events = each_told(model, _changes(lambda x: _numbers(model, of, {**parameters, name: x}), steps))
+        met = Crossings(tuple(_changes(lambda x: _numbers(model, of, {**parameters, name: x}), steps)), (), ())
+    met = user_crossings(model, met)
+    if is_open:
+        high = _last(met.found, at)
+    events = tuple(c for c in met.found if low < c.at < high)
     centres = [at, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
     grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
@@ -148,7 +148,7 @@ def growth(
     shown = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity can be shown
     values, c = values[shown], c[shown]
     found = roots(c)
-    if met is not None:
+    if is_polynomial:
         stable, heavily_damped = _within(met.stable, low, high), _within(met.heavily_damped, low, high)
     else:
         inside = is_stable(c)
@@ -158,8 +158,7 @@ def growth(
         None if of.rate is None else np.broadcast_to(of.rate({**parameters, name: values}), values.shape).astype(float)
     )
     many = [c.at for c in events if _crowded(c.kind)] + [at] * _crowded(design.structure)
-    bicycle = model.words[0] == "weave" and model.degree == _BICYCLE
-    followed = modes(values, found, at, many, bicycle=bicycle, speed=speed)
+    followed = modes(values, found, at, many, bicycle=is_bicycle(model) and model.degree == _BICYCLE, speed=speed)
     if model.carrier is not None:
         found = user_root_array(model, found)
         followed = tuple(
@@ -193,7 +192,7 @@ def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str
     if over in native.names:
         return native, dict(design.dimensionless), over
     accepted = dict.fromkeys((*own.names, *native.names))
-    raise InputError([Fault(f"found '{over}'; {suggest(over, accepted)}", ("over",))])
+    raise refusal(f"found '{over}'; {suggest(over, accepted)}", "over")
 
 
 def _ends(design: Solution, name: str, end: float | None, at: float) -> Stretch:

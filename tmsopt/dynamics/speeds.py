@@ -8,12 +8,12 @@ from typing import Any
 import flint
 from flint.utils.flint_exceptions import DomainError
 
-from tmsopt.algebra.balls import exact, rational
+from tmsopt.algebra.balls import rational
 from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.boundaries.surroundings import parameter_faults
-from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, told
-from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, user_crossings
+from tmsopt.errors import InputError, refusal, short, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
@@ -135,23 +135,21 @@ def speeds(
     if name is None:
         message = f"the model '{asked.model.name}' has no parameter that is a speed; say which one varies, "
         message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(of.names)}"
-        raise InputError([Fault(message, ("parameter",))])
+        raise refusal(message, "parameter")
     if name not in of.names:
-        raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
+        raise refusal(f"unknown parameter '{name}'; {suggest(name, of.names)}", "parameter")
     own = parameters_of(design, whole, name, progress)
     start_steps(progress, "isolating speeds")
     allowed = of[name].range
     try:
         lower, upper = map(float, asked.free.get(name, (allowed.lower, allowed.upper)) if between is None else between)
-        known = math.isfinite(lower) and lower < upper
+        if not -math.inf < lower < upper:
+            raise ValueError
     except (TypeError, ValueError):
-        known = False
-    if not known:
         message = f"found {short(between)}; accepted: a least value and a greater one, `--between LOW,HIGH`"
-        raise InputError([Fault(message, ("between",))])
-    a = coefficients_over(asked, of, own, name)
-    met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
-    return Speeds(asked.problem, name, Table(own), float(lower), float(upper), **vars(told(asked.model, met)))
+        raise refusal(message, "between") from None
+    met = user_crossings(asked.model, crossings(coefficients_over(asked, of, own, name), lower, upper))
+    return Speeds(asked.problem, name, Table(own), lower, upper, **vars(met))
 
 
 def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
@@ -167,8 +165,7 @@ def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
     if name is None or not math.isfinite(of[name].range.lower):
         return None
     a, ends = coefficients_over(asked, of, design.parameters, name), of[name].range
-    upper = exact(ends.upper) if math.isfinite(ends.upper) else None
-    return crossings(a, exact(ends.lower), upper, bands_alone=True).stable
+    return crossings(a, ends.lower, ends.upper, bands_alone=True).stable
 
 
 def speed_of(of: ParameterSet) -> str | None:
@@ -192,7 +189,7 @@ def coefficients_over(problem: Posed, of: ParameterSet, own: Mapping[str, float]
     except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # no polynomial on the way
         a = []
     if not any(x != 0 for c in a for x in c):
-        raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
+        raise refusal(f"the coefficients are no polynomials in {name}, or all 0", "parameter")
     return a
 
 
