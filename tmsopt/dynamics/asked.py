@@ -1,7 +1,7 @@
 """What sets a design moving, as a user asks for it, and as a state of its system."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +15,9 @@ from tmsopt.records import Array, Table, plain
 MOST_POINTS = 1_000_000
 
 _LEAN = math.pi / 180  # where nothing is asked for
+_ANGLED = dict(zip(("lean", "steer"), ANGLES, strict=True))
 _IMPULSES = {"push": "T_delta", "lean_push": "T_phi"}
+_AMOUNTS = (*_IMPULSES, "noise")
 
 
 @dataclass(frozen=True)
@@ -51,63 +53,59 @@ class Disturbance:
         return plain(self, "start push lean_push default") | (plain(self, "noise seed") if self.noise else {})
 
 
-def asked_for(system: System, **given: Any) -> Disturbance:
-    """The disturbance that a user asks for by the words of `simulate`.
+def asked_for(system: System, given: Mapping[str, Any]) -> Disturbance:
+    """The disturbance that a user asks for.
+
+    Args:
+        given: the arguments of `simulate` by name.
 
     Raises:
         InputError: with everything that cannot be asked so.
     """
-    faults = list(_faults(system, given))
-    start: dict[str, float] = {}
-    for word, name in zip(("lean", "steer"), ANGLES, strict=True):
-        if given[word] is not None and system.impulses:
-            try:
-                start[name] = _radians(given[word])
-            except ValueError as error:
-                said = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
-                faults.append(Fault(said, (word,)))
+    start, faults = _angles(system, given)
+    stated = {} if given["start"] is None else given["start"]
+    wrong = table_faults("start", stated, f"{{'{system.names[-1]}': 0.1}}")
+    faults += wrong
+    for name, value in () if wrong else stated.items():
+        if name not in system.names:
+            faults.append(Fault(f"unknown state '{name}'; {suggest(name, system.names)}", ("start",)))
+        elif not is_number(value):
+            faults.append(Fault(f"found {short(value)}; accepted: a number", ("start", name)))
+        elif name in start:
+            faults.append(Fault("is given twice, in degrees and in rad; leave one out", ("start", name)))
+        else:
+            start[name] = float(value)
+    seconds = given["seconds"]
+    if seconds is not None and not (is_number(seconds) and seconds > 0):
+        faults.append(Fault(f"found {short(seconds)}; accepted: a number above 0", ("seconds",)))
+    faults += [*count_faults("points", given["points"], 2, MOST_POINTS), *count_faults("seed", given["seed"], 0)]
     if faults:
         raise InputError(faults)
-    start |= {name: float(x) for name, x in (given["start"] or {}).items()}
-    amounts = {name: float(given[name] or 0.0) for name in (*_IMPULSES, "noise")}
-    nothing = not start and all(given[name] is None for name in amounts)
+    nothing = not start and all(given[name] is None for name in _AMOUNTS)
     if nothing:
         start = {system.coordinates[0]: _LEAN if system.impulses else 1.0}
+    amounts = {name: float(given[name] or 0.0) for name in _AMOUNTS}
     return Disturbance(Table(start), **amounts, seed=int(given["seed"]), default=nothing)
 
 
-def _faults(system: System, given: Mapping[str, Any]) -> Iterator[Fault]:
-    for word in ("lean", "steer", *_IMPULSES, "noise"):
-        value = given[word]
-        if value is None:
-            continue
+def _angles(system: System, given: Mapping[str, Any]) -> tuple[dict[str, float], list[Fault]]:
+    """The angles at the start, and what is wrong with them and with the amounts of pushes and noise."""
+    faults, start = list[Fault](), dict[str, float]()
+    for word, value in ((w, given[w]) for w in (*_ANGLED, *_AMOUNTS) if given[w] is not None):
         if not system.impulses:
             example = ", ".join(f"{n}=1" for n in system.names[-1:])
             message = f"a stated system has no lean and no steer; say where it starts, start (--start) {example}"
-            yield Fault(message, (word,))
-        elif not is_number(value) and not (word in ("lean", "steer") and isinstance(value, str)):
-            yield Fault(f"found {short(value)}; accepted: a number", (word,))
+            faults.append(Fault(message, (word,)))
+        elif word in _ANGLED and isinstance(value, str):
+            try:
+                start[_ANGLED[word]] = with_unit(value, "rad")
+            except ValueError as error:
+                said = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
+                faults.append(Fault(said, (word,)))
+        elif not is_number(value):
+            faults.append(Fault(f"found {short(value)}; accepted: a number", (word,)))
+        elif word in _ANGLED:
+            start[_ANGLED[word]] = math.radians(value)
         elif word == "noise" and value < 0:
-            yield Fault(f"found {value:.6g}; accepted: 0 or more", (word,))
-    start = given["start"]
-    if start is not None:
-        if wrong := table_faults("start", start, f"{{'{system.names[-1]}': 0.1}}"):
-            yield from wrong
-            return
-        for name, value in start.items():
-            if name not in system.names:
-                yield Fault(f"unknown state '{name}'; {suggest(name, system.names)}", ("start",))
-            elif not is_number(value):
-                yield Fault(f"found {short(value)}; accepted: a number", ("start", name))
-            elif any(given[word] is not None and n == name for word, n in zip(("lean", "steer"), ANGLES, strict=True)):
-                yield Fault("is given twice, in degrees and in rad; leave one out", ("start", name))
-    seconds = given["seconds"]
-    if seconds is not None and not (is_number(seconds) and seconds > 0):
-        yield Fault(f"found {short(seconds)}; accepted: a number above 0", ("seconds",))
-    yield from count_faults("points", given["points"], 2, MOST_POINTS)
-    yield from count_faults("seed", given["seed"], 0)
-
-
-def _radians(angle: float | str) -> float:
-    """Of degrees, or of a text with a unit."""
-    return with_unit(angle, "rad") if isinstance(angle, str) else math.radians(angle)
+            faults.append(Fault(f"found {value:.6g}; accepted: 0 or more", (word,)))
+    return start, faults

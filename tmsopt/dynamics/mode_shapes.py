@@ -70,16 +70,16 @@ def mode_shapes(
     model, of = problem.model, problem.parameter_set
     pencil = [np.array(P, dtype=float) for P in matrices_of(model)(of.native(parameters))]
     names = coordinates_of(model, pencil)
-    chains = {(d.re, d.im): d for d in diagnosed(model, of, parameters, structure)}
-    if model.double is not None:
-        pencil = _of_H(pencil[1])
-    told = user_roots(model, structure.roots)
-    roots: dict[tuple[float, float], Root] = {(r.re, r.im if model.double else abs(r.im)): r for r in told}
+    chains = diagnosed(model, of, parameters, structure)
+    if model.double is not None:  # −[[J, R], [−R, J]]
+        n = len(names)
+        pencil = [np.eye(n), pencil[1][:n, :n] - 1j * pencil[1][:n, n:]]
+    roots = [r for r in user_roots(model, structure.roots) if model.double or r.im >= 0]
     found = []
     partial: tuple[int, ...]
-    for (re, im), root in sorted(roots.items(), key=lambda item: (-item[0][0], -item[0][1])):
-        chain = min(chains.values(), key=lambda d: math.hypot(d.re - re, d.im - im), default=None)
-        s, geometric, partial = complex(re, im), 1, (1,)
+    for root in sorted(roots, key=lambda r: (-r.re, -r.im)):
+        s, geometric, partial = complex(root.re, root.im), 1, (1,)
+        chain = min(chains, key=lambda d: abs(complex(d.re, d.im) - s), default=None)
         if root.multiplicity > 1 and chain is not None:
             s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
         vectors = _null(pencil, s, geometric)
@@ -90,12 +90,6 @@ def mode_shapes(
             at = rate * s.real, rate * s.imag
             found.append(ModeShape(*at, root.multiplicity, len(vectors), partial, sizes, turns, omega))
     return tuple(found)
-
-
-def _of_H(double: Any) -> list[Any]:
-    """I and i H of the real matrix −[[J, R], [−R, J]]."""
-    n = len(double) // 2
-    return [np.eye(n), double[:n, :n] - 1j * double[:n, n:]]
 
 
 def _null(pencil: Sequence[Any], s: complex, count: int) -> Complex:
@@ -118,9 +112,5 @@ def _amplitudes(vector: Complex) -> tuple[list[float], list[float]]:
     sizes = np.abs(vector) / np.abs(vector).max()
     moving = sizes > _NOTHING
     turned = vector / vector[int(np.argmax(moving))]
-    phases = np.where(
-        moving,
-        np.degrees(np.angle(np.where(np.abs(turned.imag) > _NOTHING * np.abs(turned), turned, turned.real))),
-        np.nan,
-    )
-    return np.where(moving, sizes, 0.0).tolist(), np.where(phases == -180, 180.0, phases).tolist()
+    clean = np.where(np.abs(turned.imag) > _NOTHING * np.abs(turned), turned, turned.real)
+    return np.where(moving, sizes, 0.0).tolist(), np.where(moving, np.degrees(np.angle(clean)), np.nan).tolist()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
 
@@ -15,7 +15,7 @@ from tmsopt.dynamics.measures import FINEST, MOST, Measure, Watched, grid, measu
 from tmsopt.dynamics.mode_shapes import ModeShape, mode_shapes
 from tmsopt.dynamics.speeds import parameters_of
 from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import InputError, refusal
 from tmsopt.files import write_csv
 from tmsopt.models.user_spectrum import user_structure
 from tmsopt.problem.files import Given, pose
@@ -75,7 +75,7 @@ class Simulation(Tabular):
     modes: tuple[ModeShape, ...]
     structure: str
     stable: bool
-    extra: tuple[str, ...] = field(default=())
+    extra: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -106,7 +106,7 @@ class Simulation(Tabular):
         return {
             **self.problem.posed.heading,
             **plain(self, "parameters stable structure disturbance units"),
-            "measures": {m.name: {n: x for n, x in m.to_json().items() if n != "name"} for m in self.measures},
+            "measures": {m.name: plain(m, "peak at overshoot settling") for m in self.measures},
             **plain(self, "deviations modes columns"),
         }
 
@@ -164,7 +164,7 @@ def simulate(
 
     More: docs/how_to/motion.md
     """
-    whole = pose(design)
+    given, whole = locals(), pose(design)
     asked = whole.nominal
     matrices_of(asked.model)
     own = asked.ordered(parameters_of(design, whole, "", progress)) | dict(at or {})
@@ -172,18 +172,7 @@ def simulate(
         raise InputError([replace(f, key=("at", *f.key[-1:])) for f in faults])
     start_steps(progress, "following the motion")
     system = system_of(asked, own)
-    disturbance = asked_for(
-        system,
-        lean=lean,
-        steer=steer,
-        push=push,
-        lean_push=lean_push,
-        start=start,
-        noise=noise,
-        seed=seed,
-        seconds=seconds,
-        points=points,
-    )
+    disturbance = asked_for(system, given)
     found = asked.values(own)["structure"]
     assert isinstance(found, Structure)
     structure = user_structure(asked.model, found)
@@ -192,22 +181,22 @@ def simulate(
     x = disturbance.state(system)
     stable = _dies_out(asked, found)
     followed, ending, on = _watched(system, x, structure, stable, rate, seconds, bool(noise))
-    times = np.linspace(0.0, ending, points)
-    step = ending / (points - 1)
-    force = disturbance.noise * system.impulses["T_delta"] if noise else np.zeros(len(x))
-    states = shaken(system.A, x, force, step, points, seed) if noise else sampled(system.A, x, step, points)
-    watched = (*system.coordinates, *system.torques)
+    times, step = np.linspace(0.0, ending, points), ending / (points - 1)
+    watched, deviations = {n: system.rows[n] for n in (*system.coordinates, *system.torques)}, Table[float]()
     if noise:
-        measures = tuple(_greatest(name, times, states @ system.rows[name]) for name in watched)
+        force = disturbance.noise * system.impulses["T_delta"]
+        states = shaken(system.A, x, force, step, points, seed)
+        measures = tuple(_greatest(name, times, states @ row) for name, row in watched.items())
+        deviations = _deviations(system, force) if stable else deviations
     else:
-        measures = tuple(measured(name, system.rows[name], on, followed) for name in watched)
+        states = sampled(system.A, x, step, points)
+        measures = tuple(measured(name, row, on, followed) for name, row in watched.items())
     base = tuple(n for n in system.names if n not in system.torques)
     rest = tuple(n for n in system.rows if n not in base)
     columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *rest)}
     if rest:
-        columns["x"] = Column(system.speed * times)
+        columns["x"], rest = Column(system.speed * times), (*rest, "x")
     modes = mode_shapes(asked, own, found, rate)
-    deviations = _deviations(system, force) if noise and stable else Table[float]()
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
         asked.problem,
@@ -220,7 +209,7 @@ def simulate(
         modes,
         structure.name,
         stable,
-        (*rest, *(("x",) if rest else ())),
+        rest,
     )
 
 
@@ -241,13 +230,12 @@ def _watched(
         InputError: where it would grow beyond all numbers.
     """
     if not structure.roots:
-        message = "the roots of this design cannot be told: one of them is at infinity, or nearly so"
-        raise InputError([Fault(message, ("parameters",))])
-    abscissa, fastest = rate * structure.abscissa, rate * max(abs(r.im) for r in structure.roots)
-    largest = rate * max(math.hypot(r.re, r.im) for r in structure.roots)
+        raise refusal("the roots of this design cannot be told: one of them is at infinity, or nearly so", "parameters")
+    z = rate * np.array([complex(r.re, r.im) for r in structure.roots])
+    abscissa, fastest, largest = map(float, (z.real.max(), np.abs(z.imag).max(), np.abs(z).max()))
     if seconds is not None and seconds * abscissa > _LARGEST:
         accepted = f"accepted: up to {_LARGEST / abscissa:.4g}, in which it grows by e^{_LARGEST:.0f}"
-        raise InputError([Fault(f"found {seconds:.6g} of a design that is not stable; {accepted}", ("seconds",))])
+        raise refusal(f"found {seconds:.6g} of a design that is not stable; {accepted}", "seconds")
     size = float(np.linalg.norm(system.A[: len(system.names), : len(system.names)], 2))
     ending = _RADIANS / largest if largest > _ROUNDING * size else _ALONE / (size or 1.0)
     if not stable or -abscissa < max(_SLOW * fastest, _ROUNDING * largest):

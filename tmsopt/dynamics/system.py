@@ -2,15 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import refusal
 from tmsopt.models import Model
 from tmsopt.models.bicycles.bicycle import contact_path
-from tmsopt.models.model import Feedback
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Table
 
@@ -67,7 +66,7 @@ def matrices_of(model: Model) -> Any:
     if model.pencil is None:
         advice = "write its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
         message = f"'{model.name}' is given by its coefficients alone, which tell roots and no motion; {advice}"
-        raise InputError([Fault(message, ("model",))])
+        raise refusal(message, "model")
     return model.pencil
 
 
@@ -98,32 +97,32 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
     if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled) > _SINGULAR:
         message = "the mass matrix of this design is singular: a root is at infinity, and there is no motion to show"
-        raise InputError([Fault(message, ("parameters",))])
+        raise refusal(message, "parameters")
     A = -np.linalg.solve(pencil[0], pencil[-1])
     if len(pencil) == 3:
         A = np.block([[np.zeros((n, n)), np.eye(n)], [A, -np.linalg.solve(pencil[0], pencil[1])]])
     if is_bicycle(model):
-        feedback = model.feedback(native) if model.feedback else None
-        mass = pencil[0] if feedback is None else np.array(feedback.mass, dtype=float)
-        moving = _bicycle(A, mass, feedback, native)
-        rate = 1.0 if of.rate is None else float(of.rate(parameters))
-        torque = 1.0 if of.torque is None else float(of.torque(parameters))
-        length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
-        return replace(_in_units(moving, rate, torque, length), units=_units(of.rate is not None))
-    if model.double is not None:
-        order = np.arange(n).reshape(2, -1).T.ravel()
-        names = tuple(f"{name}_{part}" for name in coordinates_of(model, pencil) for part in ("re", "im"))
-        unit = Table(dict(zip(names, np.eye(n), strict=True)))
-        return System(names, names, A[np.ix_(order, order)], unit, Table(), math.nan, Table())
+        return _bicycle(A, pencil[0], problem, parameters)
     q = coordinates_of(model, pencil)
     names = (*q, *(f"{name}dot" for name in q)) if len(pencil) == 3 else q
+    if model.double is not None:
+        order = np.arange(n).reshape(2, -1).T.ravel()
+        A = A[np.ix_(order, order)]
+        q = names = tuple(f"{name}_{part}" for name in q for part in ("re", "im"))
     return System(names, q, A, Table(dict(zip(names, np.eye(len(names)), strict=True))), Table(), math.nan, Table())
 
 
-def _bicycle(A: Array, mass: Array, feedback: Feedback | None, native: Mapping[str, Any]) -> System:
-    """In the model's own units: the path as two more states, and the torques of a controller as rows."""
-    driven = () if feedback is None else tuple(TORQUES[k] for k in sorted(feedback.driven))
-    lagged = feedback is not None and feedback.lag is not None
+def _bicycle(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
+    """The path as two more states, and the torques of a controller as rows, in the units of the parameters.
+
+    A rate of 1 is `rate` 1/s, a torque of 1 `torque` N m and a length of 1 `length` m.
+    """
+    of = problem.parameter_set
+    native = of.native(parameters)
+    feedback = problem.model.feedback(native) if problem.model.feedback else None
+    lagged, driven = feedback is not None and feedback.lag is not None, dict[str, int]()
+    if feedback is not None:
+        mass, driven = np.array(feedback.mass, dtype=float), {TORQUES[k]: k for k in sorted(feedback.driven)}
     names = (*ANGLES, *RATES, *(driven if lagged else ()))
     yaw, yaw_of_rate, v, w, aside = map(float, contact_path(native))
     n = len(names)
@@ -136,20 +135,25 @@ def _bicycle(A: Array, mass: Array, feedback: Feedback | None, native: Mapping[s
     rows["y_front"] = unit[n + 1] + w * unit[n] + aside * unit[1]
     if feedback is not None and not lagged:
         gains = np.hstack([np.array(feedback.gains, dtype=float), np.zeros((2, 2))])
-        rows |= {TORQUES[k]: -gains[k] for k in sorted(feedback.driven)}
+        rows |= {name: -gains[k] for name, k in driven.items()}
     jumps = np.linalg.inv(mass)
-    impulses = {name: np.r_[0.0, 0.0, jumps[:, k], np.zeros(n - 2)] for k, name in enumerate(TORQUES)}
-    return System(names, ANGLES, whole, Table(rows), Table(impulses), v, Table())
-
-
-def _in_units(system: System, rate: float, torque: float, length: float) -> System:
-    """The same where a rate of 1 is `rate` 1/s, a torque of 1 `torque` N m and a length of 1 `length` m."""
+    rate = 1.0 if of.rate is None else float(of.rate(parameters))
+    torque = 1.0 if of.torque is None else float(of.torque(parameters))
+    length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
     one = dict.fromkeys(RATES, rate) | dict.fromkeys(TORQUES, torque) | {"y_rear": length, "y_front": length}
-    states = np.array([one.get(name, 1.0) for name in (*system.names, "psi", "y_rear")])
-    rows = {name: one.get(name, 1.0) * row / states for name, row in system.rows.items()}
-    impulses = {name: rate / torque * states * jump for name, jump in system.impulses.items()}
-    A = rate * states[:, None] * system.A / states
-    return replace(system, A=A, rows=Table(rows), impulses=Table(impulses), speed=system.speed * rate * length)
+    states = np.array([one.get(name, 1.0) for name in (*names, "psi", "y_rear")])
+    impulses = {
+        name: rate / torque * states * np.r_[0.0, 0.0, jumps[:, k], np.zeros(n - 2)] for k, name in enumerate(TORQUES)
+    }
+    return System(
+        names,
+        ANGLES,
+        rate * states[:, None] * whole / states,
+        Table({name: one.get(name, 1.0) * row / states for name, row in rows.items()}),
+        Table(impulses),
+        v * rate * length,
+        _units(of.rate is not None),
+    )
 
 
 def _units(si: bool) -> Table[str]:
