@@ -154,9 +154,7 @@ def growth(
         inside = is_stable(c)
         stable = tuple(_reaching(values, run, events) for run in _runs(values, inside))
         heavily_damped = _runs(values, inside & np.all(found.imag == 0, axis=-1))
-    rate = (
-        None if of.rate is None else np.broadcast_to(of.rate({**parameters, name: values}), values.shape).astype(float)
-    )
+    rate = None if of.rate is None else np.zeros(values.shape) + of.rate({**parameters, name: values})
     many = [c.at for c in events if _crowded(c.kind)] + [at] * _crowded(design.structure)
     followed = modes(values, found, at, many, bicycle=is_bicycle(model) and model.degree == _BICYCLE, speed=speed)
     if model.carrier is not None:
@@ -230,18 +228,16 @@ def _numbers(model: Model, of: ParameterSet, columns: Mapping[str, Any]) -> Arra
 def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:
     """Where stability begins or ends between points of a grid, by halving."""
     inside = is_stable(coefficients(grid))
-    for k in np.flatnonzero(inside[1:] != inside[:-1]):
-        low, high = grid[k : k + 2]
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            low, high = (middle, high) if is_stable(coefficients(middle)) == inside[k] else (low, middle)
-        there = coefficients(high)
-        if not np.all(np.isfinite(there)) or there[0] == 0:  # a pole, or a root at infinity: nothing crosses the axis
-            continue
-        found = roots(there)
-        first = found[np.abs(found.real).argmin()]
-        kind = "weave" if first.imag else "capsize"
-        yield Crossing(float(high), kind, Root(0.0, abs(float(first.imag))), rightmost=True, changes=True)
+    k = np.flatnonzero(inside[1:] != inside[:-1])
+    low, high = grid[k], grid[k + 1]
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        same = is_stable(coefficients(middle)) == inside[k]
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    for at, there in zip(high.tolist(), coefficients(high), strict=True):
+        if np.all(np.isfinite(there)) and there[0] != 0:  # no pole nor root at infinity, where nothing crosses the axis
+            omega = abs(min(roots(there).tolist(), key=lambda z: abs(z.real)).imag)
+            yield Crossing(at, "weave" if omega else "capsize", Root(0.0, omega), rightmost=True, changes=True)
 
 
 def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:

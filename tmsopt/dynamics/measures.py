@@ -41,7 +41,7 @@ class Measure:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        return plain(self, "name peak at overshoot settling")
+        return plain(self)
 
 
 @dataclass(frozen=True)
@@ -76,50 +76,54 @@ def measured(name: str, row: Array, on: Watched, settles: bool) -> Measure:
     Args:
         settles: whether the motion dies out within the grid.
     """
-    values, slopes = on.states @ row, on.states @ on.A.T @ row
-    turns = np.flatnonzero(slopes[:-1] * slopes[1:] < 0)
-    at, peak = max((_largest(row, on, turns, values, sign) for sign in (1.0, -1.0)), key=lambda each: abs(each[1]))
-    if peak == 0:
-        return Measure(name, 0.0, 0.0, 0.0, 0.0 if settles else math.nan)
-    after = turns[on.times[turns + 1] > at]
-    back = _largest(row, on, after, np.where(on.times >= at, values, 0.0), -math.copysign(1.0, peak))[1]
-    overshoot = max(0.0, -back / peak)
-    settling = _settling(row, on, turns, values, SETTLED * abs(peak)) if settles else math.nan
-    return Measure(name, peak, at, overshoot, settling)
+    slopes = on.states @ on.A.T @ row
+    output = _Output(on, row, on.states @ row, np.flatnonzero(slopes[:-1] * slopes[1:] < 0))
+    at, peak = max((output.largest(sign) for sign in (1.0, -1.0)), key=lambda each: abs(each[1]))
+    overshoot = max(0.0, -output.largest(-math.copysign(1.0, peak), at)[1] / peak) if peak else 0.0
+    return Measure(name, peak, at, overshoot, output.settling(SETTLED * abs(peak)) if settles else math.nan)
 
 
-def _largest(row: Array, on: Watched, turns: NDArray[np.intp], values: Array, sign: float) -> tuple[float, float]:
-    """Time and value of the greatest sign · c x: at an end of the grid, or at a turn, found exactly."""
-    best = int(np.argmax(sign * values))
-    found = [(float(on.times[best]), float(values[best]))]
-    sizes = np.maximum(sign * values[turns], sign * values[turns + 1])
-    for k in turns[sizes >= _NEAR * sign * values[best]] if sign * values[best] > 0 else ():
-        found.append(_turn(row, on, int(k)))
-    return max(found, key=lambda each: sign * each[1])
+@dataclass(frozen=True)
+class _Output:
+    """An output c x at the points of a grid, and the points between which and the next it turns."""
 
+    on: Watched
+    row: Array
+    values: Array
+    turns: NDArray[np.intp]
 
-def _turn(row: Array, on: Watched, k: int) -> tuple[float, float]:
-    """Time and value where c x turns between two points of the grid."""
-    slope = partial(_after, on.A, on.states[k], on.A.T @ row)
-    own = _zero(slope, on.times[k + 1] - on.times[k])
-    return float(on.times[k] + own), _after(on.A, on.states[k], row, own)
+    def largest(self, sign: float, since: float = 0.0) -> tuple[float, float]:
+        """Time and value of the greatest sign · c x: at a point of the grid, or at a turn, found exactly."""
+        on, turns = self.on, self.turns[self.on.times[self.turns + 1] > since]
+        values = sign * np.where(on.times >= since, self.values, 0.0)
+        best = int(np.argmax(values))
+        found = [(float(on.times[best]), sign * float(values[best]))]
+        near = np.maximum(values[turns], values[turns + 1]) >= _NEAR * values[best]
+        found += [self.turn(k) for k in turns[near] if values[best] > 0]
+        return max(found, key=lambda each: sign * each[1])
 
+    def turn(self, k: int) -> tuple[float, float]:
+        """Time and value where c x turns between two points of the grid."""
+        A, state, time = self.on.A, self.on.states[k], self.on.times[k]
+        own = _zero(partial(_after, A, state, A.T @ self.row), self.on.times[k + 1] - time)
+        return float(time + own), _after(A, state, self.row, own)
 
-def _settling(row: Array, on: Watched, turns: NDArray[np.intp], values: Array, within: float) -> float:
-    """When |c x| was above the limit for the last time; nan where it still is at the end."""
-    above = np.flatnonzero(np.abs(values) > within)
-    if not above.size:
-        return 0.0
-    last = int(above[-1])
-    if last == len(values) - 1:
-        return math.nan
-    begin, state, end = on.times[last], on.states[last], on.times[last + 1]
-    for k in (k for k in turns if k >= last and max(abs(values[k]), abs(values[k + 1])) > _NEAR * within):
-        at, value = _turn(row, on, int(k))
-        if abs(value) > within:
-            begin, state, end = at, at_times(on.A, on.states[k], np.array([at - on.times[k]]))[0], on.times[k + 1]
-    sign = math.copysign(1.0, float(row @ state))
-    return float(begin + _zero(lambda s: sign * _after(on.A, state, row, s) - within, end - begin))
+    def settling(self, within: float) -> float:
+        """When |c x| was above the limit for the last time; nan where it still is at the end."""
+        on, sizes = self.on, np.abs(self.values)
+        above = np.flatnonzero(sizes > within)
+        if not above.size:
+            return 0.0
+        last = int(above[-1])
+        if last == len(sizes) - 1:
+            return math.nan
+        begin, state, end = on.times[last], on.states[last], on.times[last + 1]
+        for k in (k for k in self.turns if k >= last and max(sizes[k : k + 2]) > _NEAR * within):
+            at, value = self.turn(k)
+            if abs(value) > within:
+                begin, state, end = at, at_times(on.A, on.states[k], np.array([at - on.times[k]]))[0], on.times[k + 1]
+        sign = math.copysign(1.0, float(self.row @ state))
+        return float(begin + _zero(lambda s: sign * _after(on.A, state, self.row, s) - within, end - begin))
 
 
 def _after(A: Array, x: Array, row: Array, time: float) -> float:

@@ -119,23 +119,18 @@ def _passed(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[s
     if abs(old.real - new.real) != 2:
         return []
     many, few = (old, new) if old.real > new.real else (new, old)
-    ends = {id(old): -1 if forward else 0, id(new): 0 if forward else -1}
-    r, p = many.roots[ends[id(many)]], few.roots[ends[id(few)]]
+    r, p = (part.roots[-1 if (part is old) == forward else 0] for part in (many, few))
     i = int(np.diff(r[: many.real].real).argmin())
     j = few.real + int(p[few.real :].imag.argmin())
-    others, rest = [k for k in range(len(r)) if k not in (i, i + 1)], [k for k in range(len(p)) if k != j]
+    others, rest = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
     apart = [np.abs(x - y).min(initial=np.inf) for x, y in ((r[others], r[i : i + 2].mean()), (p[rest], p[j].real))]
     if abs(r[i + 1] - r[i]) > _APART * apart[0] or 2 * p[j].imag > _APART * apart[1]:
         return []
-    reals = many.real - 2  # those that stay stand in order
-    paired = [*zip(others[:reals], rest[:reals], strict=True)]
-    if others[reals:]:
-        order = _nearest(r[others[reals:]], p[rest[reals:]])
-        paired += [(others[reals + k], rest[reals + int(m)]) for k, m in enumerate(order)]
+    rest[few.real :] = rest[few.real :][_nearest(r[others[few.real :]], p[rest[few.real :]])]  # real ones stay in order
     if many is old:
         both = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
-        found = {j: both} | {b: names[a] for a, b in paired}
+        found = {j: both} | {b: names[a] for a, b in zip(others, rest, strict=True)}
     else:
         upper, _, lower = names[j].partition(" + ")
-        found = {i: lower or upper, i + 1: upper} | {a: names[b] for a, b in paired}
+        found = {i: lower or upper, i + 1: upper} | {a: names[b] for a, b in zip(others, rest, strict=True)}
     return [found[k] for k in range(len(found))]
