@@ -110,7 +110,7 @@ def _nlp(model: Model, set_name: str, weighted: tuple[str, ...], edge: Edge) -> 
         formula=formula([sum(y * y for y in x[:n]), *rows], (*(y.value for y in x), *numbers)),
         numbers={},
         lower=(-np.inf,) * n + (0.0,) * extra,
-        upper=(np.inf,) * n + edge.upper,
+        upper=(*(np.inf,) * n, *edge.unknowns.values()),
         rows=(*[edge.name] * len(equations), *["others"] * len(others)),
         row_lower=(0.0,) * len(rows),
         row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),

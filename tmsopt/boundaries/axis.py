@@ -58,13 +58,10 @@ def stands_on(
     largest = max((math.hypot(r.re, r.im) for r in structure.roots), default=0.0)
     if beyond or (abs(structure.abscissa) > _FAR * largest and largest):
         return (), False
-    edges = edges_at(problem, parameters)
+    edges = edges_at(problem, parameters) or (("weave",) if beyond == 0 else ())
     longest = longest_on_line(meetings, abscissa, largest)
-    if beyond == 0 and longest is None:
-        return edges or ("weave",), True
-    if beyond == 0:
-        edges = edges or ("weave",)
-    return edges, bool(edges) and longest_on_axis(problem, parameters) == (longest or 1)
+    tied = beyond == 0 and longest is None
+    return edges, tied or (bool(edges) and longest_on_axis(problem, parameters) == (longest or 1))
 
 
 def longest_on_axis(problem: Posed, parameters: Numbers) -> int | None:

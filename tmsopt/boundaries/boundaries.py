@@ -4,15 +4,14 @@ Coefficients c here are those of the polynomial times the sign of a0 on the stab
 positive where the roots are left of the imaginary axis. Every form stays regular where a0 vanishes.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array, Table, Truth
 from tmsopt.roots import discriminant, hurwitz_minors, is_stable, product, real_roots, rebuilt, roots
 
 MATCHED = 1e-10
@@ -26,85 +25,148 @@ _SMALL = 1e-3
 
 
 @dataclass(frozen=True)
-class Edge:
-    """A piece of a boundary: the polynomials for which the equations have unknowns that are ≥ 0.
+class Rest:
+    """All polynomials of a degree with no root in Re s > 0 by their factors; where `real`, those with real roots alone.
 
-    A factor with unknown roots is e s² + 1 − e, or e s + 1 − e, which reaches infinity at e = 0, times a `Rest`.
+    Above degree 2 a linear factor, if any, is f s + 1 − f; the first quadratic has any size, the others are
+    a s² + b s + 1 − a − b.
+    """
+
+    degree: int
+    real: bool
+
+    @property
+    def unknowns(self) -> dict[str, float]:
+        """Names of the factor coefficients, each ≥ 0, and what they are at most."""
+        more = {f"{letter}{k}": 1.0 for k in range(1, self.degree // 2) for letter in "ab"}
+        return dict.fromkeys("f" * self._odd, 1.0) | dict.fromkeys("ABC"[: self.degree + 1], np.inf) | more
+
+    @property
+    def _odd(self) -> int:
+        """How many factors are linear beside the first."""
+        return self.degree % 2 if self.degree > 2 else 0
+
+    def factors(self, u: Sequence[Any]) -> list[list[Any]]:
+        """Of the unknowns."""
+        more = self._odd + 3
+        linear, scaled = u[: self._odd], ([u[k], u[k + 1], 1 - u[k] - u[k + 1]] for k in range(more, len(u), 2))
+        return [*([f, 1 - f] for f in linear), list(u[self._odd : more]), *scaled]
+
+    def nonnegative(self, u: Sequence[Any]) -> list[Any]:
+        """Expressions of the unknowns that are ≥ 0."""
+        quadratics = [factor for factor in self.factors(u) if len(factor) == 3]
+        return [c for _, _, c in quadratics[1:]] + ([b * b - 4 * a * c for a, b, c in quadratics] if self.real else [])
+
+    def guess(self, c: Array) -> list[float]:
+        """Unknowns near numeric coefficients: quadratics of neighbouring roots; the rightmost real one is linear."""
+        if self.degree <= 2:
+            return list(c.tolist())
+        found = roots(regular(c))
+        linear: list[float] = []
+        if self._odd:
+            rightmost = max((z for z in found if z.imag == 0), key=lambda z: z.real)
+            linear = [1 / (1 + max(-float(rightmost.real), 0.0))]
+            found = np.delete(found, np.flatnonzero(found == rightmost)[0])
+        order = np.lexsort((found.imag, np.abs(found.imag), found.real, found.imag == 0))
+        z, w = found[order].reshape(-1, 2).T
+        bounded = np.maximum(np.stack([np.ones(len(z)), -(z + w).real, (z * w).real], axis=1), 0.0)
+        scaled = bounded / bounded.sum(axis=1, keepdims=True)
+        whole = np.array(product(*([x, 1 - x] for x in linear), *scaled), dtype=float)
+        size = max(float(whole @ c) / float(whole @ whole), 0.0)
+        return [*linear, *(size * scaled[0]).tolist(), *scaled[1:, :2].ravel().tolist()]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A piece of a boundary: the multiples of a divisor by a `Rest`, with unknowns that are ≥ 0.
+
+    A divisor with unknown roots is e s² + 1 − e, or e s + 1 − e squared, which reaches infinity at e = 0.
 
     Attributes:
         name: ``weave``, ``capsize``, ``infinity``, ``EP2``, and ``capsize, real`` and ``infinity, real``, where
             all other roots are real; ``real`` for heavy damping itself, as it is seen from outside.
-        unknowns, upper: names of factor coefficients, and what they are at most.
-        equations: number of a coefficient → an expression of the coefficients and the unknowns that is 0.
-        nonnegative: expressions of these that are ≥ 0: the other roots are not right of the axis, or are real.
-        guess: unknowns to start from, for numeric coefficients.
+        real: whether the other roots are real, or else not right of the axis.
+        divisor: of e.
+        candidates: values of e that may be near, for numeric coefficients; None for a divisor without e.
     """
 
     name: str
-    unknowns: tuple[str, ...]
-    upper: tuple[float, ...]
-    equations: Callable[[Sequence[Any], Sequence[Any]], dict[int, Any]]
-    nonnegative: Callable[[Sequence[Any], Sequence[Any]], list[Any]]
-    guess: Callable[[Array], list[float]]
+    degree: int
+    real: bool
+    divisor: Callable[[Any], list[Any]]
+    candidates: Callable[[Array], list[float]] | None = None
+
+    @property
+    def unknowns(self) -> dict[str, float]:
+        """Names of factor coefficients, and what they are at most."""
+        return {} if self._by_signs else dict.fromkeys("e" * self._own, 1.0) | self._rest.unknowns
+
+    @property
+    def _rest(self) -> Rest:
+        return Rest(self.degree + 1 - len(self.divisor(0.0)), self.real)
+
+    @property
+    def _own(self) -> int:
+        return int(self.candidates is not None)
+
+    @property
+    def _by_signs(self) -> bool:
+        return self._rest.degree <= _BY_SIGNS and not (self._own or self.real)
+
+    def equations(self, c: Sequence[Any], u: Sequence[Any]) -> dict[int, Any]:
+        """Number of a coefficient → an expression of the coefficients and the unknowns that is 0."""
+        if self._by_signs:
+            return {self._end: c[self._end]}
+        whole = product(self.divisor(u[0] if self._own else 0.0), *self._rest.factors(u[self._own :]))
+        return {k: a - b for k, (a, b) in enumerate(zip(c, whole, strict=True))}
+
+    @property
+    def _end(self) -> int:
+        """The coefficient that is 0 at a root 0, or at infinity."""
+        return self.degree * int(self.divisor(0.0)[0])
+
+    def nonnegative(self, c: Sequence[Any], u: Sequence[Any]) -> list[Any]:
+        """Expressions that are ≥ 0: the other roots are not right of the axis, or are real.
+
+        For the limits of stable polynomials without an end: coefficients, of a cubic c1 c2 − c0 c3 too.
+        """
+        if not self._by_signs:
+            return self._rest.nonnegative(u[self._own :])
+        rest = [x for k, x in enumerate(c) if k != self._end]
+        return [*rest, *([hurwitz_minors(rest)[1]] if len(rest) - 1 == _BY_SIGNS else [])]
+
+    def guess(self, c: Array) -> list[float]:
+        """The e with which the divisor divides c most nearly, and the unknowns of the quotient."""
+        if self._by_signs:
+            return []
+        size = terms(c)
+
+        def left(e: float) -> Array:
+            return quotient(c, np.array(self.divisor(e)), size)
+
+        def off(e: float) -> float:
+            return float(np.abs((c - np.convolve(self.divisor(e), left(e))) / size).max())
+
+        best = min(self.candidates(c) if self.candidates else [0.0], key=off)
+        return [best] * self._own + self._rest.guess(left(best))
 
 
 @lru_cache(maxsize=16)
-def edges(degree: int) -> Mapping[str, Edge]:
+def edges(degree: int) -> Table[Edge]:
     """Every piece of a boundary among the polynomials of a degree ≥ 2, by name.
 
     Heavy damping is seen from outside too: there the nearest polynomial with real roots is on an edge, or on several.
     """
     every = (
-        _multiples("weave", degree, False, lambda e: [e, 0, 1 - e], _pairs),
-        _multiples("capsize", degree, False, lambda e: [1, 0]),
-        _multiples("infinity", degree, False, lambda e: [0, 1]),
-        _multiples("EP2", degree, True, lambda e: [e * e, 2 * e * (1 - e), (1 - e) * (1 - e)], _doubles),
-        _multiples("capsize, real", degree, True, lambda e: [1, 0]),
-        _multiples("infinity, real", degree, True, lambda e: [0, 1]),
-        _multiples("real", degree, True, lambda e: [1]),
+        Edge("weave", degree, False, lambda e: [e, 0, 1 - e], _pairs),
+        Edge("capsize", degree, False, lambda e: [1, 0]),
+        Edge("infinity", degree, False, lambda e: [0, 1]),
+        Edge("EP2", degree, True, lambda e: [e * e, 2 * e * (1 - e), (1 - e) * (1 - e)], _doubles),
+        Edge("capsize, real", degree, True, lambda e: [1, 0]),
+        Edge("infinity, real", degree, True, lambda e: [0, 1]),
+        Edge("real", degree, True, lambda e: [1]),
     )
-    return MappingProxyType({edge.name: edge for edge in every})
-
-
-def _multiples(
-    name: str,
-    degree: int,
-    real: bool,
-    divisor: Callable[[Any], list[Any]],
-    candidates: Callable[[Array], list[float]] | None = None,
-) -> Edge:
-    """The multiples of a divisor; `candidates` gives values of its unknown e, if it has one, that may be near."""
-    left_over, own = degree + 1 - len(divisor(0.0)), 0 if candidates is None else 1
-    if left_over == degree - 1 <= _BY_SIGNS and not (own or real):
-        end = degree * divisor(0.0)[0]  # the coefficient that is 0
-        return Edge(name, (), (), lambda c, u: {end: c[end]}, lambda c, u: _limits_of_stable(c, end), lambda c: [])
-    others = rest(left_over, real)
-
-    def equations(c: Sequence[Any], u: Sequence[Any]) -> dict[int, Any]:
-        whole = product(divisor(u[0] if own else 0.0), *others.factors(u[own:]))
-        return {k: a - b for k, (a, b) in enumerate(zip(c, whole, strict=True))}
-
-    def guess(c: Array) -> list[float]:
-        """The e with which the divisor divides c most nearly, and the unknowns of the quotient."""
-        if candidates is None:
-            first = divisor(0.0).index(1)
-            return others.guess(c[first : first + left_over + 1])
-        size = terms(c)
-
-        def left(e: float) -> Array:
-            return quotient(c, np.array(divisor(e)), size)
-
-        best = min(candidates(c), key=lambda e: float(np.abs((c - np.convolve(divisor(e), left(e))) / size).max()))
-        return [best, *others.guess(left(best))]
-
-    unknowns, upper = ("e",) * own + others.unknowns, (1.0,) * own + others.upper
-    return Edge(name, unknowns, upper, equations, lambda c, u: others.nonnegative(u[own:]), guess)
-
-
-def _limits_of_stable(c: Sequence[Any], end: int) -> list[Any]:
-    """≥ 0 exactly for the limits of stable polynomials without an end: coefficients, of a cubic c1 c2 − c0 c3 too."""
-    rest = [x for k, x in enumerate(c) if k != end]
-    return [*rest, *([hurwitz_minors(rest)[1]] if len(rest) - 1 == _BY_SIGNS else [])]
+    return Table({edge.name: edge for edge in every})
 
 
 def _pairs(c: Array) -> list[float]:
@@ -119,17 +181,6 @@ def _doubles(c: Array) -> list[float]:
     real = np.sort(z[z.imag == 0].real)
     doubles = [*((real[1:] + real[:-1]) / 2), *z[z.imag > 0].real]
     return [float(1 / (1 - x)) for x in doubles if x < 0] or [1 / (1 + float(np.abs(z).mean()))]
-
-
-KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "weave": ("weave",),
-        "capsize": ("capsize",),
-        "infinity": ("infinity",),
-        "heavy damping": ("EP2", "capsize, real", "infinity, real", "real"),
-    }
-)
-"""Boundary → the pieces it is made of."""
 
 
 def heavily_damped(c: Array) -> Truth:
@@ -170,53 +221,6 @@ def losses(c: Array, heavy: bool) -> tuple[str, ...]:
     return tuple(passed) or ("weave",)
 
 
-@dataclass(frozen=True)
-class Rest:
-    """Polynomials of one degree by their factors.
-
-    Attributes:
-        unknowns, upper: names of the factor coefficients, each ≥ 0, and what they are at most.
-        factors: of the unknowns.
-        nonnegative: expressions of the unknowns that are ≥ 0.
-        guess: unknowns near given numeric coefficients.
-    """
-
-    unknowns: tuple[str, ...]
-    upper: tuple[float, ...]
-    factors: Callable[[Sequence[Any]], list[list[Any]]]
-    nonnegative: Callable[[Sequence[Any]], list[Any]]
-    guess: Callable[[Array], list[float]]
-
-
-@lru_cache(maxsize=64)
-def rest(degree: int, real: bool) -> Rest:
-    """All polynomials of a degree with no root in Re s > 0; where `real`, those with real roots alone."""
-    if degree < 2:
-        few = ("A", "B")[: degree + 1]
-        return Rest(few, (np.inf,) * len(few), lambda u: [list(u)], lambda u: [], lambda c: c.tolist())
-    odd, more = degree % 2, degree // 2 - 1
-
-    def quadratics(u: Sequence[Any]) -> list[list[Any]]:
-        scaled = [[u[k], u[k + 1], 1 - u[k] - u[k + 1]] for k in range(odd + 3, len(u), 2)]
-        return [list(u[odd : odd + 3]), *scaled]
-
-    def factors(u: Sequence[Any]) -> list[list[Any]]:
-        return [*([[u[0], 1 - u[0]]] if odd else []), *quadratics(u)]
-
-    def nonnegative(u: Sequence[Any]) -> list[Any]:
-        every = quadratics(u)
-        return [c for _, _, c in every[1:]] + ([b * b - 4 * a * c for a, b, c in every] if real else [])
-
-    names = [f"{letter}{k}" for k in range(1, more + 1) for letter in "ab"]
-    return Rest(
-        (*("f" * odd), "A", "B", "C", *names),
-        (*(1.0,) * odd, *(np.inf,) * 3, *(1.0,) * (2 * more)),
-        factors,
-        nonnegative,
-        lambda c: c.tolist() if degree == 2 else _guess(c, odd),
-    )
-
-
 def regular(c: Array) -> Array:
     """The same with a leading coefficient that is not too small for roots."""
     size = float(np.abs(c).max()) or 1.0
@@ -234,20 +238,3 @@ def quotient(c: Array, factor: Array, size: Array) -> Array:
     """What a polynomial divided by a factor is most nearly, in units of the size of each coefficient."""
     columns = np.stack([np.convolve(factor, unit) for unit in np.eye(len(c) - len(factor) + 1)], axis=1)
     return np.asarray(np.linalg.lstsq(columns / size[:, None], c / size, rcond=None)[0])
-
-
-def _guess(c: Array, odd: int) -> list[float]:
-    """Quadratics of neighbouring roots; the linear factor has the rightmost real one."""
-    found = roots(regular(c))
-    linear: list[float] = []
-    if odd:
-        rightmost = max((z for z in found if z.imag == 0), key=lambda z: z.real)
-        linear = [1 / (1 + max(-float(rightmost.real), 0.0))]
-        found = np.delete(found, np.flatnonzero(found == rightmost)[0])
-    order = np.lexsort((found.imag, np.abs(found.imag), found.real, found.imag == 0))
-    z, w = found[order].reshape(-1, 2).T
-    bounded = np.maximum(np.stack([np.ones(len(z)), -(z + w).real, (z * w).real], axis=1), 0.0)
-    scaled = bounded / bounded.sum(axis=1, keepdims=True)
-    whole = np.array(product(*([x, 1 - x] for x in linear), *scaled), dtype=float)
-    size = max(float(whole @ c) / float(whole @ whole), 0.0)
-    return [*linear, *(size * scaled[0]).tolist(), *scaled[1:, :2].ravel().tolist()]

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from tmsopt.boundaries.approach import ALIKE, Approach, Method, approach
-from tmsopt.boundaries.boundaries import KINDS, Edge, edges
+from tmsopt.boundaries.boundaries import Edge, edges
 from tmsopt.boundaries.rays import RayCrossing, between, elsewhere, most_damped, ray_crossings
 from tmsopt.boundaries.surroundings import WeightedDesign, placed
 from tmsopt.boundaries.witness import exactly_stable, is_boundary
-from tmsopt.errors import Fault, InputError, suggest, table_faults
+from tmsopt.errors import InputError, refusal, suggest, table_faults
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -24,6 +24,9 @@ from tmsopt.records import Array, Numbers, Printable, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
+
+KINDS = (*STABILITY, "heavy damping")
+"""All boundaries; that of heavy damping has several edges."""
 
 _ROUNDS = 3
 _KEPT = 256  # designs
@@ -132,8 +135,7 @@ class Robustness(Printable):
         return {
             **plain(self, "stable heavily_damped radius to_stability"),
             "limit": self.limit.kind if self.limit.found else None,
-            **plain(self, "edges zeros"),
-            **plain(self, "parameters weights"),
+            **plain(self, "edges zeros parameters weights"),
             "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
         }
 
@@ -171,8 +173,8 @@ def nearest(
 
     More: docs/how_to/tolerances.md
     """
-    if pattern not in tuple(KINDS):
-        raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", ("pattern",))])
+    if pattern not in KINDS:
+        raise refusal(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", "pattern")
     place = _place(design, parameters, weights)
     start_steps(progress, f"looking for the nearest {pattern}")
     return _nearest(place, ray_crossings(place), pattern)
@@ -206,15 +208,15 @@ def robustness_at(problem: Posed, parameters: Numbers) -> Robustness:
 
     IPOPT, which searches for designs, has no part in it.
     """
-    return _at(problem, Table(parameters), Table(problem.weights))
+    return _at(problem, Table(parameters))
 
 
 @lru_cache(maxsize=_KEPT)
-def _at(problem: Posed, parameters: Table[float], weights: Table[float]) -> Robustness:
-    return _surveyed(placed(problem, parameters, weights or None), STABILITY, sqp)
+def _at(problem: Posed, parameters: Table[float]) -> Robustness:
+    return _surveyed(placed(problem, parameters, problem.weights or None), STABILITY, sqp)
 
 
-def _surveyed(place: WeightedDesign, kinds: Sequence[str] = tuple(KINDS), method: Method = ipopt) -> Robustness:
+def _surveyed(place: WeightedDesign, kinds: Sequence[str] = KINDS, method: Method = ipopt) -> Robustness:
     damped = "heavy damping" in kinds
     seen = ray_crossings(place, damped=damped)
     found = _each(place, seen, kinds, method)
@@ -237,11 +239,12 @@ def _each(place: WeightedDesign, seen: list[RayCrossing], kinds: Sequence[str], 
 
 def _zeros(place: WeightedDesign) -> tuple[str, ...]:
     """Parameters at 0 each of which makes a design stable alone: the edge is where what they stand for is not there."""
-    at = [n for n, weight in place.weights.items() if abs(place.parameters[n]) <= _NOTHING * weight]
+    own = place.parameters
     return tuple(
         n
-        for n in at
-        if any(exactly_stable(place.problem, {**place.parameters, n: s * _SHIFT * place.weights[n]}) for s in (1, -1))
+        for n, weight in place.weights.items()
+        if abs(own[n]) <= _NOTHING * weight
+        and any(exactly_stable(place.problem, {**own, n: moved * weight}) for moved in (_SHIFT, -_SHIFT))
     )
 
 
@@ -256,7 +259,7 @@ def _place(design: Given, parameters: Numbers | None, weights: Numbers | None) -
         return placed(problem, design.parameters if parameters is None else parameters, weights)
     if parameters is None and problem.free:
         message = f"missing; the problem frees {' '.join(problem.free)}: give their values, or a solution"
-        raise InputError([Fault(message, ("parameters",))])
+        raise refusal(message, "parameters")
     return placed(problem, problem.ordered(parameters or {}), weights)
 
 
@@ -266,7 +269,7 @@ def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, method: 
     if kind in place.stands_on or (heavy and place.on_edge):
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
-    mine = [s for s in seen if s.edge in KINDS[kind]]
+    mine = [s for s in seen if (s.edge not in STABILITY if heavy else s.edge == kind)]
     starts: dict[tuple[str, float], list[Array]] = {}
     for crossing in mine:
         starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
@@ -298,7 +301,7 @@ def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], m
             best = found or best
         if not best.u.size:
             break
-        met = between(place, best.u, edge.name not in STABILITY)
+        met = between(place, best.u, edge.real)
         starts = [c.u for c in met if (c.edge, c.sign) == (edge.name, sign)]
         if edge.name == "real" and best.distance < before:  # no rays came there, and starts much alike end alike
             starts += elsewhere(place, best.distance, turn)

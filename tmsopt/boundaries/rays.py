@@ -37,22 +37,22 @@ class RayCrossing:
     distance: float
 
 
-def ray_crossings(place: WeightedDesign, seed: int = 0, damped: bool = True) -> list[RayCrossing]:
+def ray_crossings(place: WeightedDesign, damped: bool = True) -> list[RayCrossing]:
     """The nearest few crossings of each edge in different directions, nearest first.
 
     Args:
         damped: whether the edges of heavy damping are looked for too.
     """
-    rays = directions(place, seed)
+    rays = directions(place)
     return along(place, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))), damped)
 
 
-def between(place: WeightedDesign, u: Array, damped: bool = True) -> list[RayCrossing]:
+def between(place: WeightedDesign, u: Array, damped: bool) -> list[RayCrossing]:
     """Crossings on the straight way to u, short of its end."""
     return along(place, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1], damped)
 
 
-def along(place: WeightedDesign, rays: Array, t: Array, damped: bool = True) -> list[RayCrossing]:
+def along(place: WeightedDesign, rays: Array, t: Array, damped: bool) -> list[RayCrossing]:
     """Crossings between displacements t · ray, t of shape (rays, steps)."""
     c = place.coefficients(place.along(rays[:, None, :], t))
     found: list[RayCrossing] = []
@@ -71,28 +71,26 @@ def along(place: WeightedDesign, rays: Array, t: Array, damped: bool = True) -> 
     return sorted(found, key=lambda x: x.distance)
 
 
-def directions(place: WeightedDesign, seed: int) -> Array:
+def directions(place: WeightedDesign) -> Array:
     """Unit vectors: the axes, the gradients of the boundaries both ways, and random ones."""
     axes = np.eye(len(place.lower))
-    random = np.random.default_rng(seed).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
+    random = np.random.default_rng(0).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
     near = place.coefficients(_STEP * np.concatenate([axes, -axes]))
     slopes = (_tests(near[: len(axes)]) - _tests(near[len(axes) :])).T
     slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
-    slopes = np.ldexp(
-        slopes, -np.frexp(np.abs(slopes).max(axis=1, keepdims=True, initial=0.0))[1]
-    )  # squares are doubles
+    largest = np.abs(slopes).max(axis=1, keepdims=True, initial=0.0)
+    slopes = np.ldexp(slopes, -np.frexp(largest)[1])  # squares are doubles
     every = np.concatenate([axes, -axes, slopes, -slopes, random])
     return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
 
 
-def most_damped(place: WeightedDesign, sign: float, seed: int = 0) -> list[Array]:
+def most_damped(place: WeightedDesign, sign: float) -> list[Array]:
     """The design and points around it that are nearest to having real roots only, for a given sign of a0."""
-    rays = directions(place, seed)
+    rays = directions(place)
     u = place.along(rays[:, None, :], np.broadcast_to(_AROUND, (len(rays), len(_AROUND)))).reshape(-1, rays.shape[1])
     c = sign * place.coefficients(u)
-    u, c = (
-        part[np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)] for part in (u, c)
-    )
+    kept = np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)
+    u, c = u[kept], c[kept]
     ratio = np.min(-(z := roots(c)).real / np.abs(z), axis=1) if len(c) else np.zeros(0)
     rows = np.argsort(-ratio, kind="stable").tolist()
     unit = u / np.linalg.norm(u, axis=1, keepdims=True)

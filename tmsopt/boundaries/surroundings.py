@@ -1,6 +1,6 @@
 """A design, the weights of changes to it, and the polynomials around it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -47,11 +47,6 @@ class WeightedDesign:
             at[n] = r.upper if u[k] >= self.upper[k] and r.closed else at[n]
         return at
 
-    def scaled(self, parameters: Mapping[str, Any]) -> list[Any]:
-        """Coefficients in the unit of time and the size in which the design's own are near 1."""
-        a = self.problem.model.coefficients(parameters, self.problem.parameter_set)
-        return [c / s for c, s in zip(a, self.scale, strict=True)]
-
     @cached_property
     def lower(self) -> Array:
         """Displacements to the lower ends of the physical ranges."""
@@ -78,10 +73,13 @@ class WeightedDesign:
         return np.clip(t[..., None] * directions, self.lower, self.upper)
 
     def coefficients(self, u: Array) -> Array:
-        """Displacements of shape (…, n) → coefficients of shape (…, degree + 1), scaled to the size of 1."""
+        """Displacements of shape (…, n) → coefficients of shape (…, degree + 1).
+
+        In the unit of time and the size in which the design's own are near 1.
+        """
         with np.errstate(all="ignore"):
-            c = self.scaled(self.displaced(np.moveaxis(u, -1, 0)))
-            return np.stack(np.broadcast_arrays(*c, u[..., 0])[:-1], axis=-1)
+            a = self.problem.model.coefficients(self.displaced(np.moveaxis(u, -1, 0)), self.problem.parameter_set)
+            return np.stack(np.broadcast_arrays(*a, u[..., 0])[:-1], axis=-1) / self.scale
 
     @cached_property
     def stable(self) -> bool:
@@ -114,15 +112,19 @@ class WeightedDesign:
 
     @cached_property
     def _own(self) -> Array:
-        return np.array([float(c) for c in self.scaled(self.parameters)])
+        return self._unscaled / self.scale
 
     @cached_property
     def scale(self) -> Array:
         """Size of each coefficient in that unit of time."""
-        a = np.array(self.problem.model.coefficients(self.parameters, self.problem.parameter_set), dtype=float)
+        a = self._unscaled
         unit = abs(a[-1] / a[0]) ** (1 / (len(a) - 1)) if a[0] and a[-1] else 1.0
         powers = unit ** np.arange(len(a))
         return np.asarray(powers * (float(np.abs(a / powers).max()) or 1.0))
+
+    @cached_property
+    def _unscaled(self) -> Array:
+        return np.array(self.problem.model.coefficients(self.parameters, self.problem.parameter_set), dtype=float)
 
 
 def placed(problem: Posed, parameters: Numbers, weights: Numbers | None) -> WeightedDesign:

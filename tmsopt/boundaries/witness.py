@@ -14,7 +14,7 @@ from tmsopt.boundaries.rays import directions
 from tmsopt.boundaries.surroundings import WeightedDesign
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Numbers
-from tmsopt.roots import exact_roots, is_stable, lienard_chipart, multiple_real_roots, routh, shift
+from tmsopt.roots import exact_roots, is_stable, multiple_real_roots, routh, shift
 
 BITS = 400
 """Of the balls in which a sign is decided; one that they leave open is 0."""
@@ -25,7 +25,6 @@ _FEW = 4  # designs there that exact arithmetic is asked about
 _LEFT, _NEAR = (1e-4, 1e-3, 1e-2), 0.05  # of the roots' size, to move them; of the distance, that this may take
 _ROUNDS, _STEP = 4, 1e-6
 _NONE = 1e-10  # of the terms of the design's own coefficients: below it there is no polynomial
-_SMALL = 4  # degree up to which Liénard–Chipart's conditions have few terms
 
 
 def is_boundary(place: WeightedDesign, u: Array, heavy: bool) -> bool:
@@ -51,7 +50,7 @@ def is_boundary(place: WeightedDesign, u: Array, heavy: bool) -> bool:
 def _beside(place: WeightedDesign, u: Array, heavy: bool, within: bool) -> Iterator[Array]:
     """Displacements near one at which doubles find the other verdict."""
     size = float(np.linalg.norm(u))
-    around = np.concatenate([[u / size, -u / size], directions(place, seed=0)])
+    around = np.concatenate([[u / size, -u / size], directions(place)])
     for reach in _BESIDE:
         points = np.clip(u + max(reach * size, _LEAST) * around, place.lower, place.upper)
         at = place.coefficients(points)
@@ -77,11 +76,7 @@ def exactly_stable(problem: Posed, parameters: Numbers) -> bool:
     """Whether all roots of the design as stored lie left of the imaginary axis, in ball arithmetic."""
     with flint.ctx.workprec(BITS):
         c = _balls(problem, parameters)
-        if not (c[0] > 0 or c[0] < 0):
-            return False
-        signed = [-x for x in c] if c[0] < 0 else c
-        tests = lienard_chipart(signed) if len(c) <= _SMALL + 1 else routh(signed)
-        return all(x > 0 for x in tests)
+        return all(x * c[0] > 0 for x in routh(c))
 
 
 def _all_real(problem: Posed, parameters: Numbers) -> bool:
