@@ -10,7 +10,7 @@ from helpers import shares
 
 import tmsopt
 from tmsopt import InputError
-from tmsopt.executor import EngineError
+from tmsopt.executor import EngineError, here, processes
 from tmsopt.models import tms
 
 curve = import_module("tmsopt.fronts.curve")
@@ -25,27 +25,27 @@ PROBLEM = tmsopt.Problem(tms, FIXED, FREE, pareto=["abscissa", "Fr"], constraint
 ASK = subproblems.FrontSolver(PROBLEM, options.Options())
 
 
-def each(function, items, processes):
-    with team.Team(processes) as side_by_side:
-        return dict(side_by_side.each(function, ASK, items))
+def each(function, items, workers):
+    return dict(team.each(workers, function, ASK, items))
 
 
-@pytest.mark.parametrize("processes", [1, 3])
-def test_every_item_has_its_answer(processes):
-    found = each(shares.squared, range(9), processes)
+@pytest.mark.parametrize("workers", [here, lambda: processes(3)])
+def test_every_item_has_its_answer(workers):
+    with workers() as side_by_side:
+        found = each(shares.squared, range(9), side_by_side)
     assert {k: square for k, (square, _) in found.items()} == {k: k**2 for k in range(9)}
 
 
 def test_processes_share_the_work():
-    with team.Team(2) as side_by_side:
-        workers = [pid for _, (_, pid) in side_by_side.each(shares.slowly_squared, ASK, range(8))]
+    with processes(2) as side_by_side:
+        workers = [pid for _, pid in each(shares.slowly_squared, range(8), side_by_side).values()]
     assert len(set(workers)) == 2
     assert os.getpid() not in workers
 
 
 def test_an_item_that_ends_its_processes_is_an_error():
-    with team.Team(2) as side_by_side, pytest.raises(EngineError, match="exit code 3"):
-        dict(side_by_side.each(shares.dying_at_two, ASK, range(9)))
+    with processes(2) as side_by_side, pytest.raises(EngineError, match="exit code 3"):
+        each(shares.dying_at_two, range(9), side_by_side)
 
 
 def test_what_cannot_be_sent_is_solved_here():
@@ -54,12 +54,12 @@ def test_what_cannot_be_sent_is_solved_here():
 
 
 def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():
-    with team.Team(1) as side_by_side:
+    with here() as side_by_side:
         found = []
         with pytest.raises(KeyboardInterrupt):
-            found.extend(side_by_side.each(shares.interrupted_at_two, ASK, range(4)))
+            found.extend(team.each(side_by_side, shares.interrupted_at_two, ASK, range(4)))
         assert found == [(0, 0), (1, 1)]
-        assert dict(side_by_side.each(shares.squared, ASK, [3])) == {0: (9, os.getpid())}
+        assert each(shares.squared, [3], side_by_side) == {0: (9, os.getpid())}
 
 
 @pytest.mark.slow

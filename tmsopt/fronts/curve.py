@@ -1,15 +1,16 @@
 """The front of two objectives: limits set one after the other where it is known least."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, pairwise
+from itertools import accumulate, islice, pairwise
 
+from tmsopt.executor import Executor
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
 from tmsopt.fronts.subproblems import FrontSolver, least, point
-from tmsopt.fronts.team import AT_ONCE, Team
+from tmsopt.fronts.team import AT_ONCE, each
 from tmsopt.problem.solution import Solution
-from tmsopt.progress import Steps, begin
+from tmsopt.progress import Steps
 from tmsopt.search.solve import covered
 
 Objectives = tuple[float, ...]
@@ -28,13 +29,13 @@ _ROOM = 1.5  # of the mean spacing: a longer stretch has room for a point
 _CLOSE = 0.3  # of the mean spacing: unlabelled points closer than this to another are left out
 
 
-def curve(team: Team, ask: FrontSolver, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> Front:
-    """The front between its two ends, with kinks and gaps.
+def curve(team: Executor, ask: FrontSolver, front: Front, points: int, progress: Steps) -> Front:
+    """The front between the two ends that `ask` has, with kinks and gaps; nothing else is known of it yet.
 
     Each new limit is set where neighbours are farthest apart, on the objective that changes more there; sweeps both
     ways then carry a better branch along the front.
     """
-    search, interrupted = _Search(team, ask, ends, points, progress), False
+    search, interrupted = _Search(team, ask, points, progress), False
     try:
         for _ in range(_ROUNDS):
             search.fill()
@@ -44,7 +45,7 @@ def curve(team: Team, ask: FrontSolver, ends: Sequence[FrontPoint], points: int,
             search.sweep()
     except KeyboardInterrupt:
         interrupted = True
-    return replace(_thinned(search), interrupted=interrupted)
+    return replace(_thinned(search, front), interrupted=interrupted)
 
 
 @dataclass(frozen=True)
@@ -71,12 +72,12 @@ class _Stretch:
 
     left: FrontPoint
     right: FrontPoint
-    size: tuple[float, float]
+    size: tuple[float, ...]
     axis: int
     unknown: tuple[float, float]
-    suspect: bool = False
-    failed: bool = False
-    gap: bool = False
+    suspect: bool
+    failed: bool
+    gap: bool
 
     @property
     def length(self) -> float:
@@ -97,13 +98,11 @@ class _Stretch:
 class _Search:
     """The probes made so far; the front is always read from them afresh."""
 
-    def __init__(
-        self, team: Team, ask: FrontSolver, ends: Sequence[FrontPoint], points: int, progress: Steps | None
-    ) -> None:
-        self.team, self.ask, self.ends, self.points, self.progress = team, ask, tuple(ends), points, progress
+    def __init__(self, team: Executor, ask: FrontSolver, points: int, progress: Steps) -> None:
+        self.team, self.ask, self.points, self.progress = team, ask, points, progress
+        self.ends, self.range = ask.ends, ask.ranges
         self.probes: list[_Probe] = []
         self.done, self.most = 0, points  # of what is counted
-        self.range = tuple(abs(ends[0].objectives[k] - ends[1].objectives[k]) for k in (0, 1))
 
     def chain(self) -> list[FrontPoint]:
         """Efficient points by the first objective."""
@@ -115,22 +114,19 @@ class _Search:
 
     def _stretch(self, left: FrontPoint, right: FrontPoint) -> _Stretch:
         a, b = left.objectives, right.objectives
-        size = (abs(a[0] - b[0]) / self.range[0], abs(a[1] - b[1]) / self.range[1])
+        size = tuple(abs(x - y) / span for x, y, span in zip(a, b, self.range, strict=True))
         own = [p for p in self.probes if self._led_nowhere(p, *((b, a) if p.axis else (a, b)))]
-        if not own:
-            axis = int(size[1] > size[0])
-            return _Stretch(left, right, size, axis, (min(a[axis], b[axis]), max(a[axis], b[axis])))
-        axis = own[0].axis
+        axis = own[0].axis if own else int(size[1] > size[0])
         low, high = sorted((a[axis], b[axis]))
         failures = [p.eps for p in own if p.axis == axis and p.found is None]
         empty = [p.eps for p in own if p.axis == axis and p.found is not None]
-        above = max(failures + empty), high
+        above = max(failures + empty, default=low), high
         first = min(failures, default=low)
         below = max([low, *(e for e in empty if e < first)]), first
         unknown = below if below[1] - below[0] > _FAILED * self.range[axis] else above
         enough = _FAILED if failures else _GAP
-        gap = unknown[1] - unknown[0] <= enough * self.range[axis]
-        return _Stretch(left, right, size, axis, unknown, True, bool(failures), gap)
+        gap = bool(own) and unknown[1] - unknown[0] <= enough * self.range[axis]
+        return _Stretch(left, right, size, axis, unknown, bool(own), bool(failures), gap)
 
     def _led_nowhere(self, probe: _Probe, low: Objectives, high: Objectives) -> bool:
         """Whether a probe between two neighbours failed, or found nothing better than the one that is lower in it."""
@@ -158,11 +154,10 @@ class _Search:
         """What comes of probes, solved side by side; those that have ended are kept when the user ends the others."""
         found: dict[int, _Probe | None] = {}
         try:
-            for k, probe in self.team.each(_probed, self.ask, asked):
+            for k, probe in each(self.team, _probed, self.ask, asked):
                 found[k] = probe
                 self.done += 1
-                if self.progress:
-                    self.progress(min(self.done, self.most), self.most)
+                self.progress(min(self.done, self.most), self.most)
         finally:
             ended = [found.get(k) for k in range(len(asked))]
             self.probes += [probe for probe in ended if probe is not None]
@@ -179,7 +174,7 @@ class _Search:
 
     def fill(self) -> None:
         """Points where neighbours are farthest apart, until there are enough."""
-        begin(self.progress, "following the front", "point")
+        self.progress.begin("following the front", "point")
         self.done, self.most = len(self.chain()), self.points
         while not self.exhausted:
             stretches = self.stretches()
@@ -194,47 +189,43 @@ class _Search:
     def sweep(self) -> bool:
         """Solve each point anew from the design before it, both ways; whether any became better."""
         before = len(self.chain())
-        begin(self.progress, "looking for better branches", "sub-problem")
+        self.progress.begin("looking for better branches", "sub-problem")
         self.done, self.most = 0, 2 * before
         better = False
         for backwards in (False, True):
             chain = self.chain()[::-1] if backwards else self.chain()
             previous, rest = chain[0], chain[1:-1]
             while rest:  # a few at once, as if none became better; where one does, those after it are asked again
-                ahead = self._next(previous, rest)
+                ahead = [*islice(self._next(previous, rest), AT_ONCE)]
                 new = self.probe([asked for _, asked in ahead])
                 found = next((k for k, probe in enumerate(new) if probe is not None), None)
                 if found is None:
                     last = ahead[-1][0] if len(ahead) == AT_ONCE else len(rest) - 1
                     previous, rest = rest[last], rest[last + 1 :]
                 else:
-                    late = {id(probe) for probe in new[found + 1 :]}
-                    self.probes = [probe for probe in self.probes if id(probe) not in late]
+                    late = sum(probe is not None for probe in new[found + 1 :])
+                    del self.probes[len(self.probes) - late :]
                     better, rest = True, rest[ahead[found][0] + 1 :]
                     previous = self.probes[-1].found or previous
         return better or len(self.chain()) < before
 
-    def _next(self, previous: FrontPoint, rest: Sequence[FrontPoint]) -> list[tuple[int, "_Asked"]]:
+    def _next(self, previous: FrontPoint, rest: Sequence[FrontPoint]) -> Iterator[tuple[int, "_Asked"]]:
         """The next points that are to be solved anew, by their places, each from the one before it."""
-        ahead: list[tuple[int, _Asked]] = []
         for place, old in enumerate(rest):
             probe = next((p for p in self.probes if p.found is old), None)
             if probe is not None and not self._near(previous.solution, old.solution):
                 k = 1 - probe.axis
                 enough = old.objectives[k] - _UNUSED * self.range[k]
                 way = ((previous.solution,), True)
-                ahead.append((place, _Asked(probe.axis, probe.eps, (way,), enough, None, len(self.probes))))
+                yield place, _Asked(probe.axis, probe.eps, (way,), enough, None, len(self.probes))
             previous = old
-            if len(ahead) == AT_ONCE:
-                break
-        return ahead
 
     def settle(self) -> bool:
         """Ends of gaps and places of kinks, to their tolerance; ended early, with True, where another branch is met.
 
         A kink is halved from the neighbours' designs alone and, as both may be on a poorer branch, at last as others.
         """
-        begin(self.progress, "placing kinks and gaps", "sub-problem")
+        self.progress.begin("placing kinks and gaps", "sub-problem")
         self.done = 0
         while not self.exhausted:
             stretches = self.stretches()
@@ -288,7 +279,7 @@ def _probed(ask: FrontSolver, asked: _Asked) -> _Probe | None:
     return _Probe(asked.axis, asked.eps, found and asked.known)  # of a poor local optimum, the neighbour is better
 
 
-def _thinned(search: _Search) -> Front:
+def _thinned(search: _Search, front: Front) -> Front:
     """The front as reported: labelled points, and the others where they are not crowded."""
     stretches = search.stretches()
     chain = [stretches[0].left, *(s.right for s in stretches)]
@@ -311,16 +302,14 @@ def _thinned(search: _Search) -> Front:
             kept.append(i)
             last = x
     place = {i: k for k, i in enumerate(kept)}
-    proved = dict(search.team.each(_covered, search.ask, [chain[i].solution for i in kept]))
+    proved = dict(each(search.team, _covered, search.ask, [chain[i].solution for i in kept]))
     notes = () if not search.exhausted else ("the search was ended: too many sub-problems; ask for more points",)
-    return Front(
-        problem=search.ask.problem.problem,
-        objectives=search.ask.texts,
+    return replace(
+        front,
         points=tuple(replace(chain[i], solution=proved[k], label="; ".join(words[i])) for k, i in enumerate(kept)),
         kinks=tuple(replace(kink, index=place[kink.index]) for kink in kinks),
         gaps=tuple(replace(gap, index=place[gap.index]) for gap in gaps),
         solved=len(search.probes) + 2,
-        seconds=0.0,
         notes=notes,
     )
 

@@ -6,17 +6,17 @@ from itertools import takewhile
 from typing import Unpack
 
 from tmsopt.errors import MOST_POINTS, InputError, count_faults, refusal
-from tmsopt.executor import cores
+from tmsopt.executor import Executor, cores, here, processes
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import FrontSolver, alone, best_first, point
 from tmsopt.fronts.surface import surface
-from tmsopt.fronts.team import AT_ONCE, Team, can_send
+from tmsopt.fronts.team import AT_ONCE, can_send, each
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
 from tmsopt.program.options import Asked, Options, documents_options, options_of
-from tmsopt.progress import Steps, begin
+from tmsopt.progress import Steps
 
 POINTS = 25
 STARTS = 2
@@ -68,35 +68,31 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
         raise InputError(faults)
     began = time.perf_counter()
     ask = FrontSolver(problem, replace(how, progress=None))
-    with Team(min(workers or cores(), AT_ONCE) if can_send(ask) else 1) as team:
-        front = _front(team, ask, points, how.progress)
+    several = min(workers or cores(), AT_ONCE) if can_send(ask) else 1
+    with processes(several) if several > 1 else here() as team:
+        front = _front(team, ask, points, how.progress or Steps(lambda _: None))
     if front.interrupted:
         words = f"the user stopped the search after {front.solved} sub-problems; this is what is known of the front"
         front = replace(front, notes=(*front.notes, words))
     return replace(front, seconds=time.perf_counter() - began)
 
 
-def _front(team: Team, ask: FrontSolver, points: int, progress: Steps | None) -> Front:
+def _front(team: Executor, ask: FrontSolver, points: int, progress: Steps) -> Front:
     n, easier, ends = len(ask.texts), dict[int, Solution](), dict[int, FrontPoint]()
-    begin(progress, "looking for the ends of the front", "sub-problem")
-
-    def count() -> None:
-        if progress:
-            progress(len(easier) + len(ends), 2 * n)
-
-    count()
+    progress.begin("looking for the ends of the front", "sub-problem")
+    progress(0, 2 * n)
     front = Front(ask.problem.problem, ask.texts, (), (), (), n, 0.0)
     try:
-        for k, found in team.each(alone, ask, range(n)):
+        for k, found in each(team, alone, ask, range(n)):
             easier[k] = found
-            count()
+            progress(len(easier), 2 * n)
             for solution in (easier[j] for j in takewhile(easier.__contains__, range(n))):
                 if solution.status != "optimal":
                     raise NotSolved(solution)
         ask = replace(ask, easier=easier)
-        for k, best in team.each(best_first, ask, range(n)):
+        for k, best in each(team, best_first, ask, range(n)):
             ends[k] = replace(point(ask, best), label=_label(ask.texts[k].strip()))
-            count()
+            progress(n + len(ends), 2 * n)
     except KeyboardInterrupt:
         if not ends:
             raise
@@ -109,10 +105,7 @@ def _front(team: Team, ask: FrontSolver, points: int, progress: Steps | None) ->
         best_in_all = min(at, key=lambda p: sum(p.objectives))
         note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
         return replace(front, points=(replace(best_in_all, label="best in all"),), notes=(note,))
-    if n == 2:
-        return curve(team, ask, at, points, progress)
-    shown, gaps, solved, interrupted = surface(team, ask, at, points, progress)
-    return replace(front, points=shown, gaps=gaps, solved=solved, interrupted=interrupted)
+    return (curve if n == 2 else surface)(team, ask, front, points, progress)
 
 
 def _label(text: str) -> str:

@@ -1,13 +1,15 @@
 """The front of three objectives: a grid of limits on two of them, over the payoff table."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
-from tmsopt.fronts.front import FrontPoint, Gap, efficient
+from tmsopt.executor import Executor
+from tmsopt.fronts.front import Front, Gap, efficient
 from tmsopt.fronts.subproblems import FrontSolver, least, objectives, point, solvable
-from tmsopt.fronts.team import Team
+from tmsopt.fronts.team import each
 from tmsopt.problem.solution import Solution
-from tmsopt.progress import Steps, begin
+from tmsopt.progress import Steps
 
 MOST = 12
 """Limits per objective at most, so 144 cells."""
@@ -23,16 +25,15 @@ class _Cell(NamedTuple):
     number: int
 
 
-def surface(
-    team: Team, ask: FrontSolver, ends: Sequence[FrontPoint], points: int, progress: Steps | None
-) -> tuple[tuple[FrontPoint, ...], tuple[Gap, ...], int, bool]:
-    """Efficient points, sub-problems that failed, the number of those solved, and whether the user ended it.
+def surface(team: Executor, ask: FrontSolver, front: Front, points: int, progress: Steps) -> Front:
+    """The front, of which nothing is known yet but the ends that `ask` has, with the sub-problems that failed as gaps.
 
     Objective 0 is minimised with limits on 1 and 2, from loose to tight, those side by side that do not follow from one
     another; the worst values in the payoff table stand for the nadir. A limit that no design meets ends its row, and
     every tighter one with it.
     """
-    begin(progress, "following the front", "sub-problem")
+    progress.begin("following the front", "sub-problem")
+    ends = ask.ends
     low, high = ([f(column) for column in zip(*(p.objectives for p in ends), strict=True)] for f in (min, max))
     side, count, interrupted = min(points, MOST), 0, False
     solved: dict[tuple[int, int], Solution | None] = {(side, side): ends[0].solution}  # the loosest limits cut nothing
@@ -52,10 +53,9 @@ def surface(
                 else:
                     cells[i, j] = _Cell(limits, tuple(near or [p.solution for p in ends]), count + len(cells))
             places = list(cells)
-            for k, (found, possible) in team.each(_solved, ask, list(cells.values())):
+            for k, (found, possible) in each(team, _solved, ask, list(cells.values())):
                 count += 1
-                if progress:
-                    progress(count, side * side - 1)
+                progress(count, side * side - 1)
                 if possible:
                     solved[places[k]] = found
                 if possible and found is None:
@@ -67,7 +67,7 @@ def surface(
     every = [*ends, *(point(ask, s) for s in {id(s): s for s in ordered if s is not None}.values())]
     kept = efficient(every, [_SAME * (h - b) for b, h in zip(low, high, strict=True)])
     gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for _, text in sorted(failed.items()))
-    return tuple(kept), gaps, count + 3, interrupted
+    return replace(front, points=tuple(kept), gaps=gaps, solved=count + 3, interrupted=interrupted)
 
 
 def _solved(ask: FrontSolver, cell: _Cell) -> tuple[Solution | None, bool]:

@@ -5,7 +5,7 @@ from contextlib import closing
 from functools import partial
 from typing import Any, TypeVar
 
-from tmsopt.executor import Crash, EngineError, Executor, here, processes
+from tmsopt.executor import Crash, EngineError, Executor
 from tmsopt.fronts.subproblems import FrontSolver
 
 AT_ONCE = 4
@@ -15,34 +15,21 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-class Team:
-    """Workers that solve sub-problems; to be closed.
+def each(
+    team: Executor, function: Callable[[FrontSolver, T], R], ask: FrontSolver, items: Sequence[T]
+) -> Iterator[tuple[int, R]]:
+    """Places of the items with what the function makes of each, as they come.
 
-    What comes out is the same for any number of them: no sub-problem knows what another has met.
+    They are the same for any number of workers: no sub-problem knows what another has met.
+
+    Raises:
+        EngineError: an item ends every process that tries it.
     """
-
-    def __init__(self, workers: int) -> None:
-        self._executor: Executor = processes(workers) if workers > 1 else here()
-
-    def __enter__(self) -> "Team":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._executor.__exit__(*error)
-
-    def each(
-        self, function: Callable[[FrontSolver, T], R], ask: FrontSolver, items: Sequence[T]
-    ) -> Iterator[tuple[int, R]]:
-        """Places of the items with what the function makes of each, as they come.
-
-        Raises:
-            EngineError: an item ends every process that tries it.
-        """
-        with closing(self._executor.map(partial(function, ask), items)) as answers:
-            for place, answer in answers:
-                if isinstance(answer, Crash):
-                    raise EngineError(f"a sub-problem of the front ends its process ({answer.cause})")
-                yield place, answer
+    with closing(team.map(partial(function, ask), items)) as answers:
+        for place, answer in answers:
+            if isinstance(answer, Crash):
+                raise EngineError(f"a sub-problem of the front ends its process ({answer.cause})")
+            yield place, answer
 
 
 def can_send(thing: Any) -> bool:
