@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ _ELSEWHERE = 4  # starts; as many as led 11 of 196 random systems of degrees 6 t
 _POINTS = 400  # looked at on the straight way to a nearest point
 _AROUND = np.array([0.1, 0.3, 1.0])
 _STEP = 1e-6  # of differences, which only choose directions
+_stable = partial(is_stable, exact=False)  # up to rounding: a bracket closes in on where that decides
 
 
 @dataclass(frozen=True)
@@ -43,17 +45,16 @@ def ray_crossings(place: WeightedDesign, damped: bool = True) -> list[RayCrossin
     Args:
         damped: whether the edges of heavy damping are looked for too.
     """
-    rays = directions(place)
-    return along(place, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))), damped)
+    return along(place, directions(place), _RADII, damped)
 
 
 def between(place: WeightedDesign, u: Array, damped: bool) -> list[RayCrossing]:
     """Crossings on the straight way to u, short of its end."""
-    return along(place, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1], damped)
+    return along(place, u[None, :], np.linspace(0.0, 1.0, _POINTS)[:-1], damped)
 
 
 def along(place: WeightedDesign, rays: Array, t: Array, damped: bool) -> list[RayCrossing]:
-    """Crossings between displacements t · ray, t of shape (rays, steps)."""
+    """Crossings between displacements t · ray, t ascending."""
     c = place.coefficients(place.along(rays[:, None, :], t))
     found: list[RayCrossing] = []
     for heavy, test in ((False, _stable), (True, heavily_damped))[: 1 + damped]:
@@ -61,13 +62,12 @@ def along(place: WeightedDesign, rays: Array, t: Array, damped: bool) -> list[Ra
         ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
         if not ray.size:
             continue
-        all_of = _Bracket(place, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).narrowed(*_COARSE)
+        all_of = _Bracket(place, test, rays[ray], t[step], t[step + 1], inside[ray, step]).narrowed(*_COARSE)
         names = [losses(c, heavy) for c in all_of.sides()[0]]
         distance = np.linalg.norm(place.along(all_of.rays, all_of.high), axis=1)
-        unit = all_of.rays / np.linalg.norm(all_of.rays, axis=1, keepdims=True)
         for name in sorted({n for each in names for n in each}):
             rows = [k for k in np.argsort(distance, kind="stable") if name in names[k]]
-            found += all_of.rows(_different(unit, rows)).narrowed(*_FINE).crossings(heavy)
+            found += all_of.rows(_different(all_of.rays, rows)).narrowed(*_FINE).crossings(heavy)
     return sorted(found, key=lambda x: x.distance)
 
 
@@ -87,14 +87,13 @@ def directions(place: WeightedDesign) -> Array:
 def most_damped(place: WeightedDesign, sign: float) -> list[Array]:
     """The design and points around it that are nearest to having real roots only, for a given sign of a0."""
     rays = directions(place)
-    u = place.along(rays[:, None, :], np.broadcast_to(_AROUND, (len(rays), len(_AROUND)))).reshape(-1, rays.shape[1])
+    u = place.along(rays[:, None, :], _AROUND).reshape(-1, rays.shape[1])
     c = sign * place.coefficients(u)
     kept = np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)
     u, c = u[kept], c[kept]
     ratio = np.min(-(z := roots(c)).real / np.abs(z), axis=1) if len(c) else np.zeros(0)
     rows = np.argsort(-ratio, kind="stable").tolist()
-    unit = u / np.linalg.norm(u, axis=1, keepdims=True)
-    return [np.zeros(rays.shape[1]), *u[_different(unit, rows)]]
+    return [np.zeros(rays.shape[1]), *u[_different(u, rows)]]
 
 
 def elsewhere(place: WeightedDesign, distance: float, seed: int) -> list[Array]:
@@ -102,11 +101,6 @@ def elsewhere(place: WeightedDesign, distance: float, seed: int) -> list[Array]:
     rays = np.random.default_rng(seed).standard_normal((_ELSEWHERE, len(place.lower)))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     return [*place.along(rays, np.full(_ELSEWHERE, distance))]
-
-
-def _stable(c: Array) -> Truth:
-    """Up to rounding: a bracket closes in on where that decides."""
-    return is_stable(c, exact=False)
 
 
 def _tests(c: Array) -> Array:
@@ -122,8 +116,9 @@ def _tests(c: Array) -> Array:
     return np.stack([c[..., 0], c[..., -1], *(np.where(proper, x, np.nan) for x in (pair, double))], axis=-1)
 
 
-def _different(unit: Array, rows: list[int]) -> NDArray[np.int_]:
+def _different(rays: Array, rows: list[int]) -> NDArray[np.int_]:
     """The first few of the rows whose directions differ."""
+    unit = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     kept: list[int] = []
     for k in rows:
         if len(kept) < _KEPT and all(float(unit[k] @ unit[other]) < _ALIKE for other in kept):

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.fronts.front import FrontPoint
-from tmsopt.problem.limit import limit_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.program.options import STARTS, Options
@@ -49,8 +48,8 @@ class FrontSolver:
     def _hopeless(self, problem: Posed, near: Sequence[Solution]) -> frozenset[str]:
         """Parts of the box whose best in an objective, without any limit, is worse than what is asked or had of it."""
         names = eps_names(self)
-        limits = {k: limit_of(problem.constraints[n]) for k, n in enumerate(names) if n in problem.constraints}
-        most = {k: limit for k, limit in limits.items() if limit is not None}
+        limits = {k: problem.constraints[n] for k, n in enumerate(names) if n in problem.constraints}
+        most = {k: float(text.rpartition("<=")[2]) for k, text in limits.items()}
         hopeless = set[str]()
         for k, best in self.easier.items():
             if not best.sides:
@@ -111,7 +110,7 @@ def least(
     Returns: the best that is optimal, or None.
     """
     asked = subproblem(ask, k, limits)
-    if pin is not None and near:
+    if pin is not None:
         asked = _pinned(ask, asked, pin, near[0])
     ended = [ask.solve(asked, (0 if few else ask.options.starts) if near else _RETRY, near, without_sample=few)]
     if not few and all(s.status != "optimal" for s in ended):
