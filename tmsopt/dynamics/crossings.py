@@ -7,7 +7,7 @@ that hold for every y, such as a root 0, are split off before.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -91,9 +91,6 @@ def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_
     p = _bivariate([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
     a, split = _rows(p), _split(p)
     places = {kind: _real_places(q, lower, upper) for kind, q in _conditions(a, split).items() if not q.is_zero()}
-    named = {} if bands_alone else places
-    found = [(y, *rest) for kind, ys in named.items() for y in ys for rest in _named(a, split, kind, y)]
-    found.sort(key=lambda place: place[0])
     marks = sorted({y for ys in places.values() for y in ys})
     cells = list(_cells(marks, lower, upper))
     states = [_state(_at(a, middle)) for _, _, middle in cells]
@@ -102,8 +99,10 @@ def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_
     kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
     changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
     always = {"infinity": len(a) < len(coefficients)} | lasting
+    named = {} if bands_alone else places
+    here = ((y, each) for y in marks for kind, ys in named.items() if y in ys for each in _named(a, split, kind, y))
     return Crossings(
-        tuple(Crossing(float(y), kind, root, first, changed[float(y)]) for y, kind, root, first in found),
+        tuple(Crossing(float(y), *each, changed[float(y)]) for y, each in here),
         _bands(cells, [stable for stable, _ in states]),
         _bands(cells, [damped for _, damped in states]),
         tuple(kind for kind, holds in always.items() if holds),
@@ -209,29 +208,21 @@ def _named(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple
     coefficients = _finite_part(_at(a, y))
     size = _size(a, y, coefficients)
     roots = _grouped(coefficients, size)
-    if not roots:
-        return
-    line = max(r.re for r in roots)
-
-    def first(root: Root) -> bool:
-        return root.re >= line - _SAME * size
+    line = max((r.re for r in roots), default=math.nan)
 
     def within(part: Sequence[Any], root: Root) -> int:
         """How often a root is one of a part."""
         own = _grouped(_finite_part(_at(part, y)), size)
         return sum(o.multiplicity for o in own if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME * size)
 
-    if kind == "capsize":
-        zero = min(roots, key=lambda r: abs(complex(r.re, r.im)))
-        yield kind, Root(0.0, 0.0, zero.multiplicity), first(zero)
-    elif kind == "weave":
-        for root in roots:
-            if abs(root.re) <= _SAME * size < root.im and within(split.rest, root):
-                yield kind, Root(0.0, root.im, root.multiplicity), first(root)
-    else:
-        for root in roots:
-            if root.multiplicity > 1 and root.im >= 0 and within(split.once, root) > 1:
-                yield f"{'CEP' if root.im else 'EP'}{root.multiplicity}", root, first(root)
+    holds: dict[str, Callable[[Root], bool]] = {
+        "capsize": lambda r: r.re == r.im == 0,
+        "weave": lambda r: r.re == 0 < r.im and within(split.rest, r) > 0,
+        "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and within(split.once, r) > 1,
+    }
+    for root in filter(holds[kind], roots):
+        name = f"{'CEP' if root.im else 'EP'}{root.multiplicity}" if kind == "EP2" else kind
+        yield name, root, root.re >= line - _SAME * size
 
 
 def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
@@ -257,10 +248,8 @@ def _grouped(coefficients: Sequence[Any], size: float) -> list[Root]:
         z = complex(left[0].re, left[0].im)
         near = [r for r in left if abs(complex(r.re, r.im) - z) <= _SAME * size]
         left = [r for r in left if r not in near]
-        number = sum(r.multiplicity for r in near)
-        middle = sum(complex(r.re, r.im) * r.multiplicity for r in near) / number
-        re, im = (x if abs(x) > _SAME * size else 0.0 for x in (middle.real, middle.imag))
-        groups.append(Root(re, im, number))
+        re, im = (x if abs(x) > _SAME * size else 0.0 for x in (z.real, z.imag))
+        groups.append(Root(re, im, sum(r.multiplicity for r in near)))
     return groups
 
 

@@ -1,6 +1,7 @@
 """x′ = A x by matrix exponentials, which are smooth where eigenvectors merge: nothing here needs an eigenvector."""
 
 import math
+from itertools import accumulate
 
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
@@ -42,11 +43,7 @@ def shaken(A: Array, x: Array, force: Array, step: float, count: int, seed: int)
     sizes, axes = np.linalg.eigh((covariance + covariance.T) / 2)
     root = axes * np.sqrt(np.maximum(sizes, 0.0))
     steps = np.random.default_rng(seed).standard_normal((count - 1, n)) @ root.T
-    found = np.empty((count, n))
-    found[0] = x
-    for k, jump in enumerate(steps):
-        found[k + 1] = forward @ found[k] + jump
-    return found
+    return np.array([*accumulate(steps, lambda state, jump: forward @ state + jump, initial=x)])
 
 
 def stationary(A: Array, force: Array) -> Array:

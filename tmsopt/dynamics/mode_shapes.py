@@ -68,7 +68,7 @@ def mode_shapes(
         rate: how many 1/s a rate of 1 is.
     """
     model, of = problem.model, problem.parameter_set
-    pencil = [np.array(P, dtype=float) for P in matrices_of(model)(of.native(parameters))]
+    pencil = matrices_of(model)(of.native(parameters))
     names = coordinates_of(model, pencil)
     chains = diagnosed(model, of, parameters, structure)
     if model.double is not None:  # −[[J, R], [−R, J]]

@@ -61,13 +61,12 @@ def matrices_of(model: Model) -> Any:
     Raises:
         InputError: where it is known by its characteristic polynomial alone.
     """
-    if model.double is not None:
-        return model.double
-    if model.pencil is None:
+    pencil = model.double or model.pencil
+    if pencil is None:
         advice = "write its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
         message = f"'{model.name}' is given by its coefficients alone, which tell roots and no motion; {advice}"
         raise refusal(message, "model")
-    return model.pencil
+    return lambda native: [np.array(P, dtype=float) for P in pencil(native)]
 
 
 def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
@@ -92,7 +91,7 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     """
     model, of = problem.model, problem.parameter_set
     native = of.native(parameters)
-    pencil = [np.array(P, dtype=float) for P in matrices_of(model)(native)]
+    pencil = matrices_of(model)(native)
     n = len(pencil[0])
     scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
     if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled) > _SINGULAR:
