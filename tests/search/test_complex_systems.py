@@ -161,6 +161,10 @@ def test_the_threshold_of_a_pt_dimer():
     assert margins.radius == pytest.approx(0.25, abs=1e-9)
 
 
+def test_heavy_damping_of_the_polynomial_is_no_boundary():
+    assert not tmsopt.nearest(tmsopt.solve("problems/ring_backscattering.toml"), "heavy damping").found
+
+
 def test_a_carrier_of_a_million_couplings():
     """No false exceptional point is found: it is where it is without the carrier, to the roundings of that."""
     model = from_hamiltonian([["w1 - 1j*g1", "k"], ["k", "w - 1j*g2"]])

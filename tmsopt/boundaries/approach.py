@@ -49,8 +49,8 @@ Method = Callable[..., Callable[[Array], Run]]
 
 def approach(
     place: WeightedDesign, edge: Edge, sign: float, size: float, method: Method
-) -> Callable[[Array, float], Approach | None]:
-    """A function from a start, and a distance to beat, to a nearest point of an edge; None where it ends elsewhere.
+) -> Callable[[Array, Approach], Approach]:
+    """A function from a start, and the best so far, to a nearest point of an edge; the best where it ends elsewhere.
 
     Args:
         sign: sign of a0 on the side of the edge that is stable or heavily damped.
@@ -68,18 +68,18 @@ def approach(
     )
     run, polish = method(nlp, max_iterations=_ITERATIONS), polisher(nlp)
 
-    def from_start(u: Array, below: float) -> Approach | None:
+    def from_start(u: Array, best: Approach) -> Approach:
         c = sign * place.coefficients(u)
         if not (np.all(np.isfinite(c)) and c.any()):
-            return None
+            return best
         raw = run(np.concatenate([u / size, edge.guess(c)]))
-        if below == math.inf and raw.status == _UNFINISHED:  # nothing is known yet: it may go on
+        if not best.u.size and raw.status == _UNFINISHED:  # nothing is known yet: it may go on
             raw = run(raw.x)
-        if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - ALIKE):
-            return None
+        if float(np.linalg.norm(raw.x[:n])) * size >= best.distance * (1 - ALIKE):
+            return best
         point = polish(raw, nlp)
         if not point.violation <= _FEASIBLE:
-            return None
+            return best
         u_found = np.clip(point.x[:n] * size, place.lower, place.upper)
         amiss = point.violation * float(np.abs(point.row_multipliers).max(initial=0.0))
         return Approach(u_found, point.stationarity <= _STATIONARY and amiss <= _SHIFTED * point.objective)

@@ -218,23 +218,17 @@ def _at(problem: Posed, parameters: Table[float]) -> Robustness:
 
 def _surveyed(place: WeightedDesign, kinds: Sequence[str] = KINDS, method: Method = ipopt) -> Robustness:
     damped = "heavy damping" in kinds
-    seen = ray_crossings(place, damped=damped)
-    found = _each(place, seen, kinds, method)
+    seen = ray_crossings(place, damped)
+    found = [_nearest(place, seen, kind, method) for kind in kinds]
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
         seen = sorted([*seen, *between(place, u, damped)], key=lambda c: c.distance)
-        found = _each(place, seen, kinds, method)
+        found = [_nearest(place, seen, kind, method) for kind in kinds]
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
     zeros = _zeros(place) if place.stands_on else ()
     return Robustness(place.problem.problem, stable, place.stands_on, zeros, place.heavily_damped, *own, *found)
-
-
-def _each(place: WeightedDesign, seen: list[RayCrossing], kinds: Sequence[str], method: Method) -> list[Nearest]:
-    """The nearest point of each boundary; eigenfrequencies of a complex system pass the real line alone."""
-    real = place.problem.model.carrier is None
-    return [_nearest(place, seen, kind, method) if real or kind == "weave" else Nearest(kind) for kind in kinds]
 
 
 def _zeros(place: WeightedDesign) -> tuple[str, ...]:
@@ -266,6 +260,8 @@ def _place(design: Given, parameters: Numbers | None, weights: Numbers | None) -
 def _nearest(place: WeightedDesign, seen: list[RayCrossing], kind: str, method: Method = ipopt) -> Nearest:
     """The least distance over the pieces of one boundary; the way into heavy damping is sought without a ray too."""
     heavy = kind == "heavy damping"
+    if place.problem.model.carrier is not None and kind != "weave":  # eigenfrequencies pass the real line alone
+        return Nearest(kind)
     if kind in place.stands_on or (heavy and place.on_edge):
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
@@ -297,8 +293,7 @@ def _best(place: WeightedDesign, edge: Edge, sign: float, starts: list[Array], m
     for turn in range(_ROUNDS):
         before = best.distance
         for u in starts:
-            found = run(u, best.distance)
-            best = found or best
+            best = run(u, best)
         if not best.u.size:
             break
         met = between(place, best.u, edge.real)

@@ -1,7 +1,7 @@
 """Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from tmsopt.dynamics.modes import Mode, modes
 from tmsopt.dynamics.speeds import coefficients_over, speed_of
 from tmsopt.dynamics.system import is_bicycle
 from tmsopt.errors import InputError, is_number, refusal, short, suggest
-from tmsopt.models import Model, Parameter, ParameterSet, Values
+from tmsopt.models import Parameter, ParameterSet, Values
 from tmsopt.models.user_spectrum import user_root_array
 from tmsopt.problem.files import Given
 from tmsopt.problem.problem import Problem
@@ -127,14 +127,19 @@ def growth(
     at, critical = parameters[name], float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
     speed = name in SPEEDS
     low, high = _ends(design, name, end, at)
+
+    def coefficients(x: Array) -> Array:
+        """Of shape (n, degree + 1)."""
+        a = model.coefficients({**parameters, name: x}, of)
+        return np.stack(np.broadcast_arrays(*a, x)[:-1], axis=-1).astype(float)
+
     is_open, is_polynomial = speed and end is None, True
     try:
         a = coefficients_over(design.problem.posed, of, parameters, name)
         met = crossings(a, low, math.inf if is_open else high)
     except InputError:
         is_open = is_polynomial = False
-        steps = np.linspace(low, high, _POINTS)
-        met = Crossings(tuple(_changes(lambda x: _numbers(model, of, {**parameters, name: x}), steps)), (), ())
+        met = Crossings(tuple(_changes(coefficients, np.linspace(low, high, _POINTS))), (), ())
     met = user_crossings(model, met)
     if is_open:
         high = _last(met.found, at)
@@ -142,9 +147,9 @@ def growth(
     centres = [at, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
     grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
-    values = grid[(grid > low) & (grid <= high)] if speed else grid[(grid >= low) & (grid <= high)]
+    values = grid[(grid > low if speed else grid >= low) & (grid <= high)]
 
-    c = _numbers(model, of, {**parameters, name: values})
+    c = coefficients(values)
     shown = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity can be shown
     values, c = values[shown], c[shown]
     found = roots(c)
@@ -217,12 +222,6 @@ def _within(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch,
 def _crowded(structure: str) -> bool:
     """Whether more than two roots meet at a design."""
     return "EP" in structure and structure != "EP2"
-
-
-def _numbers(model: Model, of: ParameterSet, columns: Mapping[str, Any]) -> Array:
-    """Coefficients for columns of parameters, shape (n, degree + 1)."""
-    shape = np.broadcast_shapes(*(np.shape(column) for column in columns.values()))
-    return np.stack([np.broadcast_to(c, shape) for c in model.coefficients(columns, of)], axis=-1).astype(float)
 
 
 def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:

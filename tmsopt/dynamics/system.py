@@ -16,8 +16,6 @@ from tmsopt.records import Array, Table
 ANGLES, RATES, TORQUES = ("phi", "delta"), ("phidot", "deltadot"), ("T_phi", "T_delta")
 """Names of lean and steer, to the right, of their rates, and of a controller's torques on them."""
 
-PATH = ("x", "psi", "y_rear", "y_front")
-"""Way along the road, yaw to the right, and how far the contacts are to the right of the first line."""
 
 _SINGULAR = 1e15  # condition of a mass matrix, columns of one size, from which on it cannot be inverted
 
