@@ -286,6 +286,12 @@ def test_bad_words_are_told(words, status, said):
     assert said in err
 
 
+def test_all_that_cannot_be_asked_is_told_at_once():
+    with pytest.raises(tmsopt.InputError) as error:
+        tmsopt.simulate(BENCHMARK, lean=[1], start=[1], seconds=-1)  # type: ignore[arg-type]
+    assert [fault.key for fault in error.value.faults] == [("lean",), ("start",), ("seconds",)]
+
+
 def test_without_a_design_there_is_no_motion(tmp_path):
     file = tmp_path / "none.toml"
     file.write_text((PROBLEMS / "ep4.toml").read_text() + '[constraints]\ndecay = "abscissa <= -100"\n')

@@ -189,18 +189,16 @@ def heavily_damped(c: Array) -> Truth:
     A quartic has four different real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
     16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted.
     """
-    n = c.shape[-1] - 1
-    stable = is_stable(c, exact=False)
-    if n == 1:
-        return np.asarray(stable)
-    if n > 4:
-        return _counted(c, stable)
-    real = stable & (discriminant([c[..., k] for k in range(n + 1)]) > 0)
-    if n < 4:
-        return np.asarray(real)
-    a, b, p, q, r = (c[..., k] for k in range(5))
-    second = 64 * a**3 * r - 16 * a * a * p * p + 16 * a * b * b * p - 16 * a * a * b * q - 3 * b**4
-    return np.asarray(real & (8 * a * p < 3 * b * b) & (second < 0))
+    columns, damped = np.moveaxis(c, -1, 0), np.asarray(is_stable(c, exact=False))
+    if len(columns) > 5:
+        return _counted(c, damped)
+    if len(columns) > 2:
+        damped = damped & (discriminant(columns) > 0)
+    if len(columns) == 5:
+        a, b, p, q, r = columns
+        second = 64 * a**3 * r - 16 * a * a * p * p + 16 * a * b * b * p - 16 * a * a * b * q - 3 * b**4
+        damped = damped & (8 * a * p < 3 * b * b) & (second < 0)
+    return np.asarray(damped)
 
 
 def _counted(c: Array, stable: Truth) -> Truth:

@@ -93,18 +93,18 @@ def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_
     places = {kind: _real_places(q, lower, upper) for kind, q in _conditions(a, split).items() if not q.is_zero()}
     marks = sorted({y for ys in places.values() for y in ys})
     cells = list(_cells(marks, lower, upper))
-    states = [_state(_at(a, middle)) for _, _, middle in cells]
+    stable, damped = zip(*(_state(_at(a, middle)) for _, _, middle in cells), strict=True)
     lasting = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
     marginal = [any(lasting.values()) and _marginal(split, middle) for _, _, middle in cells]
-    kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
+    kept = [held or on for held, on in zip(stable, marginal, strict=True)]
     changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
     always = {"infinity": len(a) < len(coefficients)} | lasting
     named = {} if bands_alone else places
     here = ((y, each) for y in marks for kind, ys in named.items() if y in ys for each in _named(a, split, kind, y))
     return Crossings(
         tuple(Crossing(float(y), *each, changed[float(y)]) for y, each in here),
-        _bands(cells, [stable for stable, _ in states]),
-        _bands(cells, [damped for _, damped in states]),
+        _bands(cells, stable),
+        _bands(cells, damped),
         tuple(kind for kind, holds in always.items() if holds),
         _bands(cells, marginal),
         split.zeros,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from tmsopt.dynamics.flow import at_times, sampled
@@ -121,13 +122,13 @@ class _Output:
         for k in (k for k in self.turns if k >= last and max(sizes[k : k + 2]) > _NEAR * within):
             at, value = self.turn(k)
             if abs(value) > within:
-                begin, state, end = at, at_times(on.A, on.states[k], np.array([at - on.times[k]]))[0], on.times[k + 1]
+                begin, state, end = at, expm(on.A * (at - on.times[k])) @ on.states[k], on.times[k + 1]
         sign = math.copysign(1.0, float(self.row @ state))
         return float(begin + _zero(lambda s: sign * _after(on.A, state, self.row, s) - within, end - begin))
 
 
 def _after(A: Array, x: Array, row: Array, time: float) -> float:
-    return float(row @ at_times(A, x, np.array([time]))[0])
+    return float(row @ (expm(A * time) @ x))
 
 
 def _zero(function: Any, end: float) -> float:

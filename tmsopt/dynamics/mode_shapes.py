@@ -57,7 +57,7 @@ class ModeShape:
 
 
 def mode_shapes(
-    problem: Posed, parameters: Mapping[str, float], structure: Structure, rate: float = 1.0
+    problem: Posed, parameters: Mapping[str, float], structure: Structure, rate: float
 ) -> tuple[ModeShape, ...]:
     """The shapes at every root of a design, rightmost first: null vectors of its matrices at the root.
 
@@ -83,10 +83,10 @@ def mode_shapes(
         if root.multiplicity > 1 and chain is not None:
             s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
         vectors = _null(pencil, s, geometric)
-        omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, 1)])), None)
+        omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag)])), None)
         for vector in vectors:
-            amplitudes, phases = _amplitudes(vector[: len(names)])
-            sizes, turns = (Table(dict(zip(names, column, strict=True))) for column in (amplitudes, phases))
+            columns = _amplitudes(vector[: len(names)])
+            sizes, turns = (Table(dict(zip(names, column, strict=True))) for column in columns)
             at = rate * s.real, rate * s.imag
             found.append(ModeShape(*at, root.multiplicity, len(vectors), partial, sizes, turns, omega))
     return tuple(found)

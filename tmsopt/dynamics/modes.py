@@ -35,10 +35,10 @@ def modes(
     values: Array,
     found: Complex,
     design: float,
-    crowds: Sequence[float] = (),
+    crowds: Sequence[float],
     *,
-    bicycle: bool = False,
-    speed: bool = False,
+    bicycle: bool,
+    speed: bool,
 ) -> tuple[Mode, ...]:
     """Every root between meetings, with the name of its mode.
 
@@ -54,7 +54,7 @@ def modes(
         design: value of the design.
         crowds: where more than two roots meet, besides what the roots show.
     """
-    parts = _pieces(values, found, np.asarray(crowds, dtype=float))
+    parts = _pieces(values, found, crowds)
     if not parts:
         return ()
     usual = [k for k, part in enumerate(parts) if bicycle and part.roots.shape[1] == 3 and part.real == 2]
@@ -73,7 +73,7 @@ def modes(
     )
 
 
-def _pieces(values: Array, found: Complex, crowds: Array) -> list[_Piece]:
+def _pieces(values: Array, found: Complex, crowds: Sequence[float]) -> list[_Piece]:
     real = np.count_nonzero(found.imag == 0, axis=1)
     cuts = np.union1d(np.flatnonzero(np.diff(real)) + 1, np.searchsorted(values, crowds))
     parts = []

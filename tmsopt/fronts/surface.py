@@ -18,8 +18,9 @@ _SAME = 1e-7  # of the range: a corner of the table is held with a slack of 1e-9
 
 
 class _Cell(NamedTuple):
-    """A sub-problem: limits on objectives, designs near by, and its number."""
+    """A sub-problem: its place in the grid, limits on objectives, designs near by, and its number."""
 
+    place: tuple[int, int]
     limits: Mapping[int, float]
     near: tuple[Solution, ...]
     number: int
@@ -40,7 +41,7 @@ def surface(team: Executor, ask: FrontSolver, front: Front, points: int, progres
     failed: dict[int, str] = {}
     try:
         for diagonal in range(2 * side - 1, 1, -1):
-            cells: dict[tuple[int, int], _Cell] = {}
+            cells: list[_Cell] = []
             for i, j in ((i, diagonal - i) for i in range(side, 0, -1) if 1 <= diagonal - i <= side):
                 looser = [cell for cell in ((i + 1, j), (i, j + 1)) if max(cell) <= side]
                 if any(cell not in solved for cell in looser):  # no design meets its limits, nor these
@@ -51,15 +52,14 @@ def surface(team: Executor, ask: FrontSolver, front: Front, points: int, progres
                 if meets:  # the best under looser limits is the best here
                     solved[i, j] = meets[0]
                 else:
-                    cells[i, j] = _Cell(limits, tuple(near or [p.solution for p in ends]), count + len(cells))
-            places = list(cells)
-            for k, (found, possible) in each(team, _solved, ask, list(cells.values())):
-                count += 1
+                    near = near or [p.solution for p in ends]
+                    cells.append(_Cell((i, j), limits, tuple(near), count + len(cells)))
+            for k, (found, possible) in each(team, _solved, ask, cells):
+                count, own = count + 1, cells[k]
                 progress(count, side * side - 1)
                 if possible:
-                    solved[places[k]] = found
+                    solved[own.place] = found
                 if possible and found is None:
-                    own = cells[places[k]]
                     failed[own.number] = " and ".join(f"{ask.texts[n]} <= {v:.6g}" for n, v in own.limits.items())
     except KeyboardInterrupt:
         interrupted = True
