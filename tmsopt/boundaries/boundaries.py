@@ -189,7 +189,7 @@ def heavily_damped(c: Array) -> Truth:
     A quartic has four different real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
     16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted.
     """
-    columns, damped = np.moveaxis(c, -1, 0), np.asarray(is_stable(c, exact=False))
+    columns, damped = [*np.moveaxis(c, -1, 0)], np.asarray(is_stable(c, exact=False))
     if len(columns) > 5:
         return _counted(c, damped)
     if len(columns) > 2:

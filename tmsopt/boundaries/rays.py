@@ -60,8 +60,6 @@ def along(place: WeightedDesign, rays: Array, t: Array, damped: bool) -> list[Ra
     for heavy, test in ((False, _stable), (True, heavily_damped))[: 1 + damped]:
         inside = test(c)
         ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
-        if not ray.size:
-            continue
         all_of = _Bracket(place, test, rays[ray], t[step], t[step + 1], inside[ray, step]).narrowed(*_COARSE)
         names = [losses(c, heavy) for c in all_of.sides()[0]]
         distance = np.linalg.norm(place.along(all_of.rays, all_of.high), axis=1)

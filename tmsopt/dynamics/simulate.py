@@ -173,8 +173,7 @@ def simulate(
     start_steps(progress, "following the motion")
     system = system_of(asked, own)
     disturbance = asked_for(system, given)
-    found = asked.values(own)["structure"]
-    assert isinstance(found, Structure)
+    found: Structure = asked.values(own)["structure"]
     structure = user_structure(asked.model, found)
     of = asked.parameter_set
     rate = 1.0 if of.rate is None else float(of.rate(own))

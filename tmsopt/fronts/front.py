@@ -129,7 +129,8 @@ class Front(Tabular):
             values = dict(zip(self.objectives, point.objectives, strict=True))
             yield {
                 **values,
-                **{name: value for name, value in point.solution.parameters.items() if name not in values},
+                **point.solution.parameters,
+                **values,
                 "abscissa": point.solution.abscissa,
                 "structure": point.structure,
                 "stable": point.stable,
