@@ -83,7 +83,7 @@ def longest_on_axis(problem: Posed, parameters: Numbers) -> int | None:
         return None
     double = flint.fmpq_poly([c for x in shared.coeffs() for c in (x, flint.fmpq(0))])
     rest = (flint.fmpq_poly(ascending) / double).coeffs()[::-1]
-    if len(rest) > 1 and not all(q > 0 for q in lienard_chipart([c / rest[0] for c in rest])):
+    if not all(q > 0 for q in lienard_chipart([c / rest[0] for c in rest])):
         return None
     on_axis = double * flint.fmpq_poly([0] * zeros + [1])
     multiple = [(f, int(m)) for f, m in flint.fmpq_poly(a[::-1]).factor()[1] if m > 1 and (on_axis % f).is_zero()]

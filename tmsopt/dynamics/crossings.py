@@ -195,9 +195,9 @@ def _real_places(polynomial: Any, lower: Any, upper: Any | None) -> list[Any]:
 def _marginal(split: _Split, y: Any) -> bool:
     """Whether no root is right of the axis, and those on it are simple, between two places; roots 0 aside."""
     rest, mirrored = _at(split.rest, y), _at(split.mirrored, y)
-    if split.repeats_mirrored or not (len(rest) == 1 or _state(rest)[0]):
+    if split.repeats_mirrored or not _state(rest)[0]:
         return False
-    return len(mirrored) == 1 or all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
+    return all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
 
 
 def _named(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:

@@ -137,8 +137,15 @@ def _bicycle(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, flo
     rate = 1.0 if of.rate is None else float(of.rate(parameters))
     torque = 1.0 if of.torque is None else float(of.torque(parameters))
     length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
-    one = dict.fromkeys(RATES, rate) | dict.fromkeys(TORQUES, torque) | {"y_rear": length, "y_front": length}
-    states = np.array([one.get(name, 1.0) for name in (*names, "psi", "y_rear")])
+    kinds = (  # names, what 1 is, and its unit in SI and else
+        (("t",), 1.0, ("√(w/g)", "s")),
+        ((*ANGLES, "psi"), 1.0, ("rad", "rad")),
+        (RATES, rate, ("rad √(g/w)", "rad/s")),
+        (TORQUES, torque, ("m_B g w", "N m")),
+        (("x", "y_rear", "y_front"), length, ("w", "m")),
+    )
+    one = {name: size for each, size, _ in kinds for name in each}
+    states = np.array([one[name] for name in (*names, "psi", "y_rear")])
     impulses = {
         name: rate / torque * states * np.r_[0.0, 0.0, jumps[:, k], np.zeros(n - 2)] for k, name in enumerate(TORQUES)
     }
@@ -146,20 +153,8 @@ def _bicycle(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, flo
         names,
         ANGLES,
         rate * states[:, None] * whole / states,
-        Table({name: one.get(name, 1.0) * row / states for name, row in rows.items()}),
+        Table({name: one[name] * row / states for name, row in rows.items()}),
         Table(impulses),
         v * rate * length,
-        _units(of.rate is not None),
-    )
-
-
-def _units(si: bool) -> Table[str]:
-    """Of time, angles, rates, torques and lengths."""
-    time, rate, torque, length = ("s", "rad/s", "N m", "m") if si else ("√(w/g)", "rad √(g/w)", "m_B g w", "w")
-    return Table(
-        {"t": time}
-        | dict.fromkeys((*ANGLES, "psi"), "rad")
-        | dict.fromkeys(RATES, rate)
-        | dict.fromkeys(TORQUES, torque)
-        | dict.fromkeys(("x", "y_rear", "y_front"), length)
+        Table({name: either[of.rate is not None] for each, _, either in kinds for name in each}),
     )
