@@ -12,7 +12,8 @@ from tmsopt.problem.solution import Solution
 from tmsopt.program.options import STARTS, Options
 from tmsopt.search.solve import solve_any_status
 
-_RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
+RETRY = 16
+"""Starts for a sub-problem that the neighbours' designs and a few starts did not solve."""
 _SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
 _AT_END = 1e-6  # of a parameter's range: IPOPT stays inside it, and where limits are degenerate polishing keeps that
 _BEYOND = 1e-6  # relative: a part of the box whose best is worse by less than this is searched all the same
@@ -41,7 +42,8 @@ class FrontSolver:
         self, problem: Posed, starts: int, near: Sequence[Solution] = (), without_sample: bool = False
     ) -> Solution:
         """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
-        beside = [_inside(problem, n) for n in near]
+        free = problem.free.items()
+        beside = [{n: min(max(design.parameters[n], lo), hi) for n, (lo, hi) in free} for design in near]
         options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
         return solve_any_status(problem, options, beside, without_sample, self._hopeless(problem, near))
 
@@ -112,16 +114,11 @@ def least(
     asked = subproblem(ask, k, limits)
     if pin is not None:
         asked = _pinned(ask, asked, pin, near[0])
-    ended = [ask.solve(asked, (0 if few else ask.options.starts) if near else _RETRY, near, without_sample=few)]
+    ended = [ask.solve(asked, (0 if few else ask.options.starts) if near else RETRY, near, without_sample=few)]
     if not few and all(s.status != "optimal" for s in ended):
-        ended.append(ask.later(1).solve(asked, _RETRY))
+        ended.append(ask.later(1).solve(asked, RETRY))
     found = min((s for s in ended if s.status == "optimal"), key=lambda s: s.value, default=None)
     return found if found is None or not ask.ranges else _tightened(ask, k, limits, found)
-
-
-def solvable(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> bool:
-    """Whether a sub-problem without an optimum may have one: False when no start satisfied its limits."""
-    return ask.solve(subproblem(ask, k, limits), _RETRY).status != "infeasible"
 
 
 def subproblem(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> Posed:
@@ -183,10 +180,6 @@ def _tightened(ask: FrontSolver, k: int, limits: Mapping[int, float], found: Sol
     better = ask.solve(asked, ask.options.starts, [found])
     gain = sum((values[j] - b) / ask.ranges[j] for j, b in enumerate(objectives(ask, better)) if j in loose)
     return better if better.status == "optimal" and gain > _WORTH else found
-
-
-def _inside(problem: Posed, near: Solution) -> dict[str, float]:
-    return {n: min(max(near.parameters[n], lo), hi) for n, (lo, hi) in problem.free.items()}
 
 
 def _pinned(ask: FrontSolver, asked: Posed, k: int, best: Solution) -> Posed:

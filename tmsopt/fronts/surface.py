@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from tmsopt.executor import Executor
 from tmsopt.fronts.front import Front, Gap, efficient
-from tmsopt.fronts.subproblems import FrontSolver, least, objectives, point, solvable
+from tmsopt.fronts.subproblems import RETRY, FrontSolver, least, objectives, point, subproblem
 from tmsopt.fronts.team import each
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps
@@ -71,6 +71,6 @@ def surface(team: Executor, ask: FrontSolver, front: Front, points: int, progres
 
 
 def _solved(ask: FrontSolver, cell: _Cell) -> tuple[Solution | None, bool]:
-    """The best of a cell, None where no optimum was found, and whether there may be one."""
+    """The best of a cell, None where no optimum was found, and whether there may be one: not if no start met limits."""
     found = least(ask.later(cell.number), 0, cell.limits, cell.near)
-    return found, found is not None or solvable(ask, 0, cell.limits)
+    return found, found is not None or ask.solve(subproblem(ask, 0, cell.limits), RETRY).status != "infeasible"
