@@ -157,8 +157,8 @@ def growth(
         stable, heavily_damped = _within(met.stable, low, high), _within(met.heavily_damped, low, high)
     else:
         inside = is_stable(c)
-        stable = tuple(_reaching(values, run, events) for run in _runs(values, inside))
-        heavily_damped = _runs(values, inside & np.all(found.imag == 0, axis=-1))
+        stable = tuple(_runs(values, inside, events))
+        heavily_damped = tuple(_runs(values, inside & np.all(found.imag == 0, axis=-1), ()))
     rate = None if of.rate is None else np.zeros(values.shape) + of.rate({**parameters, name: values})
     many = [c.at for c in events if _crowded(c.kind)] + [at] * _crowded(design.structure)
     followed = modes(values, found, at, many, bicycle=is_bicycle(model) and model.degree == _BICYCLE, speed=speed)
@@ -239,16 +239,11 @@ def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Cr
             yield Crossing(at, "weave" if omega else "capsize", Root(0.0, omega), rightmost=True, changes=True)
 
 
-def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:
-    """First and last value of each run of points in which something holds."""
+def _runs(values: Array, inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
+    """First and last value of each run of points in which something holds, up to events between these and the next."""
     changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
-    return tuple((float(values[k]), float(values[m - 1])) for k, m in changes.reshape(-1, 2))
-
-
-def _reaching(values: Array, run: Stretch, events: Sequence[Crossing]) -> Stretch:
-    """A run of points up to where stability changes between its ends and the points beside them."""
-    low, high = run
-    before, after = values[values < low][-1:], values[values > high][:1]
-    begin = [c.at for c in events if before.size and before[0] <= c.at <= low]
-    end = [c.at for c in events if after.size and high <= c.at <= after[0]]
-    return max(begin, default=low), min(end, default=high)
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    for k, m in changes.reshape(-1, 2):
+        begin = [c.at for c in events if padded[k] <= c.at <= values[k]]
+        end = [c.at for c in events if values[m - 1] <= c.at <= padded[m + 1]]
+        yield float(max(begin, default=values[k])), float(min(end, default=values[m - 1]))
