@@ -102,7 +102,7 @@ def _nlp(model: Model, set_name: str, weighted: tuple[str, ...], edge: Edge) -> 
     a = model.coefficients({name: moved.get(name, given[name]) for name in of.names}, of)
     c = [given[_SIGN] * coefficient / given[f"{_SCALE}{k}"] for k, coefficient in enumerate(a)]
     equations = [e / given[f"{_SIZE}{k}"] for k, e in edge.equations(c, x[n:]).items()]
-    others = edge.nonnegative(c, x[n:])
+    others = edge.nonnegative(x[n:])
     rows = [*equations, *others]
     return NLP(
         formulation="nearest",

@@ -12,13 +12,10 @@ from typing import Any
 import numpy as np
 
 from tmsopt.records import Array, Table, Truth
-from tmsopt.roots import discriminant, hurwitz_minors, is_stable, product, real_roots, rebuilt, roots
+from tmsopt.roots import discriminant, is_stable, product, real_roots, rebuilt, roots
 
 MATCHED = 1e-10
 """Relative change of a coefficient up to which a polynomial counts as on an edge."""
-
-_BY_SIGNS = 3
-"""Up to this degree Hurwitz's inequalities give all limits of stable polynomials; above, they admit others too."""
 
 _LEAD = 1e-9  # of the largest coefficient: a smaller leading one is replaced before roots are guessed from
 _SMALL = 1e-3
@@ -99,7 +96,7 @@ class Edge:
     @property
     def unknowns(self) -> dict[str, float]:
         """Names of factor coefficients, and what they are at most."""
-        return {} if self._by_signs else dict.fromkeys("e" * self._own, 1.0) | self._rest.unknowns
+        return dict.fromkeys("e" * self._own, 1.0) | self._rest.unknowns
 
     @property
     def _rest(self) -> Rest:
@@ -109,36 +106,17 @@ class Edge:
     def _own(self) -> int:
         return int(self.candidates is not None)
 
-    @property
-    def _by_signs(self) -> bool:
-        return self._rest.degree <= _BY_SIGNS and not (self._own or self.real)
-
     def equations(self, c: Sequence[Any], u: Sequence[Any]) -> dict[int, Any]:
         """Number of a coefficient → an expression of the coefficients and the unknowns that is 0."""
-        if self._by_signs:
-            return {self._end: c[self._end]}
         whole = product(self.divisor(u[0] if self._own else 0.0), *self._rest.factors(u[self._own :]))
         return {k: a - b for k, (a, b) in enumerate(zip(c, whole, strict=True))}
 
-    @property
-    def _end(self) -> int:
-        """The coefficient that is 0 at a root 0, or at infinity."""
-        return self.degree * int(self.divisor(0.0)[0])
-
-    def nonnegative(self, c: Sequence[Any], u: Sequence[Any]) -> list[Any]:
-        """Expressions that are ≥ 0: the other roots are not right of the axis, or are real.
-
-        For the limits of stable polynomials without an end: coefficients, of a cubic c1 c2 − c0 c3 too.
-        """
-        if not self._by_signs:
-            return self._rest.nonnegative(u[self._own :])
-        rest = [x for k, x in enumerate(c) if k != self._end]
-        return [*rest, *([hurwitz_minors(rest)[1]] if len(rest) - 1 == _BY_SIGNS else [])]
+    def nonnegative(self, u: Sequence[Any]) -> list[Any]:
+        """Expressions of the unknowns that are ≥ 0: the other roots are not right of the axis, or are real."""
+        return self._rest.nonnegative(u[self._own :])
 
     def guess(self, c: Array) -> list[float]:
         """The e with which the divisor divides c most nearly, and the unknowns of the quotient."""
-        if self._by_signs:
-            return []
         size = terms(c)
 
         def left(e: float) -> Array:
