@@ -14,15 +14,17 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import flint
 import numpy as np
+from flint.utils.flint_exceptions import DomainError
 
 from tmsopt.algebra.balls import Tilt, as_ball, exact
-from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, made, trace
-from tmsopt.algebra.kinds import quotient
+from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, fold, made, trace
+from tmsopt.algebra.intervals import ball
+from tmsopt.algebra.kinds import BALLS, quotient, values
 from tmsopt.models import Model, ParameterSet
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Bound
@@ -33,11 +35,8 @@ PROVEN = 1e-9
 """Gap, relative to the size of the roots and of the bound, below which a design counts as proven optimal."""
 
 ROUNDING = 1e-15  # of the quotient to a double, and of its root
-_NODES = np.linspace(-1, 1, 9)
 _BITS = 212  # the parameters of a set are doubles, so exact; what follows from them is right far beyond the answer
-_DEGREE = 4  # in any one parameter; nine nodes fit it
 _CORNERS = 12  # free parameters, beyond which their ranges have too many
-_FIT = np.linalg.pinv(np.vander(_NODES, _DEGREE + 1))
 
 _MORE = 8  # designs at which a relation is tried beyond those that determine it
 _FINENESS = 2**40  # steps of a range, one of which an exact design takes at random
@@ -45,8 +44,6 @@ _FINENESS = 2**40  # steps of a range, one of which an exact design takes at ran
 _RATIONAL = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div", "quotient", "ratio"}
 """Operations that make rational functions, beside whole powers."""
 
-Box = Mapping[str, tuple[float, float]]
-Exact = Mapping[str, Any]
 Known = Mapping[tuple[str, float], Any]
 
 
@@ -99,83 +96,88 @@ def _largest_product(problem: Posed) -> float:
     Along a parameter in which aₙ and a0 are linear the quotient is monotone, so its extremes are at the ends. One
     further parameter may enter otherwise; along it the stationary points are polynomial roots.
     """
-    if len(problem.free) > _CORNERS or not is_rational(problem.model, problem.model.sets[0]):
+    model = problem.model
+    if len(problem.free) > _CORNERS or not is_rational(model, model.sets[0]):
         return _enclosed_product(problem)
-    model, (box, known) = problem.model, _algebraic_box(problem)
-    inside = [_point_of(box, part) for part in (Fraction(1, 2), Fraction(2, 3))]
-    constant = [n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, inside)]
-    varying = [n for n in box if n not in constant]
-    curved = [n for n in varying if not _has_degree(model, n, inside, 1)]
-    if len(curved) > 1 or not all(_has_degree(model, n, inside, _DEGREE) for n in curved):
+    box, known = _algebraic_box(problem)
+    outer = _outer(model, tuple(box))
+    shares = np.random.default_rng(0).random(len(box)).tolist()  # of the ranges: a point at which every power shows
+    inside = [lo + (hi - lo) * share for (lo, hi), share in zip(box.values(), shares, strict=True)]
+    try:
+        through = {n: _through(outer, inside, n) for n, (lo, hi) in box.items() if lo < hi}
+    except (DomainError, TypeError):  # a parameter divides, or what is fixed leaves no number
         return _enclosed_product(problem)
-    ends = [box[n] if n in varying and n not in curved else ((box[n][0] + box[n][1]) / 2,) for n in box]
-    corners = dict(zip(box, np.array(list(itertools.product(*ends))).T, strict=True))
-    quotients, signs = _along(model, corners, curved[0], box, known) if curved else _at(model, corners, known)
-    if len(signs) != 1:
-        return math.inf
-    return float(quotients.max())
+    varying = {n: max(a.degree() for a in ends) for n, (*ends, turning) in through.items() if turning}
+    curved = [n for n, degree in varying.items() if degree > 1]
+    if len(curved) > 1:
+        return _enclosed_product(problem)
+    at = [ends if varying.get(n) == 1 else (sum(ends) / 2,) for n, ends in box.items()]
+    points = [*itertools.product(*at)]
+    for name in curved:
+        along = [_along(outer, corner, name, *box[name]) for corner in points]
+        if not all(along):
+            return math.inf
+        points = [*itertools.chain(*along)]
+    return _largest(outer, dict(zip(box, np.array(points).T, strict=True)), known)
+
+
+@lru_cache(maxsize=64)
+def _outer(model: Model, names: tuple[str, ...]) -> Formula:
+    """a0 and aₙ in the algebraic parameters."""
+    return trace(lambda x: model.polynomial(**x)[:: model.degree], names)
 
 
 def _enclosed_product(problem: Posed) -> float:
     """An upper end of |aₙ/a0| over the box, by balls; inf where they contain a0 = 0."""
-    of = problem.parameter_set
     with flint.ctx.workprec(_BITS):
-        ends = {n: (exact(lo), exact(hi)) for n, (lo, hi) in problem.free.items()}
-        box = {n: as_ball(lo).union(as_ball(hi)) for n, (lo, hi) in ends.items()}
-        a = problem.model.coefficients(problem.ordered({n: exact(v) for n, v in problem.fixed.items()} | box), of)
-        upper = as_ball(abs(quotient(as_ball(a[-1]), as_ball(a[0])))).upper()
-        return float(upper) if upper.is_finite() else math.inf
+        box = {n: ball(ends) for n, ends in problem.free.items()}
+        given = problem.ordered({n: exact(v) for n, v in problem.fixed.items()} | box)
+        return _upper(problem.model.coefficients(given, problem.parameter_set))
 
 
-def _at(model: Model, points: Mapping[str, Array], known: Known) -> tuple[Array, set[bool]]:
-    """|aₙ/a0| at points, and the signs of a0. Where both vanish the quotient is constant along the edges that end.
+def _upper(a: Sequence[Any]) -> float:
+    """An upper end of |aₙ/a0|; inf where that may not exist."""
+    upper = as_ball(abs(quotient(as_ball(a[-1]), as_ball(a[0])))).upper()
+    return float(upper) if upper.is_finite() else math.inf
 
-    The largest are upper ends of balls: a small a0 is a difference, of which doubles lose as many digits as cancel.
+
+def _largest(outer: Formula, points: Mapping[str, Array], known: Known) -> float:
+    """Greatest |aₙ/a0| at points; inf unless a0 has one sign there.
+
+    Where both vanish the quotient is constant along the edges that end. The largest are upper ends of balls: a small
+    a0 is a difference, of which doubles lose as many digits as cancel.
     """
-    a = model.polynomial(**points)
-    last, first, *_ = np.broadcast_arrays(*map(np.asarray, (a[-1], a[0], *points.values())))
+    first, last, *_ = np.broadcast_arrays(*values(outer, points), *points.values())
     both = (last == 0) & (first == 0)
-    if np.any((first == 0) & ~both) or np.all(both):
-        return np.array([math.inf]), set()
+    if set(np.sign(first[~both]).tolist()) not in ({-1.0}, {1.0}):
+        return math.inf
     with np.errstate(over="ignore"):
         quotients = np.where(both, 0.0, np.abs(last / np.where(both, 1.0, first)))
     with flint.ctx.workprec(_BITS):
         for k in np.flatnonzero(quotients >= quotients.max() / 2):
-            at = {n: float(np.broadcast_to(column, last.shape)[k]) for n, column in points.items()}
-            a = model.polynomial(**{n: known.get((n, v), exact(v)) for n, v in at.items()})
-            upper = as_ball(abs(quotient(a[-1], a[0]))).upper()
-            quotients[k] = float(upper) if upper.is_finite() else math.inf
-    return quotients[~both], set((first[~both] > 0).tolist())
+            at = {n: float(column[k]) for n, column in points.items()}
+            quotients[k] = _upper(values(outer, {n: known.get((n, x), exact(x)) for n, x in at.items()}))
+    return float(quotients.max())
 
 
-def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box, known: Known) -> tuple[Array, set[bool]]:
-    """The same at the ends and stationary points of the one curved parameter; no sign at all if it has a pole."""
-    lower, upper = box[name]
-    y = (lower + upper) / 2 + (upper - lower) / 2 * _NODES
-    grid: dict[str, Any] = {n: column[:, None] for n, column in corners.items()} | {name: y[None, :]}
-    a = model.polynomial(**grid)
-    shape = (len(corners[name]), len(y))
-    tops, bottoms = (np.broadcast_to(c, shape) @ _FIT.T for c in (a[-1], a[0]))
-    points: list[dict[str, float]] = []
-    for k, (top, bottom) in enumerate(zip(tops, bottoms, strict=True)):
-        if _inside(bottom).size:
-            return np.array([math.inf]), set()
-        turning = np.convolve(np.polyder(top), bottom) - np.convolve(top, np.polyder(bottom))
-        at = {n: float(column[k]) for n, column in corners.items()}
-        for u in (-1.0, 1.0, *_inside(turning)):
-            points.append({**at, name: (lower + upper) / 2 + (upper - lower) / 2 * float(u)})
-    return _at(model, {n: np.array([p[n] for p in points]) for n in corners}, known)
+def _through(outer: Formula, point: Sequence[float], name: str) -> tuple[Any, Any, Any]:
+    """a0 and aₙ as polynomials in one parameter, the others as at a point, and what vanishes where aₙ/a0 turns."""
+    at = dict(zip(outer.names, map(exact, point), strict=True)) | {name: flint.fmpq_poly([0, 1])}
+    first, last = (flint.fmpq_poly([1]) * a for a in fold(outer, at, BALLS))
+    return first, last, last.derivative() * first - last * first.derivative()
 
 
-def _inside(polynomial: Array) -> Array:
-    """Real roots in [-1, 1] of a fitted polynomial, with a margin for rounding."""
-    size = np.abs(polynomial)
-    if size[-1] > 1.001 * size[:-1].sum():  # the constant term outweighs the others
-        return np.empty(0)
-    clean = np.where(size > 1e-13 * size.max(), polynomial, 0.0)
-    found = np.roots(clean)
-    close = (np.abs(found.imag) < 1e-6) & (np.abs(found.real) <= 1 + 1e-6)
-    return np.asarray(np.clip(found.real[close], -1.0, 1.0))
+def _along(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
+    """A corner moved to the ends and stationary points along the one curved parameter; nowhere if it has a pole."""
+    first, _, turning = _through(outer, corner, name)
+    poles, inside = (
+        [z.real for z, _ in p.complex_roots() if z.imag == 0 and not (z.real < ends[0] or z.real > ends[1])]
+        for p in (first, turning)
+    )
+    if poles:
+        return []
+    places = (*ends, *(min(max(float(x), ends[0]), ends[1]) for x in inside))
+    return [tuple(x if n == name else c for n, c in zip(outer.names, corner, strict=True)) for x in places]
 
 
 def _algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], Known]:
@@ -187,54 +189,21 @@ def _algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], Know
     ends = {p.name: problem.free.get(p.name) or (problem.fixed[p.name],) for p in of.parameters}
     ends |= {p.name: (*e, 0.0) for p in of.parameters if p.tangent and min(e := ends[p.name]) < 0 < max(e)}
     corners = np.array(list(itertools.product(*(ends[n] for n in of.names))))
-    values = problem.model.algebraic(of.native(dict(zip(of.names, corners.T, strict=True))))
-    box, known, balls = {}, {}, dict[int, dict[str, Any]]()
-    for n, given in values.items():
+    doubles = problem.model.algebraic(of.native(dict(zip(of.names, corners.T, strict=True))))
+
+    @cache
+    def balls(k: int) -> dict[str, Any]:
+        """The algebraic parameters at a corner."""
+        with flint.ctx.workprec(_BITS):
+            return problem.model.algebraic(of.native(dict(zip(of.names, map(exact, corners[k].tolist()), strict=True))))
+
+    box, known = {}, dict[tuple[str, float], Any]()
+    for n, given in doubles.items():
         column = np.broadcast_to(np.asarray(given, dtype=float), len(corners))
-        for k in (extremes := [int(column.argmin()), int(column.argmax())]):
-            if k not in balls:
-                with flint.ctx.workprec(_BITS):
-                    design = {m: exact(float(v)) for m, v in zip(of.names, corners[k], strict=True)}
-                    balls[k] = problem.model.algebraic(of.native(design))
-            known[n, float(column[k])] = balls[k][n]
-        box[n] = (float(column[extremes[0]]), float(column[extremes[1]]))
+        least, greatest = int(column.argmin()), int(column.argmax())
+        box[n] = float(column[least]), float(column[greatest])
+        known |= {(n, box[n][0]): balls(least)[n], (n, box[n][1]): balls(greatest)[n]}
     return box, known
-
-
-def _plays_no_role(model: Model, name: str, inside: Sequence[Exact]) -> bool:
-    """Whether aₙ/a0 is free of a parameter: exact arithmetic at points where a difference would show.
-
-    A quotient that does not exist is a ball nan, which equals nothing.
-    """
-    each = (_exact(model, name, others, [Fraction(3, 7), Fraction(11, 5)]) for others in inside)
-    return all(last * other == another * first for (last, first), (another, other) in each)
-
-
-def _has_degree(model: Model, name: str, inside: Sequence[Exact], degree: int) -> bool:
-    """Whether aₙ and a0 are of a degree in a parameter at most, by exact differences where a higher one would show."""
-    for others in inside:
-        at = _exact(model, name, others, [Fraction(1, 3) + k for k in range(degree + 3)])
-        for row in zip(*at, strict=True):
-            differences = list(row)
-            for _ in range(degree + 1):
-                differences = [b - a for a, b in itertools.pairwise(differences)]
-            if not all(difference == 0 for difference in differences):
-                return False
-    return True
-
-
-def _point_of(box: Box, part: Fraction) -> Exact:
-    """Exact values somewhere in a box."""
-    return {
-        n: exact(lo) if lo == hi else exact(lo + (hi - lo) * float(part * Fraction(k, 13)))
-        for k, (n, (lo, hi)) in enumerate(box.items(), start=3)
-    }
-
-
-def _exact(model: Model, name: str, others: Exact, at: Sequence[Fraction]) -> list[tuple[Any, Any]]:
-    """aₙ and a0 for exact values of one parameter, the others fixed."""
-    rows = [model.polynomial(**{**others, name: exact(x)}) for x in at]
-    return [(a[-1], a[0]) for a in rows]
 
 
 @lru_cache(maxsize=64)
@@ -275,47 +244,41 @@ def relations(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
 
 def _null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
     """Reduced basis of the vectors that every row is orthogonal to."""
-    width = len(rows[0])
     reduced, rank = flint.fmpq_mat([list(row) for row in rows]).rref()
-    pivots = [next(j for j in range(width) if reduced[i, j] != 0) for i in range(rank)]
-    basis = []
-    for free in (j for j in range(width) if j not in pivots):
-        vector = [flint.fmpq(int(j == free)) for j in range(width)]
-        for i, pivot in enumerate(pivots):
-            vector[pivot] = -reduced[i, free]
-        basis.append(vector)
-    return basis
+    width = range(len(rows[0]))
+    pivots = {next(j for j in width if reduced[i, j] != 0): i for i in range(rank)}
+    return [
+        [-reduced[pivots[j], free] if j in pivots else flint.fmpq(j == free) for j in width]
+        for free in width
+        if free not in pivots
+    ]
 
 
 def _bound_of(relation: Sequence[Any]) -> float:
     """−z, with z the largest real zero of h or a derivative; −inf for a relation of a0 alone, which is 0 then."""
     n = len(relation) - 1
-    h = flint.fmpq_poly([b * math.comb(n, k) for k, b in enumerate(relation)])
-    if h.degree() < 1:
-        return -math.inf
-    zeros = []
+    h: Any = flint.fmpq_poly([b * math.comb(n, k) for k, b in enumerate(relation)])
+    zeros: list[float] = []
     while h.degree() > 0:
-        integral: Any = flint.fmpz_poly([int(c) for c in (h * h.denom()).coeffs()])
-        zeros += [float(z.real.upper()) for z, _ in integral.complex_roots() if z.imag == 0]
+        zeros += [float(z.real.upper()) for z, _ in h.complex_roots() if z.imag == 0]
         h = h.derivative()
-    return math.nextafter(-max(zeros), -math.inf) if max(zeros) else 0.0
+    largest = max(zeros, default=math.inf)
+    return math.nextafter(-largest, -math.inf) if largest else 0.0
 
 
 def _exact_rows(problem: Posed) -> list[list[Any]] | None:
     """Coefficients at random designs of the box; None where one is no fraction."""
-    of, rng = problem.parameter_set, np.random.default_rng(0)
-    fixed = {n: exact(v) for n, v in problem.fixed.items()}
+    of, rng, rows = problem.parameter_set, np.random.default_rng(0), []
     if any(of[n].tangent and v != 0 for n, v in problem.fixed.items()):
         return None
-    rows = []
     for _ in range(problem.model.degree + 1 + _MORE):
-        drawn: dict[str, Any] = {n: Tilt(flint.fmpq(0)) if of[n].tangent else v for n, v in fixed.items()}
-        for n, ends in problem.free.items():
+        drawn: dict[str, Any] = {}
+        for n, ends in problem.ordered({**{n: (v, v) for n, v in problem.fixed.items()}, **problem.free}).items():
             lower, upper = (exact(math.tan(e)) if of[n].tangent else exact(e) for e in ends)
             at = lower + (upper - lower) * flint.fmpq(int(rng.integers(_FINENESS)), _FINENESS)
             drawn[n] = Tilt(at) if of[n].tangent else at
-        row = problem.model.coefficients({n: drawn[n] for n in of.names}, of)
-        if not all(isinstance(c, int | flint.fmpq) for c in row):
+        row = problem.model.coefficients(drawn, of)
+        if not all(isinstance(c, flint.fmpq) for c in row):
             return None
-        rows.append([flint.fmpq(c) if isinstance(c, int) else c for c in row])
+        rows.append(row)
     return rows
