@@ -30,7 +30,7 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text, unit_at
 from tmsopt.records import Array, Numbers
-from tmsopt.roots import Root, Structure
+from tmsopt.roots import Root, Structure, product
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.enclosed import nearest_roots
 
@@ -38,7 +38,6 @@ _DIGITS = 150  # slopes are differences over 2⁻¹⁰⁰ of a parameter
 _SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from what a structure tolerates up to 5e-7
 _LINE = 1e-6  # relative distance from the worst root up to which another is on the limit too
 _STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # of Newton's method; designs judged; basis vectors added to the nearest point
-_GONE = 1e-24  # of its natural size: what is left of a cₖ after these steps, where the slopes are not all but singular
 _RANK = 1e-9  # of the steepest direction, below which one moves nothing
 _MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
 _LEAST = 1e-3  # of its range: natural size of a parameter near 0
@@ -59,14 +58,12 @@ class _Cluster:
         root: of the ideal design, on or above the real axis.
         along: unit vector along the limit, the inside of which is on its left.
         exactly: whether the limit is an equality.
-        anywhere: whether the mean of its roots may be where it is, instead of at the root.
     """
 
     case: Case
     root: Root
     along: complex
     exactly: bool
-    anywhere: bool = False
 
     @property
     def place(self) -> complex:
@@ -75,7 +72,7 @@ class _Cluster:
 
     def parts(self) -> Iterator[tuple[int, bool]]:
         """Order k of each cₖ, and whether it is its real part; without those that are 0 or free to move."""
-        for k in range(2 if self.anywhere else 1, self.root.multiplicity + 1):
+        for k in range(1, self.root.multiplicity + 1):
             for real in (True, False):
                 if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.along.imag == 0)):
                     yield k, real
@@ -127,23 +124,6 @@ def _beside(problem: Posed, parameters: Numbers) -> Iterator[dict[str, float]]:
     for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items()):
         if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper:
             yield {**parameters, name: x}
-
-
-def multiple_roots_exist(problem: Posed, parameters: Numbers) -> bool:
-    """Whether a design within rounding of one has exactly the multiple roots that this one has to rounding.
-
-    There Newton's method, in 150 digits, gains digits with every step; where equations are all but singular it stalls.
-    """
-    roots = problem.values(parameters)["structure"].roots
-    clusters = [
-        _Cluster(Case(), r, 1j, True, True) for r in roots if r.multiplicity > 1 and r.im >= 0 and (r.re or r.im)
-    ]
-    if not clusters:
-        return True
-    spread = _SpreadRoots(problem, parameters, clusters, list(problem.free), 0.0)
-    with flint.ctx.workdps(_DIGITS):
-        off = spread.solved()[1]
-    return all(abs(float(x)) <= _GONE * scale for x, scale in zip(off, spread.aims[2].tolist(), strict=True))
 
 
 def abscissa_as_stored(solution: Solution) -> str:
@@ -212,7 +192,7 @@ class _SpreadRoots:
     spread: float
 
     @cached_property
-    def aims(self) -> tuple[Array, Array, Array]:
+    def aims(self) -> Array:
         """Of each part of each cₖ: what it is in the spread, how far it may be off, and its natural size."""
         aims = []
         for cluster in self.clusters:
@@ -224,8 +204,7 @@ class _SpreadRoots:
             for k, real in cluster.parts():
                 leeway = h**k / 8 if real else h ** (k - 1) * across
                 aims.append((c[k].real if real else c[k].imag, leeway, size**k))
-        target, leeways, sizes = np.array(aims).T
-        return target, leeways, sizes
+        return np.array(aims).T
 
     @cached_property
     def widths(self) -> Array:
@@ -276,13 +255,9 @@ class _SpreadRoots:
             a = self.problem.model.coefficients(cluster.case.applied(at), self.problem.parameter_set)
             if not all(c.is_finite() for c in a):
                 return [flint.arb("nan")] * len(target)
-            place, c = flint.acb(cluster.place), [flint.acb(1)]
+            place, along = flint.acb(cluster.place), flint.acb(cluster.along)
             z = sorted((z for z, m in isolated_roots(a) for _ in range(m)), key=lambda z: float(abs(z - place)))
-            own = z[: cluster.root.multiplicity]
-            middle = sum(own, flint.acb(0)) / len(own) if cluster.anywhere else place
-            for root in own:
-                t = (root - middle) / flint.acb(cluster.along)
-                c = [a - t * b for a, b in zip([*c, 0], [0, *c], strict=True)]
+            c = product(*([flint.acb(1), (place - root) / along] for root in z[: cluster.root.multiplicity]))
             found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]
         return [(x - t).mid() for x, t in zip(found, target, strict=True)]
 
