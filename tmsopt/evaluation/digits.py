@@ -11,7 +11,6 @@ from functools import reduce
 from typing import Any
 
 import flint
-import numpy as np
 
 from tmsopt.algebra.balls import exact
 from tmsopt.algebra.kinds import BALLS, greater, lesser
@@ -21,7 +20,7 @@ from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, SIMPLE
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIMPLE
 from tmsopt.problem.units import Reading, frequencies, readings
 from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure
@@ -30,7 +29,7 @@ from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest_dec
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
 
-_Key = tuple[Any, ...]
+_Key = tuple[str, str]  # a field of `Certified`, and in a table a name
 _Several = tuple[Enclosed, ...]
 
 
@@ -63,32 +62,47 @@ def certified_numbers(
         structures[case] = problem.values(case.applied(parameters))["structure"]
     listed = [case for case in cases if not case.direction]
     design = _Design(problem, _exact(parameters), checked, listed, structures)
-    before = _rechecked(checked)
-    numbers: dict[_Key, float] = {}
+    before: dict[_Key, float] = {("value", ""): checked.objective, ("realised", ""): checked.realised}
+    before["abscissa", ""] = checked.structure.abscissa
+    before |= {("quantities", name): x for name, x in checked.quantities.items()}
+    before |= {("dimensionless", name): x for name, x in checked.dimensionless.items()}
+    numbers: dict[_Key, Any] = {}
     for precision in _PRECISIONS:
-        last = precision == _PRECISIONS[-1]
         with flint.ctx.workprec(precision):
-            roots = design.roots(last)
+            roots = design.roots(last=precision == _PRECISIONS[-1])
             balls = [] if roots is None else [each for each in design.balls(*roots) if each[0] not in numbers]
             for key, ball, digits in balls:
-                number = nearest_decimal(ball, digits) if digits else nearest_double(ball)
-                expected = last or math.isnan(before.get(key, math.nan))
-                if number is not None and (expected or not math.isnan(number)):
+                number = _nearest(ball, digits)
+                # At the very end of where a quantity exists, as Fr_c = 0, rounding of the parameters alone may carry
+                # it beyond.
+                if number is not None and not (math.isfinite(before.get(key, math.nan)) and math.isnan(number)):
                     numbers[key] = number
         if roots is not None and numbers.keys() >= {key for key, *_ in balls}:
             break
-    # At the very end of where a quantity exists, as Fr_c = 0, rounding of the parameters alone may carry it beyond.
-    exist = {key: x for key, x in numbers.items() if not (math.isnan(x) and math.isfinite(before.get(key, math.nan)))}
-    return _assembled(problem.model, checked, before | exist)
+
+    def table(field: str) -> Table[Any]:
+        return Table({name: x for (of, name), x in (before | numbers).items() if of == field})
+
+    return Certified(
+        value=table("value")[""],
+        abscissa=table("abscissa")[""],
+        realised=table("realised")[""],
+        roots=numbers.get(("roots", "")) or user_roots(problem.model, checked.structure.roots),
+        quantities=table("quantities"),
+        dimensionless=table("dimensionless"),
+        si=table("si"),
+    )
 
 
-def _rechecked(checked: Evaluation) -> dict[_Key, float]:
-    """What the recheck found in double precision."""
-    found: dict[_Key, float] = {("value",): checked.objective, ("realised",): checked.realised}
-    found["abscissa",] = checked.structure.abscissa
-    for kind, table in (("quantities", checked.quantities), ("dimensionless", checked.dimensionless)):
-        found |= {(kind, name): value for name, value in table.items()}
-    return found
+def _nearest(ball: Any, digits: int) -> Any:
+    """What a ball, a root, or each of several rounds to; None where that is not certain."""
+    if isinstance(ball, tuple):
+        each = tuple(_nearest(one, digits) for one in ball)
+        return None if None in each else each
+    if isinstance(ball, Enclosed):
+        place = _nearest((ball.re, ball.im), digits)
+        return place and Root(place[0], place[1], ball.multiplicity)
+    return nearest_decimal(ball, digits) if digits else nearest_double(ball)
 
 
 @dataclass(frozen=True)
@@ -111,41 +125,34 @@ class _Design:
         model, of, checked, known = self.problem.model, self.problem.parameter_set, self.checked, dict[str, Any]()
         worst, damped, fastest = (ideal[c] for c in (checked.worst, checked.least_damped, checked.fastest))
         if stored:
-            yield ("realised",), _rightmost(stored), 0
+            yield ("realised", ""), _rightmost(stored), 0
         if damped and model.carrier is None:
             known["damping_ratio"] = reduce(lesser, map(_ratio, damped))
         if fastest and ANGULAR_FREQUENCY in checked.quantities:
             known[ANGULAR_FREQUENCY] = reduce(greater, (root.im for root in fastest))
-        yield from ((("quantities", name), ball, 0) for name, ball in known.items())
         if worst:
             known["abscissa"] = _rightmost(worst)
-            yield ("abscissa",), known["abscissa"], 0
-            for k, root in enumerate(_shown(model, worst)):
-                for part, ball in (("re", root.re), ("im", root.im), ("multiplicity", exact(root.multiplicity))):
-                    yield ("roots", k, part), ball, 0
+            yield ("abscissa", ""), known["abscissa"], 0
+            yield ("roots", ""), _shown(model, worst), 0
         if checked.around and math.isfinite(checked.around.radius):
             known[RADIUS] = exact(checked.around.radius)
         nominal, abscissa, pi = self.values(Case()), known.get("abscissa", math.nan), flint.arb.pi()
         if of.rate is not None:
             rates = frequencies(fastest, of.rate(self.exact), pi)
             nominal = nominal.with_known({"frequency": reduce(greater, rates, flint.arb(0))})
-        nominal = nominal.with_known({"abscissa": abscissa})
-        yield from ((("quantities", n), nominal[n], 0) for n in checked.quantities if n not in _ROOTS)
+        nominal = nominal.with_known({"abscissa": abscissa, **known})
+        yield from ((("quantities", n), nominal[n], 0) for n in checked.quantities if n in known or n not in ROOT_NAMES)
         native = of.native(self.exact)
         yield from ((("dimensionless", n), native[n], 0) for n in checked.dimensionless)
-        for name, values, digits in readings(of, self.exact, nominal, abscissa, worst, pi):
-            several = isinstance(values, tuple)
-            yield from ((("si", name, k), ball, digits) for k, ball in enumerate(values if several else [values]))
-            if several:
-                yield ("si", name, "count"), exact(len(values)), 0
+        yield from ((("si", n), x, k) for n, x, k in readings(of, self.exact, nominal, abscissa, worst, pi))
         objective = self.problem.objective
-        if objective is not None and set(objective.names) & {*_ROOTS} <= set(known):
+        if objective is not None and set(objective.names) & {*ROOT_NAMES} <= set(known):
             differs = depends_on_case(self.problem, objective, self.cases)
             cases = self.cases if differs else [Case()]
             each = [objective.of(self.values(case).with_known(known), BALLS) for case in cases]
-            yield ("value",), reduce(lesser if self.problem.sense == "maximize" else greater, each), 0
+            yield ("value", ""), reduce(lesser if self.problem.sense == "maximize" else greater, each), 0
 
-    def roots(self, last: bool) -> tuple[_Several, dict[Case, _Several]] | None:
+    def roots(self, last: bool) -> tuple[_Several, Mapping[Case, _Several]] | None:
         """The roots as stored in the worst case, and in each case those of the nearest polynomial of its structure.
 
         None where they are not decided, the `last` time what the recheck found.
@@ -173,9 +180,6 @@ class _Design:
         return Values(self.problem.model, self.problem.parameter_set, varied)
 
 
-_ROOTS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY, RADIUS)
-
-
 def _exact(table: Numbers) -> dict[str, Any]:
     return {name: exact(value) for name, value in table.items()}
 
@@ -196,23 +200,3 @@ def _shown(model: Model, roots: _Several) -> _Several:
         return found
     nothing = flint.arb(2) ** -_PRECISIONS[0] * (1 + abs(model.carrier))
     return tuple(replace(z, im=flint.arb(0)) if z.im.contains(0) and abs(z.im) < nothing else z for z in found)
-
-
-def _assembled(model: Model, checked: Evaluation, numbers: Mapping[_Key, float]) -> Certified:
-    count = len([key for key in numbers if key[0] == "roots" and key[2] == "multiplicity"])
-    parts = [[numbers.get(("roots", k, part), math.nan) for part in ("re", "im", "multiplicity")] for k in range(count)]
-    roots = [Root(re, im, int(m)) for re, im, m in parts] if not np.isnan(parts).any() else []
-    si: dict[str, Reading] = {}
-    for name in dict.fromkeys(key[1] for key in numbers if key[0] == "si"):
-        length = numbers.get(("si", name, "count"))
-        each = tuple(numbers.get(("si", name, k), math.nan) for k in range(1 if length is None else int(length)))
-        si[name] = each[0] if length is None else each
-    return Certified(
-        value=numbers["value",],
-        abscissa=numbers["abscissa",],
-        realised=numbers["realised",],
-        roots=tuple(roots) or user_roots(model, checked.structure.roots),
-        quantities=Table({n: numbers["quantities", n] for n in checked.quantities}),
-        dimensionless=Table({n: numbers["dimensionless", n] for n in checked.dimensionless}),
-        si=Table(si),
-    )
