@@ -105,11 +105,9 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
     violations, doubt = _violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
     feasible = np.all(np.isnan([np.full(m, np.nan), *violations.values()]), axis=0)
-    bound, related = np.full(m, -np.inf), np.zeros(m, dtype=bool)
-    if bounded(problem):
-        bound, related = _bounds(problem, coefficients, settled)
-        bound = np.where(feasible, bound, -np.inf)
-        certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
+    bound, related = _bounds(problem, coefficients, settled)
+    bound = np.where(feasible, bound, -np.inf)
+    certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
     said = _laws(problem, wide, coefficients, feasible, settled) if problem.model is tms else {}
     return Verdicts(
         certain,
@@ -122,7 +120,7 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
         np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf),
         related,
         said,
-        {text: _column(x, m) for text, x in zip(reports, evaluate(problem, reports, plain), strict=True)},
+        {text: _spread(x, m).value for text, x in zip(reports, evaluate(problem, reports, plain), strict=True)},
     )
 
 
@@ -130,10 +128,6 @@ def _spread(number: Any, m: int) -> Bounded:
     """One number of each design."""
     wide = as_bounded(number)
     return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.value, wide.error)))
-
-
-def _column(number: Any, m: int) -> Array:
-    return np.ascontiguousarray(np.broadcast_to(np.asarray(number, dtype=float), m))
 
 
 def _possible(problem: Posed, given: Mapping[str, Any]) -> Truth:
@@ -157,7 +151,7 @@ def _violations(problem: Posed, given: Mapping[str, Any], found: Motions) -> tup
     names = list(dict.fromkeys(n for c in problem.conditions.values() for n in c.names))
     values = dict(zip(names, evaluate(problem, names, given), strict=True))
     for name, condition in problem.conditions.items():
-        left, right = (_column(side, m) for side in condition.sides(values))
+        left, right = (_spread(side, m).value for side in condition.sides(values))
         difference = left - right
         excess, size = condition.excess(difference), np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
         relative = excess / size
@@ -169,7 +163,7 @@ def _violations(problem: Posed, given: Mapping[str, Any], found: Motions) -> tup
 
 
 def _bounds(problem: Posed, coefficients: Sequence[Bounded], settled: Callable[[Any], Array]) -> tuple[Array, Truth]:
-    """The bound of `instant_bound` on the abscissa of each design, and where it is one by relations.
+    """The bound of `instant_bound` on the abscissa of each design, if any, and where it is one by relations.
 
     Coefficients that do not vary have relations of two: with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and with aₙ.
 
@@ -177,9 +171,10 @@ def _bounds(problem: Posed, coefficients: Sequence[Bounded], settled: Callable[[
         settled: rounds numbers to doubles, and notes where that is not certain.
     """
     model, of, n = problem.model, problem.parameter_set, problem.model.degree
-    quotients = settled(abs(coefficients[-1] / coefficients[0]))
-    known = -(quotients ** (1 / n)) * (1 + ROUNDING)
-    if any(p.tangent for p in of.parameters) or not is_rational(model, of):
+    known = np.full(len(coefficients[0].value), -np.inf)
+    if bounded(problem):
+        known = -(settled(abs(coefficients[-1] / coefficients[0])) ** (1 / n)) * (1 + ROUNDING)
+    if not bounded(problem) or any(p.tangent for p in of.parameters) or not is_rational(model, of):
         return known, np.zeros(len(known), dtype=bool)
     least = np.full(len(known), np.inf)
     for j in range(n + 1):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.cases import Case
-from tmsopt.problem.dependence import depends_on_case
+from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, roots_at
 from tmsopt.problem.verdict.meetings import is_crossing
@@ -73,10 +73,10 @@ def recheck(
     """
     looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
     violations, amounts = looked.violations(problem.conditions)
-    nominal, worst, crossing = looked.nominal, looked.each[looked.top], False
-    structure = worst["structure"]
+    nominal, top, crossing = looked.nominal, looked.worst["abscissa"], False
+    structure = looked.each[top]["structure"]
     if not math.isfinite(structure.abscissa):
-        exist = all(math.isfinite(float(c)) for c in worst.coefficients)
+        exist = all(math.isfinite(float(c)) for c in looked.each[top].coefficients)
         violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or none
     if problem.pattern is not None:
         a = [float(c) for c in nominal.coefficients]
@@ -92,15 +92,15 @@ def recheck(
         nominal = nominal.with_known({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
-        realised=realised_abscissa(problem, looked.cases[looked.top].applied(parameters)),
+        realised=realised_abscissa(problem, looked.cases[top].applied(parameters)),
         objective=looked.objective,
         violations=Table(violations),
         amounts=Table(violations | amounts),
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
-        worst=looked.cases[looked.top],
-        least_damped=looked.cases[looked.least],
-        fastest=looked.cases[looked.fastest],
+        worst=looked.cases[top],
+        least_damped=looked.cases[looked.worst["damping_ratio"]],
+        fastest=looked.cases[looked.worst.get(ANGULAR_FREQUENCY, top)],
         around=looked.around,
         crossing=crossing,
     )
@@ -187,18 +187,14 @@ class _Look:
     """A design in its cases, with root quantities the worst over them.
 
     Attributes:
-        top: number of the case with the largest abscissa.
-        least: number of the case with the least damping ratio.
-        fastest: number of the case with the greatest angular frequency, where that is asked for, else `top`.
+        worst: root quantity → number of the case in which it is the worst; the angular frequency where it is asked for.
     """
 
     problem: Posed
     cases: list[Case]
     nominal: Values
     each: list[Values]
-    top: int
-    least: int
-    fastest: int
+    worst: Mapping[str, int]
     around: Robustness | None
 
     def at(self, expression: Expression) -> list[Values]:
@@ -234,29 +230,28 @@ def _look(
 ) -> _Look:
     """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
     listed = [case for case in cases if not case.direction] or [Case()]
-    nominal = problem.values(parameters)
-    each = [nominal if case == Case() else problem.values(case.applied(parameters)) for case in listed]
-    numbers = range(len(each))
-    if stored is not None:
-        nominal, *each = (
-            values.with_known(
-                {"structure": Structure("undecided", _realised_roots(problem, case.applied(stored)), 0.0)}
-            )
-            for case, values in zip((Case(), *listed), (nominal, *each), strict=True)
-        )
-    top = max(numbers, key=lambda k: _or_infinite(each[k]["abscissa"]))
-    least = min(numbers, key=lambda k: float(each[k]["damping_ratio"]))
-    worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
-    fastest = top
-    if problem.asks(ANGULAR_FREQUENCY):
-        fastest = max(numbers, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
-        worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]
+
+    @cache
+    def values(case: Case) -> Values:
+        found = problem.values(case.applied(parameters))
+        if stored is None:
+            return found
+        exactly = _realised_roots(problem, case.applied(stored))
+        return found.with_known({"structure": Structure("undecided", exactly, 0.0)})
+
+    nominal, *each = map(values, (Case(), *listed))
+    worst = {
+        name: max(range(len(each)), key=lambda k: _or_infinite(sign * each[k][name]))
+        for name, sign in WORSE_DIRECTION.items()
+        if name != ANGULAR_FREQUENCY or problem.asks(ANGULAR_FREQUENCY)
+    }
+    shared = {name: each[k][name] for name, k in worst.items()}
     if around is None and problem.asks_radius and stored is None:
         around = robustness_at(problem, parameters)
     if around is not None:
-        worst[RADIUS] = around.radius
-    nominal, *each = (v.with_known({"structure": v["structure"], **worst}) for v in (nominal, *each))
-    return _Look(problem, listed, nominal, each, top, least, fastest, around)
+        shared[RADIUS] = around.radius
+    nominal, *each = (v.with_known({"structure": v["structure"], **shared}) for v in (nominal, *each))
+    return _Look(problem, listed, nominal, each, worst, around)
 
 
 def _or_infinite(value: float) -> float:
