@@ -103,14 +103,14 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
     for n in nlp.variables[len(free) :]:  # nan for a coefficient of a factor, which this program does not use
         at[n] = float(values[n]) / units.get(n, 1.0) if n in values else np.nan
     x = {n: ca.SX.sym(n) for n in at}
-    f, g = nlp.symbolic(ca.vertcat(*x.values()))
-    rows = ca.Function("rows", [*x.values()], [g])
-    reached = np.array(rows(*(value if np.isfinite(value) else 0.0 for value in at.values()))).ravel()
+    every = ca.vertcat(*x.values())
+    f, g = nlp.symbolic(every)
+    reached = nlp.at(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
     steady = [n for n in x if _is_steady(nlp, n, reached)]
     f, g = ca.substitute([f, g], [x[n] for n in steady], [ca.SX(at[n]) for n in steady])
     build = _Builder()
     for k, name in enumerate(nlp.rows):
-        if name in problem.constraints and ca.depends_on(g[k], ca.vertcat(*x.values())):
+        if name in problem.constraints and ca.depends_on(g[k], every):
             build.hold_row(nlp, k, g[k], reached[k])
     needed = [n for n in x if n == "abscissa"]
     for _ in nlp.lifts:
@@ -205,27 +205,23 @@ class _Builder:
                 self.hold(Held(name, signed, j, size**k), symbol)
                 return symbol
 
-            real, imaginary = [1], [0]
             omega = self.unknown(f"omega.{j}", root.im, size) if root.im else 0
-            for k in range(1, root.multiplicity + 1):
-                real.append(zero(f"c{k}", k, k <= 2))
-                imaginary.append(zero(f"im c{k}", k, False) if root.im and k > 1 else 0)
-            factors.append(_times_conjugate(omega, real, imaginary) if root.im else real)
+            re, im = [1], [0]
+            for k in range(1, root.multiplicity + 1):  # Horner's rule in t − iω
+                re, im = (
+                    [x + omega * y for x, y in zip([*re, 0], [0, *im], strict=True)],
+                    [y - omega * x for x, y in zip([0, *re], [*im, 0], strict=True)],
+                )
+                re[-1] += zero(f"c{k}", k, k <= 2)
+                im[-1] += zero(f"im c{k}", k, False) if root.im and k > 1 else 0
+            pair = [x + y for x, y in zip(product(re, re), product(im, im), strict=True)]
+            factors.append(pair if root.im else re)
         rest = [complex(r.re, r.im) - line[0].re for r in others for _ in range(r.multiplicity)]
         monic = np.atleast_1d(np.poly(rest)).real.tolist()
         factors.append([1, *(self.unknown(f"r{k}", monic[k], size**k) for k in range(1, len(monic)))])
         moved, matched = shift(a, gamma), product(*factors)
         for k in range(1, len(moved)):
             self.hold(Held("roots", False, size=lead * size**k), moved[k] - a[0] * matched[k])
-
-
-def _times_conjugate(omega: Any, real: Sequence[Any], imaginary: Sequence[Any]) -> list[Any]:
-    """A complex polynomial in t − iω, times its conjugate, in t: a Taylor shift by Horner division first."""
-    re, im = list(real), list(imaginary)
-    for end in range(len(re), 1, -1):
-        for k in range(1, end):
-            re[k], im[k] = re[k] + omega * im[k - 1], im[k] - omega * re[k - 1]
-    return [a + b for a, b in zip(product(re, re), product(im, im), strict=True)]
 
 
 def _derivatives(x: Any, f: Any, h: Any) -> ca.Function:
