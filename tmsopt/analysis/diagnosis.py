@@ -113,45 +113,34 @@ def diagnosed(
     free: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[Diagnosis, ...]:
     """The same for any design of a model whose roots have a structure; free = ranges beside which it may be 0."""
-    if all(root.multiplicity == 1 for root in structure.roots):
-        return ()
+    widths, found = {n: b - a for n, (a, b) in (free or {}).items()}, []
+
+    def ranks(at: Meeting) -> Jordan | None:
+        """Jordan structure by the matrices; None without them, or if they are singular for every s."""
+        if model.pencil is None:
+            return None
+        matrices = pencil_of(model, of, at.values)
+        threshold = max(_RANK, _TIMES * math.sqrt(structure.distance))
+        return jordan(matrices, at.s, at.multiplicity, threshold) if is_regular(matrices, at.s, threshold) else None
+
     with many_digits():
-        return tuple(
-            _diagnosis(model, of, design, structure.distance, root, {n: b - a for n, (a, b) in (free or {}).items()})
-            for root in user_roots(model, structure.roots)
-            if root.multiplicity > 1 and (root.im >= 0 or model.double is not None)
-        )
-
-
-def _diagnosis(
-    model: Model,
-    of: ParameterSet,
-    design: Numbers,
-    distance: float,
-    root: Root,
-    widths: Numbers,
-) -> Diagnosis:
-    k = root.multiplicity
-    stored = met(model, of, design, widths, complex(root.re, root.im), k)
-    ranks = _ranks(model, of, stored, distance)
-    at = polished(stored, ranks.geometric if ranks else 1)
-    exact = _ranks(model, of, at, distance)
-    ranks = exact if ranks and exact and exact.geometric == ranks.geometric else ranks
-    partial = ranks.partial if ranks else (k,)
-    kind = "semisimple" if at.geometric == k else "defective" if at.geometric == 1 else "partly defective"
-    ordered = tuple(sorted((response(at, name) for name in of.names), key=_sensitivity))
-    place = middle(at.s)
-    omega = tuple(complex(z.re, z.im) for z in eigenfrequencies(model, [Root(place.real, place.imag, k)]))
-    return Diagnosis(place.real, place.imag, k, at.geometric, partial, kind, ranks, distance, ordered, *omega)
-
-
-def _ranks(model: Model, of: ParameterSet, at: Meeting, distance: float) -> Jordan | None:
-    """Jordan structure by the matrices; None without them, or if they are singular for every s."""
-    if model.pencil is None:
-        return None
-    matrices = pencil_of(model, of, at.values)
-    threshold = max(_RANK, _TIMES * math.sqrt(distance))
-    return jordan(matrices, at.s, at.multiplicity, threshold) if is_regular(matrices, at.s, threshold) else None
+        for root in user_roots(model, structure.roots):
+            k = root.multiplicity
+            if k == 1 or (root.im < 0 and model.double is None):
+                continue
+            stored = met(model, of, design, widths, complex(root.re, root.im), k)
+            as_stored = ranks(stored)
+            at = polished(stored, as_stored.geometric if as_stored else 1)
+            exact, g = ranks(at), at.geometric
+            verdict = exact if as_stored and exact and exact.geometric == as_stored.geometric else as_stored
+            partial = verdict.partial if verdict else (k,)
+            kind = "semisimple" if g == k else "defective" if g == 1 else "partly defective"
+            ordered = tuple(sorted((response(at, name) for name in of.names), key=_sensitivity))
+            s = middle(at.s)
+            omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
+            distance = structure.distance
+            found.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))
+    return tuple(found)
 
 
 def _sensitivity(response: Response) -> tuple[float, float]:

@@ -91,7 +91,7 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
         worst=worst(alone),
         precision=together,
         warnings=warnings(solution),
-        goal=(problem.minimize or problem.maximize or problem.locate or "").strip(),
+        goal=problem.goal or (problem.locate or "").strip(),
         abscissa=solution.abscissa,
         value=solution.value,
     )

@@ -134,8 +134,7 @@ def moved(problem: Posed, name: str, step: float) -> Posed:
 def _unresolved(solution: Solution, name: str) -> Lever:
     """The lever of a bound or a constraint, to first order."""
     problem = solution.problem.posed
-    goal = problem.minimize or problem.maximize
-    gained, worth = unit_of_all(problem, goal) if goal else Unit(), solution.active[name]
+    gained, worth = unit_of_all(problem, problem.goal) if problem.goal else Unit(), solution.active[name]
     if name in problem.constraints:
         condition, shown = problem.conditions[name], limit_text(problem, name)
         natural = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, name))

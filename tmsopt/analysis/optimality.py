@@ -156,7 +156,7 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
         verdict=verdict,
         reason=reason,
         order=order,
-        goal=_goal(problem),
+        goal=problem.goal,
         roots=_on_line(around, found) if stationary else (),
         limits=Table(_limits(solution, around, found) if stationary else {}),
         unknowns=unknowns,
@@ -211,7 +211,7 @@ def _verdict(
 ) -> tuple[str, int, str]:
     """Verdict, derivatives that decide it, and the sentence."""
     problem, name = around.problem, f"this {solution.structure} is"
-    extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {_goal(problem)}"
+    extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {problem.goal}"
     extreme += ", which was not asked for" if solution.problem.locate else ""
     if beyond is not None:
         return NOT_MINIMAL, beyond.order, f"{name} no {extreme}: {_pays(around, found)}; {_way(solution, beyond)}"
@@ -241,10 +241,6 @@ def _doubt(around: LocalProgram, found: Conditions) -> str:
     if curved(found.curvature) <= 0 and not np.isnan(found.curvature):
         return f"along what is left free it {'gains' if curved(found.curvature) else 'is flat'} to second order"
     return ""
-
-
-def _goal(problem: Posed) -> str:
-    return (problem.minimize or problem.maximize or "").strip()
 
 
 def _counts(around: LocalProgram) -> tuple[int, int]:

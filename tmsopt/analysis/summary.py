@@ -61,7 +61,7 @@ def faster_than(solution: Solution) -> str:
 
 def _quality(solution: Solution) -> str:
     problem, bound = solution.problem.posed, solution.bound
-    text = (problem.minimize or problem.maximize or "").strip()
+    text = problem.goal
     if not problem.free:
         return "the design as given, with nothing free"
     if not text:
@@ -127,11 +127,10 @@ def _idle(solution: Solution, name: str) -> str:
         _varies([[values[k]] for _, values in rows]) or (roots_move and bool(_ROOTS & set(e.names)))
         for k, e in enumerate(asked)
     ]
-    goal = problem.locate or ""
-    if (goal and roots_move) or (problem.objective and moves[0]):
+    if (problem.locate and roots_move) or (problem.objective and moves[0]):
         return ""
     affected = [n for n, m in zip(conditions, moves[len(asked) - len(conditions) :], strict=True) if m]
-    what = " and ".join(part for part in (goal, (problem.minimize or problem.maximize or "").strip()) if part)
+    what = " and ".join(filter(None, (problem.locate, problem.goal)))
     if any(n in solution.active or conditions[n].equality for n in affected):
         return ""  # it moves the optimum through a constraint that binds
     ends = " … ".join(_limit(problem, f"{name}.{end}") for end in ("min", "max"))

@@ -49,7 +49,7 @@ Known = Mapping[tuple[str, float], Any]
 
 def bounded(problem: Posed) -> bool:
     """Whether the bound speaks of the problem: it asks for the least abscissa."""
-    return problem.sense == "minimize" and (problem.minimize or "").strip() == "abscissa"
+    return problem.sense == "minimize" and problem.goal == "abscissa"
 
 
 def instant_bound(problem: Posed, value: float) -> Bound:

@@ -137,9 +137,9 @@ def abscissa_as_stored(solution: Solution) -> str:
     if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
         return ""
     at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
-    problem, unit = solution.problem, unit_at(solution.problem.posed, "abscissa", at)
-    goal = problem.minimize or problem.maximize or ""
-    first = "" if goal.strip() == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
+    problem = solution.problem.posed
+    unit = unit_at(problem, "abscissa", at)
+    first = "" if problem.goal == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
     return f"{first}as stored {unit.number(realised, _SHOWN)}"
 
 

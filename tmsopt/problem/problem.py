@@ -204,6 +204,11 @@ class Posed:
         return next(asked, "evaluate")
 
     @property
+    def goal(self) -> str:
+        """The text of the objective; empty without one."""
+        return (self.minimize or self.maximize or "").strip()
+
+    @property
     def sign(self) -> float:
         """1, or −1 where the objective is maximised: times this, the less of it the better."""
         return 1.0 if self.maximize is None else -1.0
