@@ -44,7 +44,7 @@ class Conditions:
 
 def conditions(program: LocalProgram) -> Conditions:
     """Multipliers, rank and curvature at the point of a program."""
-    _, gradient, _, jacobian, _ = program.at(program.x)
+    gradient, _, jacobian, _ = program.at(program.x)
     signed = np.array([held.signed for held in program.held])
     slope, rows = gradient * program.sizes, jacobian * program.sizes
     lengths = np.linalg.norm(rows, axis=1)
@@ -82,6 +82,6 @@ def _curvature(program: LocalProgram, multipliers: Array, firm: Array, steepness
     free = directions[np.sum(lengths > _RANK * lengths.max(initial=0.0)) :].T  # columns that no row changes
     if not free.shape[1]:
         return np.nan, np.zeros(len(program.x))
-    hessian = program.at(program.x, multipliers)[4] * np.outer(program.sizes, program.sizes)
+    hessian = program.at(program.x, multipliers)[3] * np.outer(program.sizes, program.sizes)
     values, vectors = np.linalg.eigh(free.T @ hessian @ free)
     return float(values[0] / max(np.abs(values).max(), steepness)), free @ vectors[:, 0]

@@ -56,7 +56,7 @@ def better(program: LocalProgram, found: Conditions, solution: Solution) -> Bett
 
 def _along(program: LocalProgram, found: Conditions, both: bool) -> Iterator[Array]:
     """Points on the way, the farthest first."""
-    jacobian = program.at(program.x)[3]
+    jacobian = program.at(program.x)[2]
     signed = np.array([held.signed for held in program.held])
     direction = found.downhill / np.abs(found.downhill / program.sizes).max()
     for k in range(_STEPS):
@@ -72,7 +72,7 @@ def _corrected(program: LocalProgram, x: Array, target: Array) -> Array | None:
     """The nearest point at which what is held has given values, by Newton's method; None where it fails."""
     start = x
     for _ in range(_NEWTON):
-        _, _, h, jacobian, _ = program.at(x)
+        _, h, jacobian, _ = program.at(x)
         if not np.all(np.isfinite(jacobian)):
             return None
         step = np.linalg.lstsq(jacobian * program.sizes, target - h, rcond=1e-12)[0] * program.sizes

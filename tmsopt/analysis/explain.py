@@ -7,7 +7,7 @@ from typing import Any
 
 from tmsopt.analysis.limits import Lever, levers
 from tmsopt.analysis.optimality import Optimality, optimality
-from tmsopt.analysis.rounding import Rounded, rounded_designs, worst
+from tmsopt.analysis.rounding import Rounded, rounded_designs
 from tmsopt.analysis.summary import summary, warnings
 from tmsopt.problem.files import Given
 from tmsopt.problem.solution import Bound
@@ -27,7 +27,6 @@ class Explanation(Tabular):
         optimality: whether the design is a local optimum, by the multipliers of its factors.
         levers: the limits that bind, the most valuable first; empty unless the design is optimal.
         rounding: free parameter → the design with it alone rounded to 3 digits.
-        worst: the parameter whose rounding costs most; empty where none costs anything.
         precision: the design with all free parameters rounded to 2, 3, 4 and 6 digits.
         goal: what was optimised, or the pattern that was located; empty where nothing was asked.
         abscissa, value: of the design, and of its objective.
@@ -47,12 +46,17 @@ class Explanation(Tabular):
     optimality: Optimality
     levers: tuple[Lever, ...]
     rounding: Table[Rounded]
-    worst: str
     precision: tuple[Rounded, ...]
     warnings: tuple[str, ...]
     goal: str = ""
     abscissa: float = math.nan
     value: float = math.nan
+
+    @property
+    def worst(self) -> str:
+        """The parameter whose rounding costs most; empty where none costs anything."""
+        losing = {name: row.loss for name, row in self.rounding.items() if row.loss > 0}
+        return max(losing, key=losing.__getitem__, default="")
 
     def records(self) -> Iterable[dict[str, Any]]:
         """The limits that bind, one a row."""
@@ -88,7 +92,6 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
         optimality=optimality(solution),
         levers=levers(solution, resolve, steps),
         rounding=alone,
-        worst=worst(alone),
         precision=together,
         warnings=warnings(solution),
         goal=problem.goal or (problem.locate or "").strip(),

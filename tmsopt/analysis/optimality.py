@@ -231,7 +231,7 @@ def _doubt(around: LocalProgram, found: Conditions) -> str:
     """Why nothing is decided where no better design was found; empty where the conditions decide."""
     if found.residual > STATIONARY or (found.downhill.any() and np.isnan(found.curvature)):
         return f"nothing that binds holds {found.residual:.1g} of its gradient, yet no better design was found downhill"
-    left, sizes = np.abs(around.at(around.x)[2]), np.array([h.size for h in around.held])
+    left, sizes = np.abs(around.at(around.x)[1]), np.array([h.size for h in around.held])
     off = float(np.divide(left, sizes, out=np.zeros_like(left), where=sizes > 0).max(initial=0.0))
     if off > _MET:
         return f"what is held is met to {off:.1g} only"

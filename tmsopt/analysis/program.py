@@ -68,7 +68,7 @@ class LocalProgram:
         x: the point.
         sizes: natural size of each variable.
         held: what the rows of h are.
-        functions: (x, y) → f, ∇f, h, ∂h/∂x and the Hessian of f − y·h.
+        functions: (x, y) → ∇f, h, ∂h/∂x and the Hessian of f − y·h.
         line: the roots on the rightmost line, complex pairs by their upper root.
         idle: free parameters without any part in the program.
     """
@@ -82,12 +82,11 @@ class LocalProgram:
     line: tuple[Root, ...]
     idle: tuple[str, ...]
 
-    def at(self, x: Array, y: Array | None = None) -> tuple[float, Array, Array, Array, Array]:
-        """f, ∇f, h, ∂h/∂x, and the Hessian of f − y·h."""
-        f, gradient, h, jacobian, hessian = (
-            np.array(part) for part in self.functions(x, np.zeros(len(self.held)) if y is None else y)
-        )
-        return float(f.item()), gradient.ravel(), h.ravel(), jacobian, hessian
+    def at(self, x: Array, y: Array | None = None) -> tuple[Array, Array, Array, Array]:
+        """∇f, h, ∂h/∂x, and the Hessian of f − y·h."""
+        found = self.functions(x, np.zeros(len(self.held)) if y is None else y)
+        gradient, h, jacobian, hessian = (part.full() for part in found)
+        return gradient.ravel(), h.ravel(), jacobian, hessian
 
 
 def program(problem: Posed, solution: Solution) -> LocalProgram:
@@ -111,14 +110,14 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
     build = _Builder()
     for k, name in enumerate(nlp.rows):
         if name in problem.constraints and ca.depends_on(g[k], every):
-            build.hold_row(nlp, k, g[k], reached[k])
+            build.hold_row(nlp, k, g, reached)
     needed = [n for n in x if n == "abscissa"]
     for _ in nlp.lifts:
         binding = ca.vertcat(f, *build.rows)
         for n in [n for n in x if n not in free and n not in needed and ca.depends_on(binding, x[n])]:
             needed.append(n)
             for k in _rows_of(nlp, n):
-                build.hold_row(nlp, k, g[k], reached[k])
+                build.hold_row(nlp, k, g, reached)
     if beyond := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed]:
         raise NotCovered(f"the {beyond[0]} binds, which the conditions on the abscissa do not cover")
     if not (needed and ca.depends_on(ca.vertcat(f, *build.rows), x["abscissa"])):
@@ -145,13 +144,16 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
                     build.hold(Held(f"{n}.{end}", True), side * (x[n] - at[n]))
         variables.append((n, x[n], at[n], own))
     names, symbols, point, sizes = zip(*variables, *build.unknowns, strict=True)
+    z, h = ca.vertcat(*symbols), ca.vertcat(*build.rows)
+    y = ca.SX.sym("y", h.numel())
+    parts = [ca.gradient(f, z), h, ca.jacobian(h, z), ca.hessian(f - ca.dot(y, h), z)[0]]
     return LocalProgram(
         problem=problem,
         variables=names,
         x=np.array(point),
         sizes=np.array(sizes),
         held=tuple(build.held),
-        functions=_derivatives(ca.vertcat(*symbols), f, ca.vertcat(*build.rows)),
+        functions=ca.Function("held", [z, y], [ca.densify(part) for part in parts]),
         line=line,
         idle=idle,
     )
@@ -181,12 +183,12 @@ class _Builder:
         self.held.append(held)
         self.rows.append(expression)
 
-    def hold_row(self, nlp: NLP, k: int, expression: Any, value: float) -> None:
+    def hold_row(self, nlp: NLP, k: int, g: Any, reached: Array) -> None:
         """A row of the NLP, if it is an equality or holds with equality."""
         name, lower, upper = nlp.rows[k], nlp.row_lower[k], nlp.row_upper[k]
         for end, side in ((lower, 1), (upper, -1)):
-            if np.isfinite(end) and (lower == upper or abs(value - end) <= _ACTIVE * (1 + abs(end))):
-                self.hold(Held(name, lower != upper), side * (expression - end))
+            if np.isfinite(end) and (lower == upper or abs(reached[k] - end) <= _ACTIVE * (1 + abs(end))):
+                self.hold(Held(name, lower != upper), side * (g[k] - end))
                 return
 
     def unknown(self, name: str, value: float, size: float) -> Any:
@@ -222,10 +224,3 @@ class _Builder:
         moved, matched = shift(a, gamma), product(*factors)
         for k in range(1, len(moved)):
             self.hold(Held("roots", False, size=lead * size**k), moved[k] - a[0] * matched[k])
-
-
-def _derivatives(x: Any, f: Any, h: Any) -> ca.Function:
-    y = ca.SX.sym("y", h.numel())
-    lagrangian = f - ca.dot(y, h)
-    parts = [f, ca.gradient(f, x), h, ca.jacobian(h, x), ca.hessian(lagrangian, x)[0]]
-    return ca.Function("held", [x, y], [ca.densify(part) for part in parts])

@@ -69,54 +69,45 @@ def rounded_designs(solution: Solution) -> tuple[Table[Rounded], tuple[Rounded, 
 
 def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) -> tuple[Rounded, ...]:
     """A design with some of its parameters rounded, for each choice of these and of significant digits."""
+    problem, found = solution.problem.posed, []
     with flint.ctx.workdps(_WORKING), np.errstate(all="ignore"):  # what has no value is nan or inf
-        return tuple(_rounded(solution, names, digits) for names, digits in choices)
-
-
-def _rounded(solution: Solution, names: Sequence[str], digits: int) -> Rounded:
-    problem = solution.problem.posed
-    units = {n: unit_of(problem, n) for n in names}
-    written = {n: _decimal(solution, n, unit, digits) for n, unit in units.items()}
-    design = {**solution.parameters, **{n: _exact(text, units[n]) for n, text in written.items()}}
-    values, violated = judged_exactly(problem, design, _cases(solution, design))
-    abscissa, roots = float(values["abscissa"]), values["structure"].roots
-    has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
-    return Rounded(
-        digits=digits,
-        written=Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()}),
-        realised=abscissa,
-        loss=abscissa - solution.abscissa,
-        damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # not with a root at infinity
-        objective=float(problem.objective(values)) if problem.objective else math.nan,
-        violations=Table(violated | _beyond_box(problem, design)),
-    )
-
-
-def worst(alone: Mapping[str, Rounded]) -> str:
-    """The parameter whose rounding costs most; empty where none costs anything."""
-    losing = {name: row.loss for name, row in alone.items() if row.loss > 0}
-    return max(losing, key=lambda name: losing[name], default="")
+        for names, digits in choices:
+            units = {n: unit_of(problem, n) for n in names}
+            written = {n: _decimal(solution, n, unit, digits) for n, unit in units.items()}
+            design = {**solution.parameters, **{n: _exact(text, units[n]) for n, text in written.items()}}
+            values, violated = judged_exactly(problem, design, _cases(solution, design))
+            abscissa, roots = float(values["abscissa"]), values["structure"].roots
+            has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
+            row = Rounded(
+                digits=digits,
+                written=Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()}),
+                realised=abscissa,
+                loss=abscissa - solution.abscissa,
+                damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # not with a root at infinity
+                objective=float(problem.objective(values)) if problem.objective else math.nan,
+                violations=Table(violated | _beyond_box(problem, design)),
+            )
+            found.append(row)
+    return tuple(found)
 
 
 def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
-    """The listed cases, the worst of the unrounded design and those of the rounded one, or one that changes nothing."""
+    """The listed cases, the worst of the unrounded design and those of the rounded one."""
     problem = solution.problem.posed
-    cases = [case for case in problem.cases if not case.direction]
-    cases += [solution.worst] if solution.worst else []
+    cases = [*problem.cases, *filter(None, [solution.worst])]
     if problem.scenarios or problem.tolerances:
         cases += [w.case for w in worst_cases(problem, {n: float(x) for n, x in design.items()}).values()]
-    return list(dict.fromkeys(cases)) or [Case()]
+    return cases
 
 
 def _beyond_box(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
     """Ends of ranges that a design is beyond, by how much."""
-    found = {}
-    for name, (lower, upper) in problem.free.items():
-        value = float(design[name])
-        for end, amount, limit in (("min", lower - value, lower), ("max", value - upper, upper)):
-            if amount > FEASIBLE * max(1.0, abs(limit)):
-                found[f"{name}.{end}"] = amount
-    return found
+    return {
+        f"{name}.{end}": amount
+        for name, ends in problem.free.items()
+        for end, limit, side in zip(("min", "max"), ends, (-1.0, 1.0), strict=True)
+        if (amount := side * (float(design[name]) - limit)) > FEASIBLE * max(1.0, abs(limit))
+    }
 
 
 def _short(solution: Solution, name: str) -> bool:

@@ -1,7 +1,7 @@
 """Where, within its scenarios and tolerances, a design does worst, and the proof that it does no worse anywhere."""
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -49,27 +49,22 @@ class Worst:
     value: float
 
 
-def worst_case_targets(problem: Posed, cases: Sequence[Case]) -> dict[str, tuple[float, Expression | str]]:
-    """What may differ between cases: name → sign that makes the worst the greatest, and what it is."""
-    found: dict[str, tuple[float, Expression | str]] = {"abscissa": (1.0, "abscissa")}
-    asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
-    found |= {n: (sign, n) for n, sign in WORSE_DIRECTION.items() if any(n in e.names for e in asked)}
-    if problem.objective and depends_on_case(problem, problem.objective, cases):
-        found["objective"] = (problem.sign, problem.objective)
-    for name, condition in problem.conditions.items():
-        if depends_on_case(problem, condition, cases):
-            found[f"constraint {name}"] = (condition.sign, condition)
-    return found
-
-
 def worst_cases(problem: Posed, parameters: Numbers) -> dict[str, Worst]:
     """The worst case of everything that differs between cases, over whole bands and tolerance boxes.
 
     A grid with a closer look at its worst points; the value in the case found is exact, with multiple roots
     recognised, but a peak narrower than the grid can escape: `prove` excludes that.
     """
+    asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
+    targets: dict[str, tuple[float, Expression | str]] = {"abscissa": (1.0, "abscissa")}  # with the sign of the worst
+    targets |= {n: (sign, n) for n, sign in WORSE_DIRECTION.items() if any(n in e.names for e in asked)}
+    if problem.objective and depends_on_case(problem, problem.objective, problem.cases):
+        targets["objective"] = (problem.sign, problem.objective)
+    for name, condition in problem.conditions.items():
+        if depends_on_case(problem, condition, problem.cases):
+            targets[f"constraint {name}"] = (condition.sign, condition)
     found: dict[str, Worst] = {}
-    for name, (sign, what) in worst_case_targets(problem, problem.cases).items():
+    for name, (sign, what) in targets.items():
         shared = {n: found[n].value for n in found if isinstance(what, Expression) and n in what.names}
         measured = []
         for case in _peaks(problem, parameters, sign, what, shared):
@@ -157,6 +152,10 @@ def _apart(u: Array, high: Array, distance: float) -> list[int]:
     return chosen
 
 
+_Box = dict[tuple[bool, str], Interval]
+"""(Whether it is added to the stored number, parameter) → interval; the side that was halved last is the last."""
+
+
 def cover(problem: Posed, parameters: Numbers, worst: float, boxes: int | None = None) -> Cover:
     """Prove that no case has a root right of `worst` plus SLACK: Liénard–Chipart signs of p(t + limit) in balls.
 
@@ -165,40 +164,24 @@ def cover(problem: Posed, parameters: Numbers, worst: float, boxes: int | None =
     if boxes is None:
         boxes = max(BOXES >> max(problem.model.degree - 4, 0), _FEWEST)
     limit, done = worst + SLACK * (1 + abs(worst)), 0
-    waiting = deque(_first(problem))
+    choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.scenarios.values()]
+    offset: _Box = {(True, n): outwards(-t, t) for n, t in problem.tolerances.items()}
+    waiting = deque[_Box]()
+    for each in product(*choices):  # bands and tolerances whole
+        at = zip(problem.scenarios, each, strict=True)
+        waiting.append({(False, n): outwards(*ends) for n, ends in at} | offset)
     with flint.ctx.workdps(_DIGITS):
         while waiting and done < boxes:
             box = waiting.popleft()
             done += 1
             if not _left_of(problem, parameters, box, flint.arb(limit)):
-                halves = _halves(box)
-                if not halves:
+                side = next((side for side, (lower, upper) in box.items() if lower < (lower + upper) / 2 < upper), None)
+                if side is None:
                     return Cover(limit, False, done)
-                waiting += halves
+                lower, upper = box.pop(side)
+                middle = (lower + upper) / 2
+                waiting += [{**box, side: half} for half in ((lower, middle), (middle, upper))]
     return Cover(limit, not waiting, done)
-
-
-_Box = dict[tuple[bool, str], Interval]
-"""(Whether it is added to the stored number, parameter) → interval; the side that was halved last is the last."""
-
-
-def _first(problem: Posed) -> Iterator[_Box]:
-    """Bands and tolerances whole, one box for each choice of separate scenario values."""
-    choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.scenarios.values()]
-    offset: _Box = {(True, n): outwards(-t, t) for n, t in problem.tolerances.items()}
-    for each in product(*choices):
-        yield {(False, n): outwards(*ends) for n, ends in zip(problem.scenarios, each, strict=True)} | offset
-
-
-def _halves(box: _Box) -> list[_Box]:
-    """Both halves across the widest side; none where it cannot be divided."""
-    side = next((side for side, (lower, upper) in box.items() if lower < upper), None)
-    if side is None:
-        return []
-    lower, upper = box[side]
-    middle = (lower + upper) / 2
-    rest = {other: ends for other, ends in box.items() if other != side}
-    return [{**rest, side: half} for half in ((lower, middle), (middle, upper))] if lower < middle < upper else []
 
 
 def _left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> bool:
@@ -211,8 +194,7 @@ def _left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> bool
             at[n] = ball(ends) + (at[n] if added else 0)
         if moving:
             at[moving] = flint.arb_series([at[moving], 1], prec=2)
-        given = problem.model.coefficients(at, problem.parameter_set)
-        a = [flint.arb(c) if isinstance(c, int | float) else c for c in given]  # a model may have plain numbers too
+        a = problem.model.coefficients(at, problem.parameter_set)
         sign = -1 if _term(a[0], 0) < 0 else 1
         shifted = [sign * c for c in shift(a, gamma)]
         return [shifted[0], *lienard_chipart(shifted)]
