@@ -45,6 +45,7 @@ class Meeting:
         unit: size of the roots about it.
         off: relative size of what is left of the conditions for the root.
         width: how far the root may be off, in its unit.
+        moving: parameters that are moved with the root, so that all conditions are met; none where its place alone is.
     """
 
     polynomial: Polynomial
@@ -59,6 +60,7 @@ class Meeting:
     unit: float = 1.0
     off: float = 0.0
     width: float = _ROUNDING
+    moving: Sequence[str] = ()
 
     def relative(self, name: str) -> bool:
         """Whether changes of a parameter are relative to its value; of one that is 0 they are absolute."""
@@ -135,7 +137,7 @@ def met(
     doubt = {n: _ROUNDING * x for n, x in sizes.items()}
     real = model.double is None and s.imag == 0
     found = Meeting(_polynomial(model, of), values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
-    return _improved(replace(found, unit=max(_size(found), abs(s)) or 1.0), ())
+    return _improved(replace(found, unit=max(_size(found), abs(s)) or 1.0))
 
 
 def polished(found: Meeting, geometric: int) -> Meeting:
@@ -144,51 +146,50 @@ def polished(found: Meeting, geometric: int) -> Meeting:
     The conditions: p and its derivatives below the multiplicity are 0 at the root and, with g independent eigenvectors,
     so are all derivatives of p in s and a parameter of an order below g.
     """
-    found = replace(found, geometric=geometric)
     every = [n for n, size in found.sizes.items() if size > 0]
-    best = _improved(found, [n for n in every if n in found.free])
-    return best if best.off < _MET else _improved(best, every)
+    best = _improved(replace(found, geometric=geometric, moving=[n for n in every if n in found.free]))
+    return best if best.off < _MET else _improved(replace(best, moving=every))
 
 
-def _improved(start: Meeting, moving: Sequence[str]) -> Meeting:
+def _improved(start: Meeting) -> Meeting:
     """With conditions met better by what may be moved; the place alone where nothing may."""
     best, lead = start, abs(start.own()[start.multiplicity]).mid()
-    left = _conditions(best, lead, bool(moving))
+    left = _conditions(best, lead)
     off = _norm(left)
     while 2.0 ** (-2 * _BITS // 3) < off < np.inf:
         tried = []
-        for step in _steps(best, left, lead, moving):
-            at = _moved(best, step, moving)
-            if all(abs(at.values[n] - start.values[n]) <= _FARTHEST * start.sizes[n] for n in moving):
-                tried.append((_norm(new := _conditions(at, lead, bool(moving))), at, new, step))
+        for step in _steps(best, left, lead):
+            at = _moved(best, step)
+            if all(abs(at.values[n] - start.values[n]) <= _FARTHEST * start.sizes[n] for n in start.moving):
+                tried.append((_norm(new := _conditions(at, lead)), at, new, step))
         new_off, at, new, step = min(tried, key=lambda each: each[0], default=(off, best, left, []))
         if not new_off < _SLOW * off:
             break
-        lengths = {n: _LAST * abs(float(x)) for n, x in zip(moving, step, strict=False)}
+        lengths = {n: _LAST * abs(float(x)) for n, x in zip(start.moving, step, strict=False)}
         doubt = {n: max(_ROUNDING, lengths.get(n, 0.0)) * x for n, x in start.sizes.items()}
         width = max(_ROUNDING, _LAST * float(abs(step[-1])), float(new_off))
         best, off, left = replace(at, doubt=doubt, width=width), new_off, new
     return _settled(replace(best, off=float(off)))
 
 
-def _conditions(at: Meeting, lead: Any, every: bool) -> list[Any]:
+def _conditions(at: Meeting, lead: Any) -> list[Any]:
     """What must be 0, relative; of a place alone what makes it the mean of the roots that nearly meet."""
     k, g = at.multiplicity, at.geometric
-    found = at.own()[:k] if every else at.own()[k - 1 : k]
-    for name in at.values if every and g > 1 else ():
+    found = at.own()[0 if at.moving else k - 1 : k]
+    for name in at.values if at.moving and g > 1 else ():
         series = at.changed(name, flint.arb_series([0, at.sizes[name] or 1], prec=g))
         for m in range(1, g):
             found += at.taylor(order(series, m))[: g - m]
     return [x / lead for x in found]
 
 
-def _steps(at: Meeting, left: Sequence[Any], lead: Any, moving: Sequence[str]) -> Iterator[list[Any]]:
+def _steps(at: Meeting, left: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
     """Least-squares steps: of parameters in their sizes, then of the root in its unit."""
-    small = flint.arb(2) ** (-_BITS // 3)
+    small, count = flint.arb(2) ** (-_BITS // 3), len(at.moving)
     size = max(abs(x) for x in left).mid()
     columns = []
-    for shift in np.eye(len(moving) + 1).tolist():
-        ahead = _conditions(_moved(at, [small * x for x in shift], moving), lead, bool(moving))
+    for shift in np.eye(count + 1).tolist():
+        ahead = _conditions(_moved(at, [small * x for x in shift]), lead)
         columns.append([(a - b) / small for a, b in zip(ahead, left, strict=True)])
     if not at.real:
         columns.append([flint.acb(0, 1) * x for x in columns[-1]])
@@ -197,14 +198,13 @@ def _steps(at: Meeting, left: Sequence[Any], lead: Any, moving: Sequence[str]) -
     J, r = (np.concatenate([x.real, x.imag]) for x in (matrix, right))
     for rank in _RANKS if np.isfinite(J).all() else ():  # where conditions are singular their slopes vanish too
         found = np.linalg.lstsq(J, -r, rcond=rank)[0]
-        steps: list[Any] = [size * float(x) for x in found[: len(moving)]]
-        yield [*steps, size * flint.acb(*found[len(moving) :].tolist())]
+        yield [*(size * float(x) for x in found[:count]), size * flint.acb(*found[count:].tolist())]
 
 
-def _moved(at: Meeting, step: Sequence[Any], moving: Sequence[str]) -> Meeting:
-    values = {**at.values, **{n: (at.values[n] + at.sizes[n] * x).mid() for n, x in zip(moving, step, strict=False)}}
+def _moved(at: Meeting, step: Sequence[Any]) -> Meeting:
+    moved = {n: (at.values[n] + at.sizes[n] * x).mid() for n, x in zip(at.moving, step, strict=False)}
     s = at.s + at.unit * step[-1]
-    return replace(at, values=values, s=flint.acb(s.real.mid(), s.imag.mid()))
+    return replace(at, values={**at.values, **moved}, s=flint.acb(s.real.mid(), s.imag.mid()))
 
 
 def _settled(at: Meeting) -> Meeting:

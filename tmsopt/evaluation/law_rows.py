@@ -89,7 +89,7 @@ class LawRow:
 def law_rows(design: Solution) -> Iterator[LawRow]:
     """Every law, with the reason where its conditions do not hold."""
     p = {name: float(value) for name, value in design.dimensionless.items()}
-    heights, tilt = _heights(p), {"lambda_s": p["lambda_s"]}
+    heights, tilted = _heights(p), _heights(p, "lambda_s")
     not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_why_not_ep4(design)}"
     not_one = "" if p["chi_H"] == 1 else f"needs chi_H = 1; here chi_H = {p['chi_H']:.6g}"
     r, T = design.abscissa, math.tan(p["lambda_s"])
@@ -99,11 +99,11 @@ def law_rows(design: Solution) -> Iterator[LawRow]:
         return LawRow(label, subject, float(numeric), float(law), reason)
 
     root = "abscissa, the 4-fold root"
-    yield row("w0", root, r, laws.w0(p["mu"], p["chi_H"], **heights, **tilt), not_ep4)
+    yield row("w0", root, r, laws.w0(p["mu"], p["chi_H"], **tilted), not_ep4)
     mismatch = np.max(np.abs(a / a[0] / laws.poly4(r) - 1)) if r and a[0] else math.nan
     yield row("4poly", "largest relative mismatch of a coefficient", mismatch, 0.0, not_ep4)
     yield row("chib", "chi_B", p["chi_B"], laws.chib(r, p["chi_H"], **heights), not_ep4)
-    a2 = laws.a2(p["Fr"], p["mu"], p["chi_H"], **heights, **tilt, omega0=r)
+    a2 = laws.a2(p["Fr"], p["mu"], p["chi_H"], **tilted, omega0=r)
     yield row("a2", "left minus right side", a2, 0.0, not_ep4)
 
     general = not_ep4 or ("" if not_one else "at chi_H = 1 the mass ratio is free; see the laws for chi_H = 1")
@@ -134,7 +134,7 @@ def law_rows(design: Solution) -> Iterator[LawRow]:
     yield row("frep4", "Fr", p["Fr"], laws.frep4(**heights)[0], special)
     on_set = design.structure in ("EP4", "2EP2", "CEP2")
     off_set = not_one or ("" if on_set else f"holds on the EP set; the structure is '{design.structure}'")
-    yield row("epset", "Fr", p["Fr"], laws.epset(**heights, **tilt), off_set)
+    yield row("epset", "Fr", p["Fr"], laws.epset(**tilted), off_set)
 
 
 def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[str, tuple[Any, Any, Any]]:
@@ -144,22 +144,23 @@ def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[s
         p: dimensionless parameters, numbers or arrays of these.
         coefficients: shape (…, 5).
     """
-    heights, tilt, exists, one = _heights(p), {"lambda_s": p["lambda_s"]}, np.isfinite(critical), p["chi_H"] == 1
-    shape = {n: p[n] for n in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")}
+    heights, tilted, shape = (_heights(p, *more) for more in ((), ("lambda_s",), ("lambda_s", "mu", "chi_B", "chi_H")))
+    exists, one = np.isfinite(critical), p["chi_H"] == 1
     best = laws.chibm(**heights)
     optimal = np.abs(p["chi_B"] - best) <= SAME_LAW * np.maximum(np.abs(p["chi_B"]), np.abs(best))
     printed = np.all(laws.lscf(p["Fr"], **shape), axis=0)
-    first = np.sqrt(np.maximum(laws.Frc1(p["chi_B"], **heights, **tilt), 0.0))
+    first = np.sqrt(np.maximum(laws.Frc1(p["chi_B"], **tilted), 0.0))
     return {
         "lscf": (1.0 * is_stable(coefficients), 1.0 * printed, (p["lambda_s"] > 0) & (p["chi_H"] >= 1)),
         "flus": (critical, laws.Fr_c(**shape), exists),
         "Frc1": (critical, first, one & exists),
-        "frm": (critical, laws.frm(**heights, **tilt), one & exists & optimal),
+        "frm": (critical, laws.frm(**tilted), one & exists & optimal),
     }
 
 
-def _heights(p: Mapping[str, Any]) -> dict[str, Any]:
-    return {n: p[n] for n in ("zeta_B", "zeta_H")}
+def _heights(p: Mapping[str, Any], *more: str) -> dict[str, Any]:
+    """The heights among parameters, and more of these."""
+    return {n: p[n] for n in ("zeta_B", "zeta_H", *more)}
 
 
 def _why_not_ep4(design: Solution) -> str:
