@@ -24,7 +24,6 @@ import numpy as np
 from tmsopt.analysis.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
 from tmsopt.analysis.descent import Better, better
 from tmsopt.analysis.program import LocalProgram, NotCovered, program
-from tmsopt.models import Model
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.dependence import demands_heavy_damping
 from tmsopt.problem.files import Given
@@ -35,7 +34,6 @@ from tmsopt.program.formulate import formulate
 from tmsopt.program.starts import initial_point
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Printable, Table, plain
-from tmsopt.roots import Root
 from tmsopt.search.solve import solved_first
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
@@ -271,24 +269,18 @@ def _way(solution: Solution, beyond: Better) -> str:
 def _on_line(around: LocalProgram, found: Conditions) -> tuple[OnLine, ...]:
     """The roots on the line with their multipliers."""
     listed, held = [], list(zip(around.held, found.multipliers.tolist(), strict=True))
+    model = around.problem.model
     total = sum(around.line[h.cluster].multiplicity * y for h, y in held if h.name == "c1")
     for k, root in enumerate(around.line):
         own = {h.name: y for h, y in held if h.cluster == k}
         first, second = own.pop("c1"), own.pop("c2", math.nan)
         share = root.multiplicity * first / total if total else math.nan
         beta = first / 2 if root.im else first  # β moves two roots of a pair, by half of it
-        shown, *omega = _shown(around.problem.model, root)
+        # of a complex system the user reads the conjugate
+        (shown,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
+        omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [shown]))
         listed.append(OnLine(shown.re, shown.im, root.multiplicity, share, beta, second, tuple(own.values()), *omega))
     return tuple(listed)
-
-
-def _shown(model: Model, upper: Root) -> tuple[Any, ...]:
-    """A root as the user reads it; of a complex system the one that is its conjugate, and the eigenfrequency."""
-    if model.carrier is None:
-        return (upper,)
-    (shown,) = user_roots(model, [replace(upper, im=-upper.im)])
-    (omega,) = eigenfrequencies(model, [shown])
-    return shown, complex(omega.re, omega.im)
 
 
 def _limits(solution: Solution, around: LocalProgram, found: Conditions) -> Mapping[str, float]:

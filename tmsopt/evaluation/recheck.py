@@ -21,7 +21,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, roots_at
 from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.records import Numbers, Table
-from tmsopt.roots import Root, Structure, pattern_distance
+from tmsopt.roots import Structure, pattern_distance
 
 FEASIBLE = 1e-9
 """Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
@@ -236,7 +236,7 @@ def _look(
         found = problem.values(case.applied(parameters))
         if stored is None:
             return found
-        exactly = _realised_roots(problem, case.applied(stored))
+        exactly = roots_at(problem.model, problem.parameter_set, case.applied(stored))
         return found.with_known({"structure": Structure("undecided", exactly, 0.0)})
 
     nominal, *each = map(values, (Case(), *listed))
@@ -261,9 +261,5 @@ def _or_infinite(value: float) -> float:
 
 def realised_abscissa(problem: Posed, parameters: Numbers) -> float:
     """Abscissa of the parameters exactly as stored."""
-    found = _realised_roots(problem, parameters)
+    found = roots_at(problem.model, problem.parameter_set, parameters)
     return found[0].re if found else math.nan
-
-
-def _realised_roots(problem: Posed, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
-    return roots_at(problem.model, problem.parameter_set, parameters)

@@ -15,7 +15,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import flint
@@ -99,8 +99,13 @@ def held(
             _SpreadRoots(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist())
         )
         others: Iterator[dict[str, float]] = (design for way in ways for design in way.designs())
-    else:
-        others = filter(partial(_has_objective, problem), _beside(problem, parameters))
+    else:  # some roundings of one free parameter off, inside the box
+        near = (
+            {**parameters, name: x}
+            for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items())
+            if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper
+        )
+        others = (design for design in near if _has_objective(problem, design))
     for design in others:
         if not missed(problem, design, cases, checked.around):
             again = recheck(problem, design, cases, checked.around)
@@ -117,13 +122,6 @@ def _has_objective(problem: Posed, parameters: Numbers) -> bool:
     with flint.ctx.workdps(_DIGITS):
         exact = {n: flint.arb(x) for n, x in parameters.items()}
         return bool(as_ball(asked(Values(problem.model, problem.parameter_set, exact))).is_finite())
-
-
-def _beside(problem: Posed, parameters: Numbers) -> Iterator[dict[str, float]]:
-    """Designs some roundings of one free parameter off, inside the box."""
-    for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items()):
-        if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper:
-            yield {**parameters, name: x}
 
 
 def abscissa_as_stored(solution: Solution) -> str:
