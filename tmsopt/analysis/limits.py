@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt.analysis.steps import natural_step, step_within
 from tmsopt.errors import InputError
 from tmsopt.models.expression import written_sides
-from tmsopt.problem.limit import limit_of, with_limit
+from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, dimension_of, limit_text, unit_of, unit_of_all
@@ -118,12 +118,12 @@ def moved(problem: Posed, name: str, step: float) -> Posed:
     """The problem with one limit changed by a step: a bound, or the right-hand side of a constraint."""
     if name in problem.constraints:
         text = problem.constraints[name]
-        left, sign, right = written_sides(text)
-        number = limit_of(f"{right} {sign} x")
-        if number is None or limit_of(f"{left} {sign} x") is not None:
-            text = f"({left}) {sign} ({right}) {'+' if step > 0 else '-'} {abs(step)!r}"
+        limit = split_limit(text)
+        if limit and not limit.behind:  # the number on the right
+            text = limit.written(repr(limit.value + step))
         else:
-            text = with_limit(text, number + step)
+            left, sign, right = written_sides(text)
+            text = f"({left}) {sign} ({right}) {'+' if step > 0 else '-'} {abs(step)!r}"
         return replace(problem.problem, constraints={**problem.constraints, name: text}).posed
     parameter, end = name.rsplit(".", 1)
     lower, upper = problem.free[parameter]

@@ -1,7 +1,8 @@
 """A solution in words: its structure, how good it is, and what a reader must be warned of."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def warnings(solution: Solution) -> tuple[str, ...]:
     return (
         *_timeless(problem),
         *_leaning(solution),
-        *(text for name in problem.free if (text := idle[name])),
+        *filter(None, idle.values()),
         *(text for name in problem.free if not idle[name] for text in _touching(solution, name)),
     )
 
@@ -120,16 +121,16 @@ def _idle(solution: Solution, name: str) -> str:
     lower, upper = problem.free[name]
     points = [solution.parameters[name], *(lower + part * (upper - lower) for part in _PARTS)]
     conditions = problem.conditions
-    asked = ([problem.objective] if problem.objective else []) + list(conditions.values())
-    rows = [_signature(problem, {**solution.parameters, name: x}, asked) for x in points]
+    asked: dict[Any, Expression] = {**conditions, **({None: problem.objective} if problem.objective else {})}
+    rows = [_signature(problem, {**solution.parameters, name: x}, asked.values()) for x in points]
     roots_move = _varies([monic for monic, _ in rows])
-    moves = [
-        _varies([[values[k]] for _, values in rows]) or (roots_move and bool(_ROOTS & set(e.names)))
-        for k, e in enumerate(asked)
+    affected = [
+        n
+        for k, (n, e) in enumerate(asked.items())
+        if _varies([[values[k]] for _, values in rows]) or (roots_move and not _ROOTS.isdisjoint(e.names))
     ]
-    if (problem.locate and roots_move) or (problem.objective and moves[0]):
+    if (problem.locate and roots_move) or None in affected:
         return ""
-    affected = [n for n, m in zip(conditions, moves[len(asked) - len(conditions) :], strict=True) if m]
     what = " and ".join(filter(None, (problem.locate, problem.goal)))
     if any(n in solution.active or conditions[n].equality for n in affected):
         return ""  # it moves the optimum through a constraint that binds
@@ -139,7 +140,7 @@ def _idle(solution: Solution, name: str) -> str:
 
 
 def _signature(
-    problem: Posed, parameters: dict[str, float], asked: list[Expression]
+    problem: Posed, parameters: dict[str, float], asked: Iterable[Expression]
 ) -> tuple[list[float], list[float]]:
     """Monic coefficients, and expressions with the roots held: what they read beside the roots."""
     values = problem.values(problem.ordered(parameters))
