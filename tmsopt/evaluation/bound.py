@@ -215,8 +215,12 @@ def relation_bound(problem: Posed) -> float:
     without rounding: they hold at designs drawn at random, more of them than they are determined by.
     """
     rows = _exact_rows(problem) if is_rational(problem.model, problem.parameter_set) else None
+    if not rows:
+        return -math.inf
+    # Independent b with Σ b_k a_k = 0, reduced from the leading coefficient on, and from the last one.
+    reduced = [*_null_space(rows), *(b[::-1] for b in _null_space([row[::-1] for row in rows]))]
     with flint.ctx.workprec(_BITS):
-        return max(map(_bound_of, relations(rows) if rows else []), default=-math.inf)
+        return max(map(_bound_of, reduced), default=-math.inf)
 
 
 @lru_cache(maxsize=64)
@@ -230,16 +234,6 @@ def is_rational(model: Model, of: ParameterSet) -> bool:
     powers = [s for s in coefficients.steps if s.op == "pow" and s.operands[1] in wholes]
     rational = [s for s in coefficients.steps if s.op in _RATIONAL and not isinstance(s.value, Formula)]
     return len(powers) + len(rational) == len(coefficients.steps)
-
-
-def relations(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
-    """Independent b with Σ b_k a_k = 0 for every row a of fractions.
-
-    Each is reduced: from the leading coefficient on, and from the last one.
-    """
-    forward = _null_space(rows)
-    backward = [relation[::-1] for relation in _null_space([row[::-1] for row in rows])]
-    return forward + [b for b in backward if b not in forward]
 
 
 def _null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:

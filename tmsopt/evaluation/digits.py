@@ -160,19 +160,17 @@ class _Design:
         stored = enclosed_roots(self.values(self.checked.worst).coefficients)
         ideal: dict[Case, _Several] = {}
         for case, structure in self.structures.items():
-            found = self.ideal(case, structure, stored)
+            coefficients = self.values(case).coefficients
+            found: _Several | None = ()  # with a root at infinity
+            if structure.roots and structure.name in SIMPLE and all(root.multiplicity == 1 for root in structure.roots):
+                found = (stored if case == self.checked.worst else None) or enclosed_roots(coefficients)
+            elif structure.roots:
+                found = nearest_roots(coefficients, structure.roots)
             if (found is None or stored is None) and not last:
                 return None
             as_found = (Enclosed(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in structure.roots)
             ideal[case] = tuple(as_found) if found is None else found
         return stored or (), ideal
-
-    def ideal(self, case: Case, found: Structure, stored: _Several | None) -> _Several | None:
-        """Roots in a case of the nearest polynomial that has the structure; none for a root at infinity."""
-        coefficients = self.values(case).coefficients
-        if found.roots and found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots):
-            return (stored if case == self.checked.worst else None) or enclosed_roots(coefficients)
-        return nearest_roots(coefficients, found.roots) if found.roots else ()
 
     def values(self, case: Case) -> Values:
         """Everything derived from the exact parameters in a case, root quantities excluded."""
