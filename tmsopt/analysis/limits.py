@@ -137,7 +137,9 @@ def _unresolved(solution: Solution, name: str) -> Lever:
     gained, worth = unit_of_all(problem, problem.goal) if problem.goal else Unit(), solution.active[name]
     if name in problem.constraints:
         condition, shown = problem.conditions[name], limit_text(problem, name)
-        natural = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, name))
+        sides = [abs(float(side)) for side in condition.sides(problem.values(solution.parameters))]
+        size = max(filter(math.isfinite, sides), default=1.0)  # they are equal but for rounding
+        natural = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, size)
         sign, words = condition.sign, f"relaxing {name} ({shown}) by {natural.text}"
         if condition.equality:  # the right-hand side moves to where the objective is better
             sign = math.copysign(1.0, -problem.sign * worth)
@@ -152,13 +154,6 @@ def _unresolved(solution: Solution, name: str) -> Lever:
     words = f"{step.text if step else 'nothing'} {'more' if end else 'less'} {name}"
     change, shown = direction * step.size if step else 0.0, unit.show(limit, 10)
     return Lever(name, "bound", shown, is_physical(problem, name), words, change, abs(worth), gained=gained)
-
-
-def _size(solution: Solution, name: str) -> float:
-    """Size of the sides of a constraint at the optimum, where they are equal but for rounding."""
-    problem = solution.problem.posed
-    sides = problem.conditions[name].sides(problem.values(solution.parameters))
-    return max((size for size in (abs(float(side)) for side in sides) if math.isfinite(size)), default=1.0)
 
 
 def _solved_again(solution: Solution, problem: Posed, starts: int, look: bool) -> Solution:

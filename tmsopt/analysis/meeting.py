@@ -104,13 +104,6 @@ def many_digits() -> Iterator[None]:
         flint.ctx.cap = cap
 
 
-def _polynomial(model: Model, of: ParameterSet) -> Polynomial:
-    """The polynomial whose roots the user reads."""
-    if model.double is None:
-        return lambda values: model.coefficients(values, of)
-    return lambda values: characteristic_polynomial([[-x for x in row] for row in pencil_of(model, of, values)[1]])
-
-
 def pencil_of(model: Model, of: ParameterSet, values: Mapping[str, Any]) -> tuple[Matrix, ...]:
     """Matrices of the matrix polynomial with these roots, in descending powers; of a complex H those of s + iH."""
     native = of.native(values)
@@ -136,7 +129,14 @@ def met(
     values = {n: flint.arb(exact(x)) for n, x in design.items()}
     doubt = {n: _ROUNDING * x for n, x in sizes.items()}
     real = model.double is None and s.imag == 0
-    found = Meeting(_polynomial(model, of), values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
+
+    def polynomial(values: Mapping[str, Any]) -> list[Any]:
+        """The one whose roots the user reads."""
+        if model.double is None:
+            return model.coefficients(values, of)
+        return characteristic_polynomial([[-x for x in row] for row in pencil_of(model, of, values)[1]])
+
+    found = Meeting(polynomial, values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
     return _improved(replace(found, unit=max(_size(found), abs(s)) or 1.0))
 
 
@@ -169,7 +169,8 @@ def _improved(start: Meeting) -> Meeting:
         doubt = {n: max(_ROUNDING, lengths.get(n, 0.0)) * x for n, x in start.sizes.items()}
         width = max(_ROUNDING, _LAST * float(abs(step[-1])), float(new_off))
         best, off, left = replace(at, doubt=doubt, width=width), new_off, new
-    return _settled(replace(best, off=float(off)))
+    parts, least = (best.s.real, best.s.imag), best.unit * best.width  # what is 0 but for rounding is 0
+    return replace(best, off=float(off), s=flint.acb(*(flint.arb(0) if abs(x) <= least else x for x in parts)))
 
 
 def _conditions(at: Meeting, lead: Any) -> list[Any]:
@@ -205,12 +206,6 @@ def _moved(at: Meeting, step: Sequence[Any]) -> Meeting:
     moved = {n: (at.values[n] + at.sizes[n] * x).mid() for n, x in zip(at.moving, step, strict=False)}
     s = at.s + at.unit * step[-1]
     return replace(at, values={**at.values, **moved}, s=flint.acb(s.real.mid(), s.imag.mid()))
-
-
-def _settled(at: Meeting) -> Meeting:
-    """What is 0 in the root but for rounding is 0."""
-    least = at.unit * at.width
-    return replace(at, s=flint.acb(*(flint.arb(0) if abs(x) <= least else x for x in (at.s.real, at.s.imag))))
 
 
 def _size(at: Meeting) -> float:

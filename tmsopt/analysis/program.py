@@ -105,7 +105,9 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
     every = ca.vertcat(*x.values())
     f, g = nlp.symbolic(every)
     reached = nlp.at(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
-    steady = [n for n in x if _is_steady(nlp, n, reached)]
+    tied = {n: _rows_of(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
+    # what is the greatest of several, and here the constant one of them
+    steady = [n for n, rows in tied.items() if all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in rows)]
     f, g = ca.substitute([f, g], [x[n] for n in steady], [ca.SX(at[n]) for n in steady])
     build = _Builder()
     for k, name in enumerate(nlp.rows):
@@ -163,12 +165,6 @@ def _rows_of(nlp: NLP, name: str) -> list[int]:
     """Rows that tie a lifted quantity to the parameters; a constant piece of it, which has a leeway, does not."""
     tied = enumerate(zip(nlp.rows, nlp.row_lower, strict=True))
     return [k for k, (row, lower) in tied if row == name and row not in _ROOT_ROWS and lower == 0]
-
-
-def _is_steady(nlp: NLP, name: str, reached: Array) -> bool:
-    """Whether a quantity that is the greatest of several is the constant one of them here."""
-    lifted = name in nlp.rows and name not in _ROOT_ROWS
-    return lifted and all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in _rows_of(nlp, name))
 
 
 class _Builder:

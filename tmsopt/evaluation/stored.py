@@ -165,12 +165,11 @@ def _clusters(
             z = complex(root.re, root.im)
             if root.multiplicity == 1 or root.im < 0 or z == 0:
                 continue
-            if ANGULAR_FREQUENCY in asked and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size:
-                found.append(_Cluster(case, root, -1.0, exactly))
-            elif "damping_ratio" in asked and -root.re <= (checked.quantities["damping_ratio"] + _LINE) * abs(z):
-                found.append(_Cluster(case, root, z / abs(z), exactly))
-            elif root.re >= checked.structure.abscissa - size:
-                found.append(_Cluster(case, root, 1j, exactly))
+            fast = ANGULAR_FREQUENCY in asked and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size
+            undamped = "damping_ratio" in asked and -root.re <= (checked.quantities["damping_ratio"] + _LINE) * abs(z)
+            if fast or undamped or root.re >= checked.structure.abscissa - size:
+                along = -1.0 if fast else z / abs(z) if undamped else 1j
+                found.append(_Cluster(case, root, along, exactly))
     return found
 
 
