@@ -1,6 +1,5 @@
 """What an optimum means: which limits it leans on and what they are worth, and how much rounding it bears."""
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -48,9 +47,9 @@ class Explanation(Tabular):
     rounding: Table[Rounded]
     precision: tuple[Rounded, ...]
     warnings: tuple[str, ...]
-    goal: str = ""
-    abscissa: float = math.nan
-    value: float = math.nan
+    goal: str
+    abscissa: float
+    value: float
 
     @property
     def worst(self) -> str:

@@ -60,8 +60,8 @@ class OnLine:
     multiplicity: int
     share: float
     beta: float
-    kappa: float = math.nan
-    ties: tuple[float, ...] = ()
+    kappa: float
+    ties: tuple[float, ...]
     eigenfrequency: complex | None = None
 
     def to_json(self) -> dict[str, Any]:

@@ -40,7 +40,7 @@ class Law:
     branches: Branches
     below: float
     above: float
-    least: float = 0.0
+    least: float
 
 
 @dataclass(frozen=True)

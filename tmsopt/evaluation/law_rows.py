@@ -53,7 +53,7 @@ class LawRow:
     subject: str
     numeric: float
     law: float
-    reason: str = ""
+    reason: str
 
     @property
     def name(self) -> str:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
 
@@ -53,11 +53,11 @@ class Evaluation:
     amounts: Table[float]
     quantities: Table[float]
     dimensionless: Table[float]
-    worst: Case = field(default_factory=Case)
-    least_damped: Case = field(default_factory=Case)
-    fastest: Case = field(default_factory=Case)
-    around: Robustness | None = None
-    crossing: bool = False
+    worst: Case
+    least_damped: Case
+    fastest: Case
+    around: Robustness | None
+    crossing: bool
 
 
 def recheck(
