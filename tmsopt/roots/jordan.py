@@ -78,7 +78,7 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
     blocks = [scale * unit**i * _numbers(_derivative(matrices, s, i)) for i in range(min(d, multiplicity - 1) + 1)]
     values = np.linalg.svd(blocks[0], compute_uv=False)[::-1] / np.linalg.norm(size * scale, 2)
     geometric = _nullity(values, 1, multiplicity, threshold)
-    partial = _partial(blocks, n, multiplicity, geometric, threshold)
+    partial = _partial(blocks, multiplicity, geometric, threshold)
     nonzero = float(values[geometric]) if geometric < n else float("inf")
     return Jordan(geometric, partial, float(values[geometric - 1]), nonzero, threshold)
 
@@ -90,13 +90,7 @@ def _nullity(values: Array, least: int, most: int, threshold: float) -> int:
     return least + int(np.argmax(above[least : most + 1] - above[least - 1 : most]))
 
 
-def _partial(
-    blocks: Sequence[Complex],
-    n: int,
-    multiplicity: int,
-    geometric: int,
-    threshold: float,
-) -> tuple[int, ...]:
+def _partial(blocks: Sequence[Complex], multiplicity: int, geometric: int, threshold: float) -> tuple[int, ...]:
     """Lengths of the chains, from how many are at least 1, 2 … long."""
     if geometric == 1:
         return (multiplicity,)
@@ -105,10 +99,8 @@ def _partial(
     nullity = geometric
     while nullity < multiplicity and longer[-1]:
         size = len(longer) + 1
-        toeplitz = np.zeros((size * n, size * n), dtype=complex)
-        for i in range(size):
-            for j in range(max(0, i - len(blocks) + 1), i + 1):
-                toeplitz[i * n : (i + 1) * n, j * n : (j + 1) * n] = blocks[i - j]
+        known = [*blocks, *[np.zeros_like(blocks[0])] * size]  # those beyond the degree, and above the diagonal, are 0
+        toeplitz = np.block([[known[i - j] if i >= j else known[-1] for j in range(size)] for i in range(size)])
         values = np.linalg.svd(toeplitz, compute_uv=False)
         found = _nullity(values[::-1] / largest, nullity, nullity + longer[-1], threshold)
         longer.append(found - nullity)
@@ -215,24 +207,18 @@ def _nullity_modulo(rows: Sequence[Sequence[Any]], factor: Any) -> int:
 
 
 def equilibrated(matrices: Sequence[Any], unit: float) -> tuple[Array, Array]:
-    """Sizes of the terms of L at eigenvalues of a size, and factors that bring rows and columns of them near 1."""
+    """Sizes of the terms of L at eigenvalues of a size, and powers of two that bring its rows and columns near 1."""
     d = len(matrices) - 1
     size = np.asarray(sum(np.abs(P) * (unit ** (d - k)) for k, P in enumerate(matrices)), dtype=float)
-    return size, np.outer(*_equilibrated(size))
-
-
-def _equilibrated(size: Array) -> tuple[Array, Array]:
-    """Powers of two for rows and columns that bring the largest entry of each near 1."""
     rows, columns = np.ones((2, len(size)))
     for _ in range(_SWEEPS):
         scaled = np.outer(rows, columns) * size
         high, wide = scaled.max(axis=1), scaled.max(axis=0)
         rows = rows / np.sqrt(np.where(high > 0, high, 1.0))
         columns = columns / np.sqrt(np.where(wide > 0, wide, 1.0))
-    return np.exp2(np.round(np.log2(rows))), np.exp2(np.round(np.log2(columns)))
+    return size, np.outer(*(np.exp2(np.round(np.log2(factors))) for factors in (rows, columns)))
 
 
 def _numbers(matrix: Matrix) -> Complex:
     """Middles of balls as complex doubles."""
-    balls = ([flint.acb(x) for x in row] for row in matrix)
-    return np.array([[complex(float(x.real.mid()), float(x.imag.mid())) for x in row] for row in balls])
+    return np.array([[complex(flint.acb(x)) for x in row] for row in matrix])

@@ -64,7 +64,7 @@ def abscissa(coefficients: ArrayLike) -> Array:
     return np.asarray(roots(coefficients).real.max(axis=-1))
 
 
-def rebuilt(values: NDArray[np.complex128]) -> Array:
+def rebuilt(values: NDArray[np.complex128] | Array) -> Array:
     """Monic real coefficients of the polynomials with these roots: shape (…, n) in, (…, n + 1) out.
 
     Example:
@@ -74,7 +74,11 @@ def rebuilt(values: NDArray[np.complex128]) -> Array:
 
     More: docs/reference/python.md
     """
-    return _elementary(values).real
+    result = np.zeros((*values.shape[:-1], values.shape[-1] + 1), dtype=complex)
+    result[..., 0] = 1
+    for k in range(values.shape[-1]):
+        result[..., 1 : k + 2] -= values[..., k : k + 1] * result[..., : k + 1]
+    return result.real
 
 
 def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> Array:
@@ -91,10 +95,9 @@ def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> A
     More: docs/explanation/factors.md
     """
     c = np.asarray(coefficients, dtype=float)
-    size = _elementary(-np.abs(values)).real
-    error = np.abs(_elementary(values).real - c / c[..., :1])
+    error = np.abs(rebuilt(values) - c / c[..., :1])
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.max(np.where(error == 0, 0.0, error / size), axis=-1))
+        return np.asarray(np.max(np.where(error == 0, 0.0, error / rebuilt(-np.abs(values))), axis=-1))
 
 
 def _scale(monic: Array) -> Array:
@@ -126,7 +129,7 @@ def _factors(values: NDArray[np.complex128]) -> Array:
 def _isolated(coefficients: Array, found: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """The roots of one polynomial, correctly rounded; those found already where they do not fit into doubles."""
     isolated = isolated_roots(coefficients.tolist())
-    each = [complex(float(z.real.mid()), float(z.imag.mid())) for z, m in isolated for _ in range(m)]
+    each = [complex(z) for z, m in isolated for _ in range(m)]
     exact = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
     return exact if exact.shape == found.shape and np.all(np.isfinite(exact)) else found
 
@@ -162,8 +165,9 @@ def _newton_step(factors: Array, monic: Array) -> Array:
         for column in (0, 1):  # d/dp multiplies by s, d/dq by 1
             width = min(n - column, other.shape[-1])
             jacobian[:, column : column + width, 2 * k + column] = other[:, :width]
-    size = _elementary(-np.abs(_factor_roots(factors)[:, :n])).real[:, 1:] + 1e-300
-    unit = np.abs(_factor_roots(factors)).reshape(rows, half, 2).max(axis=-1) + 1e-300
+    radius = np.abs(_factor_roots(factors))
+    size = rebuilt(-radius[:, :n])[:, 1:] + 1e-300
+    unit = radius.reshape(rows, half, 2).max(axis=-1) + 1e-300
     columns = np.stack([unit, unit**2], axis=-1).reshape(rows, 2 * half)
     if n % 2:
         jacobian[:, :, -1] = 0  # the lone root's q stays 0
@@ -200,12 +204,3 @@ def _factor_roots(factors: Array) -> NDArray[np.complex128]:
     first = np.where(real, large, half + 1j * root)
     second = np.where(real, small, half - 1j * root)
     return np.stack([first, second], axis=-1).reshape(len(factors), 2 * factors.shape[1])
-
-
-def _elementary(values: NDArray[np.complex128] | Array) -> NDArray[np.complex128]:
-    """Coefficients of ∏ (s − value)."""
-    result = np.zeros((*values.shape[:-1], values.shape[-1] + 1), dtype=complex)
-    result[..., 0] = 1
-    for k in range(values.shape[-1]):
-        result[..., 1 : k + 2] -= values[..., k : k + 1] * result[..., : k + 1]
-    return result

@@ -172,7 +172,7 @@ def _guesses(groups: tuple[Part, ...], others: int, z: Roots) -> list[list[float
     """Unknowns of the tied factors from roots chosen among z, and the rest by least squares; the nearest first."""
     target = rebuilt(z)
     far = np.abs(z).max()
-    size = rebuilt((-np.abs(z) - 1e-3 * (far if far ** len(z) > 0 else 1.0)).astype(complex))  # all may be 0
+    size = rebuilt(-np.abs(z) - 1e-3 * (far if far ** len(z) > 0 else 1.0))  # all may be 0
     found: dict[tuple[float, ...], float] = {}
     for choice in islice(product(*(g.guesses(z) for g in groups)), _LOOKED_AT):
         tied = np.array(

@@ -38,9 +38,9 @@ def sizes(found: Roots, monic: Array | None = None, off: Array | None = None, to
     """
     radius = np.abs(found)
     floor = 1e-3 * float(np.median(radius) or radius.max())
-    size = rebuilt((-np.maximum(radius, floor)).astype(complex))
+    size = rebuilt(-np.maximum(radius, floor))
     if monic is not None and off is not None:
-        size = np.where(np.abs(monic) > _RESOLVED * off, rebuilt(-radius.astype(complex)), size)
+        size = np.where(np.abs(monic) > _RESOLVED * off, rebuilt(-radius), size)
         size = np.maximum(size, _ROUNDINGS * off / tolerance) if tolerance else size
     return np.maximum(size, 1e-100)
 
