@@ -121,21 +121,16 @@ def _by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
     flat = c.reshape(-1, c.shape[-1])
     stable = np.all(np.isfinite(flat) & (flat > 0), axis=1)
     rows = np.flatnonzero(stable)
-    if not rows.size:
-        return np.asarray(stable.reshape(c.shape[:-1]))
     with np.errstate(all="ignore"):
         column = routh([Bounded(x, np.zeros(len(rows))) for x in flat[rows].T])
         value, error = (np.stack([getattr(x, part) for x in column], axis=1) for part in ("value", "error"))
-        positive, negative = value > error, value < -error
     if not exact:
-        stable[rows] = np.all(value > 0, axis=1)
-        return np.asarray(stable.reshape(c.shape[:-1]))
+        error = np.zeros_like(value)
     # An entry after one that is not positive decides nothing, so the first that is not tells.
-    first = np.argmin(np.concatenate([positive, np.zeros((len(rows), 1), bool)], axis=1), axis=1)
-    certain = positive.all(axis=1)
-    refuted = np.concatenate([negative, np.zeros((len(rows), 1), bool)], axis=1)[np.arange(len(rows)), first]
-    stable[rows] = certain
-    for k in rows[~(certain | refuted)]:
+    first = np.argmin(value > error, axis=1)[:, None]  # or any, where all are
+    least, off = (np.take_along_axis(x, first, axis=1)[:, 0] for x in (value, error))
+    stable[rows] = least > off
+    for k in rows[~(np.abs(least) > off)] if exact else ():
         stable[k] = all(x > 0 for x in _column([flint.fmpq(*a.as_integer_ratio()) for a in flat[k].tolist()]))
     return np.asarray(stable.reshape(c.shape[:-1]))
 
