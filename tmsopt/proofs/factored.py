@@ -10,6 +10,7 @@ import flint
 
 from tmsopt.roots import Pattern, composition, evaluate, lienard_chipart
 from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots
+from tmsopt.roots.polynomial import rightmost_first
 
 Factor = Sequence[Any]
 """Monic coefficients, descending."""
@@ -32,7 +33,7 @@ class Factored:
             found += [replace(z, multiplicity=multiplicity * z.multiplicity) for z in own]
         if any(a.re.overlaps(b.re) and a.im.overlaps(b.im) for k, a in enumerate(found) for b in found[k + 1 :]):
             return None
-        return tuple(sorted(found, key=lambda z: (-float(z.re), -float(z.im))))
+        return rightmost_first(found)
 
     @cached_property
     def abscissa(self) -> Any:

@@ -1,12 +1,13 @@
 """Roots of polynomials with rational coefficients, to any number of digits, multiplicities exact."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import flint
 
 from tmsopt.algebra.balls import DIGITS, rational
-from tmsopt.roots.polynomial import Root
+from tmsopt.roots.polynomial import Root, rightmost_first
 
 
 def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root, ...]:
@@ -22,17 +23,14 @@ def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root
     More: docs/explanation/factors.md
     """
     with flint.ctx.workdps(digits):
-        found = [Root(float(z.real.mid()), float(z.imag.mid()), m) for z, m in isolated_roots(coefficients)]
-    return tuple(sorted(found, key=lambda r: (-r.re, -r.im)))
+        return rightmost_first(Root(float(z.real), float(z.imag), m) for z, m in isolated_roots(coefficients))
 
 
 def isolated_roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
     """The distinct ones as balls of the working precision, each with its multiplicity."""
     terms = [rational(c) for c in coefficients]
-    common = flint.fmpz(1)
-    for term in terms:
-        common = common.lcm(term.q)
-    polynomial: Any = flint.fmpz_poly([int(t.p * (common // t.q)) for t in reversed(terms)])
+    common = math.lcm(*(int(term.q) for term in terms))
+    polynomial: Any = flint.fmpz_poly([int(t * common) for t in reversed(terms)])
     return [(z, int(m)) for z, m in polynomial.complex_roots()]
 
 

@@ -3,9 +3,11 @@
 Only ``+ - *`` are used, so one formula serves CasADi expressions, NumPy arrays, exact fractions and balls.
 """
 
-from collections.abc import Sequence
+import operator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -106,9 +108,7 @@ def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
 
 
 def _sum(a: Coefficients, b: Coefficients) -> list[Any]:
-    n = max(len(a), len(b))
-    left, right = [0] * (n - len(a)) + list(a), [0] * (n - len(b)) + list(b)
-    return [x + y for x, y in zip(left, right, strict=True)]
+    return [x + y for x, y in zip_longest(reversed(a), reversed(b), fillvalue=0)][::-1]
 
 
 def characteristic_polynomial(A: Sequence[Sequence[Any]]) -> list[Any]:
@@ -126,10 +126,7 @@ def characteristic_polynomial(A: Sequence[Sequence[Any]]) -> list[Any]:
 
 def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
     """Sum of the products of as many terms as both have."""
-    total: Any = 0
-    for x, y in zip(a, b, strict=False):
-        total = total + x * y
-    return total
+    return reduce(operator.add, map(operator.mul, a, b), 0)
 
 
 @dataclass(frozen=True)
@@ -146,3 +143,8 @@ class Root:
     re: float
     im: float
     multiplicity: int = 1
+
+
+def rightmost_first(roots: Iterable[Any]) -> tuple[Any, ...]:
+    """Roots with parts re and im, doubles or balls, in the order of their middles; the upper one of a pair first."""
+    return tuple(sorted(roots, key=lambda r: (-float(r.re), -float(r.im))))

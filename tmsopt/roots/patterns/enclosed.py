@@ -15,7 +15,7 @@ from tmsopt.algebra.balls import as_ball, rational
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.naming import shown
 from tmsopt.roots.patterns.shape import Shape
-from tmsopt.roots.polynomial import Root, evaluate, product
+from tmsopt.roots.polynomial import Root, evaluate, product, rightmost_first
 
 _STEPS = 80
 _FLOOR = 1000  # a root smaller than the median root by more than this counts as this much smaller
@@ -74,7 +74,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
             found.append(Enclosed(z.real.mid() + ball, flint.arb(0) if z.imag == 0 else z.imag.mid() + ball))
     if not all(a.re.is_finite() and a.im.is_finite() for a in found) or _overlap(found):
         return None
-    return _sorted(found)
+    return rightmost_first(found)
 
 
 def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
@@ -113,7 +113,7 @@ def _converged(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[Enclo
         size = max(abs(x) for x in u)
         if all(abs(d) <= small * size for d in step):
             found = _roots_of(shape, [x + flint.arb(0, (size * sure).upper()) for x in u])
-            return None if found is None else _sorted(found)
+            return None if found is None else rightmost_first(found)
     return None
 
 
@@ -156,10 +156,6 @@ def _double(x: flint.fmpq) -> float:
 def _overlap(found: Sequence[Enclosed]) -> bool:
     balls = [flint.acb(root.re, root.im) for root in found]
     return any(a.overlaps(b) for k, a in enumerate(balls) for b in balls[:k])
-
-
-def _sorted(roots: Sequence[Enclosed]) -> tuple[Enclosed, ...]:
-    return tuple(sorted(roots, key=lambda r: (-float(r.re), -float(r.im))))
 
 
 def _roots_of(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:

@@ -11,7 +11,7 @@ from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.multiplicity import Fit, decided
 from tmsopt.roots.patterns.pattern import Pattern, Roots
-from tmsopt.roots.polynomial import Root
+from tmsopt.roots.polynomial import Root, rightmost_first
 
 ROUNDING = 8 * np.finfo(float).eps
 """Relative error that coefficients of a quartic computed in double precision carry anyway."""
@@ -193,7 +193,7 @@ def _named(fit: Fit, found: Roots, unit: float) -> Structure:
     pairs = ((w, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,)))
     roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in pairs]
     name = "2EP2" if [(root.im, root.multiplicity) for root in roots] == _TWO_DOUBLE else _line_name(line)
-    return Structure(name, _sorted(roots), fit.distance)
+    return Structure(name, rightmost_first(roots), fit.distance)
 
 
 _TWO_DOUBLE = [(0.0, 2), (0.0, 2)]  # all roots of a quartic, which have a name of their own
@@ -216,8 +216,4 @@ def _simple_name(found: Roots) -> str:
 
 
 def _simple(found: Roots) -> tuple[Root, ...]:
-    return _sorted([Root(float(z.real), float(z.imag)) for z in found])
-
-
-def _sorted(roots: list[Root]) -> tuple[Root, ...]:
-    return tuple(sorted(roots, key=lambda r: (-r.re, -r.im)))
+    return rightmost_first(Root(float(z.real), float(z.imag)) for z in found)
