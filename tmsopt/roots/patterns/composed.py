@@ -4,11 +4,10 @@
 coefficients, so that the equations stay linear in them.
 """
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from itertools import combinations, islice, product
+from itertools import accumulate, combinations, islice, product
 from types import MappingProxyType
 from typing import Any
 
@@ -72,82 +71,50 @@ def _pattern(name: str, degree: int) -> Pattern:
 
 def _composed(name: str, groups: tuple[Part, ...], degree: int) -> Pattern:
     tied = [u for g in groups for u in g.unknowns]
-    often = Counter(tied)
-    seen: Counter[str] = Counter()
-    names = []
-    for u in tied:
-        seen[u] += 1
-        names.append(f"{u}{seen[u]}" if often[u] > 1 else u)
+    names = [f"{u}{tied[: k + 1].count(u)}" if tied.count(u) > 1 else u for k, u in enumerate(tied)]
     others = degree - sum(g.roots for g in groups)
     rest = [f"{'d' if 'c' in tied else 'c'}{k}" for k in range(1, others + 1)]
-    slices, at = [], 0
-    for g in groups:
-        slices.append(slice(at, at + len(g.unknowns)))
-        at += len(g.unknowns)
+    starts = accumulate((len(g.unknowns) for g in groups), initial=0)
+    placed = [(g, slice(at, at + len(g.unknowns))) for g, at in zip(groups, starts, strict=False)]
 
-    def each(u: Sequence[Any]) -> list[list[list[Any]]]:
-        return [g.factors(u[s]) for g, s in zip(groups, slices, strict=True)]
+    def factors(u: Sequence[Any], without: Collection[str] = ()) -> list[list[Any]]:
+        remainder = [[1, *u[len(tied) :]]] if others else []
+        return [f for g, s in placed if g.kind not in without for f in g.factors(u[s])] + remainder
 
-    def factors(u: Sequence[Any]) -> list[list[Any]]:
-        return [f for part in each(u) for f in part] + remainder(u)
-
-    def remainder(u: Sequence[Any]) -> list[list[Any]]:
-        return [[1, *u[at:]]] if others else []
-
-    def off_axis(u: Sequence[Any]) -> list[list[Any]]:
-        return [f for g, part in zip(groups, each(u), strict=True) if g.kind not in AXIS for f in part] + remainder(u)
-
-    alone = groups[0] if len(groups) == 1 else None
-    whole = alone if not others else None
     return Pattern(
         name=name,
         meaning=" and ".join(g.meaning for g in groups) + (" beside other roots" if others else ""),
         unknowns=(*names, *rest),
         factors=factors,
         guesses=partial(_guesses, groups, others),
-        nonnegative=lambda u: [x for g, s in zip(groups, slices, strict=True) for x in g.nonnegative(u[s])],
-        abscissa=_abscissa(whole),
-        rest=off_axis if any(g.kind in AXIS for g in groups) else None,
-        test=_test(alone),
-        marks=_marks(groups, slices, others),
+        nonnegative=lambda u: [x for g, s in placed for x in g.nonnegative(u[s])],
+        abscissa=None if others or len(groups) > 1 else _ABSCISSAE.get((groups[0].kind, groups[0].count)),
+        rest=partial(factors, without=AXIS) if any(g.kind in AXIS for g in groups) else None,
+        test=_TESTS.get(name),
+        marks=_marks(placed, others),
         ends={u: ENDS[g.kind] for g in groups for u in g.unknowns if u == "W"} if "W" in names else {},
         degree=degree,
     )
 
 
-def _abscissa(whole: Part | None) -> Any:
-    """Largest real part of the roots where one group makes up all of them."""
-    if whole is not None and whole.kind == "EP" and whole.count == 1:
-        return lambda u: u[0]
-    if whole is not None and whole.kind == "CEP" and whole.count == 1:
-        return lambda u: -u[0] / 2
-    return None
+_ABSCISSAE: Mapping[tuple[str, int], Any] = {("EP", 1): lambda u: u[0], ("CEP", 1): lambda u: -u[0] / 2}
+"""Largest real part of the roots where parts of one kind, so many, make up all of them."""
+
+_TESTS: Mapping[str, Any] = {"capsize": lambda a: a[-1], "weave": weave_test, "EP2": meeting}
+"""For patterns of codimension 1: a function of the coefficients that changes sign across the set."""
 
 
-def _test(alone: Part | None) -> Any:
-    """For patterns of codimension 1: a function of the coefficients that changes sign across the set."""
-    if alone is None:
-        return None
-    match alone.kind, alone.order, alone.count:
-        case "capsize", _, _:
-            return lambda a: a[-1]
-        case "weave", _, _:
-            return weave_test
-        case "EP", 2, 1:
-            return meeting
-    return None
-
-
-def _marks(groups: Sequence[Part], slices: Sequence[slice], others: int) -> dict[str, Any]:
+def _marks(placed: Sequence[tuple[Part, slice]], others: int) -> dict[str, Any]:
     """More special patterns that a curve may pass."""
     marks: dict[str, Any] = {}
-    roots = [(g, s.start) for g, s in zip(groups, slices, strict=True) if g.unknowns == ("r",)]
+    roots = [(g, s.start) for g, s in placed if g.unknowns == ("r",)]
     for (one, j), (other, k) in combinations(roots, 2):
-        rest = [g.name for g in groups if g not in (one, other)]
+        rest = [g.name for g, _ in placed if g not in (one, other)]
         marks[_joined(f"EP{one.order + other.order}", *rest)] = lambda u, j=j, k=k: u[j] - u[k]
-    if len(groups) > 1:
+    if len(placed) > 1:
         return marks
-    (alone,), end = groups, slices[-1].stop
+    ((alone, own),) = placed
+    end = own.stop
     if alone.in_quadratics and len(alone.unknowns) == 2:
         marks[f"EP{2 * alone.order}"] = lambda u: u[0] * u[0] - 4 * u[1]
     if others and alone.unknowns == ("r",):

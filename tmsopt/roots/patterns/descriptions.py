@@ -1,6 +1,9 @@
 """Structures of the rightmost line in words."""
 
 import re
+from collections.abc import Sequence
+
+from tmsopt.roots.patterns.parts import NUMBERS, several, times
 
 STRUCTURES = {
     "EP4": "four roots meet in one (EP4)",
@@ -17,8 +20,6 @@ STRUCTURES = {
 }
 """Each structure of a quartic."""
 
-_NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
-_TIMES = {2: "double", 3: "triple"}
 _PART = re.compile(r"(?P<count>\d*)(?P<kind>C?EP)(?P<order>\d+)|(?P<pairs>\w+) pairs|(?P<simple>pair|real)")
 
 
@@ -32,14 +33,21 @@ def in_words(structure: str, degree: int = 4) -> str:
     alone = parts[0] if len(parts) == 1 else None
     if alone and alone["kind"] == "EP" and not alone["count"]:
         order = int(alone["order"])
-        every = "both" if order == 2 else f"all {_NUMBERS[order]}"
-        which = every if order == degree else f"the {_NUMBERS[order]} rightmost"
-        return f"{which} roots meet in one ({structure})"
+        return f"{all_or(order, degree, 'rightmost')} roots meet in one ({structure})"
     if alone and alone["kind"] == "CEP" and not alone["count"]:
-        return f"{_NUMBERS[int(alone['order'])]} complex pairs meet in one ({structure})"
-    named = [_named(part) for part in parts if part]
-    listed = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
-    return f"{listed} have one decay rate ({structure})"
+        return f"{NUMBERS[int(alone['order'])]} complex pairs meet in one ({structure})"
+    return f"{listed([_named(part) for part in parts if part])} have one decay rate ({structure})"
+
+
+def all_or(order: int, degree: int, which: str) -> str:
+    """Both or all of so many roots; the two, three … of some kind where there are others."""
+    number = NUMBERS[order]
+    return f"the {number} {which}".rstrip() if order != degree else "both" if order == 2 else f"all {number}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """One, two and three."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
 def _named(part: re.Match[str]) -> str:
@@ -47,7 +55,5 @@ def _named(part: re.Match[str]) -> str:
         return {"pair": "a complex pair", "real": "a real root"}[part["simple"]]
     if part["pairs"]:
         return f"{part['pairs']} complex pairs"
-    order, count = int(part["order"]), int(part["count"] or 1)
-    times = _TIMES.get(order, f"{order}-fold")
-    what = f"real {times} root" if part["kind"] == "EP" else f"{times} complex pair"
-    return f"a {what}" if count == 1 else f"{_NUMBERS[count]} {what}s"
+    fold = times(int(part["order"]))
+    return several(int(part["count"] or 1), f"real {fold} root" if part["kind"] == "EP" else f"{fold} complex pair")

@@ -9,11 +9,11 @@ from dataclasses import replace
 from functools import cache
 
 from tmsopt.roots.patterns.composed import pattern
-from tmsopt.roots.patterns.parts import parts_of
+from tmsopt.roots.patterns.descriptions import all_or, listed
+from tmsopt.roots.patterns.parts import parts_of, several, times
 from tmsopt.roots.patterns.pattern import Pattern
 
 _MEANING = {"weave": "a real eigenfrequency", "resonance": "a real double eigenfrequency"}
-_COUNTS = ("", "", "two ", "three ", "four ", "five ", "six ")
 _REAL = "is a pattern of a real system"
 
 
@@ -47,10 +47,7 @@ def complex_pattern(name: str, size: int) -> Pattern:
 
 
 def _meaning(kind: str, order: int, count: int) -> str:
-    if kind != "EP":
-        return _MEANING[kind]
-    times = {2: "double", 3: "triple"}.get(order, f"{order}-fold")
-    return f"a {times} eigenfrequency" if count == 1 else f"{_COUNTS[count]}{times} eigenfrequencies"
+    return several(count, f"{times(order)} eigenfrequency") if kind == "EP" else _MEANING[kind]
 
 
 def complex_name(name: str) -> str:
@@ -79,13 +76,11 @@ def complex_in_words(structure: str, size: int, gain: bool = False) -> str:
         return f"one eigenfrequency {'has the most gain' if gain else 'is least damped'} (single)"
     if match := re.fullmatch(r"EP(\d+)", structure):
         order = int(match[1])
-        every = "both" if order == 2 else f"all {_COUNTS[order].strip()}"
-        which = every if order == size else f"the {_COUNTS[order]}{'' if gain else 'least damped'}".rstrip()
         most = " of most gain" if gain and order != size else ""
+        which = all_or(order, size, "" if gain else "least damped")
         return f"{which} eigenfrequencies{most} meet in one ({structure})"
-    named = [_part(part) for part in structure.split("+")]
-    listed = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
-    return f"{listed} have one {'gain' if gain else 'decay rate'} ({structure})"
+    every = listed([_part(part) for part in structure.split("+")])
+    return f"{every} have one {'gain' if gain else 'decay rate'} ({structure})"
 
 
 def _part(part: str) -> str:

@@ -2,12 +2,12 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 from tmsopt.roots.patterns.composed import composition
+from tmsopt.roots.patterns.parts import several
 from tmsopt.roots.patterns.pattern import Pattern
-from tmsopt.roots.patterns.shape import Group, Shape
+from tmsopt.roots.patterns.shape import Group, Shape, with_simple
 from tmsopt.roots.polynomial import Root, product
 
 
@@ -50,7 +50,7 @@ def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
         name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
         meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""),
         unknowns=_unknowns(shape),
-        factors=partial(_factors, shape),
+        factors=shape.factors,
         guesses=lambda z: [[float(x) for x in start]],
         nonnegative=shape.gaps,
         degree=shape.degree,
@@ -88,12 +88,6 @@ def _unknowns(shape: Shape) -> tuple[str, ...]:
     return tuple(kind if kind != "d" and kinds.count(kind) == 1 else u for u, kind in each)
 
 
-def _factors(shape: Shape, unknowns: Sequence[Any]) -> list[list[Any]]:
-    each = zip(shape.group_factors(unknowns), shape.groups, strict=True)
-    repeated = [f for f, g in each for _ in range(g.multiplicity)]
-    return [*repeated, shape.rest_factor(unknowns)] if shape.rest else repeated
-
-
 def _name(groups: Sequence[Group]) -> str:
     """``EP3``, ``2EP2+CEP2``, ``EP2+two pairs+real``: real roots first, the highest multiplicity first."""
     counted = Counter((not g.real, -g.multiplicity) for g in groups if g.multiplicity > 1)
@@ -101,9 +95,7 @@ def _name(groups: Sequence[Group]) -> str:
         f"{count if count > 1 else ''}{'C' if pair else ''}EP{-order}"
         for (pair, order), count in sorted(counted.items())
     ]
-    pairs = sum(g.multiplicity == 1 and not g.real for g in groups)
-    names += ["pair" if pairs == 1 else f"{_COUNTS[pairs]} pairs"] if pairs else []
-    return "+".join([*names, *("real" for g in groups if g.multiplicity == 1 and g.real)])
+    return with_simple(names, groups)
 
 
 def _meaning(tied: Sequence[Group], others: Sequence[Group]) -> str:
@@ -116,10 +108,6 @@ def _words(groups: Sequence[Group]) -> str:
     counted = Counter(groups)
     words = []
     for group in sorted(counted, key=lambda g: (g.multiplicity == 1, g.real == (g.multiplicity == 1), -g.multiplicity)):
-        count, fold = counted[group], f"{group.multiplicity}-fold " if group.multiplicity > 1 else ""
-        what = "real root" if group.real else "complex pair"
-        words.append(f"{_COUNTS[count]} {fold}{what}{'s' if count > 1 else ''}")
+        fold = f"{group.multiplicity}-fold " if group.multiplicity > 1 else ""
+        words.append(several(counted[group], f"{fold}{'real root' if group.real else 'complex pair'}"))
     return " and ".join(words)
-
-
-_COUNTS = ("no", "a", "two", "three", "four", "five", "six")

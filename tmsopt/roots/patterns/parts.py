@@ -26,6 +26,19 @@ _WORDS = {
 ENDS = {"weave": "the pair meets in a double root 0", "resonance": "both pairs meet in a 4-fold root 0"}
 """What happens where W of s² + W reaches 0."""
 
+NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
+"""Numbers up to the highest degree, in words."""
+
+
+def several(count: int, what: str) -> str:
+    """One or more things of a kind: a real root, two real roots."""
+    return f"a {what}" if count == 1 else f"{NUMBERS[count]} {what}s".replace("ys", "ies")
+
+
+def times(order: int) -> str:
+    """A multiplicity in words."""
+    return {2: "double", 3: "triple"}.get(order, f"{order}-fold")
+
 
 @dataclass(frozen=True)
 class Part:
@@ -53,9 +66,7 @@ class Part:
         """In words."""
         if self.kind in _WORDS:
             return _WORDS[self.kind]
-        times = {1: "a", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}.get(self.count, str(self.count))
-        what = "real root" if self.kind == "EP" else "complex pair"
-        return f"{times} {self.order}-fold {what}{'s' if self.count > 1 else ''}"
+        return several(self.count, f"{self.order}-fold {'real root' if self.kind == 'EP' else 'complex pair'}")
 
     @property
     def roots(self) -> int:

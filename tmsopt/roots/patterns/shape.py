@@ -1,10 +1,11 @@
 """Polynomials with certain multiple roots, certain roots on one vertical line, and others free, as factored forms."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from tmsopt.roots.patterns.parts import NUMBERS
 from tmsopt.roots.polynomial import product
 
 
@@ -24,6 +25,14 @@ class Group:
     def degree(self) -> int:
         """Number of roots."""
         return self.multiplicity * (1 if self.real else 2)
+
+
+def with_simple(names: Iterable[str], groups: Iterable[Group]) -> str:
+    """Names of multiple roots joined, with those of the simple pairs and the simple real roots among groups."""
+    simple = [g.real for g in groups if g.multiplicity == 1]
+    pairs = simple.count(False)
+    several = ["pair"] if pairs == 1 else [f"{NUMBERS[pairs]} pairs"] if pairs else []
+    return "+".join([*names, *several, *["real"] * simple.count(True)])
 
 
 @dataclass(frozen=True)
@@ -80,10 +89,15 @@ class Shape:
         """The monic factor with free coefficients."""
         return [1, *list(unknowns)[len(unknowns) - self.rest :]]
 
+    def factors(self, unknowns: Sequence[Any]) -> list[list[Any]]:
+        """All factors, each as often as its multiplicity says."""
+        each = zip(self.group_factors(unknowns), self.groups, strict=True)
+        repeated = [f for f, g in each for _ in range(g.multiplicity)]
+        return [*repeated, self.rest_factor(unknowns)] if self.rest else repeated
+
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the product of all factors, descending from 1."""
-        each = zip(self.group_factors(unknowns), self.groups, strict=True)
-        return product(*[f for f, g in each for _ in range(g.multiplicity)], self.rest_factor(unknowns))
+        return product(*self.factors(unknowns))
 
     def start(self, places: Sequence[complex], rest: Sequence[Any]) -> list[Any]:
         """Unknowns for one root of each group, that of a pair in the upper half-plane, and the rest's coefficients."""

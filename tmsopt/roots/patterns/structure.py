@@ -11,6 +11,7 @@ from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.multiplicity import Fit, decided
 from tmsopt.roots.patterns.pattern import Pattern, Roots
+from tmsopt.roots.patterns.shape import Group, with_simple
 from tmsopt.roots.polynomial import Root, rightmost_first
 
 ROUNDING = 8 * np.finfo(float).eps
@@ -188,7 +189,7 @@ def _named(fit: Fit, found: Roots, unit: float) -> Structure:
     each = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
     each += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
     right = max(z.real for z, _ in each)
-    line = [(multiplicity, z.imag == 0) for z, multiplicity in each if z.real == right]
+    line = [Group(multiplicity, z.imag == 0) for z, multiplicity in each if z.real == right]
     least = _NOTHING * max(abs(z) for z, _ in each)
     pairs = ((w, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,)))
     roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in pairs]
@@ -199,16 +200,10 @@ def _named(fit: Fit, found: Roots, unit: float) -> Structure:
 _TWO_DOUBLE = [(0.0, 2), (0.0, 2)]  # all roots of a quartic, which have a name of their own
 
 
-def _line_name(line: Sequence[tuple[int, bool]]) -> str:
-    """Name of the roots and pairs on a vertical line, given by multiplicity and whether they are real."""
-    multiple = sorted(((m, real) for m, real in line if m > 1), reverse=True)
-    names = [f"EP{m}" if real else f"CEP{m}" for m, real in multiple]
-    pairs = sum(m == 1 and not real for m, real in line)
-    names += [f"{_COUNTS[pairs]}pair" + ("s" if pairs > 1 else "")] if pairs else []
-    return "+".join([*names, *("real" for m, real in line if m == 1 and real)])
-
-
-_COUNTS = ("", "", "two ", "three ", "four ", "five ", "six ")
+def _line_name(line: Sequence[Group]) -> str:
+    """Name of the roots and pairs on a vertical line."""
+    multiple = sorted((g.multiplicity, g.real) for g in line if g.multiplicity > 1)
+    return with_simple((f"EP{m}" if real else f"CEP{m}" for m, real in reversed(multiple)), line)
 
 
 def _simple_name(found: Roots) -> str:
