@@ -3,13 +3,14 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array, Complex, Truth
+from tmsopt.roots.discs import Discs
 from tmsopt.roots.exact import exact_roots
-from tmsopt.roots.numeric import roots
+from tmsopt.roots.numeric import regular, roots
 
 Counts = NDArray[np.int_]
 
-_ROOM = 1.001
+_ROOM = 1.002
 """For the rounding of the radii themselves."""
 
 
@@ -33,9 +34,7 @@ def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Cou
 
     More: docs/how_to/charts.md
     """
-    c = np.asarray(coefficients, dtype=float)
-    if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
-        raise ValueError("real_roots takes finite coefficients, two or more, with a leading one other than 0")
+    c = regular(coefficients, "real_roots")
     rows = c.reshape(-1, c.shape[-1])
     z, doubtful = _enclose(rows)
     real = z.imag == 0
@@ -46,20 +45,11 @@ def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Cou
     return negative.reshape(c.shape[:-1]), positive.reshape(c.shape[:-1])
 
 
-def _enclose(c: Array) -> tuple[NDArray[np.complex128], Truth]:
+def _enclose(c: Array) -> tuple[Complex, Truth]:
     """Numeric roots of the rows, and where discs that hold the true ones touch one another, 0 or both sides."""
-    n = c.shape[1] - 1
     z = roots(c)
-    itself = np.eye(n, dtype=bool)
     with np.errstate(all="ignore"):
-        value, size = np.zeros_like(z), np.zeros(z.shape)
-        for column in c.T:
-            value = value * z + column[:, None]
-            size = size * np.abs(z) + np.abs(column)[:, None]
-        apart = np.abs(z[:, :, None] - z[:, None, :])
-        others = np.prod(np.where(itself, np.abs(c[:, :1, None]), apart), axis=2)
-        rounding = 8 * n * np.finfo(float).eps * size  # of Horner's rule in complex numbers, with room
-        radius = _ROOM * n * (np.abs(value) + rounding) / others
-        isolated = np.all(itself | (apart > _ROOM * (radius[:, :, None] + radius[:, None, :])), axis=2)
-        decided = np.abs(np.where(z.imag == 0, z.real, z.imag)) > _ROOM * radius
-    return z, ~np.all(isolated & decided, axis=1)
+        discs = Discs(c.T, np.zeros(c.T.shape), z.T)
+        radius = _ROOM * discs.radius
+        decided = np.abs(np.where(z.imag == 0, z.real, z.imag)) > radius.T
+    return z, ~(np.all(decided, axis=1) & discs.disjoint(radius))

@@ -5,6 +5,7 @@ The true roots lie in discs about numeric ones z, of radii n |p(z)|/(|a0| ∏ |z
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -40,6 +41,34 @@ class Motions:
     simple: Truth
 
 
+class Discs:
+    """Discs about numeric roots of polynomials, with one true root in each where they are disjoint.
+
+    Attributes:
+        product: |a0| ∏ |z − zⱼ|, with the other roots zⱼ.
+        own: what the errors of the coefficients may change p(z) by.
+        radius: of the discs.
+    """
+
+    def __init__(self, coefficients: Array, off: Array, z: Complex) -> None:
+        """Coefficients and their errors, descending, of shape (n + 1, m), and numeric roots, of shape (n, m)."""
+        n, size = len(z), np.abs(z)
+        self.apart = {(i, j): np.abs(z[i] - z[j]) for i, j in combinations(range(n), 2)}
+        self.product = np.abs(coefficients[0]) * np.ones_like(size)
+        for (i, j), apart in self.apart.items():
+            self.product[i] *= apart
+            self.product[j] *= apart
+        self.own, terms, value = np.zeros_like(size), np.zeros_like(size), np.zeros_like(z)
+        for one, error in zip(coefficients, off, strict=True):
+            self.own, terms, value = self.own * size + error, terms * size + np.abs(one), value * z + one
+        self.radius = n * (np.abs(value) + n * _HORNER * terms + self.own) / self.product
+
+    def disjoint(self, radius: Array) -> Truth:
+        """Of which polynomials discs of some radii do not touch one another."""
+        apart = [apart > radius[i] + radius[j] for (i, j), apart in self.apart.items()]
+        return np.all([np.ones(radius.shape[1], dtype=bool), *apart], axis=0)
+
+
 @np.errstate(all="ignore")
 def enclose_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motions:
     """Abscissa and damping ratio of polynomials, coefficients descending, each of shape (m,).
@@ -54,24 +83,14 @@ def enclose_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motion
     z = _numeric(np.where(fit, a, (np.arange(n + 1) % n == 0)[:, None] * 1.0))
     size = np.abs(z)
     reach = np.maximum(size, _FLOOR * np.median(size, axis=0))
-    product = np.ones_like(size)
-    for i in range(n):
-        for j in range(i + 1, n):
-            apart = np.abs(z[i] - z[j])
-            product[i] *= apart
-            product[j] *= apart
     moved = np.stack([np.prod(size[i] + reach, axis=0) for i in range(n)])
-    own, terms, value = np.zeros_like(size), np.zeros_like(size), np.zeros_like(z)
-    for one, error in zip(a / a[0], off / np.abs(a[0]), strict=True):
-        own, terms, value = own * size + error, terms * size + np.abs(one), value * z + one
-    error = n * (np.abs(value) + n * _HORNER * terms + own) / product
-    near = n * (1.1 * tolerance * moved + _COVERED * own) / product + error
+    discs = Discs(a / a[0], off / np.abs(a[0]), z)
+    error = discs.radius
+    near = n * (1.1 * tolerance * moved + _COVERED * discs.own) / discs.product + error
     top, rows = z.real.argmax(axis=0), np.arange(z.shape[1])
-    simple = fit & (near < size).all(axis=0)
+    simple = fit & (near < size).all(axis=0) & discs.disjoint(near)
     right, reach_right = z[top, rows], near[top, rows]
     for i in range(n):
-        for j in range(i + 1, n):
-            simple &= np.abs(z[i] - z[j]) > near[i] + near[j]
         other = (right.real - z[i].real <= near[i] + reach_right) & (z[i].real != right.real)
         simple &= ~other & ((z[i].real != right.real) | (np.abs(z[i].imag) == np.abs(right.imag)))
     ratio, certain = _damping_ratio(z, error, size)

@@ -32,9 +32,7 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
 
     More: docs/explanation/factors.md
     """
-    c = np.asarray(coefficients, dtype=float)
-    if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
-        raise ValueError("roots takes finite coefficients, two or more, with a leading one other than 0")
+    c = regular(coefficients, "roots")
     n = c.shape[-1] - 1
     least = np.abs(c).max(axis=-1) * _LEAST  # a root that is beyond doubles is brought to their end
     lead = np.copysign(np.maximum(np.abs(c[..., 0]), least), c[..., 0])
@@ -50,6 +48,18 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     for row in np.flatnonzero(clamped | ~(error <= _JOINT)):
         found[row] = _isolated(c.reshape(-1, n + 1)[row], found[row])
     return found.reshape(*c.shape[:-1], n)
+
+
+def regular(coefficients: ArrayLike, asked: str) -> Array:
+    """Coefficients of shape (…, n + 1) that a function can take, n ≥ 1.
+
+    Raises:
+        ValueError: for a leading coefficient 0 or coefficients that are not finite.
+    """
+    c = np.asarray(coefficients, dtype=float)
+    if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
+        raise ValueError(f"{asked} takes finite coefficients, two or more, with a leading one other than 0")
+    return c
 
 
 def abscissa(coefficients: ArrayLike) -> Array:
