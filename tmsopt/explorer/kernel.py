@@ -61,6 +61,7 @@ for _each in (
     factors.damping_ratio,
     factors.root_pair,
     signs.stable,
+    signs.chain,
     signs.classes,
 ):  # each uses only those before it
     _KNOWN[_each.__name__] = FunctionType(_each.__code__, {**_each.__globals__, **_KNOWN}, _each.__name__)

@@ -66,7 +66,7 @@ class Discs:
     def disjoint(self, radius: Array) -> Truth:
         """Of which polynomials discs of some radii do not touch one another."""
         apart = [apart > radius[i] + radius[j] for (i, j), apart in self.apart.items()]
-        return np.all([np.ones(radius.shape[1], dtype=bool), *apart], axis=0)
+        return np.asarray(np.all([np.ones(radius.shape[1], dtype=bool), *apart], axis=0))
 
 
 @np.errstate(all="ignore")

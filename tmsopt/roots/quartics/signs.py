@@ -28,6 +28,17 @@ def stable(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> Any:
     return up | down
 
 
+def chain(a: Real, b: Real, c: Real, d: Real, e: Real, minus: float) -> tuple[Real, Real, Real, Real, Real]:
+    """A, C, L, M and N of the chain of Sturm, see `classes`; of sizes and with plus for minus, the sums of |terms|."""
+    A = 3.0 * (b * b) + minus * 8.0 * (a * c)
+    B = 2.0 * (b * c) + minus * 12.0 * (a * d)
+    C = b * d + minus * 16.0 * (a * e)
+    k = 3.0 * (b * A) + minus * 4.0 * (a * B)
+    L = k * B + minus * 2.0 * (c * A * A) + 4.0 * (a * A * C)
+    M = k * C + minus * d * A * A
+    return A, C, L, M, B * L * M + minus * A * M * M + minus * C * L * L
+
+
 def classes(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> tuple[Any, Any, Any]:
     """Class code, number of different real roots, and whether rounding leaves a sign in doubt.
 
@@ -36,27 +47,14 @@ def classes(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> tuple[Any, Any,
     """
     sign = where(a0 < 0.0, -1.0, 1.0)
     a, b, c, d, e = sign * a0, sign * a1, sign * a2, sign * a3, sign * a4
-    A = 3.0 * (b * b) - 8.0 * (a * c)
-    B = 2.0 * (b * c) - 12.0 * (a * d)
-    C = b * d - 16.0 * (a * e)
-    k = 3.0 * (b * A) - 4.0 * (a * B)
-    L = k * B - 2.0 * (c * A * A) + 4.0 * (a * A * C)
-    M = k * C - d * A * A
-    N = B * L * M - A * M * M - C * L * L
     b_, c_, d_, e_ = np.abs(b), np.abs(c), np.abs(d), np.abs(e)
-    A_ = 3.0 * (b * b) + 8.0 * (a * c_)
-    B_ = 2.0 * (b_ * c_) + 12.0 * (a * d_)
-    C_ = b_ * d_ + 16.0 * (a * e_)
-    k_ = 3.0 * (b_ * A_) + 4.0 * (a * B_)
-    L_ = k_ * B_ + 2.0 * (c_ * A_ * A_) + 4.0 * (a * A_ * C_)
-    M_ = k_ * C_ + d_ * A_ * A_
-    N_ = B_ * L_ * M_ + A_ * M_ * M_ + C_ * L_ * L_
-    certain = (np.abs(A) > _BOUND * A_) & (np.abs(C) > _BOUND * C_) & (np.abs(L) > _BOUND * L_)
-    certain = certain & (np.abs(M) > _BOUND * M_) & (np.abs(N) > _BOUND * N_)
-    certain = certain & (a >= _LEAST) & (a <= _MOST) & (d_ >= _LEAST) & (d_ <= _MOST) & (e_ >= _LEAST) & (e_ <= _MOST)
+    found = chain(a, b, c, d, e, -1.0)
+    A0, C0, L0, M0, N0, d0, e0 = (x > 0.0 for x in (*found, d, e))
+    certain = (a >= _LEAST) & (a <= _MOST) & (d_ >= _LEAST) & (d_ <= _MOST) & (e_ >= _LEAST) & (e_ <= _MOST)
     certain = certain & (b_ <= _MOST) & (c_ <= _MOST)
     certain = certain & ((b_ >= _LEAST) | (b_ == 0.0)) & ((c_ >= _LEAST) | (c_ == 0.0))
-    A0, C0, d0, e0, L0, M0, N0 = A > 0.0, C > 0.0, d > 0.0, e > 0.0, L > 0.0, M > 0.0, N > 0.0
+    for x, terms in zip(found, chain(a, b_, c_, d_, e_, 1.0), strict=True):
+        certain = certain & (np.abs(x) > _BOUND * terms)
     # Sign changes at −∞ of (+, −, A, −L, N), at 0 of (e, d, C, M, N), at ∞ of (+, +, A, L, N).
     left = 1 + one(A0) + one(A0 == L0) + one(L0 == N0)
     middle = one(e0 != d0) + one(d0 != C0) + one(C0 != M0) + one(M0 != N0)
