@@ -9,7 +9,7 @@ from typing import Any
 import flint
 
 from tmsopt.roots import Pattern, composition, evaluate, lienard_chipart
-from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots
+from tmsopt.roots.patterns.enclosed import Enclosed, factor_roots
 from tmsopt.roots.polynomial import rightmost_first
 
 Factor = Sequence[Any]
@@ -27,7 +27,7 @@ class Factored:
         """All roots, rightmost first, with exact multiplicities; None where the balls cannot tell two apart."""
         found: list[Enclosed] = []
         for factor, multiplicity in self.factors:
-            own = roots_of(factor)
+            own = factor_roots(factor)
             if own is None:
                 return None
             found += [replace(z, multiplicity=multiplicity * z.multiplicity) for z in own]
@@ -63,7 +63,7 @@ class Factored:
         """Whether all roots are real and negative, multiple ones included."""
         if self.stable is False:
             return False
-        each = (roots_of(factor) for factor, _ in self.factors)
+        each = (factor_roots(factor) for factor, _ in self.factors)
         return _every([self.stable, *(None if own is None else all(z.real for z in own) for own in each)])
 
 
@@ -86,7 +86,7 @@ def _formula(factor: Factor) -> Any:
         discriminant = b * b - 4 * c
         return (discriminant.sqrt() - b) / 2 if _constant(discriminant) > 0 else -b / 2 + 0 * c
     constants = [_constant(c) for c in factor]
-    own = roots_of(constants)
+    own = factor_roots(constants)
     if own is None:
         return None
     z = max(own, key=lambda z: (float(z.re), -abs(float(z.im))))
@@ -99,20 +99,6 @@ def _formula(factor: Factor) -> Any:
     return flint.arb_series([z.re, -(change / slope).real], prec=2)
 
 
-def roots_of(factor: Factor) -> Sequence[Enclosed] | None:
-    """Roots of a factor; None where the balls cannot tell. A pair on the imaginary axis has the real part 0 exactly."""
-    if len(factor) != 3:
-        return enclosed_roots(factor)
-    b, c = map(flint.arb, factor[1:])
-    nothing, discriminant = flint.arb(0), b * b - 4 * c
-    if discriminant > 0:
-        width = discriminant.sqrt()
-        far = (-b - width) / 2 if b > 0 else (width - b) / 2
-        return [Enclosed(far, nothing), Enclosed(-b - far if far.contains(0) else c / far, nothing)]
-    height = (-discriminant).sqrt() / 2
-    return [Enclosed(-b / 2, height), Enclosed(-b / 2, -height)] if discriminant < 0 else None
-
-
 def _rightmost(factor: Factor) -> Any:
     """Largest real part of the roots of a factor; of a quadratic one whatever the sign of its discriminant."""
     if len(factor) == 3:
@@ -120,7 +106,7 @@ def _rightmost(factor: Factor) -> Any:
         discriminant = b * b - 4 * c
         if not (discriminant > 0 or discriminant < 0):
             return (discriminant.nonnegative_part().sqrt() - b) / 2
-    own = roots_of(factor)
+    own = factor_roots(factor)
     if own is None:
         return None
     return reduce(lambda a, b: a.max(b), (z.re for z in own))
@@ -196,7 +182,7 @@ def _multiple(coefficients: Sequence[Any]) -> Counter[tuple[str, int]]:
     """How many multiple real roots and complex pairs there are of each multiplicity."""
     found: Counter[tuple[str, int]] = Counter()
     for factor, multiplicity in factored(coefficients).factors:
-        for z in (roots_of(factor) or ()) if multiplicity > 1 else ():
+        for z in (factor_roots(factor) or ()) if multiplicity > 1 else ():
             if z.real or z.im > 0:
                 found["EP" if z.real else "CEP", multiplicity] += 1
     return found
@@ -206,4 +192,4 @@ def _on_axis(coefficients: Sequence[Any], twice: bool) -> bool:
     even, odd = (flint.fmpq_poly([(-1) ** k * c for k, c in enumerate(coefficients[::-1][i::2])]) for i in (0, 1))
     common = even if odd.is_zero() else even.gcd(odd)
     parts = [part for part, m in common.factor()[1] if not twice or m >= 2]
-    return any(z.real and z.re > 0 for part in parts for z in roots_of(_monic(part)) or ())
+    return any(z.real and z.re > 0 for part in parts for z in factor_roots(_monic(part)) or ())

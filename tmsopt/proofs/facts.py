@@ -12,8 +12,9 @@ from tmsopt.models.exact import Written
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.proofs.existence import EXACT, Existing
-from tmsopt.proofs.factored import Factored, roots_of
+from tmsopt.proofs.factored import Factored
 from tmsopt.roots import exact_nullity, has_one_eigenvector
+from tmsopt.roots.patterns.enclosed import factor_roots
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def eigenvectors(problem: Posed, design: Written, found: Existing) -> tuple[int 
         missing = all(nullity < count for nullity, count in found_each)
         return most, Verdict(missing, f"{most} eigenvector{'s' * (most > 1)}, in fractions")
     at = pencil(of.native(found.parameters))
-    roots = [flint.acb(z.re, z.im) for f in repeated for z in roots_of(f) or ()]
+    roots = [flint.acb(z.re, z.im) for f in repeated for z in factor_roots(f) or ()]
     one = bool(roots) and all(has_one_eigenvector(at, s) for s in roots)
     words = "one eigenvector: a minor of the matrices is not 0, in balls" if one else "no minor tells it from 0"
     return (1 if one else None), Verdict(True if one else None, words)

@@ -5,7 +5,7 @@ Everything here works at the precision of `flint.ctx`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from typing import Any
 
@@ -75,6 +75,20 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     if not all(a.re.is_finite() and a.im.is_finite() for a in found) or _overlap(found):
         return None
     return rightmost_first(found)
+
+
+def factor_roots(factor: Sequence[Any]) -> Sequence[Enclosed] | None:
+    """Roots of a factor; None where the balls cannot tell. A pair on the imaginary axis has the real part 0 exactly."""
+    if len(factor) != 3:
+        return enclosed_roots(factor)
+    b, c = map(flint.arb, factor[1:])
+    nothing, discriminant = flint.arb(0), b * b - 4 * c
+    if discriminant > 0:
+        width = discriminant.sqrt()
+        far = (-b - width) / 2 if b > 0 else (width - b) / 2
+        return [Enclosed(far, nothing), Enclosed(-b - far if far.contains(0) else c / far, nothing)]
+    height = (-discriminant).sqrt() / 2
+    return [Enclosed(-b / 2, height), Enclosed(-b / 2, -height)] if discriminant < 0 else None
 
 
 def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
@@ -161,10 +175,13 @@ def _overlap(found: Sequence[Enclosed]) -> bool:
 def _roots_of(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:
     """Roots of each group, and those of the rest; None where these are not decided."""
     found: list[Enclosed] = []
-    for factor, group in zip(shape.group_factors(u), shape.groups, strict=True):
-        found += [Enclosed(re, im, group.multiplicity) for re, im in _factor_roots(factor)]
-    rest = enclosed_roots([flint.arb(c) for c in shape.rest_factor(u)])
-    return None if rest is None else [*found, *rest]
+    rest = shape.rest_factor(u)
+    for factor, count in [*zip(shape.group_factors(u), (g.multiplicity for g in shape.groups), strict=True), (rest, 1)]:
+        own = factor_roots(factor)
+        if own is None:
+            return None
+        found += [replace(z, multiplicity=count * z.multiplicity) for z in own]
+    return found
 
 
 def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | None:
@@ -195,16 +212,3 @@ def _weights(roots: Sequence[Enclosed]) -> list[Any]:
     median = (sizes[(n - 1) // 2] + sizes[n // 2]) / 2
     floor = (sizes[-1] if median == 0 else median) / _FLOOR
     return [as_ball(c) for c in product(*[[flint.arb(1), size.max(floor).mid()] for size in sizes])]
-
-
-def _factor_roots(factor: Sequence[Any]) -> list[tuple[Any, Any]]:
-    zero = flint.arb(0)
-    if len(factor) == 2:
-        return [(-factor[1], zero)]
-    half = -factor[1] / 2
-    square = half * half - factor[2]
-    if square >= 0:
-        apart = square.sqrt()
-        return [(half + apart, zero), (half - apart, zero)]
-    apart = (-square).sqrt()
-    return [(half, apart), (half, -apart)]
