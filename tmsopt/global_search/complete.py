@@ -17,7 +17,7 @@ from tmsopt.algebra.identity import multiplied_out
 from tmsopt.algebra.intervals import interval
 from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
-from tmsopt.global_search.conditions import Ends, Sheet, complex_pieces, rotating_frame, sheet, sheets
+from tmsopt.global_search.conditions import Ends, Sheet, rotating_frame, sheet, sheets
 from tmsopt.global_search.pruning import Box, Puzzle, ends, prepared, prune
 from tmsopt.models.expression import Expression
 from tmsopt.problem.problem import Posed
@@ -201,13 +201,9 @@ def _sheets(problem: Posed) -> Iterator[Sheet]:
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
     lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
-    if problem.model.double is not None and (found := rotating_frame(problem)) is not None:
-        yield sheet(problem, complex_pieces(problem.pattern.form), found, lifted)
-        return
-    scale = scale_of(problem)
-    scale = Scale(_UNITS * scale.unit, scale.lead)
-    for pieces in sheets(problem.pattern.form):
-        yield sheet(problem, pieces, scale, lifted)
+    frame, scale = rotating_frame(problem), scale_of(problem)
+    for pieces in sheets(problem.pattern.form, of_h=frame is not None):
+        yield sheet(problem, pieces, frame or Scale(_UNITS * scale.unit, scale.lead), lifted)
 
 
 def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:

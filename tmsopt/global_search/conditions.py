@@ -94,18 +94,24 @@ class Piece:
         return []
 
 
-def sheets(name: str) -> Iterator[tuple[Piece, ...]]:
-    """The ways in which the roots of a pattern may be small or large."""
-    for choice in product(*(list(_ways(part)) for part in parts_of(name))):
+def sheets(name: str, of_h: bool) -> Iterator[tuple[Piece, ...]]:
+    """The ways in which the roots of a pattern may be small or large.
+
+    Args:
+        of_h: whether the unknowns are eigenvalues of a complex H, the pattern named as that of its double: all small.
+    """
+    for choice in product(*(list(_ways(part, of_h)) for part in parts_of(name))):
         pieces: list[Piece] = []
         for kind, order, outer in (piece for way in choice for piece in way):
             pieces.append(Piece(kind, order, outer, sum(len(p.ranges) for p in pieces)))
         yield tuple(pieces)
 
 
-def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
+def _ways(part: Part, of_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
     """Kind, power and place of the factors of a part."""
-    if part.kind == "capsize":
+    if of_h:
+        yield [("point", part.order, False) if part.kind == "CEP" else ("line", part.roots // 2, False)] * part.count
+    elif part.kind == "capsize":
         yield [("zero", 1, False)]
     elif part.kind in ("weave", "resonance"):
         yield from ([("axis", part.order + (part.kind == "resonance"), outer)] for outer in (False, True))
@@ -119,16 +125,6 @@ def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
             yield [(kind, part.order, k >= inner) for k in range(part.count)]
 
 
-def complex_pieces(name: str) -> tuple[Piece, ...]:
-    """The eigenvalues of a complex H that are tied by a pattern, named as that of its double."""
-    pieces: list[Piece] = []
-    for part in parts_of(name):
-        kind, order = ("point", part.order) if part.kind == "CEP" else ("line", part.roots // 2)
-        for _ in range(part.count):
-            pieces.append(Piece(kind, order, False, sum(len(p.ranges) for p in pieces)))
-    return tuple(pieces)
-
-
 @dataclass(frozen=True)
 class RotatingFrame:
     """Where eigenfrequencies of a complex H are unknown: as (ω − centre)/unit, which none has larger than 1."""
@@ -138,11 +134,13 @@ class RotatingFrame:
 
 
 def rotating_frame(problem: Posed) -> RotatingFrame | None:
-    """The frame of a complex H, by Gershgorin's discs over the box; None where these have no bound.
+    """The frame of a complex H, by Gershgorin's discs over the box; None where these have no bound, or without H.
 
     Raises:
         NotAccepted: for an operation that has no interval arithmetic.
     """
+    if problem.model.double is None:
+        return None
     names = tuple(problem.free)
     rows = _complex_matrix(problem, {**problem.as_nodes(problem.fixed), **{n: symbol(n) for n in names}})
     asked = formula((part for row in rows for x in row for part in (x.re, x.im)), names)

@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.algebra.formula import constant, formula
 from tmsopt.algebra.intervals import Interval, root_bound
-from tmsopt.global_search.interlacing import interlace, squares_of, unknowns
+from tmsopt.global_search.interlacing import interlace, squares_of
 from tmsopt.models import Model, Values
 from tmsopt.program.formulate import Builder
 from tmsopt.program.lifts import Lifted, quadratic_pairs
@@ -73,7 +73,7 @@ def compact(model: Model, values: Values) -> list[Any]:
 
 def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lifted:
     """Every root of every case at or left of a line: a known one, or a variable."""
-    covered, values = build.covered, build.values
+    first, covered, values = len(build.x), build.covered, build.values
     looked = [case for case in covered if case in frame.signs]
     at = build.variable("abscissa", *_reach(frame, build, looked)) if line is None else line
     for case in looked:
@@ -81,10 +81,8 @@ def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lift
         edges = interlace(build, case, c, frame.largest(build.over(c), case == covered[0]), frame.compact)
         if line is None and frame.touching and len(covered) == 1:
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
-    size = (line is None) + len(looked) * unknowns(frame.model.degree)
-    return Lifted(
-        constant(at), AddedVariable("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ()
-    )
+    guess = partial(_half_plane_guess, frame, looked, line)
+    return Lifted(constant(at), AddedVariable("abscissa", len(build.x) - first, guess), (), ())
 
 
 def _reach(frame: Frame, build: Builder, looked: Sequence[int]) -> tuple[float, float]:
@@ -103,10 +101,18 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
     with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked. An odd degree
     has one factor s + d more, d ≥ 0 asked only of other ζ: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
     """
-    covered, values = build.covered, build.values
+    first, covered, values = len(build.x), build.covered, build.values
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
     looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
-    size = int(ratio is None)
+
+    def at_least(greater: Any, least: Any) -> None:
+        build.row("damping_ratio", greater - least, 0.0, np.inf)
+
+    def unless_real(a: Any, b: Any) -> None:
+        """a ≥ b, and a = b for ζ > −1."""
+        build.row("damping_ratio", (1 + zeta) * (a - b), 0.0, 0.0)
+        at_least(a, b)
+
     for case in looked:
         a = frame.coefficients(values, case)
         largest = frame.largest(build.over(a), case == covered[0])
@@ -115,27 +121,22 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
             w = build.variable(f"w{k}.{case}", 0.0, largest)
             q = build.variable(f"q{k}.{case}", -largest * largest, largest * largest) if ratio is None else w * w
-            size += 2 + (ratio is None)
             pairs.append(p)
             monic.append([1, p, q])
-            build.row("damping_ratio", p - 2 * zeta * w, 0.0, np.inf)
+            at_least(p, 2 * zeta * w)
             if ratio is None:
-                build.row("damping_ratio", (1 + zeta) * (w * w - q), 0.0, 0.0)
-                build.row("damping_ratio", w * w - q, 0.0, np.inf)
+                unless_real(w * w, q)
         if len(a) % 2 == 0:
             d = build.variable(f"d.{case}", 0.0 if ratio is not None else -largest, largest)
-            size += 1 + (ratio is None)
             monic.append([1, d])
             if ratio is None:
-                e = build.variable(f"e.{case}", 0.0, largest)
-                build.row("damping_ratio", (1 + zeta) * (e - d), 0.0, 0.0)
-                build.row("damping_ratio", e - d, 0.0, np.inf)
+                unless_real(build.variable(f"e.{case}", 0.0, largest), d)
         for one, other in pairwise(pairs):  # their order means nothing
-            build.row("damping_ratio", other - one, 0.0, np.inf)
+            at_least(other, one)
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
-    build.row("damping_ratio", 1 - zeta, 0.0, np.inf)  # real roots would satisfy any larger one, too
+    at_least(1, zeta)  # real roots would satisfy any larger one, too
     guess = partial(_sector_guess, frame, looked, ratio, build.unit)
-    return Lifted(constant(zeta), AddedVariable("damping_ratio", size, guess), (), ())
+    return Lifted(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
