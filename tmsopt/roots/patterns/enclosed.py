@@ -12,6 +12,7 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.balls import as_ball, rational
+from tmsopt.algebra.krawczyk import slopes
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.naming import shown
 from tmsopt.roots.patterns.shape import Shape
@@ -190,17 +191,11 @@ def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | 
     if found is None:
         return None
     weights = _weights(found)
-    offs = [(a - b) / w for a, b, w in zip(shape.monic(u), target, weights, strict=True)]
-    columns = []
-    for j in range(len(u)):
-        moved = shape.monic([flint.arb_series([x, 1], prec=2) if k == j else x for k, x in enumerate(u)])
-        columns.append(
-            [(m[1] if isinstance(m, flint.arb_series) else 0) / w for m, w in zip(moved, weights, strict=True)]
-        )
-    normal = flint.arb_mat([[sum(a * b for a, b in zip(p, q, strict=True)) for q in columns] for p in columns])
-    right = flint.arb_mat([[-sum(a * b for a, b in zip(p, offs, strict=True))] for p in columns])
+    offs = flint.arb_mat([[(b - a) / w] for a, b, w in zip(shape.monic(u), target, weights, strict=True)])
+    moved = slopes(lambda at: shape.monic([*at.values()]), dict(zip(shape.unknowns, u, strict=True)), shape.unknowns)
+    rows = flint.arb_mat([[slope / w for slope in row] for row, w in zip(moved.tolist(), weights, strict=True)])
     try:
-        return [normal.solve(right)[j, 0] for j in range(len(u))]
+        return list((rows.transpose() * rows).solve(rows.transpose() * offs))
     except ZeroDivisionError:
         return None
 
