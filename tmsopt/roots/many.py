@@ -5,10 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmsopt.records import Array
 from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics.classes import Classes, count_classes, quartic_classes
-from tmsopt.roots.quartics.quartic import Motion, abscissa_and_damping, make_blocks
+from tmsopt.roots.quartics.quartic import Motion, abscissa_and_damping, columns, make_blocks
 
 _QUARTIC = 5
 """Coefficients of the degree that has formulas of its own."""
@@ -25,7 +24,8 @@ def classify(coefficients: Sequence[ArrayLike]) -> Classes:
     """
     if len(coefficients) == _QUARTIC:
         return quartic_classes(*coefficients)
-    rows, shape = _rows(coefficients)
+    a, shape = columns(*coefficients)
+    rows = np.stack(a, axis=1)
     kind, count = np.empty((2, len(rows)), np.int8)
     for block in make_blocks(len(rows)):
         kind[block], count[block] = count_classes(rows[block])
@@ -43,7 +43,8 @@ def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
     """
     if len(coefficients) == _QUARTIC:
         return abscissa_and_damping(*coefficients)
-    rows, shape = _rows(coefficients)
+    a, shape = columns(*coefficients)
+    rows = np.stack(a, axis=1)
     alpha, ratio = np.full((2, len(rows)), np.nan)
     regular = np.flatnonzero(np.all(np.isfinite(rows), axis=1) & (rows[:, 0] != 0))
     for block in make_blocks(regular.size):
@@ -51,9 +52,3 @@ def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
         z = roots(rows[part])
         alpha[part], ratio[part] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
     return Motion(alpha.reshape(shape), ratio.reshape(shape), regular.size)
-
-
-def _rows(coefficients: Sequence[ArrayLike]) -> tuple[Array, tuple[int, ...]]:
-    """Coefficients of shape (polynomials, degree + 1), and the shape that they broadcast to."""
-    a = np.stack(np.broadcast_arrays(*coefficients), axis=-1, dtype=float)
-    return a.reshape(-1, a.shape[-1]), a.shape[:-1]

@@ -17,8 +17,6 @@ from tmsopt.records import Array
 from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics import factors
 
-Columns = tuple[Array, Array, Array, Array, Array]
-
 _BLOCK = 2**14  # numbers of an array that stay in the cache between two operations
 
 GOOD = 4e-15
@@ -118,16 +116,14 @@ def abscissa_and_damping(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayL
     return Motion(alpha.reshape(shape), ratio.reshape(shape), fallbacks)
 
 
-def columns(*coefficients: ArrayLike) -> tuple[Columns, tuple[int, ...]]:
+def columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     """The coefficients as flat arrays of doubles of one size, and the shape that they broadcast to.
 
     Raises:
         ValueError: for shapes that cannot be broadcast.
     """
-    given = [np.asarray(c, dtype=float) for c in coefficients]
-    shape = np.broadcast_shapes(*map(np.shape, given))
-    flat = [np.ascontiguousarray(np.broadcast_to(c, shape)).reshape(-1) for c in given]
-    return (flat[0], flat[1], flat[2], flat[3], flat[4]), shape
+    given = np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in coefficients))
+    return [np.ascontiguousarray(c).reshape(-1) for c in given], given[0].shape
 
 
 def make_blocks(size: int) -> list[slice]:
@@ -135,7 +131,7 @@ def make_blocks(size: int) -> list[slice]:
     return [slice(first, first + _BLOCK) for first in range(0, size, _BLOCK)]
 
 
-def _fill(results: Sequence[Array], a: Columns, finish: Callable[..., tuple[Array, Array]]) -> int:
+def _fill(results: Sequence[Array], a: Sequence[Array], finish: Callable[..., tuple[Array, Array]]) -> int:
     """Fill arrays with what a function makes of factors and their unit; the number that took companion eigenvalues."""
     left = [np.empty(0, dtype=int)]
     with np.errstate(all="ignore"):  # a root of coefficients of very different sizes need not be a double
