@@ -149,8 +149,7 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if design.bound.proven:
         return design, False
     clock.note = "whether there is any design"
-    anything = Question(design.problem.posed, _cases(design), None, unit_of(design.of_polynomial.roots))
-    answered = answer(anything, clock, 1.0, partial(confirmed, design, _cases(design)))
+    answered = answer(_question(design, None), clock, 1.0, partial(confirmed, design, _cases(design)))
     if answered.better is not None:
         return answered.better, True
     if answered.verdict == INFEASIBLE:
@@ -195,15 +194,15 @@ def _over_the_box(design: Solution) -> Bound:
     return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
 
 
-def _question(design: Solution, level: float) -> Question:
-    """Whether any design is better by a gap of some level."""
-    limit = design.value - design.problem.posed.sign * _gap(design.value, level)
+def _question(design: Solution, level: float | None) -> Question:
+    """Whether any design is better by a gap of some level; None for whether there is any."""
+    limit = None if level is None else design.value - design.problem.posed.sign * _gap(design.value, level)
     return Question(design.problem.posed, _cases(design), limit, unit_of(design.of_polynomial.roots))
 
 
 def _bound(design: Solution, level: float, clock: Clock) -> Bound:
     """What has been proved."""
-    gap = _gap(design.value, level) if math.isfinite(level) else math.inf
+    gap = _gap(design.value, level)
     sign = design.problem.posed.sign
     value = design.value - sign * gap if math.isfinite(gap) else -sign * math.inf
     return _searched(value, gap, level <= PROVEN, clock)

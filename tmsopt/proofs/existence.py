@@ -53,19 +53,15 @@ class Existing:
 def exactly(problem: Posed, pattern: Pattern, design: Written) -> Existing | None:
     """The design itself, if its numbers are fractions and have the pattern exactly."""
     found = as_stored(problem, design)
-    equal = any(c.equality for c in problem.conditions.values())
-    return (
-        found
-        if found and found.method == EXACT and not equal and has_pattern(pattern.form, found.coefficients)
-        else None
-    )
+    if found is None or found.method != EXACT or any(c.equality for c in problem.conditions.values()):
+        return None
+    return found if has_pattern(pattern.form, found.coefficients) else None
 
 
 def as_stored(problem: Posed, design: Written) -> Existing | None:
     """The design as its numbers are, whatever its roots; None where a0 cannot be told from 0."""
     balls, of = design.balls(), problem.parameter_set
-    tangents = {n: b.tan() for n, b in balls.items() if of[n].tangent}
-    tangents |= {n: e.ball() for n, e in design.tangents.items()}
+    tangents = {n: x for n, x in _numbers(problem, design).items() if of[n].tangent}
     exact = design.coefficients(problem.model, of)
     a = problem.model.coefficients(balls, of) if exact is None else exact
     if a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):

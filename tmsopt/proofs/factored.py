@@ -1,7 +1,7 @@
 """A polynomial as a product of factors in balls: its roots, whether it is stable, heavily damped, or has a pattern."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -38,25 +38,23 @@ class Factored:
     @cached_property
     def abscissa(self) -> Any:
         """The largest real part; None where no factor tells."""
-        tops = [_rightmost(factor) for factor, _ in self.factors]
-        return None if any(top is None for top in tops) else reduce(lambda a, b: a.max(b), tops)
+        return _extreme(flint.arb.max, [_rightmost(factor) for factor, _ in self.factors])
 
     @cached_property
     def damping_ratio(self) -> Any:
         """The least −Re s/|s|; None where the balls cannot tell."""
-        ratios = [_ratio(z) for z in self.roots or ()] or [None]
-        return None if any(ratio is None for ratio in ratios) else reduce(lambda a, b: a.min(b), ratios)
+        return _extreme(flint.arb.min, [_ratio(z) for z in self.roots or ()])
 
     @cached_property
     def angular_frequency(self) -> Any:
         """The greatest imaginary part; None where the balls cannot tell the roots apart."""
-        return reduce(lambda a, b: a.max(b), [z.im for z in self.roots]) if self.roots else None
+        return _extreme(flint.arb.max, [z.im for z in self.roots or ()])
 
     @cached_property
     def stable(self) -> bool | None:
         """Whether all roots are left of the imaginary axis: Liénard–Chipart signs of each factor."""
-        signs = [_all_positive(lienard_chipart([flint.arb(c) for c in factor])) for factor, _ in self.factors]
-        return _every(signs)
+        signs = (q for factor, _ in self.factors for q in lienard_chipart([flint.arb(c) for c in factor]))
+        return _every([True if q > 0 else False if q <= 0 else None for q in signs])
 
     @cached_property
     def heavily_damped(self) -> bool | None:
@@ -81,10 +79,6 @@ def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
 
 def _formula(factor: Factor) -> Any:
     """The largest real part of the roots of a factor, balls or series; None where they cannot be told apart."""
-    if len(factor) == 3:
-        _, b, c = factor
-        discriminant = b * b - 4 * c
-        return (discriminant.sqrt() - b) / 2 if _constant(discriminant) > 0 else -b / 2 + 0 * c
     constants = [_constant(c) for c in factor]
     own = factor_roots(constants)
     if own is None:
@@ -106,20 +100,18 @@ def _rightmost(factor: Factor) -> Any:
         discriminant = b * b - 4 * c
         if not (discriminant > 0 or discriminant < 0):
             return (discriminant.nonnegative_part().sqrt() - b) / 2
-    own = factor_roots(factor)
-    if own is None:
-        return None
-    return reduce(lambda a, b: a.max(b), (z.re for z in own))
+    return _extreme(flint.arb.max, [z.re for z in factor_roots(factor) or ()])
+
+
+def _extreme(which: Callable[[Any, Any], Any], balls: Sequence[Any]) -> Any:
+    """The greatest or the least ball; None for none, or where one is not known."""
+    return reduce(which, balls) if balls and None not in balls else None
 
 
 def _ratio(root: Enclosed) -> Any:
     if root.real:
         return flint.arb(1) if root.re < 0 else flint.arb(-1) if root.re > 0 else None
     return -root.re / (root.re * root.re + root.im * root.im).sqrt()
-
-
-def _all_positive(quantities: Iterable[Any]) -> bool | None:
-    return _every([True if q > 0 else False if q <= 0 else None for q in quantities])
 
 
 def _every(signs: Sequence[bool | None]) -> bool | None:
