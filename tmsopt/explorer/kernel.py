@@ -11,6 +11,7 @@ from typing import Any
 from tmsopt.algebra.formula import made, trace
 from tmsopt.explorer.javascript import function
 from tmsopt.roots import lienard_chipart
+from tmsopt.roots.numeric import GOOD
 from tmsopt.roots.quartics import factors, quartic, signs
 
 _QUARTIC = 4
@@ -33,7 +34,7 @@ def kernel_script(degree: int) -> str:
     if degree < _QUARTIC:
         parts.append(_traced("stableBySigns", a, lambda *c: [_stable(c)]))
     if degree == _QUARTIC:
-        rules = f"good: {quartic.GOOD}, accepted: {quartic.ACCEPTED}, steps: {quartic.STEPS}"
+        rules = f"good: {GOOD}, accepted: {quartic.ACCEPTED}, steps: {quartic.STEPS}"
         b = ["b1", "b2", "b3", "b4", "p1", "q1", "p2", "q2"]
         parts += [
             f"const QUARTIC = {{{rules}}};",

@@ -4,13 +4,19 @@ Next to a k-fold root each single root is uncertain by the k-th root of the roun
 together, by the coefficients that they rebuild.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.records import Array
 from tmsopt.roots.exact import isolated_roots
 
-_POLISHED = 4e-15  # backward error below which more Newton steps are not worth their time
+Rows = Callable[[Array, NDArray[np.intp]], Array]
+
+GOOD = 4e-15
+"""Backward error below which a Newton step is not worth its time."""
+
 _LEAST = 1e-300  # of the largest coefficient, for a leading one: the quotient of the two must be a double
 _STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more
 _JOINT = 1e-13  # backward error above which the roots are isolated exactly; seen for roots of very different size
@@ -42,8 +48,15 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
         scale = _scale(monic)
         scaled = monic / scale[:, None] ** np.arange(n + 1)
         factors = _factors(_companion_eigenvalues(scaled))
-        found, error = _newton(factors, scaled)
-        found = found * scale[:, None]
+        error = backward_error(scaled, _factor_roots(factors)[:, :n])
+        polish(
+            factors,
+            error,
+            lambda some, rows: some + _newton_step(some, scaled[rows]),
+            lambda some, rows: backward_error(scaled[rows], _factor_roots(some)[:, :n]),
+            _STEPS,
+        )
+        found = _factor_roots(factors)[:, :n] * scale[:, None]
     clamped = (np.abs(c[..., 0]) < least).reshape(-1)
     for row in np.flatnonzero(clamped | ~(error <= _JOINT)):
         found[row] = _isolated(c.reshape(-1, n + 1)[row], found[row])
@@ -144,24 +157,22 @@ def _isolated(coefficients: Array, found: NDArray[np.complex128]) -> NDArray[np.
     return exact if exact.shape == found.shape and np.all(np.isfinite(exact)) else found
 
 
-def _newton(factors: Array, monic: Array) -> tuple[NDArray[np.complex128], Array]:
-    """Roots by Newton's method on the factor coefficients, on the rows that need it; with the backward errors left."""
-    n = monic.shape[-1] - 1
-    found = _factor_roots(factors)[:, :n]
-    error = backward_error(monic, found)
-    for _ in range(_STEPS):
-        rows = np.flatnonzero(error > _POLISHED)
+def polish(found: Array, error: Array, step: Rows, judge: Rows, steps: int) -> None:
+    """Newton steps along the first axis, in place, where the backward error is not good and as long as it falls.
+
+    Args:
+        step, judge: what a step makes of some rows, by their numbers, and its backward errors.
+    """
+    rows = np.flatnonzero(error > GOOD)
+    for _ in range(steps):
         if not rows.size:
             break
-        trial = factors[rows] + _newton_step(factors[rows], monic[rows])
-        moved = _factor_roots(trial)[:, :n]
-        trial_error = backward_error(monic[rows], moved)
-        better = trial_error < error[rows]
-        if not better.any():
-            break
-        factors[rows[better]], found[rows[better]] = trial[better], moved[better]
-        error[rows[better]] = trial_error[better]
-    return found, error
+        trial = step(found[rows], rows)
+        left = judge(trial, rows)
+        better = left < error[rows]
+        rows, left = rows[better], left[better]
+        found[rows], error[rows] = trial[better], left
+        rows = rows[left > GOOD]
 
 
 def _newton_step(factors: Array, monic: Array) -> Array:

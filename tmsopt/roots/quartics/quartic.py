@@ -14,13 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.deprecated import ignore_option
 from tmsopt.records import Array
-from tmsopt.roots.numeric import roots
+from tmsopt.roots.numeric import GOOD, polish, roots
 from tmsopt.roots.quartics import factors
 
 _BLOCK = 2**14  # numbers of an array that stay in the cache between two operations
 
-GOOD = 4e-15
-"""Backward error below which a Newton step is not worth its time."""
 ACCEPTED = 5e-14
 """Backward error above which companion eigenvalues are taken."""
 STEPS = 4
@@ -156,16 +154,15 @@ def _fill(results: Sequence[Array], a: Sequence[Array], finish: Callable[..., tu
     return fallbacks
 
 
-def _polish(monic: Array, found: Array, error: Array) -> None:
-    """Newton steps on the columns that need them, in place, while the error falls."""
-    rows = np.flatnonzero(error > GOOD)
-    for _ in range(STEPS):
-        trial = np.stack(factors.newton(*monic[:, rows], *found[:, rows]))
-        left = factors.error(*monic[:, rows], *trial)
-        better = left < error[rows]
-        rows, left = rows[better], left[better]
-        found[:, rows], error[rows] = trial[:, better], left
-        rows = rows[left > GOOD]
+def _polish(b: Array, found: Array, error: Array) -> None:
+    """Newton steps on the columns that need them, in place."""
+    polish(
+        found.T,
+        error,
+        lambda some, rows: np.stack(factors.newton(*b[:, rows], *some.T), axis=1),
+        lambda some, rows: np.asarray(factors.error(*b[:, rows], *some.T)),
+        STEPS,
+    )
 
 
 def _factors_by_eigenvalues(c: Array) -> tuple[Array, NDArray[np.int_], int]:
