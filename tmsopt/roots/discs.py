@@ -80,7 +80,8 @@ def enclose_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motion
     n = len(a) - 1
     fit = np.isfinite(a).all(axis=0) & np.isfinite(off).all(axis=0)
     fit &= (np.abs(a[0]) > 2 * off[0]) & (np.abs(a[0]) * _LARGEST > np.abs(a).max(axis=0))
-    z = _numeric(np.where(fit, a, (np.arange(n + 1) % n == 0)[:, None] * 1.0))
+    told = np.where(fit, a, (np.arange(n + 1) % n == 0)[:, None] * 1.0)
+    z = np.ascontiguousarray((quartic_factors(*told).roots if n == 4 else roots(told.T)).T)
     size = np.abs(z)
     reach = np.maximum(size, _FLOOR * np.median(size, axis=0))
     moved = np.stack([np.prod(size[i] + reach, axis=0) for i in range(n)])
@@ -96,12 +97,6 @@ def enclose_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motion
     ratio, certain = _damping_ratio(z, error, size)
     abscissa = Bounded(right.real + 0.0, error[top, rows])
     return Motions(abscissa, ratio, z.imag.max(axis=0), right.imag != 0, error.max(axis=0), simple & certain)
-
-
-def _numeric(a: Array) -> Complex:
-    """Roots, shape (n, m)."""
-    found = quartic_factors(*a).roots if len(a) == 5 else roots(a.T)
-    return np.ascontiguousarray(found.T)
 
 
 def _damping_ratio(z: Complex, error: Array, size: Array) -> tuple[Bounded, Truth]:

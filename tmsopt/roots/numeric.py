@@ -47,7 +47,10 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
         monic[:, 0] = 1
         scale = _scale(monic)
         scaled = monic / scale[:, None] ** np.arange(n + 1)
-        factors = _factors(_companion_eigenvalues(scaled))
+        companion = np.zeros((len(scaled), n, n))
+        companion[:, 0, :] = -scaled[:, 1:]
+        companion[:, np.arange(1, n), np.arange(n - 1)] = 1
+        factors = _factors(np.linalg.eigvals(companion).astype(complex))
         error = backward_error(scaled, _factor_roots(factors)[:, :n])
         polish(
             factors,
@@ -129,14 +132,6 @@ def _scale(monic: Array) -> Array:
     powers = np.abs(monic[:, 1:]) ** (1 / np.arange(1, n + 1))
     scale = np.where(powers[:, -1] > 0, powers[:, -1], powers.max(axis=-1))
     return np.where(scale**n > 0, scale, 1.0)  # whose power may be, as well
-
-
-def _companion_eigenvalues(monic: Array) -> NDArray[np.complex128]:
-    n = monic.shape[-1] - 1
-    companion = np.zeros((len(monic), n, n))
-    companion[:, 0, :] = -monic[:, 1:]
-    companion[:, np.arange(1, n), np.arange(n - 1)] = 1
-    return np.linalg.eigvals(companion).astype(complex)
 
 
 def _factors(values: NDArray[np.complex128]) -> Array:

@@ -101,14 +101,11 @@ def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
             if all(isinstance(x, int) and x == 0 for x in row[j]):
                 continue
             term = product(row[j], minor(columns[:k] + columns[k + 1 :]))
-            total = _sum(total, term if k % 2 == 0 else [-t for t in term])
+            signed = term if k % 2 == 0 else [-t for t in term]
+            total = [x + y for x, y in zip_longest(reversed(total), reversed(signed), fillvalue=0)][::-1]
         return total
 
     return minor(tuple(range(len(matrix))))
-
-
-def _sum(a: Coefficients, b: Coefficients) -> list[Any]:
-    return [x + y for x, y in zip_longest(reversed(a), reversed(b), fillvalue=0)][::-1]
 
 
 def characteristic_polynomial(A: Sequence[Sequence[Any]]) -> list[Any]:

@@ -135,6 +135,7 @@ def _by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
     return np.asarray(stable.reshape(c.shape[:-1]))
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def discriminant(coefficients: Coefficients) -> Any:
     """Discriminant of a polynomial of degree 2 or more, any numbers: zero exactly where two roots coincide.
 
@@ -151,12 +152,7 @@ def discriminant(coefficients: Coefficients) -> Any:
 
     More: docs/explanation/exceptional_points.md
     """
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _discriminant(list(coefficients))
-
-
-def _discriminant(coefficients: list[Any]) -> Any:
-    match coefficients:
+    match list(coefficients):
         case [a, b, c]:
             return b * b - 4 * a * c
         case [a, b, c, d]:
@@ -165,13 +161,12 @@ def _discriminant(coefficients: list[Any]) -> Any:
             i = 12 * a * e - 3 * b * d + c * c
             j = 72 * a * c * e + 9 * b * c * d - 27 * a * d * d - 27 * e * b * b - 2 * c * c * c
             return (4 * i * i * i - j * j) / 27
-        case [_, _, _, *_]:
-            return _bezout_discriminant(coefficients)
-        case other:
-            raise ValueError(f"discriminant takes a polynomial of degree 2 or more, not {len(other) - 1}")
+    if len(coefficients) < 3:
+        raise ValueError(f"discriminant takes a polynomial of degree 2 or more, not {len(coefficients) - 1}")
+    return _bezout_discriminant(coefficients)
 
 
-def _bezout_discriminant(c: list[Any]) -> Any:
+def _bezout_discriminant(c: Coefficients) -> Any:
     n = len(c) - 1
     slope = [(n - k) * c[k] for k in range(n)][::-1]  # ascending, as Bézout's matrix has it
     other = [(k + 1) * c[k + 1] for k in range(n)][::-1]

@@ -62,17 +62,12 @@ def composition(name: str) -> list[tuple[str, int, int]]:
 @cache
 def _pattern(name: str, degree: int) -> Pattern:
     groups = parts_of(name)
-    canonical = _joined(name)
-    taken = sum(g.roots for g in groups)
-    if taken > degree:
-        raise ValueError(f"'{name}' takes {taken} roots, and the polynomial has {degree}")
-    return replace(_composed(canonical, groups, degree), **(QUARTIC.get(canonical, {}) if degree == 4 else {}))
-
-
-def _composed(name: str, groups: tuple[Part, ...], degree: int) -> Pattern:
+    others = degree - sum(g.roots for g in groups)
+    if others < 0:
+        raise ValueError(f"'{name}' takes {degree - others} roots, and the polynomial has {degree}")
+    name = _joined(name)
     tied = [u for g in groups for u in g.unknowns]
     names = [f"{u}{tied[: k + 1].count(u)}" if tied.count(u) > 1 else u for k, u in enumerate(tied)]
-    others = degree - sum(g.roots for g in groups)
     rest = [f"{'d' if 'c' in tied else 'c'}{k}" for k in range(1, others + 1)]
     starts = accumulate((len(g.unknowns) for g in groups), initial=0)
     placed = [(g, slice(at, at + len(g.unknowns))) for g, at in zip(groups, starts, strict=False)]
@@ -81,7 +76,7 @@ def _composed(name: str, groups: tuple[Part, ...], degree: int) -> Pattern:
         remainder = [[1, *u[len(tied) :]]] if others else []
         return [f for g, s in placed if g.kind not in without for f in g.factors(u[s])] + remainder
 
-    return Pattern(
+    made = Pattern(
         name=name,
         meaning=" and ".join(g.meaning for g in groups) + (" beside other roots" if others else ""),
         unknowns=(*names, *rest),
@@ -95,6 +90,7 @@ def _composed(name: str, groups: tuple[Part, ...], degree: int) -> Pattern:
         ends={u: ENDS[g.kind] for g in groups for u in g.unknowns if u == "W"} if "W" in names else {},
         degree=degree,
     )
+    return replace(made, **(QUARTIC.get(name, {}) if degree == 4 else {}))
 
 
 _ABSCISSAE: Mapping[tuple[str, int], Any] = {("EP", 1): lambda u: u[0], ("CEP", 1): lambda u: -u[0] / 2}

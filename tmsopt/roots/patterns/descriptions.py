@@ -7,18 +7,13 @@ from tmsopt.roots.patterns.parts import NUMBERS, several, times
 
 STRUCTURES = {
     "EP4": "four roots meet in one (EP4)",
-    "EP3": "the three rightmost roots meet in one (EP3)",
     "2EP2": "the roots meet two by two in two real ones (2EP2)",
-    "CEP2": "two complex pairs meet in one (CEP2)",
     "EP2": "the two rightmost roots meet in a real one (EP2)",
-    "EP2+pair": "a real double root and a complex pair have one decay rate (EP2+pair)",
-    "pair+real": "a complex pair and a real root have one decay rate (pair+real)",
-    "two pairs": "two complex pairs have one decay rate (two pairs)",
     "pair": "one complex pair is rightmost (pair)",
     "real": "one real root is rightmost (real)",
     "undecided": "double precision cannot tell which roots meet (undecided)",
 }
-"""Each structure of a quartic."""
+"""Structures of a quartic with words of their own."""
 
 _PART = re.compile(r"(?P<count>\d*)(?P<kind>C?EP)(?P<order>\d+)|(?P<pairs>\w+) pairs|(?P<simple>pair|real)")
 

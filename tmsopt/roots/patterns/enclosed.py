@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_EVEN, Context, Decimal
+from itertools import combinations
 from typing import Any
 
 import flint
@@ -73,7 +74,8 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
             distance = (degree * abs(evaluate(terms, middle) / evaluate(slope, middle))).upper()
             ball = flint.arb(0, distance)
             found.append(Enclosed(z.real.mid() + ball, flint.arb(0) if z.imag == 0 else z.imag.mid() + ball))
-    if not all(a.re.is_finite() and a.im.is_finite() for a in found) or _overlap(found):
+    balls = [flint.acb(root.re, root.im) for root in found]
+    if not all(a.is_finite() for a in balls) or any(a.overlaps(b) for a, b in combinations(balls, 2)):
         return None
     return rightmost_first(found)
 
@@ -166,11 +168,6 @@ def _double(x: flint.fmpq) -> float:
         return int(x.p) / int(x.q)  # rounded correctly, whatever the length of the two
     except OverflowError:
         return float("inf") if x > 0 else float("-inf")
-
-
-def _overlap(found: Sequence[Enclosed]) -> bool:
-    balls = [flint.acb(root.re, root.im) for root in found]
-    return any(a.overlaps(b) for k, a in enumerate(balls) for b in balls[:k])
 
 
 def _roots_of(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:

@@ -185,7 +185,7 @@ def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
 def _named(fit: Fit, found: Roots, unit: float) -> Structure:
     """The structure of a fit, in the unit of the polynomial."""
     if not fit.shape.groups:
-        return Structure(_simple_name(found), _simple(found), 0.0)
+        return Structure("pair" if found[np.argmax(found.real)].imag else "real", _simple(found), 0.0)
     each = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
     each += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
     right = max(z.real for z, _ in each)
@@ -204,10 +204,6 @@ def _line_name(line: Sequence[Group]) -> str:
     """Name of the roots and pairs on a vertical line."""
     multiple = sorted((g.multiplicity, g.real) for g in line if g.multiplicity > 1)
     return with_simple((f"EP{m}" if real else f"CEP{m}" for m, real in reversed(multiple)), line)
-
-
-def _simple_name(found: Roots) -> str:
-    return "pair" if found[np.argmax(found.real)].imag else "real"
 
 
 def _simple(found: Roots) -> tuple[Root, ...]:
