@@ -165,9 +165,10 @@ class _Run:
         if any(_inside(image, other.near) for other in known):
             return False
         zero = _zero(sheet, image)
-        if zero is None or not _within(zero.enclosure.balls, sheet.names, wide):
+        at = [(zero.enclosure.balls[n],) * 2 for n in sheet.names] if zero else []
+        if zero is None or not _inside(at, wide):
             return True
-        if not any(_within(zero.enclosure.balls, sheet.names, other.near) for other in known):
+        if not any(_inside(at, other.near) for other in known):
             known.append(zero)
         return False
 
@@ -212,7 +213,7 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     Raises:
         NotAccepted: for equations that branch and prune cannot take.
     """
-    box = tuple(_range(ends) for ends in _ends(sheet))
+    box = tuple((ends(lo)[0], ends(hi)[1]) for lo, hi in _ends(sheet))
     names = {n: symbol(n) for n in sheet.names}
     limits = [*fold(sheet.nonnegative, names, NODES), *fold(sheet.ascending, names, NODES)]
     for name, limit in sheet.limits.items():
@@ -221,12 +222,8 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     equations, more, limited = (
         prepared(multiplied_out(asked)) for asked in (sheet.equations, sheet.shared, formula(limits, sheet.names))
     )
-    widths = tuple(_width(*ends) for ends in box)
+    widths = tuple(hi - lo if math.isfinite(hi - lo) else 1.0 for lo, hi in box)
     return Puzzle(equations, limited, widths, more), box
-
-
-def _width(lo: float, hi: float) -> float:
-    return hi - lo if math.isfinite(hi - lo) else 1.0
 
 
 def _ends(sheet: Sheet) -> list[tuple[Any, Any]]:
@@ -236,16 +233,8 @@ def _ends(sheet: Sheet) -> list[tuple[Any, Any]]:
     for name, (least, greatest) in problem.free.items():
         lo, hi = (flint.arb(problem.exactly({name: end})[name]) for end in (least, greatest))
         found.append((lo.tan(), hi.tan()) if problem.parameter_set[name].tangent else (lo, hi))
-    for low, high in [(q.range.lower, q.range.upper) for q in sheet.lifted] + [
-        r for p in sheet.pieces for r in p.ranges
-    ]:
-        found.append((flint.arb(low), flint.arb(high)))
-    return found
-
-
-def _range(limits: tuple[Any, Any]) -> Ends:
-    lo, hi = (ends(x) if x.is_finite() else (float(x), float(x)) for x in limits)
-    return lo[0], hi[1]
+    plain = [(q.range.lower, q.range.upper) for q in sheet.lifted] + [r for p in sheet.pieces for r in p.ranges]
+    return found + [(flint.arb(low), flint.arb(high)) for low, high in plain]
 
 
 def _zero(sheet: Sheet, box: Box) -> _Zero | None:
@@ -268,12 +257,9 @@ def _box(own: Array) -> Box:
     return tuple(zip(*own.tolist(), strict=True))
 
 
-def _inside(box: Box, other: Box) -> bool:
+def _inside(box: Sequence[tuple[Any, Any]], other: Box) -> bool:
+    """Whether a box is in another for certain; balls are their own ends."""
     return all(lo > low and hi < high for (lo, hi), (low, high) in zip(box, other, strict=True))
-
-
-def _within(balls: Mapping[str, Any], names: Sequence[str], box: Box) -> bool:
-    return all(balls[n] > lo and balls[n] < hi for n, (lo, hi) in zip(names, box, strict=True))
 
 
 def _standing(zero: _Zero) -> str | None:
@@ -306,20 +292,23 @@ def _met(problem: Posed, condition: Expression, at: Mapping[str, Any]) -> bool:
 
 def _places(problem: Posed, left: Iterable[tuple[Box, str]]) -> list[tuple[Box, str]]:
     """Hulls in the free parameters of boxes that touch."""
-    count = len(problem.free)
     places: list[tuple[Box, str]] = []
     for box, reason in left:
-        own, rest = box[:count], []
+        own, rest = box[: len(problem.free)], []
         for other, why in places:
             if why == reason and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(own, other, strict=True)):
-                own = tuple((min(a[0], b[0]), max(a[1], b[1])) for a, b in zip(own, other, strict=True))
+                own = _hull([own, other])
             else:
                 rest.append((other, why))
         places = [*rest, (own, reason)]
     if len(places) > _SAID:
-        hull = tuple((min(p[0][k][0] for p in places), max(p[0][k][1] for p in places)) for k in range(count))
-        return [(hull, "; ".join(dict.fromkeys(why for _, why in places)))]
+        return [(_hull([own for own, _ in places]), "; ".join(dict.fromkeys(why for _, why in places)))]
     return places
+
+
+def _hull(boxes: Sequence[Box]) -> Box:
+    """The least box around boxes."""
+    return tuple((min(ends)[0], max(hi for _, hi in ends)) for ends in zip(*boxes, strict=True))
 
 
 def _ranges(problem: Posed, box: Box) -> Table[Ends]:

@@ -75,7 +75,12 @@ def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lift
     """Every root of every case at or left of a line: a known one, or a variable."""
     first, covered, values = len(build.x), build.covered, build.values
     looked = [case for case in covered if case in frame.signs]
-    at = build.variable("abscissa", *_reach(frame, build, looked)) if line is None else line
+    at: Any = line
+    if line is None:  # it is no larger than the largest root, unless that is one of a case not looked at
+        most = frame.unit * max(
+            frame.largest(build.over(frame.coefficients(values, case)), case == looked[0]) for case in looked
+        )
+        at = build.variable("abscissa", -most, most if len(values) == 1 or not frame.touching else math.inf)
     for case in looked:
         c = frame.about(values, case, at)
         edges = interlace(build, case, c, frame.largest(build.over(c), case == covered[0]), frame.compact)
@@ -83,15 +88,6 @@ def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lift
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
     guess = partial(_half_plane_guess, frame, looked, line)
     return Lifted(constant(at), AddedVariable("abscissa", len(build.x) - first, guess), (), ())
-
-
-def _reach(frame: Frame, build: Builder, looked: Sequence[int]) -> tuple[float, float]:
-    """Range of the abscissa: it is no larger than the largest root, unless that is one of a case not looked at."""
-    most = max(
-        frame.unit * frame.largest(build.over(frame.coefficients(build.values, case)), case == looked[0])
-        for case in looked
-    )
-    return -most, most if len(build.values) == 1 or not frame.touching else math.inf
 
 
 def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:

@@ -75,12 +75,12 @@ def interlace(build: Rows, case: int, coefficients: Sequence[Any], largest: floa
 
 def squares_of(coefficients: Sequence[float]) -> list[float]:
     """Squared frequencies for known coefficients that interlace best."""
-    return min(_candidates(coefficients), key=lambda squares: _violation(coefficients, squares))
 
+    def violation(squares: Sequence[float]) -> float:
+        equations, nonnegative = interlacing(coefficients, [(x, 1.0) for x in squares])
+        return float(max(*map(abs, equations), *(-e for e in nonnegative), 0.0))
 
-def _violation(coefficients: Sequence[float], squares: Sequence[float]) -> float:
-    equations, nonnegative = interlacing(coefficients, [(x, 1.0) for x in squares])
-    return float(max(*map(abs, equations), *(-e for e in nonnegative), 0.0))
+    return min(_candidates(coefficients), key=violation)
 
 
 def _candidates(coefficients: Sequence[float]) -> Iterator[list[float]]:

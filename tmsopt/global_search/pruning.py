@@ -131,7 +131,9 @@ def _newton(puzzle: Puzzle, x: Array) -> tuple[Array, Array, Truth, Array]:
     wide = np.stack([x[0] - room, x[1] + room])
     middle = (wide[0] + wide[1]) / 2
     reach = np.maximum(wide[1] - middle, middle - wide[0]) * (1 + UNIT) + _TINY
-    values = _outputs(puzzle.equations, _forward(puzzle.equations, np.stack([middle, middle])), middle)[:, :, None]
+    found = _forward(puzzle.equations, np.stack([middle, middle]))
+    outputs = [np.broadcast_to(found[o], wide[:, 0].shape) for o in puzzle.equations.outputs]
+    values = np.stack(outputs, axis=1)[:, :, None]
     slopes = _slopes(puzzle.equations, wide)
     centre = np.moveaxis((slopes[0] + slopes[1]) / 2, -1, 0)
     size = np.linalg.det(centre)
@@ -352,14 +354,6 @@ def _forward(asked: Formula, x: Array) -> list[Array]:
 @lru_cache(maxsize=4096)
 def _enclosed(value: Constant) -> Array:
     return np.array(ends(as_exact(value)))[:, None]
-
-
-def _outputs(asked: Formula, found: Sequence[Any], like: Array) -> Array:
-    """Outputs among the steps, of one shape, with the ends first."""
-    each = [
-        np.broadcast_to(found[o], (2, *np.broadcast_shapes(found[o].shape[1:], like.shape[-1:]))) for o in asked.outputs
-    ]
-    return np.stack(each, axis=1)
 
 
 def _slopes(asked: Formula, x: Array) -> Array:

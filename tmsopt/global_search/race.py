@@ -54,7 +54,8 @@ class SolverPool:
             while waiting := [answer for answer in answers if not answer.done()]:
                 tick()
                 finished, _ = wait(waiting, _TICK, FIRST_COMPLETED)
-                if not finished and any(_shows_infeasible(answer) for answer in answers):
+                decided = (answer for answer in answers if answer.done() and not answer.exception())
+                if not finished and any(answer.result().verdict == INFEASIBLE for answer in decided):
                     break  # not before: one that is all but done is worth more than a new process
                 late = time.monotonic() - began - _GRACE
                 for task, (process, answer) in zip(tasks, running, strict=True):
@@ -67,10 +68,6 @@ class SolverPool:
                 else:
                     process.end()
         return _decisions(answers)
-
-
-def _shows_infeasible(answer: "Future[Decision]") -> bool:
-    return answer.done() and not answer.exception() and answer.result().verdict == INFEASIBLE
 
 
 def _decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:

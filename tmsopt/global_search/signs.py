@@ -1,7 +1,6 @@
 """No stable design, by signs: a polynomial has all roots left of the axis only where its coefficients have one sign."""
 
 from collections import deque
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,10 @@ def none_stable(problem: Posed) -> bool:
     if problem.cases or not problem.free:
         return False
     a = problem.model.coefficients(problem.ordered({n: symbol(n) for n in problem.free}), problem.parameter_set)
-    tests = formula([*a, *_determinants(a)], problem.free)
+    n = len(a) - 1
+    # Δ2 a0 of degree 3 and Δ3 of degree 4 have the coefficients' sign where all roots are left of the axis.
+    minors = [hurwitz_minors(a)[n - 2] * (a[0] if n == 3 else 1)] if n in (3, 4) else []
+    tests = formula([*a, *minors], problem.free)
     left = deque([[(lo, hi) for lo, hi in problem.free.values()]])
     widths = np.array([hi - lo for lo, hi in problem.free.values()])
     for _ in range(_BOXES):
@@ -40,12 +42,3 @@ def none_stable(problem: Posed) -> bool:
         middle = lo + (hi - lo) / 2
         left += [[*box[:k], part, *box[k + 1 :]] for part in ((lo, middle), (middle, hi))]
     return not left
-
-
-def _determinants(a: list[Any]) -> list[Any]:
-    """A Hurwitz determinant of degree 3 or 4 that has the coefficients' sign where all roots are left of the axis."""
-    n = len(a) - 1
-    if n not in (3, 4):
-        return []
-    minor = hurwitz_minors(a)[n - 2]
-    return [a[0] * minor if n == 3 else minor]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 from tmsopt.algebra.formula import NotAccepted
 from tmsopt.evaluation.recheck import Evaluation, recheck
@@ -20,6 +21,7 @@ SOLVER = SCIP
 
 _MARGIN = 1e-3  # of the roots' usual size: a design found left of it is stable for certain
 _SHARE = 0.7  # of the time, for the proof
+_ANY = partial(Answer, FOUND, None)  # whatever design the solver found ends the question
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,12 @@ def any_stable(
     with SolverPool(SOLVER) as crew:
         clock = Clock(seconds, crew, progress)
         try:
-            told = answer(at_axis, clock, _SHARE, _any)
+            told = answer(at_axis, clock, _SHARE, _ANY)
             proved = told.verdict == INFEASIBLE
             if proved and known is not None and not best.violations:
                 proved = _admits(at_axis, best, known, clock)
             if told.verdict == FOUND and _judged(asked, told.other).design is None:  # it is on the axis
-                told = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _any)
+                told = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _ANY)
         except NotAccepted:
             return Stability()
         except Failed as error:
@@ -85,11 +87,6 @@ def any_stable(
         raise KeyboardInterrupt
     by = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
     return Stability(False, proof=by) if proved else _judged(asked, told.other)
-
-
-def _any(design: Mapping[str, float]) -> Answer:
-    """Whatever the solver found ends the question."""
-    return Answer(FOUND, other=design)
 
 
 def _checked(problem: Posed, design: Mapping[str, float]) -> Evaluation:
