@@ -15,6 +15,7 @@ from helpers.javascript import run
 
 from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, Bounded, NotAccepted, fold
 from tmsopt.models import Values, controlled, from_coefficients, from_hamiltonian, from_matrices, tms, whipple
+from tmsopt.program import NLP
 
 formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))
 multiplied_out = import_module("tmsopt.algebra.identity").multiplied_out
@@ -23,6 +24,7 @@ pruning, translation = (import_module(f"tmsopt.global_search.{n}") for n in ("pr
 
 POINTS, FEW = 1000, 20
 COUNTS = (FEW, pytest.param(POINTS, marks=[pytest.mark.slow, pytest.mark.long]))
+NOTHING = NLP("test", (), formula([0], ()), {}, (), (), (), (), ())
 SHORT = 60  # steps of what is multiplied out
 
 GAINS = ("k_phi", "k_phidot_v", "k_deltadot", "lag")
@@ -132,7 +134,7 @@ def test_intervals_scip_and_fractions_hold_the_ball(name, of, count):
     exact, met = balls(own, columns, count), dict.fromkeys(("intervals", "scip", "fractions"), 0)
     pytest.importorskip("pyscipopt")
     for k in range(len(own.outputs)):
-        part, built = own.part([own.outputs[k]]), translation._Translation()
+        part, built = own.part([own.outputs[k]]), translation.Translation(NOTHING)
         for j in range(count):
             point = {n: float(x[j]) for n, x in columns.items()}
             for kind in met if exact[j][k].is_finite() else ():

@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
-from tmsopt.global_search.translation import FEASIBILITY, translate
+from tmsopt.global_search.translation import FEASIBILITY, Translation
 
 _LEAST = 0.01  # seconds
 _MARGIN = 1e-6  # relative, for what tolerances do to a bound
@@ -24,13 +24,13 @@ def decide(asked: Task) -> Decision:
         NotAccepted: for an operation that cannot be written for SCIP.
     """
     began = time.perf_counter()
-    translated = translate(asked.nlp)
+    translated = Translation(asked.nlp)
     if translated.impossible:
         return Decision(INFEASIBLE, bound=math.inf)
     model = translated.model
-    for (symbol, scale), (lower, upper) in zip(translated.variables, asked.within, strict=False):
-        model.chgVarLb(symbol, lower / scale)
-        model.chgVarUb(symbol, upper / scale)
+    for x, (lower, upper) in zip(translated.x, asked.within, strict=False):
+        model.chgVarLb(x.symbol, lower / x.scale)
+        model.chgVarUb(x.symbol, upper / x.scale)
     if asked.least:
         model.setObjective(translated.objective)
     else:
@@ -39,7 +39,7 @@ def decide(asked: Task) -> Decision:
     model.setParam("numerics/feastol", FEASIBILITY)
     model.optimizeNogil()  # other threads of the process may see that there is nobody left to answer to
     status, found = model.getStatus(), model.getNSols() > 0
-    point = np.array([model.getVal(symbol) * scale for symbol, scale in translated.variables]) if found else None
+    point = np.array([model.getVal(x.symbol) * x.scale for x in translated.x]) if found else None
     bound = float(model.getDualbound())
     return Decision(
         verdict=INFEASIBLE if status == "infeasible" else FOUND if found else UNDECIDED,

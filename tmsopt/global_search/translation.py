@@ -32,38 +32,6 @@ _CANCELLED = 2.0**-10
 
 
 @dataclass(frozen=True)
-class Translated:
-    """An NLP as a SCIP model.
-
-    Attributes:
-        model: of pyscipopt; its objective is not set.
-        variables: SCIP's variable for each of the NLP's, and what it is to be multiplied by.
-        objective: expression to minimise.
-        impossible: whether a row without any variable is violated.
-    """
-
-    model: Any
-    variables: tuple[tuple[Any, float], ...]
-    objective: Any
-    impossible: bool
-
-
-def translate(nlp: NLP) -> Translated:
-    """The SCIP model of an NLP.
-
-    Raises:
-        NotAccepted: for an operation that cannot be written for SCIP.
-    """
-    built = _Translation()
-    x = [built.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
-    objective, *rows = nlp.fold(x, built.kind(), built.variable)
-    for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
-        built.between(row, lower, upper)
-    least = built.variable(objective).expression
-    return Translated(built.scip, tuple((v.symbol, v.scale) for v in x), least, built.impossible)
-
-
-@dataclass(frozen=True)
 class Term:
     """A result on the way: an expression of SCIP with its degree and range.
 
@@ -94,25 +62,42 @@ class Term:
         return max(_scale_of(max(map(abs, self.ends))), min(_CANCELLED * _scale_of(self.size), 1.0))
 
 
-class _Translation:
-    """Collects variables and rows of a SCIP model; discarded once it is solved."""
+class Translation:
+    """The SCIP model of an NLP; discarded once it is solved.
 
-    def __init__(self) -> None:
+    Attributes:
+        model: of pyscipopt; its objective is not set.
+        x: the variables of the NLP, each a variable of SCIP times its scale.
+        objective: expression to minimise.
+        impossible: whether a row without any variable is violated.
+    """
+
+    def __init__(self, nlp: NLP) -> None:
+        """Translate an NLP.
+
+        Raises:
+            NotAccepted: for an operation that cannot be written for SCIP.
+        """
         import pyscipopt
 
         self.functions = pyscipopt
-        self.scip = pyscipopt.Model()
-        self.scip.hideOutput()
+        self.model = pyscipopt.Model()
+        self.model.hideOutput()
         self.count = 0
         self.impossible = False
         self.known: dict[tuple[str, int], tuple[Term, Any]] = {}
+        self.x = [self.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
+        objective, *rows = nlp.fold(self.x, self.kind(), self.variable)
+        for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
+            self.between(row, lower, upper)
+        self.objective = self.variable(objective).expression
 
     def free(self, lower: float, upper: float, over: Any = None) -> Term:
         """A variable, scaled by a power of two to about 1."""
         scale = _scale_of(max(abs(lower), abs(upper)))
         ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
         self.count += 1
-        symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
+        symbol = self.model.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
         over = ball((lower, upper)) if over is None else over
         return Term(scale * symbol, 1, over, max(abs(lower), abs(upper)), symbol=symbol, scale=scale)
 
@@ -140,7 +125,7 @@ class _Translation:
 
     def equal(self, left: Any, right: Any, size: float = 1.0) -> None:
         """An equation between expressions about as large as `size`."""
-        self.scip.addCons(left / size == right / size)
+        self.model.addCons(left / size == right / size)
 
     def between(self, term: Term, lower: float, upper: float) -> None:
         """A row, scaled to about 1."""
@@ -151,9 +136,9 @@ class _Translation:
         if lower == upper:
             return self.equal(term.expression, lower, size)
         if math.isfinite(lower):
-            self.scip.addCons(term.expression / size >= lower / size)
+            self.model.addCons(term.expression / size >= lower / size)
         if math.isfinite(upper):
-            self.scip.addCons(term.expression / size <= upper / size)
+            self.model.addCons(term.expression / size <= upper / size)
 
     def kind(self) -> Kind:
         """Terms as numbers of a formula."""
