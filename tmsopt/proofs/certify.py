@@ -15,7 +15,6 @@ from tmsopt.global_search.stability import SOLVER
 from tmsopt.global_search.tasks import INFEASIBLE, Failed
 from tmsopt.problem.cases import Case
 from tmsopt.problem.files import Given, as_solvable
-from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.program.formulate import Builder
@@ -168,17 +167,11 @@ def _known(design: Solution) -> Bound:
     if design.problem.posed.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
         gap = max(1.0 - design.value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
-    if _is_frequency(design.problem.posed):
+    found, asked = design.problem.posed.objective, (design.problem.minimize or "").strip()
+    if asked in (ANGULAR_FREQUENCY, "frequency") and found and ANGULAR_FREQUENCY in found.names:  # no name of a model's
         return Bound(0.0, design.value, design.value == 0, "definition")
     bound = instant_bound(design.problem.posed, design.value)
     return bound if math.isfinite(bound.value) else _over_the_box(design)
-
-
-def _is_frequency(problem: Posed) -> bool:
-    """Whether the least frequency is asked for, which is no name of a model's own."""
-    found = problem.objective
-    named = (problem.minimize or "").strip() in (ANGULAR_FREQUENCY, "frequency")
-    return named and found is not None and ANGULAR_FREQUENCY in found.names
 
 
 def _over_the_box(design: Solution) -> Bound:

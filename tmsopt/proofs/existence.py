@@ -93,7 +93,7 @@ def beside(problem: Posed, pattern: Pattern, design: Written, stored: Mapping[st
 def _beside(system: Equations, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
     problem, pattern = system.problem, system.pattern
     held = _numbers(problem, design)
-    free = [n for n in problem.free if n not in {_name(s) for s in design.stated}]
+    free = [n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.stated}]
     reasons: list[str] = []
     for among in _choices(problem, stored, free, system.conditions):
         for unknowns in _starts(system, held, problem):
@@ -243,8 +243,3 @@ def _numbers(problem: Posed, design: Written) -> dict[str, Any]:
         n: design.tangents[n].ball() if n in design.tangents else numbers[n].tan() if of[n].tangent else numbers[n]
         for n in of.names
     }
-
-
-def _name(stated: str) -> str:
-    """The parameter of ``tan(parameter)``."""
-    return stated.removeprefix("tan(").removesuffix(")")

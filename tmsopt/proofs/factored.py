@@ -1,7 +1,7 @@
 """A polynomial as a product of factors in balls: its roots, whether it is stable, heavily damped, or has a pattern."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -149,9 +149,14 @@ def has_pattern(pattern: str, coefficients: Sequence[Any]) -> bool:
         return False
     found = _multiple(coefficients)
     kinds = {kind for kind, _, _ in wanted}
-    if "CEP" in kinds and kinds & {"weave", "resonance"} and _on_axis(coefficients, twice=True):
+    held = {
+        "capsize": coefficients[-1] == 0,
+        "weave": _on_axis(coefficients, 1),
+        "resonance": _on_axis(coefficients, 2),
+    }
+    if "CEP" in kinds and kinds & {"weave", "resonance"} and held["resonance"]:
         return False  # one double pair on the axis might count for both
-    return all(_has(kind, order, count, coefficients, found) for kind, order, count in wanted)
+    return all(held.get(kind, found[kind, order] == count) for kind, order, count in wanted)
 
 
 def multiple_roots(coefficients: Sequence[Any]) -> str:
@@ -160,14 +165,6 @@ def multiple_roots(coefficients: Sequence[Any]) -> str:
         return ""
     found = sorted(_multiple(coefficients).items(), key=lambda item: (item[0][0] != "EP", -item[0][1]))
     return "+".join(f"{count if count > 1 else ''}{kind}{order}" for (kind, order), count in found)
-
-
-def _has(kind: str, order: int, count: int, coefficients: Sequence[Any], found: Mapping[tuple[str, int], int]) -> bool:
-    if kind == "capsize":
-        return bool(coefficients[-1] == 0)
-    if kind in ("weave", "resonance"):
-        return _on_axis(coefficients, twice=kind == "resonance")
-    return found.get((kind, order), 0) == count
 
 
 def _multiple(coefficients: Sequence[Any]) -> Counter[tuple[str, int]]:
@@ -180,8 +177,9 @@ def _multiple(coefficients: Sequence[Any]) -> Counter[tuple[str, int]]:
     return found
 
 
-def _on_axis(coefficients: Sequence[Any], twice: bool) -> bool:
+def _on_axis(coefficients: Sequence[Any], order: int) -> bool:
+    """Whether there is a pair on the imaginary axis, so often or more."""
     even, odd = (flint.fmpq_poly([(-1) ** k * c for k, c in enumerate(coefficients[::-1][i::2])]) for i in (0, 1))
     common = even if odd.is_zero() else even.gcd(odd)
-    parts = [part for part, m in common.factor()[1] if not twice or m >= 2]
+    parts = [part for part, m in common.factor()[1] if m >= order]
     return any(z.real and z.re > 0 for part in parts for z in factor_roots(_monic(part)) or ())

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
 import flint
@@ -97,11 +97,11 @@ class Proof(Printable):
     method: str = "none"
     digits: int = DIGITS
     stored: bool = False
-    parameters: Table[Number] = field(default_factory=Table)
-    tangents: Table[Number] = field(default_factory=Table)
-    unknowns: Table[Number] = field(default_factory=Table)
+    parameters: Table[Number] = Table()
+    tangents: Table[Number] = Table()
+    unknowns: Table[Number] = Table()
     moved: tuple[str, ...] = ()
-    held: Table[str] = field(default_factory=Table)
+    held: Table[str] = Table()
     stated: tuple[str, ...] = ()
     numbers: tuple[str, ...] = ()
     radius: float = math.nan
@@ -116,7 +116,7 @@ class Proof(Printable):
     stable: Verdict = NOTHING
     heavily_damped: Verdict = NOTHING
     inside: Verdict = NOTHING
-    limits: Table[str] = field(default_factory=Table)
+    limits: Table[str] = Table()
     seconds: float = 0.0
     problem: Problem | None = None
 
@@ -212,13 +212,10 @@ def prove_design(
     design = written(problem.parameter_set, varied, exact, typed)
     with flint.ctx.workdps(2 * digits + _EXTRA):
         patterns = _patterns(problem, structure, roots)
-        proof = _proved(_asked(problem, case), design, varied, structure, patterns, digits)
+        # Of one case alone: its constraints are those of the nominal design, or of every case.
+        asked = problem.nominal.derive(constraints={}) if case and (case.at or case.offset) else problem
+        proof = _proved(asked, design, varied, structure, patterns, digits)
         return replace(proof, problem=problem.problem, seconds=time.perf_counter() - began)
-
-
-def _asked(problem: Posed, case: Case | None) -> Posed:
-    """The problem about one case alone: its constraints are those of the nominal design, or of every case."""
-    return problem.nominal.derive(constraints={}) if case and (case.at or case.offset) else problem
 
 
 def _proved(
@@ -273,8 +270,8 @@ def _decided(problem: Posed, design: Written) -> list[Pattern]:
 
 def _of_simple(problem: Posed, structure: str, found: Existing) -> list[str]:
     """Why the structure of a design without multiple roots is not proved; nothing if it is."""
+    name = user_structure_name(problem.model, structure)
     if structure not in _SIMPLE:
-        name = user_structure_name(problem.model, structure)
         return [f"the structure is {name}: double precision cannot tell it; locate the pattern that is meant"]
     roots = found.factored.roots
     if roots is None:
@@ -282,9 +279,7 @@ def _of_simple(problem: Posed, structure: str, found: Existing) -> list[str]:
     rest = roots[1:] if roots[0].real else roots[2:]
     if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in rest):
         return []
-    return [
-        f"the rightmost root of the design as stored is not certainly a {user_structure_name(problem.model, structure)}"
-    ]
+    return [f"the rightmost root of the design as stored is not certainly a {name}"]
 
 
 def _assembled(
