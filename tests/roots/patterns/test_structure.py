@@ -14,7 +14,7 @@ from helpers.oracles import abscissa_60, certified_roots, exact_multiplicities, 
 from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
-from tmsopt.roots import PATTERNS, exact_abscissa, exact_roots, pattern_distance, product, structure
+from tmsopt.roots import PATTERNS, exact_abscissa, exact_roots, pattern, pattern_distance, product, structure
 
 I2 = [1, 2, 2]  # −1 ± i
 EXAMPLES = {
@@ -256,6 +256,10 @@ def test_members_of_a_pattern_are_at_distance_0(name, leading):
 def test_distance_to_capsize_is_the_whole_last_coefficient():
     """A root at 0 takes a4 = 0, a relative change of 1."""
     assert pattern_distance(PATTERNS["capsize"], product([1, 1], [1, 2], [1, 3], [1, 4])) == pytest.approx(1, rel=1e-12)
+
+
+def test_a_pattern_without_unknowns_has_a_distance():
+    assert pattern_distance(pattern("capsize", 1), [2.0, 1.0]) == 1.0
 
 
 def test_patterns_of_opposite_sign_are_told_apart():

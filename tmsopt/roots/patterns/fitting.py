@@ -57,6 +57,8 @@ def gauss_newton(form: Form, guess: Array, monic: Array, size: Array, patience: 
         patience: steps that may fail to bring the distance down by a tenth before the nearest so far is returned.
     """
     u = best = guess
+    if not guess.size:
+        return guess
     least, left = np.inf, patience
     directions = 1e-100j * np.eye(len(u))
     for _ in range(_STEPS):

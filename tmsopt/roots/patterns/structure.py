@@ -136,25 +136,35 @@ def pattern_distance(
     More: docs/explanation/factors.md
     """
     try:
-        c = _matching(pattern, coefficients)
+        fits, found = _fits(pattern, coefficients, off, tolerance)
     except ValueError:
         return float("inf")
+    least = -_CLOSED * np.abs(found).max() ** 2
+    inside = (distance for distance, u in fits if all(value >= least for value in pattern.nonnegative(u)))
+    return next(inside, float("inf"))
+
+
+def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[list[float]]:
+    """Unknowns of the polynomials of a pattern nearest to a given one, one for each guess, the nearest first."""
+    return [u for _, u in _fits(pattern, coefficients, None, 0.0)[0]]
+
+
+def _fits(
+    pattern: Pattern, coefficients: ArrayLike, off: ArrayLike | None, tolerance: float
+) -> tuple[list[tuple[float, list[float]]], Roots]:
+    """The distance and the unknowns that each guess leads to, the nearest first, and the roots.
+
+    Raises:
+        ValueError: for coefficients of another degree than the pattern's.
+    """
+    c = _checked(coefficients)
+    if len(c) - 1 != pattern.degree:
+        raise ValueError(f"found coefficients of degree {len(c) - 1}; accepted: those of degree {pattern.degree}")
     found = numeric_roots(c)
     monic, size = _in_unit(c, found, 0, off, tolerance)
     fits = [gauss_newton(pattern, np.array(guess, dtype=float), monic, size) for guess in pattern.guesses(found)]
-    least = -_CLOSED * np.abs(found).max() ** 2
-    inside = [u for u in fits if all(value >= least for value in pattern.nonnegative(list(u)))]
-    return min((relative_distance(pattern, u, monic, size) for u in inside), default=float("inf"))
-
-
-def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[float, ...]]:
-    """Unknowns of the polynomials of a pattern nearest to a given one, one for each guess, the nearest first."""
-    c = _matching(pattern, coefficients)
-    found = numeric_roots(c)
-    size = sizes(found)
-    fits = [gauss_newton(pattern, np.array(guess), c / c[0], size) for guess in pattern.guesses(found)]
-    fits.sort(key=lambda u: relative_distance(pattern, u, c / c[0], size))
-    return [tuple(float(x) for x in u) for u in fits]
+    each = ((relative_distance(pattern, u, monic, size), u.tolist()) for u in fits)
+    return sorted(each, key=lambda fit: fit[0]), found
 
 
 def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float:
@@ -171,14 +181,6 @@ def _checked(coefficients: ArrayLike) -> Array:
         raise ValueError(
             "found a coefficient that is not finite, or a leading 0; accepted: finite ones, the leading one not 0"
         )
-    return c
-
-
-def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
-    """The coefficients, if they are of the pattern's degree."""
-    c = _checked(coefficients)
-    if len(c) - 1 != pattern.degree:
-        raise ValueError(f"found coefficients of degree {len(c) - 1}; accepted: those of degree {pattern.degree}")
     return c
 
 
