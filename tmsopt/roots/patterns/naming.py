@@ -46,10 +46,11 @@ def shown_patterns(roots: Sequence[Root]) -> list[Pattern]:
 
 def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     tied, others = ([g for g in shape.groups if g.tied is on] for on in (True, False))
+    meanings = [_words(groups) + where for groups, where in ((tied, " on one vertical line"), (others, "")) if groups]
     return Pattern(
         name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
-        meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""),
-        unknowns=_unknowns(shape),
+        meaning=", and ".join(meanings) + (" beside other roots" if shape.rest else ""),
+        unknowns=shape.unknowns,
         factors=shape.factors,
         guesses=lambda z: [[float(x) for x in start]],
         nonnegative=shape.gaps,
@@ -81,13 +82,6 @@ def _take(left: list[int], order: int) -> None:
     left[k] -= order
 
 
-def _unknowns(shape: Shape) -> tuple[str, ...]:
-    """Names as in other patterns, numbered only where there are several of a kind."""
-    kinds = [u.rstrip("0123456789") for u in shape.unknowns]
-    each = zip(shape.unknowns, kinds, strict=True)
-    return tuple(kind if kind != "d" and kinds.count(kind) == 1 else u for u, kind in each)
-
-
 def _name(groups: Sequence[Group]) -> str:
     """``EP3``, ``2EP2+CEP2``, ``EP2+two pairs+real``: real roots first, the highest multiplicity first."""
     counted = Counter((not g.real, -g.multiplicity) for g in groups if g.multiplicity > 1)
@@ -96,11 +90,6 @@ def _name(groups: Sequence[Group]) -> str:
         for (pair, order), count in sorted(counted.items())
     ]
     return with_simple(names, groups)
-
-
-def _meaning(tied: Sequence[Group], others: Sequence[Group]) -> str:
-    parts = [f"{_words(tied)} on one vertical line"] if tied else []
-    return ", and ".join([*parts, *([_words(others)] if others else [])])
 
 
 def _words(groups: Sequence[Group]) -> str:

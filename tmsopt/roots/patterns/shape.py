@@ -35,6 +35,10 @@ def with_simple(names: Iterable[str], groups: Iterable[Group]) -> str:
     return "+".join([*names, *several, *["real"] * simple.count(True)])
 
 
+_KINDS = {(True, True): "", (True, False): "r", (False, True): "W", (False, False): "bc"}
+"""Whether a group is real and tied → its unknowns."""
+
+
 @dataclass(frozen=True)
 class Shape:
     """A set of polynomials: the given groups, and a monic factor of degree `rest` with free coefficients.
@@ -53,14 +57,11 @@ class Shape:
 
     @cached_property
     def unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns."""
-        names = ["g"] if self._tied else []
-        for k, group in enumerate(self.groups):
-            if group.tied:
-                names += [] if group.real else [f"W{k}"]
-            else:
-                names += [f"r{k}"] if group.real else [f"b{k}", f"c{k}"]
-        return (*names, *(f"d{k}" for k in range(1, self.rest + 1)))
+        """Names of the unknowns as in other patterns, numbered in groups only where there are several of a kind."""
+        each = [(kind, k) for k, g in enumerate(self.groups) for kind in _KINDS[g.real, g.tied]]
+        kinds = [kind for kind, _ in each]
+        names = (kind if kinds.count(kind) == 1 else f"{kind}{k}" for kind, k in each)
+        return (*["g"] * self._tied, *names, *(f"d{k}" for k in range(1, self.rest + 1)))
 
     @property
     def conditions(self) -> int:
