@@ -5,7 +5,7 @@ at most a unit of size are unknown as themselves, larger ones as 1/s in the reve
 range, whatever the leading coefficient does, and no equation has a quotient.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise, product
@@ -240,24 +240,20 @@ def sheet(
     own = [x for piece in pieces for x in piece.nonnegative(u)]
     alike = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
     told = {n: c for n, c in problem.conditions.items() if not c.equality and all(name in values for name in c.names)}
+    left = conditions(a, pieces, u)
+    real = [part for x in left for part in ((x.re, x.im) if isinstance(x, Pair) else (x,))]
     return Sheet(
         problem,
         pieces,
         names,
         lifted,
-        equations=formula([*_real(conditions(a, pieces, u)), *others(values, lifted, equalities, at)], names),
+        equations=formula([*real, *others(values, lifted, equalities, at)], names),
         shared=formula(shared(a, pieces, u), names),
         nonnegative=formula(own, names),
         ascending=formula((q.place(u) - p.place(u) for p, q in alike), names),
         leading=formula([values.coefficients[0]], names),
         limits={n: formula([c(values)], names) for n, c in told.items()},
     )
-
-
-def _real(left: Iterable[Any]) -> Iterator[Any]:
-    """Left sides, complex ones by their parts."""
-    for x in left:
-        yield from (x.re, x.im) if isinstance(x, Pair) else (x,)
 
 
 def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | RotatingFrame, u: Sequence[Any]) -> Any:
