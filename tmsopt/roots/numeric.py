@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.records import Array
 from tmsopt.roots.exact import isolated_roots
+from tmsopt.roots.quartics.factors import root_pair
 
 Rows = Callable[[Array, NDArray[np.intp]], Array]
 
@@ -170,6 +171,14 @@ def polish(found: Array, error: Array, step: Rows, judge: Rows, steps: int) -> N
         rows = rows[left > GOOD]
 
 
+@np.errstate(all="ignore")
+def quadratic_roots(p: Array, q: Array) -> NDArray[np.complex128]:
+    """Roots of quadratic factors s² + p s + q of shape (…, m), those of a factor side by side; conjugates are exact."""
+    re, im, other_re, other_im = root_pair(p, q)
+    pairs = np.stack([re + 1j * im, other_re + 1j * other_im], axis=-1)
+    return np.asarray(pairs.reshape(*p.shape[:-1], 2 * p.shape[-1]))
+
+
 def _newton_step(factors: Array, monic: Array) -> Array:
     """Least-squares Newton step: at coinciding factors the Jacobian is singular and the shortest step is taken."""
     rows, half, _ = factors.shape
@@ -209,14 +218,4 @@ def _multiply(factors: Array) -> Array:
 
 def _factor_roots(factors: Array) -> NDArray[np.complex128]:
     """Both roots of each quadratic, without cancellation; the padding root 0 of an odd degree comes last."""
-    p, q = factors[..., 0], factors[..., 1]
-    half = -p / 2
-    disc = half * half - q
-    root = np.sqrt(np.abs(disc))
-    large = half + np.where(half < 0, -root, root)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        small = np.where(large == 0, 0.0, q / large)
-    real = disc >= 0
-    first = np.where(real, large, half + 1j * root)
-    second = np.where(real, small, half - 1j * root)
-    return np.stack([first, second], axis=-1).reshape(len(factors), 2 * factors.shape[1])
+    return quadratic_roots(factors[..., 0], factors[..., 1])

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.deprecated import ignore_option
 from tmsopt.records import Array
-from tmsopt.roots.numeric import GOOD, polish, roots
+from tmsopt.roots.numeric import GOOD, polish, quadratic_roots, roots
 from tmsopt.roots.quartics import factors
 
 _BLOCK = 2**14  # numbers of an array that stay in the cache between two operations
@@ -48,10 +48,7 @@ class Factors:
     @property
     def roots(self) -> NDArray[np.complex128]:
         """All roots, shape (…, 4), those of a factor side by side; conjugates are exact."""
-        with np.errstate(all="ignore"):
-            re, im, other_re, other_im = factors.root_pair(self.p, self.q)
-            pair = np.stack([re + 1j * im, other_re + 1j * other_im], axis=-1)
-        return np.asarray(pair.reshape(*self.p.shape[:-1], 4))
+        return quadratic_roots(self.p, self.q)
 
 
 @dataclass(frozen=True)
