@@ -19,7 +19,6 @@ from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.global_search.conditions import Ends, Sheet, rotating_frame, sheet, sheets
 from tmsopt.global_search.pruning import Box, Puzzle, ends, prepared, prune
-from tmsopt.models.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
 from tmsopt.program.nlp import Scale, reaches_of, scale_of
@@ -181,13 +180,15 @@ class _Run:
             if limit is not None and not any(all(at[n].overlaps(b[n]) for n in at) for b, _ in designs):
                 designs.append((at, limit))
         designs.sort(key=lambda found: [float(x) for x in found[0].values()])
+        of = problem.parameter_set
+        numbers = [{n: number(x.atan() if of[n].tangent else x, _SHOWN) for n, x in at.items()} for at, _ in designs]
         places = _places(problem, self.left)
         undecided = tuple(Undecided(_ranges(problem, box), reason) for box, reason in places)
         reasons = dict.fromkeys(u.reason for u in undecided)
         return Completeness(
             complete=not (self.left or self.stopped),
             reason="; ".join(reasons) or self.stopped,
-            designs=tuple(Table(_numbers(problem, at)) for at, _ in designs),
+            designs=tuple(map(Table, numbers)),
             limits=tuple(limit for _, limit in designs),
             boxes=self.boxes,
             seconds=seconds,
@@ -275,19 +276,15 @@ def _standing(zero: _Zero) -> str | None:
         if not condition.equality:
             told = fold(sheet.limits[name], at, BALLS)[0] if name in sheet.limits else "nan"
             excess = condition.sign * flint.arb(told)
-            if not excess.is_finite() and not _met(sheet.problem, condition, at):
-                return None
+            if not excess.is_finite():  # it may not exist somewhere near: does it at the middle, and is it met?
+                middle = sheet.problem.ordered({n: float(at[n].mid()) for n in sheet.problem.free})
+                if not condition.violation(sheet.problem.values(middle)) <= 0:
+                    return None
             room.append((f"constraint {name}", -excess))
     if any(x < 0 for _, x in room):
         return None
     on = [said for said, x in room if said and not x > 0]
     return ", ".join(on + ["a0 = 0"] * flint.arb(fold(sheet.leading, at, BALLS)[0]).contains(0))
-
-
-def _met(problem: Posed, condition: Expression, at: Mapping[str, Any]) -> bool:
-    """Whether a constraint that may not exist somewhere near exists at the middle, and is met."""
-    values = problem.values(problem.ordered({name: float(at[name].mid()) for name in problem.free}))
-    return bool(condition.violation(values) <= 0)
 
 
 def _places(problem: Posed, left: Iterable[tuple[Box, str]]) -> list[tuple[Box, str]]:
@@ -320,8 +317,3 @@ def _ranges(problem: Posed, box: Box) -> Table[Ends]:
             for n, (lo, hi) in zip(problem.free, box, strict=True)
         }
     )
-
-
-def _numbers(problem: Posed, at: Mapping[str, Any]) -> dict[str, Any]:
-    of = problem.parameter_set
-    return {n: number(x.atan() if of[n].tangent else x, _SHOWN) for n, x in at.items()}

@@ -155,8 +155,7 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         if not recheck(design.problem.posed, design.parameters, _cases(design)).violations:
             words = f"no proof: {SOLVER.name}'s relaxation excludes the feasible design that was found"
             return _in_vain(design, words), False
-        none = -math.inf if design.problem.posed.sense == "maximize" else math.inf
-        bound = _searched(none, 0.0, True, clock)
+        bound = _searched(design.problem.posed.sign * math.inf, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False
     words = "branch and bound did not decide in time whether any design is feasible"
     return _noted(replace(design, bound=_bound(design, math.inf, clock)), words), False
