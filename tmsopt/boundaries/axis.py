@@ -1,6 +1,5 @@
 """Whether a design stands on the boundary of stability already, as far as the rounding of its parameters tells."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -55,7 +54,7 @@ def stands_on(
         abscissa, meetings: of the design, in doubles.
     """
     beyond = beyond_axis(problem.model, problem.located if optimal else (), structure.roots)
-    largest = max((math.hypot(r.re, r.im) for r in structure.roots), default=0.0)
+    largest = max((r.size for r in structure.roots), default=0.0)
     if beyond or (abs(structure.abscissa) > _FAR * largest and largest):
         return (), False
     edges = edges_at(problem, parameters) or (("weave",) if beyond == 0 else ())

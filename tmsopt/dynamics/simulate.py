@@ -216,7 +216,7 @@ def _dies_out(problem: Posed, found: Structure) -> bool:
     """Whether the design is stable, multiple roots and those of a complex H by more than rounding."""
     rightmost = [r.multiplicity for r in found.roots if r.re == found.abscissa]
     exact = problem.model.carrier is None and max(rightmost, default=1) == 1
-    largest = max((math.hypot(r.re, r.im) for r in found.roots), default=0.0)
+    largest = max((r.size for r in found.roots), default=0.0)
     return found.abscissa < (0.0 if exact else -_ROUNDING * largest)
 
 

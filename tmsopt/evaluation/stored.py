@@ -130,7 +130,7 @@ def abscissa_as_stored(solution: Solution) -> str:
     Empty where the two differ by no more than a millionth.
     """
     ideal, realised = solution.abscissa, solution.abscissa_realised
-    size = max((math.hypot(root.re, root.im) for root in solution.of_polynomial.roots), default=0.0)
+    size = max((r.size for r in solution.of_polynomial.roots), default=0.0)
     ideal, realised = (x if abs(x) > _NOTHING * size else 0.0 for x in (ideal, realised))
     if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
         return ""
@@ -160,7 +160,7 @@ def _clusters(
     found = []
     for case in [case for case in cases if not case.direction] or [Case()]:
         structure = problem.values(case.applied(parameters))["structure"]
-        size = _LINE * max(math.hypot(r.re, r.im) for r in structure.roots)
+        size = _LINE * max(r.size for r in structure.roots)
         for root in structure.roots:
             z = complex(root.re, root.im)
             if root.multiplicity == 1 or root.im < 0 or z == 0:

@@ -121,6 +121,6 @@ def _threshold(condition: Expression, name: str, worse: float) -> float | None:
 
 def unit_of(roots: Iterable[Root]) -> float:
     """Geometric mean of the sizes of roots, as a power of two."""
-    sizes = [math.hypot(r.re, r.im) for r in roots for _ in range(r.multiplicity)]
+    sizes = [r.size for r in roots for _ in range(r.multiplicity)]
     known = [math.log2(size) for size in sizes if _SMALL < size < 1 / _SMALL]
     return float(2.0 ** round(sum(known) / len(known))) if known else 1.0

@@ -87,7 +87,7 @@ def _damping_ratio(values: Mapping[str, Any]) -> float:
     if isinstance(values, Values) and values.model.carrier is not None:
         return math.nan  # frequencies without a zero
     roots = values["structure"].roots
-    ratios = (-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
+    ratios = (-r.re / r.size if r.re or r.im else 0.0 for r in roots)
     return min(ratios, default=math.nan)
 
 

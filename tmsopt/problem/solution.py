@@ -156,7 +156,7 @@ class Solution(Printable):
     @property
     def stability(self) -> StabilityVerdict:
         """The verdict, and the power of t by which the motion grows, in the worst case."""
-        largest = max((math.hypot(r.re, r.im) for r in self.of_polynomial.roots), default=0.0)
+        largest = max((r.size for r in self.of_polynomial.roots), default=0.0)
         return stability((self.abscissa, self.abscissa_realised), self.edges, self.meetings, largest)
 
     @property

@@ -3,6 +3,7 @@
 Only ``+ - *`` are used, so one formula serves CasADi expressions, NumPy arrays, exact fractions and balls.
 """
 
+import math
 import operator
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -140,6 +141,11 @@ class Root:
     re: float
     im: float
     multiplicity: int = 1
+
+    @property
+    def size(self) -> float:
+        """|s|."""
+        return math.hypot(self.re, self.im)
 
 
 def rightmost_first(roots: Iterable[Any]) -> tuple[Any, ...]:

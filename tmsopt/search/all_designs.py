@@ -167,7 +167,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
 
 def _errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, float]) -> Table[float]:
     """What a proof says of a parameter, or else the search; a double is rounded, and so are roots."""
-    size = max((math.hypot(r.re, r.im) for r in solution.roots), default=0.0)
+    size = max((r.size for r in solution.roots), default=0.0)
     least = {n: abs(solution.parameters[n]) for n in solution.problem.free} | {"abscissa": size}
     known = {**own, **radius, **({"abscissa": 0.0} if radius else {})}
     return Table({n: max(known.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})

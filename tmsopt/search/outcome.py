@@ -153,11 +153,11 @@ def is_unclear(problem: Posed, checked: Evaluation) -> bool:
     roots = checked.structure.roots
     if not roots or not math.isfinite(checked.realised):
         return False
-    sizes = sorted(math.hypot(r.re, r.im) for r in roots)
+    sizes = sorted(r.size for r in roots)
     asked = any("damping_ratio" in e.names for e in (problem.objective, *problem.conditions.values()) if e)
-    if asked and any(r.multiplicity > 1 and 0 < math.hypot(r.re, r.im) < _ZERO * sizes[-1] for r in roots):
+    if asked and any(r.multiplicity > 1 and 0 < r.size < _ZERO * sizes[-1] for r in roots):
         return True
-    each = (math.hypot(r.re, r.im) * _STORED ** (1 / r.multiplicity) for r in roots)
+    each = (r.size * _STORED ** (1 / r.multiplicity) for r in roots)
     scatter = max(each) + _ZERO * sizes[-1]
     return bool(abs(checked.structure.abscissa - checked.realised) > scatter)
 
@@ -265,7 +265,7 @@ def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
 
 def runs_away(roots: Sequence[Root], ratio: float) -> bool:
     """Whether a root is so far away from others that a0 is all but 0; from those that are 0 any other is."""
-    sizes = sorted(size for r in roots if (size := math.hypot(r.re, r.im)))
+    sizes = sorted(size for r in roots if (size := r.size))
     return bool(sizes) and sizes[-1] > ratio * sizes[(len(sizes) - 1) // 2]
 
 

@@ -119,7 +119,7 @@ def claims_more(state: SearchState) -> bool:
     if state.sample is None:
         return False
     if best is not None and goal is not None and "damping_ratio" in goal.names:
-        sizes = sorted(math.hypot(root.re, root.im) for root in best.checked.structure.roots)
+        sizes = sorted(root.size for root in best.checked.structure.roots)
         if sizes and sizes[0] < state.tuning.zero_root * sizes[-1]:
             return True
     return any(end.objective < least for end in state.feasible)

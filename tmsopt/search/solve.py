@@ -342,7 +342,7 @@ def _stability_note(problem: Posed, checked: Evaluation, edges: Sequence[str], o
         return (f"not the edge of stability: another {another} {unit_of(problem, 'abscissa').show(beyond, 2)}",)
     if unstable or not optimal or checked.structure.abscissa < 0:
         return unstable
-    largest = max((math.hypot(r.re, r.im) for r in checked.structure.roots), default=0.0)
+    largest = max((r.size for r in checked.structure.roots), default=0.0)
     found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
     if problem.free and (problem.minimize or "").strip() == "abscissa":
         least = "no design that decays was found in the box; whether those of abscissa 0 grow depends on multiple roots"

@@ -119,7 +119,7 @@ def joined(solution: Any) -> dict[str, Any]:
     growing: str = solution.stability.growth
     found: dict[str, Any] = {}
     top = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
-    near = _LINE * max((math.hypot(r.re, r.im) for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
+    near = _LINE * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
 
     def of(m: MultipleRoot) -> dict[str, Any]:
         grows = {"growth": power_of_t(m.longest)} if growing and m.re == top and m.longest > 1 else {}

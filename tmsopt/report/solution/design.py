@@ -226,7 +226,7 @@ def _more(solution: Solution, found: Findings) -> str:
 def _stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
     problem, at = solution.problem.posed, at_worst(solution)
-    size = max((math.hypot(r.re, r.im) for r in solution.of_polynomial.roots), default=1.0)
+    size = max((r.size for r in solution.of_polynomial.roots), default=1.0)
     abscissa, stored = (x if abs(x) > NOTHING * size else 0.0 for x in (solution.abscissa, solution.abscissa_realised))
     realised = unit_at(problem, "abscissa", at).number(stored, ALL)
     shown = show_at(problem, "abscissa", at, abscissa, ALL)

@@ -249,7 +249,7 @@ def roots_of(roots: Sequence[Root], digits: int = 8, rate: float = 1.0) -> list[
     for root in roots:
         if root.im < 0:
             continue
-        size = math.hypot(root.re, root.im)
+        size = root.size
         re, im = (x * rate if abs(x) > NOTHING * size else 0.0 for x in (root.re, root.im))
         value = f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
         words.append(value + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""))
