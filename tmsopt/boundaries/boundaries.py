@@ -207,7 +207,8 @@ def terms(c: Array) -> Array:
     """Size of the terms that each coefficient is summed from; a root at 0 counts as a thousandth of the median."""
     lead = regular(c)
     radius = np.abs(roots(lead))
-    return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, _SMALL * float(np.median(radius))).astype(complex)))
+    least = _SMALL * (float(np.median(radius)) or 1.0)  # where all are at 0
+    return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, least).astype(complex)))
 
 
 def quotient(c: Array, factor: Array, size: Array) -> Array:
