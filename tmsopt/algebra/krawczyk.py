@@ -9,19 +9,17 @@ in the interior of X proves that X holds exactly one solution, and that it lies 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import flint
 
 from tmsopt.algebra.balls import lower
+from tmsopt.records import Table
 
 System = Callable[[Mapping[str, Any]], list[Any]]
 """Left sides of equations for balls or series by name."""
 
-_NO_UNITS: Mapping[str, float] = MappingProxyType({})
 _STEPS = 60
-_WIDEST = 1.0
 _TENTHS = 80  # powers of ten down which a box is looked for
 _FINER = 4  # boxes tried between a power of ten and the next
 
@@ -45,12 +43,13 @@ class Enclosure:
 
 def slopes(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any:
     """Jacobian of a system with respect to some of its names: by series of first order, a column each."""
-    columns = [[_slope(v) for v in system({**at, n: flint.arb_series([at[n], 1], prec=2)})] for n in names]
-    return flint.arb_mat([list(row) for row in zip(*columns, strict=True)])
+    columns = [system({**at, n: flint.arb_series([at[n], 1], prec=2)}) for n in names]
+    rows = zip(*columns, strict=True)
+    return flint.arb_mat([[v[1] if isinstance(v, flint.arb_series) else flint.arb(0) for v in row] for row in rows])
 
 
 def refined(
-    system: System, start: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = _NO_UNITS
+    system: System, start: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> dict[str, Any]:
     """The solution near a start as exact middles, by Newton's method at the working precision.
 
@@ -63,7 +62,7 @@ def refined(
     at = dict(start)
     small = flint.arb(10) ** -digits
     for _ in range(_STEPS):
-        move = _solved(slopes(system, at, names), system(at))
+        move = _solved(slopes(system, at, names), flint.arb_mat([[r.mid()] for r in system(at)]))
         size = [(abs(move[k, 0]).mid() / (units.get(n, 1) + abs(at[n]))).mid() for k, n in enumerate(names)]
         for k, n in enumerate(names):
             at[n] = (at[n] - move[k, 0]).mid()
@@ -76,15 +75,15 @@ def refined(
     )
 
 
-def _solved(jacobian: Any, residual: Sequence[Any]) -> Any:
+def _solved(jacobian: Any, right: Any) -> Any:
     try:
-        return jacobian.mid().solve(flint.arb_mat([[r.mid()] for r in residual])).mid()
+        return jacobian.mid().solve(right).mid()
     except ZeroDivisionError:
         raise Refused("the Jacobian of the equations is singular there: the solution is not isolated") from None
 
 
 def enclosed(
-    system: System, middle: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = _NO_UNITS
+    system: System, middle: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> Enclosure:
     """The solution beside a middle that is right to `digits`, in the smallest and the largest box that prove it.
 
@@ -94,58 +93,31 @@ def enclosed(
     Raises:
         Refused: where no box does.
     """
-    try:
-        inverse = slopes(system, middle, names).mid().inv().mid()
-    except ZeroDivisionError:
-        raise Refused("the Jacobian of the equations is singular there: the solution is not isolated") from None
+    count = len(names)
+    unit = flint.arb_mat(count, count, 1)
+    inverse = _solved(slopes(system, middle, names), unit)
     step = inverse * flint.arb_mat([[r] for r in system(middle)])
-    test = _Test(system, middle, names, inverse, [step[k, 0] for k in range(len(names))])
+
+    def mapped(radii: Sequence[Any]) -> dict[str, Any] | None:
+        """K(X) for the box of these radii, if it is in its interior."""
+        around = [flint.arb(0, r.upper()) for r in radii]
+        box = {n: middle[n] + a for n, a in zip(names, around, strict=True)}  # or wider, by rounding
+        contraction = unit - inverse * slopes(system, {**middle, **box}, names)
+        moves = (contraction * flint.arb_mat([[a] for a in around]) - step).entries()
+        if not all(a.contains_interior(move) for a, move in zip(around, moves, strict=True)):
+            return None
+        return {n: middle[n] + move for n, move in zip(names, moves, strict=True)}
+
     sizes = [flint.arb(units.get(n, 1)) for n in names]
-    inner = test([flint.arb(10) ** -digits * (u + abs(middle[n])) for n, u in zip(names, sizes, strict=True)])
+    inner = mapped([flint.arb(10) ** -digits * (u + abs(middle[n])) for n, u in zip(names, sizes, strict=True)])
     if inner is None:
         raise Refused(
             "the Krawczyk test fails: the Jacobian of the equations is singular at the solution, or nearly so"
         )
-    radius = flint.arb(0)
-    for tenth in range(_TENTHS):
-        if found := next((r for r in _radii(tenth) if test([r * u for u in sizes])), None):
-            radius = found
-            break
+    shares = ((1 - flint.arb(k) / _FINER) / 10**tenth for tenth in range(_TENTHS) for k in range(_FINER))
+    radius = next((r for r in map(flint.arb.mid, shares) if mapped([r * u for u in sizes])), flint.arb(0))
     off = {n: inner[n].rad() + abs(inner[n] - middle[n]).upper() for n in names}
     smallest = max(off[n] / u for n, u in zip(names, sizes, strict=True))
     if not radius > smallest:
         raise Refused("the Krawczyk test fails in every box but the smallest: the solution is hardly isolated")
     return Enclosure(inner, lower(radius))
-
-
-def _radii(tenth: int) -> list[Any]:
-    top = flint.arb(10) ** -tenth * _WIDEST
-    return [(top * (1 - flint.arb(k) / _FINER)).mid() for k in range(_FINER)]
-
-
-@dataclass(frozen=True)
-class _Test:
-    """Krawczyk's operator around one middle."""
-
-    system: System
-    middle: Mapping[str, Any]
-    names: Sequence[str]
-    inverse: Any
-    step: Sequence[Any]
-
-    def __call__(self, radii: Sequence[Any]) -> dict[str, Any] | None:
-        """K(X) for the box of these radii, if it is in its interior."""
-        count = len(self.names)
-        around = [flint.arb(0, r.upper()) for r in radii]
-        box = {n: self.middle[n] + a for n, a in zip(self.names, around, strict=True)}  # or wider, by rounding
-        contraction = flint.arb_mat(count, count, [int(i == j) for i in range(count) for j in range(count)])
-        contraction = contraction - self.inverse * slopes(self.system, {**self.middle, **box}, self.names)
-        spread = contraction * flint.arb_mat([[a] for a in around])
-        moves = [spread[k, 0] - self.step[k] for k in range(count)]
-        if not all(a.contains_interior(move) for a, move in zip(around, moves, strict=True)):
-            return None
-        return {n: self.middle[n] + move for n, move in zip(self.names, moves, strict=True)}
-
-
-def _slope(value: Any) -> Any:
-    return value[1] if isinstance(value, flint.arb_series) else flint.arb(0)
