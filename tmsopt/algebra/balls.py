@@ -7,7 +7,9 @@ these (`flint.arb_series`), a polynomial, or an array of numbers with bounds of 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import ROUND_UP, Context, Decimal
 from fractions import Fraction
+from itertools import count
 from typing import Any
 
 import flint
@@ -54,8 +56,7 @@ def number(ball: Any, digits: int) -> Number:
     """A ball as a decimal with `digits` digits and a few more, or fewer where its radius says so."""
     if not ball.is_finite():
         return Number("nan", "inf")
-    exact = rational(ball) if ball.is_exact() else None
-    if exact is not None and exact == 0:
+    if ball == 0:
         return Number("0", "0")
     middle, radius, exponent = (int(x) for x in ball.mid_rad_10exp(digits + 2 * GUARD))
     drop = max(len(str(abs(middle))) - digits - GUARD, len(str(radius)) - 2, 0)
@@ -67,42 +68,28 @@ def number(ball: Any, digits: int) -> Number:
 
 def fraction(value: Fraction, digits: int) -> Number:
     """An exact fraction as a decimal; one that ends is exact."""
-    rest = value.denominator
-    for factor in (2, 5):
-        while rest % factor == 0:
-            rest //= factor
-    if rest == 1:
-        places = 0
-        while (value * 10**places).denominator != 1:
-            places += 1
+    under = value.denominator
+    if pow(10, under.bit_length(), under) == 0:
+        places = next(n for n in count() if 10**n % under == 0)
         return Number(_decimal(int(value * 10**places), -places), "0")
     return number(flint.arb(rational(value)), digits)
 
 
 def _decimal(middle: int, exponent: int) -> str:
     """middle · 10^exponent in plain digits, or with an exponent where these would be many."""
-    sign, figures = "-" if middle < 0 else "", str(abs(middle))
-    if exponent >= 0 and len(figures) + exponent <= 20:
-        return sign + figures + "0" * exponent
-    point = len(figures) + exponent
-    if 0 < point <= len(figures):
-        whole, part = figures[:point], figures[point:]
-        return f"{sign}{whole}.{part}" if part else sign + whole
-    if -6 < point <= 0:
-        return f"{sign}0.{'0' * -point}{figures}"
-    return f"{sign}{figures[0]}.{figures[1:] or '0'}e{point - 1}"
+    exact, figures = Decimal(f"{middle}e{exponent}"), str(abs(middle))
+    leading = exact.adjusted()
+    if leading >= -6 and (exponent <= 0 or leading < 20):
+        return f"{exact:f}"
+    return f"{'-' * (middle < 0)}{figures[0]}.{figures[1:] or '0'}e{leading}"
 
 
 def _rounded_up(radius: int, exponent: int) -> str:
+    """radius · 10^exponent to two digits."""
     if radius == 0:
         return "0"
-    drop = max(len(str(radius)) - 2, 0)
-    head = -(-radius // 10**drop)
-    if head == 100:
-        head, drop = 10, drop + 1
-    if head < 10:
-        return f"{head}e{exponent + drop}"
-    return f"{head // 10}.{head % 10}e{exponent + drop + 1}"
+    upper = Context(prec=2, rounding=ROUND_UP).create_decimal(radius)
+    return f"{'.'.join(map(str, upper.as_tuple().digits))}e{upper.adjusted() + exponent}"
 
 
 def largest_radius(balls: Sequence[Any]) -> float:
@@ -163,5 +150,4 @@ def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
             return x.mid().fmpq()
         far = flint.fmpq(2) ** (_FARTHEST if exponent > 0 else -_FARTHEST)
         return far if figures > 0 else -far
-    ratio = Fraction(x)
-    return flint.fmpq(ratio.numerator, ratio.denominator)
+    return exact(Fraction(x))
