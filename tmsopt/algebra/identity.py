@@ -13,6 +13,7 @@ from typing import Any
 
 import flint
 
+from tmsopt.algebra.balls import rational
 from tmsopt.algebra.formula import (
     CONSTANT,
     INPUT,
@@ -27,7 +28,7 @@ from tmsopt.algebra.formula import (
     made as made_of,
     symbol,
 )
-from tmsopt.algebra.kinds import FLOATS
+from tmsopt.algebra.kinds import ARITHMETIC, NODES
 
 _WHOLE = 64  # exponent up to which a power is a product
 _MOST = 10**7  # products of two terms in one multiplication; more take minutes, and more memory than there is
@@ -74,7 +75,7 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
 
     def __pow__(self, n: int) -> "Quotient":
         over, under = (_power(x, abs(n)) for x in (self.over, self.under))
-        return Quotient(over, under) if n >= 0 else Quotient(under, over)
+        return Quotient(over, under) if n >= 0 else 1 / Quotient(over, under)
 
     def sqrt(self) -> "Quotient":
         """The square root of a square, with positive leading coefficients."""
@@ -120,31 +121,23 @@ class Field:
         self._known: list[tuple[str, tuple[Quotient, ...], Quotient]] = []
         self._squares: list[tuple[int, Quotient]] = []
         self.kind = Kind(
-            {**{op: partial(self._applied, op) for op in FLOATS.operations}, **self._rational()}, self.number
+            {
+                **{op: partial(self._applied, op) for op in NODES.operations},
+                **ARITHMETIC,
+                "pow": self._power,
+                "sqrt": lambda a: self._applied("sqrt", a, square=lambda: a),
+                "abs": lambda a: self._applied("abs", a, square=lambda: a * a),
+                "sin": self._sine,
+                "tan": lambda a: self._sine(a) / self._applied("cos", a),
+            },
+            self.number,
         )
-
-    def _rational(self) -> dict[str, Callable[..., Any]]:
-        return {
-            "add": lambda a, b: a + b,
-            "sub": lambda a, b: a - b,
-            "mul": lambda a, b: a * b,
-            "div": lambda a, b: a / b,
-            "neg": lambda a: -a,
-            "square": lambda a: a * a,
-            "pow": self._power,
-            "pi": partial(self._applied, "pi"),
-            "sqrt": lambda a: self._applied("sqrt", a, square=lambda: a),
-            "abs": lambda a: self._applied("abs", a, square=lambda: a * a),
-            "cos": partial(self._applied, "cos"),
-            "sin": self._sine,
-            "tan": lambda a: self._sine(a) / self._applied("cos", a),
-        }
 
     def number(self, x: Constant) -> Quotient:
         """A constant; one that is no fraction by what is known of its functions."""
         if isinstance(x, Formula):
             return fold(x, {}, self.kind)[0]  # type: ignore[no-any-return]
-        return Quotient(flint.fmpq(*Fraction(x).as_integer_ratio()) * self._one, self._one)
+        return Quotient(rational(x) * self._one, self._one)
 
     def vanishes(self, x: Any) -> bool:
         """Whether an element is 0 for all values; what is true is certain."""
@@ -199,8 +192,7 @@ class Field:
         whole = b.over.is_constant() and b.under.is_constant() and exponent.q == 1
         if not whole or abs(exponent) > _WHOLE:
             return self._applied("pow", a, b)
-        n = int(exponent.p)
-        return a**n if n >= 0 else 1 / a**-n
+        return a ** int(exponent.p)
 
     def _free(self, at: int) -> Quotient:
         return Quotient(self._context.gens()[at], self._one)

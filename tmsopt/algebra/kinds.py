@@ -34,7 +34,7 @@ ROUNDING = 4 * float(np.finfo(float).eps)
 
 Operations = Mapping[str, Callable[..., Any]]
 
-_ARITHMETIC: Operations = {
+ARITHMETIC: Operations = {
     "add": operator.add,
     "sub": operator.sub,
     "mul": operator.mul,
@@ -42,6 +42,17 @@ _ARITHMETIC: Operations = {
     "neg": operator.neg,
     "square": lambda x: x * x,
 }
+
+_ALIKE: Operations = {
+    **ARITHMETIC,
+    "abs": abs,
+    "less": operator.lt,
+    "at_most": operator.le,
+    "equal": operator.eq,
+    "positive_part": lambda x: (x + abs(x)) / 2,
+    "negligible": lambda x, size: abs(x) <= ROUNDING * size,
+}
+"""Operations that NumPy and CasADi write as Python does."""
 
 
 # Floats and arrays.
@@ -88,29 +99,23 @@ def _choose(condition: Any, a: Any, b: Any) -> Any:
 
 
 def _quotient(a: Any, b: Any) -> Any:
-    return np.where(np.equal(b, 0), np.nan, np.divide(a, b))[()]
+    return _choose(b == 0, np.nan, a / b)
 
 
 FLOATS = Kind(
     {
-        **_ARITHMETIC,
-        "div": np.divide,
+        **_ALIKE,
         "pow": _power,
-        **{name: getattr(np, name) for name in ("sqrt", "abs", "exp", "log", "sin", "cos", "tan", "sign")},
+        **{name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sign")},
         **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan")},
         "min": np.minimum,  # nan where either is
         "max": np.maximum,
-        "less": np.less,
-        "at_most": np.less_equal,
-        "equal": np.equal,
         "both": np.logical_and,
         "either": np.logical_or,
         "not": np.logical_not,
         "choose": _choose,
         "quotient": _quotient,
-        "ratio": lambda a, b: _choose(np.equal(a, 0), 0.0, _quotient(a, b)),
-        "positive_part": lambda x: (x + np.abs(x)) / 2,
-        "negligible": lambda x, size: np.abs(x) <= ROUNDING * size,
+        "ratio": lambda a, b: _choose(a == 0, 0.0, _quotient(a, b)),
     },
     as_double,
     np.float64,
@@ -135,24 +140,18 @@ def _symbolic_ratio(a: Any, b: Any) -> Any:
 
 CASADI = Kind(
     {
-        **_ARITHMETIC,
+        **_ALIKE,
         "pow": operator.pow,
         **{name: getattr(ca, name) for name in ("sqrt", "exp", "log", "sin", "cos", "asin", "acos", "atan", "sign")},
-        "abs": ca.fabs,
         "tan": _tangent,
         "min": ca.fmin,
         "max": ca.fmax,
-        "less": lambda a, b: a < b,
-        "at_most": lambda a, b: a <= b,
-        "equal": lambda a, b: a == b,
         "both": ca.logic_and,
         "either": ca.logic_or,
         "not": ca.logic_not,
         "choose": ca.if_else,
         "quotient": lambda a, b: ca.if_else(b == 0, np.nan, a / b),
         "ratio": _symbolic_ratio,
-        "positive_part": lambda x: (x + ca.fabs(x)) / 2,
-        "negligible": lambda x, size: ca.fabs(x) <= ROUNDING * size,
     },
     lambda value: float(as_double(value)),
     lambda x: x if isinstance(x, ca.SX | ca.MX) else ca.DM(float(x)),
@@ -165,7 +164,7 @@ CASADI = Kind(
 def as_exact(value: Constant) -> Any:
     """A constant as a fraction, or as a ball of the working precision."""
     if isinstance(value, Fraction):
-        return flint.fmpq(value.numerator, value.denominator)
+        return exact(value)
     return flint.arb(value) if isinstance(value, float) else fold(value, {}, BALLS)[0]
 
 
@@ -290,7 +289,7 @@ def _function(name: str) -> Callable[[Any], Any]:
 
 BALLS = Kind(
     {
-        **_ARITHMETIC,
+        **ARITHMETIC,
         "div": _ball_quotient,
         "quotient": _ball_quotient,
         "ratio": _ball_ratio,
@@ -394,8 +393,7 @@ choose, quotient, ratio, positive_part, negligible = map(
 
 def pi(like: Any) -> Any:
     """π, as a number of the kind of another."""
-    kind = kind_of(like)
-    return PI if kind is NODES else kind.constant(_PI)
+    return kind_of(like).constant(_PI)
 
 
 _PI = formula([PI])
