@@ -150,4 +150,4 @@ def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
             return x.mid().fmpq()
         far = flint.fmpq(2) ** (_FARTHEST if exponent > 0 else -_FARTHEST)
         return far if figures > 0 else -far
-    return exact(Fraction(x))
+    return flint.fmpq(*Fraction(x).as_integer_ratio())

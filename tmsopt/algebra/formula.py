@@ -5,10 +5,12 @@ CasADi (`from_casadi`). What its operations mean is said by a kind of numbers; s
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
+from itertools import accumulate, chain
 from typing import Any, NamedTuple, Union
 
 import casadi as ca
@@ -116,11 +118,8 @@ class Formula:
     @cached_property
     def uses(self) -> tuple[int, ...]:
         """How often the result of each step is taken by others."""
-        found = [0] * len(self.steps)
-        for step in self.steps:
-            for o in step.operands:
-                found[o] += 1
-        return tuple(found)
+        counted = Counter(chain.from_iterable(step.operands for step in self.steps))
+        return tuple(map(counted.__getitem__, range(len(self.steps))))
 
 
 @dataclass(frozen=True)
@@ -174,6 +173,11 @@ def fold(
 _TOTAL = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "square", "abs", "min", "max", "sin", "cos", "atan", "exp"}
 
 
+def _operators(op: str) -> tuple[Callable[["Node", Any], "Node"], Callable[["Node", Any], "Node"]]:
+    """An operation as a method of its first operand, and of its second one."""
+    return lambda self, other: made(op, self, other), lambda self, other: made(op, other, self)
+
+
 class Node:
     """A number that is not known yet: an input, a constant, or an operation on others; made by arithmetic.
 
@@ -197,35 +201,19 @@ class Node:
     def __bool__(self) -> bool:
         raise TypeError("a formula does not ask what its numbers are; write choose(condition, a, b)")
 
-    def __add__(self, other: Any) -> "Node":
-        return made("add", self, other)
+    __add__, __radd__ = _operators("add")
+    __sub__, __rsub__ = _operators("sub")
+    __mul__, __rmul__ = _operators("mul")
+    __truediv__, __rtruediv__ = _operators("div")
+    __pow__, __rpow__ = _operators("pow")
+    __lt__, __gt__ = _operators("less")
+    __le__, __ge__ = _operators("at_most")
+    __and__, __rand__ = _operators("both")
+    __or__, __ror__ = _operators("either")
+    __eq__ = _operators("equal")[0]  # type: ignore[assignment]
 
-    def __radd__(self, other: Any) -> "Node":
-        return made("add", other, self)
-
-    def __sub__(self, other: Any) -> "Node":
-        return made("sub", self, other)
-
-    def __rsub__(self, other: Any) -> "Node":
-        return made("sub", other, self)
-
-    def __mul__(self, other: Any) -> "Node":
-        return made("mul", self, other)
-
-    def __rmul__(self, other: Any) -> "Node":
-        return made("mul", other, self)
-
-    def __truediv__(self, other: Any) -> "Node":
-        return made("div", self, other)
-
-    def __rtruediv__(self, other: Any) -> "Node":
-        return made("div", other, self)
-
-    def __pow__(self, other: Any) -> "Node":
-        return made("pow", self, other)
-
-    def __rpow__(self, other: Any) -> "Node":
-        return made("pow", other, self)
+    def __ne__(self, other: object) -> "Node":  # type: ignore[override]
+        return ~made("equal", self, other)
 
     def __neg__(self) -> "Node":
         return made("neg", self)
@@ -233,55 +221,18 @@ class Node:
     def __abs__(self) -> "Node":
         return made("abs", self)
 
-    def __lt__(self, other: Any) -> "Node":
-        return made("less", self, other)
-
-    def __le__(self, other: Any) -> "Node":
-        return made("at_most", self, other)
-
-    def __gt__(self, other: Any) -> "Node":
-        return made("less", other, self)
-
-    def __ge__(self, other: Any) -> "Node":
-        return made("at_most", other, self)
-
-    def __and__(self, other: Any) -> "Node":
-        return made("both", self, other)
-
-    def __or__(self, other: Any) -> "Node":
-        return made("either", self, other)
-
     def __invert__(self) -> "Node":
         return made("not", self)
-
-    def __eq__(self, other: object) -> "Node":  # type: ignore[override]
-        return made("equal", self, other)
-
-    def __ne__(self, other: object) -> "Node":  # type: ignore[override]
-        return ~made("equal", self, other)
 
     __hash__ = object.__hash__
 
     def __array_ufunc__(self, function: Any, method: str, *given: Any) -> "Node":
-        name = function.__name__
-        return made(_NUMPY.get(name, name), *given)
+        return _renamed(function.__name__, *given)
 
     @property
     def fraction(self) -> Fraction | None:
         """The number that it is, where that is a fraction."""
         return self.value if self.op == CONSTANT and isinstance(self.value, Fraction) else None
-
-
-_NUMPY = {
-    "subtract": "sub",
-    "multiply": "mul",
-    "divide": "div",
-    "power": "pow",
-    "absolute": "abs",
-    "maximum": "max",
-    "minimum": "min",
-}
-"""Functions of NumPy whose names are not those of operations."""
 
 
 def depends_on(x: Any, names: Collection[str]) -> bool:
@@ -439,14 +390,14 @@ def from_casadi(function: ca.Function, names: Sequence[str] = ()) -> Formula:
     Args:
         names: of the inputs; by default their numbers.
     """
-    names = names or tuple(map(str, range(sum(function.nnz_in(n) for n in range(function.n_in())))))
+    names = names or tuple(map(str, range(function.nnz_in())))
     return formula(nodes_of_casadi(function, names), names)
 
 
 def nodes_of_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
     """The entries of its outputs as nodes."""
-    firsts = [sum(function.nnz_in(k) for k in range(n)) for n in range(function.n_in() + 1)]
-    ends = [sum(function.nnz_out(k) for k in range(n)) for n in range(function.n_out() + 1)]
+    firsts = list(accumulate(map(function.nnz_in, range(function.n_in())), initial=0))
+    ends = list(accumulate(map(function.nnz_out, range(function.n_out())), initial=0))
     inputs, held, outputs = [symbol(n) for n in names], dict[int, Node](), [constant(0)] * ends[-1]
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
@@ -467,7 +418,10 @@ def _translated(operation: int, operands: Sequence[Node]) -> Node:
     """An operation of CasADi; what there is not here keeps its name, and no kind of numbers takes it."""
     if operation in _WRITTEN:
         return _WRITTEN[operation](operands[0], operands[-1])
-    name = _NAMES.get(operation, f"operation {operation}")
+    return _renamed(_NAMES.get(operation, f"operation {operation}"), *operands)
+
+
+def _renamed(name: str, *operands: Any) -> Node:
     return made(_RENAMED.get(name, name), *operands)
 
 
@@ -484,9 +438,16 @@ _WRITTEN: Mapping[int, Callable[[Node, Node], Node]] = {
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
 
 _RENAMED = {
+    "subtract": "sub",
+    "multiply": "mul",
+    "divide": "div",
+    "power": "pow",
     "constpow": "pow",
     "sq": "square",
+    "absolute": "abs",
     "fabs": "abs",
+    "maximum": "max",
+    "minimum": "min",
     "fmin": "min",
     "fmax": "max",
     "lt": "less",
@@ -495,3 +456,4 @@ _RENAMED = {
     "and": "both",
     "or": "either",
 }
+"""Functions of NumPy and CasADi whose names are not those of operations."""
