@@ -22,7 +22,7 @@ import flint
 import numpy as np
 
 from tmsopt.algebra import rounding
-from tmsopt.algebra.balls import DIGITS, as_ball, exact, is_ball, rational
+from tmsopt.algebra.balls import DIGITS, as_ball, exact, is_ball
 from tmsopt.algebra.formula import PI, Constant, Formula, Kind, Node, constant, fold, formula, made, nodes_of_casadi
 from tmsopt.algebra.rounding import Bounded
 
@@ -75,7 +75,7 @@ def _double(value: Fraction | Formula) -> Any:
     if not ball.is_finite():
         with np.errstate(all="ignore"):
             return fold(value, {}, FLOATS)[0]  # nan or inf
-    return np.float64(0.0) if ball.contains(0) else _double(Fraction(str(rational(ball))))
+    return np.float64(0.0 if ball.contains(0) else float(ball))
 
 
 def _power(base: Any, exponent: Any) -> Any:
@@ -213,38 +213,34 @@ def magnitude(x: Any) -> Any:
 
 
 def greater(a: Any, b: Any) -> Any:
-    """The greater of two balls."""
-    return _extreme(a, b, 1)
+    """The greater of two balls: (a + b + |a − b|)/2, and exactly one of the two where it is certain which."""
+    if isinstance(a, Bounded) or isinstance(b, Bounded):
+        return rounding.greater(a, b)
+    difference = a - b
+    first = difference[0] if isinstance(difference, flint.arb_series) else difference
+    if first >= 0:
+        return a
+    if first <= 0:
+        return b
+    if isinstance(difference, flint.arb):
+        return as_ball(a).max(as_ball(b))
+    return (a + b + magnitude(difference)) / 2
 
 
 def lesser(a: Any, b: Any) -> Any:
     """The lesser of two balls."""
-    return _extreme(a, b, -1)
+    return -greater(-a, -b)
 
 
-def _extreme(a: Any, b: Any, sign: int) -> Any:
-    """(a + b + sign |a − b|)/2, and exactly one of the two where it is certain which."""
-    if isinstance(a, Bounded) or isinstance(b, Bounded):
-        return sign * rounding.greater(sign * a, sign * b)
+def _compare(holds: Callable[..., Any], fails: Callable[..., Any], a: Any, b: Any) -> Any:
+    """What a comparison and its opposite say of two numbers: of arrays as floats, nan where that is not certain."""
     difference = a - b
-    first = difference[0] if isinstance(difference, flint.arb_series) else difference
-    if sign * first >= 0:
-        return a
-    if sign * first <= 0:
-        return b
-    if isinstance(difference, flint.arb):
-        return as_ball(a).max(as_ball(b)) if sign > 0 else as_ball(a).min(as_ball(b))
-    return (a + b + sign * magnitude(difference)) / 2
-
-
-def _sign_of(difference: Any, holds: Callable[[Any], Any], fails: Callable[[Any], Any]) -> Any:
-    """What a comparison says of a difference with 0: of arrays as floats, nan where that is not certain."""
     if isinstance(difference, Bounded):
         low, high = difference.value - difference.error, difference.value + difference.error
-        return np.where(holds(high) & holds(low), 1.0, np.where(fails(high) & fails(low), 0.0, np.nan))
+        return np.where(holds(high, 0) & holds(low, 0), 1.0, np.where(fails(high, 0) & fails(low, 0), 0.0, np.nan))
     series = isinstance(difference, flint.arb_series)
     first = difference[0] if series else difference
-    return True if holds(first) else False if fails(first) else math.nan if series else None
+    return True if holds(first, 0) else False if fails(first, 0) else math.nan if series else None
 
 
 def _ball_choice(condition: Any, a: Any, b: Any) -> Any:
@@ -279,8 +275,7 @@ def _not(a: Any) -> Any:
     return 1.0 - a if isinstance(a, np.ndarray | float) else None if a is None else not a
 
 
-def _equals(a: Any, b: Any) -> Any:
-    return _sign_of(a - b, lambda x: x == 0, lambda x: x != 0)
+_equals = partial(_compare, operator.eq, operator.ne)
 
 
 def _function(name: str) -> Callable[[Any], Any]:
@@ -300,8 +295,8 @@ BALLS = Kind(
         "min": lesser,
         "max": greater,
         **{name: _function(name) for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")},
-        "less": lambda a, b: _sign_of(a - b, lambda x: x < 0, lambda x: x >= 0),
-        "at_most": lambda a, b: _sign_of(a - b, lambda x: x <= 0, lambda x: x > 0),
+        "less": partial(_compare, operator.lt, operator.ge),
+        "at_most": partial(_compare, operator.le, operator.gt),
         "equal": _equals,
         "both": _both,
         "either": lambda a, b: _not(_both(_not(a), _not(b))),
@@ -324,14 +319,11 @@ def square(x: Any) -> Any:
 
 def _interval_power(x: Any, y: Any) -> Any:
     """x to the power y; whole powers of any x."""
-    if y.is_integer():
-        exponent = int(float(y))
-        if exponent < 0:
-            return 1 / _interval_power(x, flint.arb(-exponent))
-        if exponent % 2 == 0:
-            return square(x ** (exponent // 2))
-        return x**exponent
-    return x**y
+    if not y.is_integer():
+        return x**y
+    exponent = int(abs(float(y)))
+    power = x**exponent if exponent % 2 else square(x ** (exponent // 2))
+    return power if y >= 0 else 1 / power
 
 
 INTERVALS = Kind(
@@ -385,9 +377,9 @@ def _applied(op: str) -> Callable[..., Any]:
     return operation
 
 
-sqrt, tan, atan, absolute, least, less, both = map(_applied, ("sqrt", "tan", "atan", "abs", "min", "less", "both"))
-choose, quotient, ratio, positive_part, negligible = map(
-    _applied, ("choose", "quotient", "ratio", "positive_part", "negligible")
+sqrt, tan, atan, absolute, least, less, both, choose, quotient, ratio, positive_part, negligible = map(
+    _applied,
+    ["sqrt", "tan", "atan", "abs", "min", "less", "both", "choose", "quotient", "ratio", "positive_part", "negligible"],
 )
 
 

@@ -1,5 +1,6 @@
 """Arrays of numbers with bounds of their errors, which every operation carries on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,11 @@ UNIT = 2 * np.finfo(float).eps
 
 _WHOLE = 64  # exponent up to which a power is a product
 _STEEP = 0.1  # of a tangent: relative change within its error, up to which its slope there is known
+
+
+def _gentle(function: Callable[[Any], Any]) -> Callable[["Bounded"], "Bounded"]:
+    """A function whose slope is nowhere beyond 1."""
+    return lambda x: rounded(function(x.value), x.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +118,7 @@ class Bounded:
         room = self.value - self.error
         return rounded(np.log(self.value), np.where(room > 0, self.error / np.where(room > 0, room, 1.0), np.inf))
 
-    def sin(self) -> "Bounded":
-        """Sines."""
-        return rounded(np.sin(self.value), self.error)
-
-    def cos(self) -> "Bounded":
-        """Cosines."""
-        return rounded(np.cos(self.value), self.error)
+    sin, cos, atan = map(_gentle, (np.sin, np.cos, np.arctan))
 
     def tan(self) -> "Bounded":
         """Tangents."""
@@ -133,10 +133,6 @@ class Bounded:
     def acos(self) -> "Bounded":
         """Arccosines."""
         return rounded(np.arccos(self.value), self._from_the_ends())
-
-    def atan(self) -> "Bounded":
-        """Arctangents."""
-        return rounded(np.arctan(self.value), self.error)
 
     def _from_the_ends(self) -> Array:
         """Error of an arcsine: by its slope, infinite where −1 or 1 may be met."""
