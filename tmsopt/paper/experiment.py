@@ -1,6 +1,5 @@
 """The experimental bicycle beside the scaling law, and how flat the optimum is that the law describes."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,14 +96,12 @@ def _critical(chi_H: float, mu: float, lambda_s: float) -> CriticalSpeed:
     chi_B, margin = np.linspace(low, high, _POINTS)[1:-1], 1e-3 * (high - low)
     ends = low + margin, high - margin
     best = float(minimize_scalar(square, bounds=ends, method="bounded", options={"xatol": 1e-10}).x)
-    if not np.isfinite(value(best)):
+    flat = np.nan, np.nan
+    if np.isfinite(value(best)):
+        # where Fr_c, given by its square with one minimum between two poles, exceeds it by the slack, on either side
+        level = (1 + SLACK) ** 2 * square(best)
+        low, high = (float(brentq(lambda x: square(x) - level, best, end)) for end in ends)
+        flat = low, high
+    else:
         best = np.nan
-    flat = (np.nan, np.nan) if np.isnan(best) else _flat(square, best, ends)
     return CriticalSpeed(chi_B, value(chi_B), chi_H, mu, (best, value(best)), value(p["chi_B"]), flat)
-
-
-def _flat(square: Callable[[float], float], best: float, ends: tuple[float, float]) -> tuple[float, float]:
-    """Where Fr_c, given by its square with one minimum between two poles, exceeds it by the slack, on either side."""
-    level = (1 + SLACK) ** 2 * square(best)
-    low, high = (float(brentq(lambda x: square(x) - level, best, end)) for end in ends)
-    return low, high

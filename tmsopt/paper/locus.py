@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from tmsopt.dynamics import Growth, growth
 from tmsopt.models import tms
-from tmsopt.paper.reference import TILT_OFFSETS, ReferenceBicycle, on_ep_set
+from tmsopt.paper.reference import ReferenceBicycle, table_1
 from tmsopt.problem.problem import Problem
 
 FR_MAX = 5.0
@@ -25,11 +25,10 @@ class LocusRow:
 
 def table_1_loci() -> tuple[LocusRow, ...]:
     """The three rows of the paper's figure: tilts of Table 1, χ_B = √2 and beside it, 0 < Fr ≤ 5."""
-    rows = []
-    for name, tilt in TILT_OFFSETS.items():
-        bicycle, offset = on_ep_set(name, tilt), 0.1 if name == "CEP2" else 0.01
-        rows.append(LocusRow(bicycle, offset, tuple(over_Fr(bicycle, shift) for shift in (0.0, -offset, offset))))
-    return tuple(rows)
+    rows = zip(table_1(), (0.01, 0.01, 0.1), strict=True)
+    return tuple(
+        LocusRow(b, offset, tuple(over_Fr(b, shift) for shift in (0.0, -offset, offset))) for b, offset in rows
+    )
 
 
 def over_Fr(bicycle: ReferenceBicycle, shift: float = 0.0) -> Growth:

@@ -8,7 +8,7 @@ import numpy as np
 from tmsopt import laws
 from tmsopt.charts.chart import Chart, chart
 from tmsopt.models import tms
-from tmsopt.paper.reference import MU, ZETA_B, ZETA_H
+from tmsopt.paper.reference import MU, ZETA_B, ZETA_H, table_1
 from tmsopt.problem.problem import Problem
 from tmsopt.records import Array, Table
 from tmsopt.tracing.branch import Trace
@@ -42,23 +42,21 @@ class Plane:
 
 
 def ep4() -> Table[float]:
-    """The EP4 of Table 1 by the closed-form laws: Fr, chi_B and lambda_s."""
-    point = laws.ep4_chi_H_1(ZETA_B, ZETA_H)
-    return Table({"Fr": float(point.Fr), "chi_B": float(point.chi_B), "lambda_s": float(point.lambda_s)})
+    """Parameters of the EP4 of Table 1, by the closed-form laws."""
+    return table_1()[0].parameters
 
 
 def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
     """(Fr, λ_s) at a distance from the law `chib1`; with the EP set where it lies there, unless without curves."""
     at, tilt = ep4(), np.linspace(*TILT, 1200)
-    chi_B = at["chi_B"] + chi_B_offset
+    chi_B, on_law = at["chi_B"] + chi_B_offset, not chi_B_offset
     curves, marked = {"Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), tilt)}, {}
-    if not chi_B_offset:
+    if on_law:
         curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
         curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
         marked = {"EP4": (at["Fr"], at["lambda_s"])}
-    problem = bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT})
-    traced = None if chi_B_offset or not boundaries else ep_set()
-    return Plane(chart(problem, points=points, boundaries=boundaries), traced, curves, marked)
+    charted = chart(bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT}), points=points, boundaries=boundaries)
+    return Plane(charted, ep_set() if on_law and boundaries else None, curves, marked)
 
 
 def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:

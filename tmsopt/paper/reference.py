@@ -42,17 +42,7 @@ def benchmark(Fr: float | None = None) -> ReferenceBicycle:
 def optimised() -> ReferenceBicycle:
     """The optimised benchmark: ω0 = −1 with χ_H, ζ_B, ζ_H of the benchmark (equations chib, a2, w0)."""
     chi_H = laws.bench["x_H"] / laws.bench["w"]
-    point = laws.ep4(-1.0, ZETA_B, ZETA_H, chi_H)[0]
-    parameters = {
-        "Fr": float(point.Fr),
-        "mu": float(point.mu),
-        "chi_B": float(point.chi_B),
-        "chi_H": chi_H,
-        "zeta_B": ZETA_B,
-        "zeta_H": ZETA_H,
-        "lambda_s": float(point.lambda_s),
-    }
-    return ReferenceBicycle("optimised benchmark", Table(parameters), -1.0)
+    return _at_point("optimised benchmark", laws.ep4(-1.0, ZETA_B, ZETA_H, chi_H)[0], chi_H=chi_H)
 
 
 def table_1() -> tuple[ReferenceBicycle, ReferenceBicycle, ReferenceBicycle]:
@@ -67,15 +57,13 @@ def on_ep_set(name: str, tilt_offset: float) -> ReferenceBicycle:
     tilt = float(point.lambda_s) + tilt_offset
     # at EP4 both are the same number; the form for EP4 has no pole to cancel
     Fr = float(laws.epset(ZETA_B, ZETA_H, tilt)) if tilt_offset else float(point.Fr)
-    parameters = {
-        "Fr": Fr,
-        "mu": MU,
-        "chi_B": float(point.chi_B),
-        "chi_H": 1.0,
-        "zeta_B": ZETA_B,
-        "zeta_H": ZETA_H,
-        "lambda_s": tilt,
-    }
+    return _at_point(name, point, chi_H=1.0, Fr=Fr, mu=MU, lambda_s=tilt)
+
+
+def _at_point(name: str, point: laws.EP4, **given: float) -> ReferenceBicycle:
+    """A bicycle with the heights of the benchmark and what the laws say of the parameters not given."""
+    given |= {"zeta_B": ZETA_B, "zeta_H": ZETA_H}
+    parameters = {n: given[n] if n in given else float(getattr(point, n)) for n in ("Fr", *_GEOMETRY)}
     return ReferenceBicycle(name, Table(parameters), float(point.omega0))
 
 

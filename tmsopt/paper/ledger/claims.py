@@ -43,26 +43,21 @@ def compute_entry(claim: Table) -> Entry:
     scope = open_scope(claim, {})
     shown = {name: _Shown(value) for name, value in scope.items()}
     printed, remark, otherwise, condition, against = (claim.get(field, "").format_map(shown) for field in _TEXTS)
-    computed = _show_computed(compute(claim["computed"], scope)) if "computed" in claim else ""
+    value = compute(claim.get("value", claim.get("computed", "''")), scope)
+    computed = format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_Shown(value)}"
     proved = are_true(claim.get("holds", []), scope)
     match claim["rule"]:
         case "decimal":
-            outcome = judge_decimal(printed, compute(claim["value"], scope), remark)
+            outcome = judge_decimal(printed, value, remark)
         case "identity":
-            outcome = judge_identity(proved, remark, otherwise, printed, computed)
+            outcome = judge_identity(proved, remark, otherwise)
         case _:
             refuted = are_true(claim["refutes"], scope)
-            outcome = judge_statement(
-                condition, bool(condition) and proved, against, refuted, printed, computed, remark
-            )
+            outcome = judge_statement(condition, bool(condition) and proved, against, refuted, remark)
     if (outcome.verdict != EXACT and not outcome.remark) or not are_true(claim.get("noted", []), scope):
         raise ArithmeticError(f"{claim['key']}: '{outcome.verdict}' without an explanation that is proved")
     told = {field: claim[field] for field in ("key", "section", "place", "statement", "route")}
-    return Entry(**told, **vars(outcome))
-
-
-def _show_computed(value: Any) -> str:
-    return format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_Shown(value)}"
+    return Entry(**told, printed=printed, computed=computed, **outcome._asdict())
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,11 @@
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import flint
 
+from tmsopt.algebra.balls import rational
 from tmsopt.records import Tabular, plain
 from tmsopt.versions import SCHEMA
 
@@ -26,13 +26,10 @@ _OFF_UNITS = 50  # of the last printed digit: only the last two digits differ
 _OFF_RELATIVE = 1e-6  # and the number is the same for every practical purpose
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """What computing a claim gave."""
+class Judgement(NamedTuple):
+    """What computing a claim gave, and what a reader must know besides."""
 
     verdict: str
-    printed: str = ""
-    computed: str = ""
     remark: str = ""
 
 
@@ -86,9 +83,7 @@ class Ledger(Tabular):
 
 def format_digits(value: Any) -> str:
     """A ball or a fraction to 40 significant digits."""
-    ball = value if isinstance(value, flint.arb) else flint.arb(value)
-    text: str = ball.str(SHOWN, radius=False)
-    return text
+    return str(flint.arb(value).str(SHOWN, radius=False))
 
 
 def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
@@ -100,45 +95,29 @@ def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
     Raises:
         ArithmeticError: if the ball is too wide to tell.
     """
-    fraction = Fraction(printed)
-    claimed = flint.fmpq(fraction.numerator, fraction.denominator)
-    shown = format_digits(value)
+    claimed, ball = rational(printed), flint.arb(value)
     if isinstance(value, flint.fmpq) and value == claimed:
-        return Judgement(EXACT, printed, shown, remark)
-    unit = flint.fmpq(1, 10 ** len(printed.partition(".")[2]))
-    ball = flint.arb(value) if isinstance(value, flint.fmpq) else value
-    distance = abs(ball - claimed) / unit
-    half, few = flint.arb(0.5), flint.arb(_OFF_UNITS)
+        return Judgement(EXACT, remark)
+    distance = abs(ball - claimed) * 10 ** len(printed.partition(".")[2])
+    half = flint.arb(0.5)
     if distance <= half:
         verdict = DIGITS_HOLD
     elif not distance > half:
         raise ArithmeticError(f"{printed} against {ball}: the ball is too wide to round")
     else:
         close = abs(ball - claimed) < abs(ball) * _OFF_RELATIVE
-        verdict = DIGITS_OFF if distance < few and close else FAILS
-    size = f"{float(distance.mid()):.2g}" if verdict != FAILS else f"{float(distance.mid()):.3g}"
+        verdict = DIGITS_OFF if distance < _OFF_UNITS and close else FAILS
+    size = f"{float(distance.mid()):.{2 + (verdict == FAILS)}g}"
     words = f"The true value is {size} units of the last printed digit away."
-    return Judgement(verdict, printed, shown, f"{words} {remark}".strip())
+    return Judgement(verdict, f"{words} {remark}".strip())
 
 
-def judge_identity(
-    holds: bool, remark: str = "", otherwise: str = "", printed: str = "", computed: str = ""
-) -> Judgement:
+def judge_identity(holds: bool, remark: str = "", otherwise: str = "") -> Judgement:
     """Exact where a proof runs through; otherwise it does not hold, for the reason given."""
-    if holds:
-        return Judgement(EXACT, printed, computed, remark)
-    return Judgement(FAILS, printed, computed, otherwise or "The proof does not run through.")
+    return Judgement(EXACT, remark) if holds else Judgement(FAILS, otherwise or "The proof does not run through.")
 
 
-def judge_statement(
-    condition: str,
-    under: bool,
-    against: str,
-    counterexample: bool,
-    printed: str = "",
-    computed: str = "",
-    remark: str = "",
-) -> Judgement:
+def judge_statement(condition: str, under: bool, against: str, counterexample: bool, remark: str = "") -> Judgement:
     """Judge a general statement: proved under a condition and refuted outside it, or refuted.
 
     Args:
@@ -152,6 +131,5 @@ def judge_statement(
     """
     if not counterexample:
         raise ArithmeticError(f"neither proved nor refuted: {condition}")
-    parts = [f"Condition: {condition}."] if under else []
-    parts += [f"Counterexample: {against}.", remark]
-    return Judgement(CONDITIONAL if under else FAILS, printed, computed, " ".join(p for p in parts if p))
+    needed = f"Condition: {condition}. " if under else ""
+    return Judgement(CONDITIONAL if under else FAILS, f"{needed}Counterexample: {against}. {remark}".strip())
