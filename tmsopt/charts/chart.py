@@ -148,12 +148,11 @@ class Chart(Printable):
             "title": self.about["title"],
             "model": self.about["problem"]["model"],
             "axes": {n: {**axis, "unit": of[n].unit if of else "1"} for n, axis in grid.describe().items()},
+            **({} if plane else {"layers": list(self.layers)}),
+            "classes": counts.shares,
+            "satisfied": None if counts.satisfied is None else counts.satisfied / counts.designs,
+            "least_abscissa": place and {"value": counts.least, **place},
         }
-        if not plane:
-            data["layers"] = list(self.layers)
-        data["classes"] = counts.shares
-        data["satisfied"] = None if counts.satisfied is None else counts.satisfied / counts.designs
-        data["least_abscissa"] = place and {"value": counts.least, **place}
         if plane or self.domain:
             data["boundaries"] = self.domain and self.domain.to_json()
         data["fallbacks"] = counts.fallbacks
@@ -227,7 +226,7 @@ def chart(
     with where as target, processes(workers) if workers > 1 else here() as executor:
         began = time.perf_counter()
         left = [rows for rows in grid.tiles(target.tile) if rows.start not in target.done]
-        done = before = sum(t.designs for t in target.done.values())
+        done = before = add_tallies(target.done.values()).designs
         if steps:
             steps(done, grid.size)
         for place, found in executor.map(work.compute, left):
@@ -241,8 +240,8 @@ def chart(
     seconds = time.perf_counter() - began
     for layer in memory.values():
         layer.flags.writeable = False
-    run = {"engine": "numpy", **({} if path is None else {"designs": done - before}), "seconds": seconds}
-    run["per_second"] = (done - before) / seconds
+    new = done - before
+    run = {"engine": "numpy", **({"designs": new} if path else {}), "seconds": seconds, "per_second": new / seconds}
     asked = work.problem.problem
     edges = domain(asked, progress=progress) if boundaries and len(grid.axes) == 2 else None
     return Chart(about, grid.values, target.layers, add_tallies(target.done.values()), edges, path, run, asked)
@@ -282,7 +281,7 @@ def _describe(work: Survey, tile: int) -> dict[str, Any]:
     }
     if problem.model.statement is not None:
         stated["statement"] = dict(problem.model.statement)
-    layers: dict[str, Any] = {n: {"dtype": d.str} for n, d in work.dtypes.items()}
+    layers = {n: {"dtype": d.str} for n, d in work.dtypes.items()}
     for name, expression in work.quantities.items():
         layers[name]["expression"] = expression
     return {

@@ -113,14 +113,12 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
     if fresh and os.path.lexists(path):
         with _locked(path):
             move_aside(path)
-    try:
+    with _writing(path):
         if not path.exists():
             _check_room(path, about, grid)
             path.mkdir()
         elif not any((path / n).exists() for n in (_ABOUT, _LOCK)):
             raise _no_chart(path)
-    except OSError as error:
-        raise _unwritten(path, error) from None
     with _locked(path):
         if not os.path.lexists(path / _ABOUT):
             _create(path, about, grid)
@@ -137,23 +135,26 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    try:
-        held = FileLock(path / _LOCK, timeout=0).acquire()
-    except Timeout:
-        message = f"'{path}' is being written by another process; wait for it, or give another name"
-        raise refusal(message, "--output") from None
-    except OSError as error:
-        raise _unwritten(path, error) from None
+    with _writing(path):
+        try:
+            held = FileLock(path / _LOCK, timeout=0).acquire()
+        except Timeout:
+            message = f"'{path}' is being written by another process; wait for it, or give another name"
+            raise refusal(message, "--output") from None
     with held:
         yield
 
 
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise refusal(f"'{path}' cannot be written: {error.strerror or error}", "--output") from None
+
+
 def _layer(name: str) -> str:
     return f"layers/{name}.npy"
-
-
-def _unwritten(path: Path, error: OSError) -> InputError:
-    return refusal(f"'{path}' cannot be written: {error.strerror or error}", "--output")
 
 
 def _no_chart(path: Path) -> InputError:
@@ -169,7 +170,7 @@ def _check_room(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
 
 def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
     """Files of a new chart, about.json last: without it the folder is begun anew."""
-    try:
+    with _writing(path):
         for part in ("axes", "layers"):
             shutil.rmtree(path / part, ignore_errors=True)  # of a process that was killed right then
             (path / part).mkdir()
@@ -179,8 +180,6 @@ def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
             np.lib.format.open_memmap(path / _layer(name), "w+", np.dtype(layer["dtype"]), grid.shape)
         (path / _TILES).touch()
         write_text(path / _ABOUT, json.dumps(about, indent=2, ensure_ascii=False))
-    except OSError as error:
-        raise _unwritten(path, error) from None
 
 
 # Reading

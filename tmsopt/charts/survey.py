@@ -103,7 +103,7 @@ class Survey:
     Attributes:
         layers: names among `LAYERS`.
         quantities: name → expression, further layers.
-        single: whether numbers are kept in single precision.
+        dtypes: layer → the kind of its numbers.
         before, after: what is computed before the roots, coefficients among it, and what takes them.
     """
 
@@ -111,33 +111,26 @@ class Survey:
     grid: Grid
     layers: tuple[str, ...]
     quantities: Mapping[str, str]
-    single: bool
+    dtypes: Mapping[str, np.dtype[Any]]
     before: ArrayFunction = field(repr=False)
     after: ArrayFunction = field(repr=False)
-
-    @property
-    def dtypes(self) -> dict[str, np.dtype[Any]]:
-        """Layer → the kind of its numbers."""
-        wanted = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*self.layers, *self.quantities)}
-        return {n: np.dtype(np.float32) if self.single and d == np.float64 else d for n, d in wanted.items()}
 
     def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
         """The layers of a few rows, shape (len(rows), n), and their counts."""
         model, shape = self.problem.model, (len(rows), self.grid.shape[-1])
-        columns, fallbacks = {**self.problem.fixed, **self.grid.columns(rows)}, 0
+        columns, fallbacks, asked = {**self.problem.fixed, **self.grid.columns(rows)}, 0, set(self.layers)
         with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
             values = self.before(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
-            if {"kind", "real_roots"} & set(self.layers):
-                classes = classify(coefficients)
-                values |= {"kind": classes.kind, "real_roots": classes.real_roots}
-            if self.after.names or {"abscissa", "damping_ratio"} & set(self.layers):
+            if {"kind", "real_roots"} & asked:
+                values |= vars(classify(coefficients))
+            if self.after.names or {"abscissa", "damping_ratio"} & asked:
                 motion = find_motion(coefficients)
                 fallbacks = motion.fallbacks
                 ratio = motion.damping_ratio if model.carrier is None else np.full(shape, np.nan)
                 found = {"abscissa": motion.abscissa, "damping_ratio": ratio}
                 values |= found | self.after(columns | found)
-            if {"satisfied", "margin"} & set(self.layers):
+            if {"satisfied", "margin"} & asked:
                 sides = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
                 values["margin"] = reduce(np.minimum, sides, np.inf)
                 values["satisfied"] = values["margin"] >= 0
@@ -193,12 +186,13 @@ def survey(
         wanted |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
     wanted |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
     late = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
+    dtypes = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *extra)}
     return Survey(
         problem,
         Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
         tuple(dict.fromkeys(layers)),
         dict(extra),
-        single,
+        {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in dtypes.items()},
         before=array_function(problem, {n: e for n, e in wanted.items() if n not in late}),
         after=array_function(problem, late),
     )
