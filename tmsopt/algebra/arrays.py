@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import INPUT, Formula, fold
+from tmsopt.algebra.formula import Formula, fold
 from tmsopt.algebra.kinds import BALLS, FLOATS
 from tmsopt.algebra.rounding import Bounded, as_bounded
 
@@ -31,7 +31,9 @@ def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
     with np.errstate(all="ignore"):
         if math.prod(shape) <= BLOCK:
             return fold(formula, columns, FLOATS)
-        large = _whole(formula, {n: _axes(np.shape(x)) for n, x in columns.items()}, _axes(shape))
+        strides = {n: np.broadcast_to(x, shape).strides for n, x in columns.items()}  # 0 along axes of no influence
+        axes = [k for k, n in enumerate(shape) if n != 1]
+        large = set.intersection(*(formula.depending([n for n in columns if strides[n][k]]) for k in axes))
         names, small, rest = formula.split(large)
         known = columns | dict(zip(names, fold(small, columns, FLOATS), strict=True))
         found = [known[str(o)] if str(o) in known else np.empty(shape) for o in formula.outputs]
@@ -42,22 +44,6 @@ def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
             for k, value in zip(filled, fold(rest, near, FLOATS), strict=True):
                 _cut(found[k], rows, along)[...] = value
     return found
-
-
-def _whole(formula: Formula, given: Mapping[str, int], axes: int) -> set[int]:
-    """The steps that have all the axes of a grid."""
-    own: list[int] = []
-    for step in formula.steps:
-        along = given[step.value] if step.op == INPUT else 0
-        for o in step.operands:
-            along |= own[o]
-        own.append(along)
-    return {k for k, along in enumerate(own) if along == axes}
-
-
-def _axes(shape: tuple[int, ...]) -> int:
-    """The axes, from the last one on, along which there is more than one element, as bits."""
-    return sum(1 << k for k, n in enumerate(reversed(shape)) if n != 1)
 
 
 def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
