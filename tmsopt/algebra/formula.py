@@ -253,8 +253,7 @@ def constant(x: Any) -> Node:
     if isinstance(x, Node):
         return x
     if isinstance(x, float):
-        x = float(x)  # NumPy's among them
-        return Node(CONSTANT, (), Fraction(repr(x)) if math.isfinite(x) else x)
+        return Node(CONSTANT, (), Fraction(str(x)) if math.isfinite(x) else float(x))
     return Node(CONSTANT, (), Fraction(x) if isinstance(x, int | Fraction) else Fraction(int(x.p), int(x.q)))
 
 

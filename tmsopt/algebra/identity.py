@@ -39,9 +39,12 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
     """A quotient of two polynomials; equal to another if the cross products are."""
 
     over: Any
-    under: Any
+    under: Any = None  # 1
 
     def __post_init__(self) -> None:
+        if self.under is None:
+            object.__setattr__(self, "under", self.over**0)
+            return
         common = self.over.gcd(self.under)
         if not common.is_constant():
             object.__setattr__(self, "over", self.over // common)
@@ -89,9 +92,7 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
         return bool(_times(self.over, o.under) == _times(o.over, self.under))
 
     def _other(self, other: Any) -> "Quotient":
-        if isinstance(other, Quotient):
-            return other
-        return Quotient(self.under * 0 + other, self.under * 0 + 1)
+        return other if isinstance(other, Quotient) else Quotient(self.under * 0 + other)
 
 
 def _times(a: Any, b: Any) -> Any:
@@ -114,7 +115,7 @@ class Field:
         others = sum(step.op not in (INPUT, CONSTANT) for one in each for step in one.steps)
         count = len(formula.names)
         context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(count + 2 * others + 1)), "lex")
-        self._context, self._one = context, context.constant(1)
+        self._context = context
         self.inputs = {name: self._free(k) for k, name in enumerate(formula.names)}
         self._used = count
         self._nodes = [symbol(name) for name in formula.names]  # what each unknown is
@@ -137,7 +138,7 @@ class Field:
         """A constant; one that is no fraction by what is known of its functions."""
         if isinstance(x, Formula):
             return fold(x, {}, self.kind)[0]  # type: ignore[no-any-return]
-        return Quotient(rational(x) * self._one, self._one)
+        return Quotient(self._context.constant(rational(x)))
 
     def vanishes(self, x: Any) -> bool:
         """Whether an element is 0 for all values; what is true is certain."""
@@ -149,8 +150,7 @@ class Field:
                 while len(powers) <= exponents[at] // 2:
                     powers.append(powers[-1] * square)
                 kept = (*exponents[:at], exponents[at] % 2, *exponents[at + 1 :])
-                term = self._context.from_dict({kept: coefficient})
-                rest = rest + powers[exponents[at] // 2] * Quotient(term, self._one)
+                rest += powers[exponents[at] // 2] * Quotient(self._context.from_dict({kept: coefficient}))
             x = rest
         return not x.over
 
@@ -195,7 +195,7 @@ class Field:
         return a ** int(exponent.p)
 
     def _free(self, at: int) -> Quotient:
-        return Quotient(self._context.gens()[at], self._one)
+        return Quotient(self._context.gens()[at])
 
 
 def multiplied_out(asked: Formula) -> Formula:

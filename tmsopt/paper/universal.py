@@ -65,7 +65,7 @@ def heavy_section(A1: ArrayLike) -> tuple[Array, Array]:
     There the polynomial is σ² (y² + A1 y + A2 − 2), y = σ + 1/σ. All σ are real and negative exactly if both y
     are real and at most −2: A2 ≤ 2 + A1²/4 and, as −A1/2 ≤ −2, A2 ≥ 2 A1 − 2.
     """
-    a = np.where(np.asarray(A1, dtype=float) >= 4, np.asarray(A1, dtype=float), np.nan)
+    a = np.where(np.greater_equal(A1, 4), A1, np.nan)
     return 2 * a - 2, 2 + a * a / 4
 
 
@@ -86,7 +86,7 @@ def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
     The double root is the largest, the smallest, or between the two others. Along the first axis a face goes from
     EP4 to the limit; along the second from one edge to the next: 2EP2 to EP3, 2EP2 to EP3, EP3 to EP3.
     """
-    u, v = np.meshgrid(np.linspace(0, 1, points), np.linspace(0, 1, points))
+    u, v = np.meshgrid(*[np.linspace(0, 1, points)] * 2)
 
     def face(m: Callable[[Array], Array], t: Callable[[Array], Array]) -> Array:
         """Points (v m(u), v t(u)): a ray per u, along which A1 and A3 grow from 4, cut at the limit."""

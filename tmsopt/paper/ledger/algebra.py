@@ -30,7 +30,7 @@ _RADIUS = 50  # of the box in which a solution is proved
 def make_ring(names: str) -> dict[str, Quotient]:
     """The variables of a ring of rational functions by their names."""
     variables = flint.fmpq_mpoly_ctx.get(names.split(), "lex").gens()
-    return dict(zip(names.split(), (Quotient(x, x * 0 + 1) for x in variables), strict=True))
+    return dict(zip(names.split(), map(Quotient, variables), strict=True))
 
 
 # Rational functions
@@ -81,19 +81,17 @@ def degree_in(x: Quotient, variable: Quotient) -> int:
 
 
 def _index_of(x: Quotient, variable: Quotient) -> int:
-    names: tuple[str, ...] = x.over.context().names()
-    return names.index(str(variable.over))
+    return int(x.over.context().variable_to_index(str(variable.over)))
 
 
 def factorise(x: Quotient) -> list[Quotient]:
     """The irreducible factors of the numerator, once each."""
-    return [Quotient(factor, factor**0) for factor, _ in x.over.factor()[1]]
+    return [Quotient(factor) for factor, _ in x.over.factor()[1]]
 
 
 def resultant(x: Quotient, y: Quotient, variable: Quotient) -> Quotient:
     """Resultant of two numerators: it vanishes where both do for one value of the variable."""
-    found = x.over.resultant(y.over, str(variable.over))
-    return Quotient(found, found * 0 + 1)
+    return Quotient(x.over.resultant(y.over, str(variable.over)))
 
 
 # Polynomials in s

@@ -8,9 +8,10 @@ shares nothing with what it checks.
 
 import ast
 import operator
+import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from typing import Any
 
@@ -51,8 +52,8 @@ def read_tables() -> Table:
 @cache
 def list_definitions() -> Mapping[str, tuple[list[str], Table]]:
     """Parameters and table of each name under ``[define]``."""
-    heads = ((head.replace("(", " ").replace(",", "").strip(")").split(), head) for head in read_tables()["define"])
-    return {name: (parameters, read_tables()["define"][head]) for (name, *parameters), head in heads}
+    heads = ((re.findall(r"\w+", head), table) for head, table in read_tables()["define"].items())
+    return {name: (parameters, table) for (name, *parameters), table in heads}
 
 
 def compute(text: str, scope: Scope) -> Any:
@@ -91,7 +92,7 @@ def _look_up(name: str, scope: Scope) -> Any:
     if name not in list_definitions():
         return VOCABULARY[name]
     parameters, _ = list_definitions()[name]
-    return (lambda *operands: _apply(name, *operands)) if parameters else _apply(name)
+    return partial(_apply, name) if parameters else _apply(name)
 
 
 def _apply(name: str, *operands: Any) -> Any:
