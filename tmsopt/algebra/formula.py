@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import accumulate, chain
 from typing import Any, NamedTuple, Union
 
@@ -293,10 +293,6 @@ def _power(a: Fraction, b: Fraction) -> Fraction | None:
     return a ** int(b) if whole and size * abs(b) <= _BITS else None
 
 
-def _at_zero(value: int, a: Fraction) -> Fraction | None:
-    return None if a else Fraction(value)
-
-
 _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -306,12 +302,10 @@ _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
     "square": lambda a: a * a,
     "abs": abs,
     "pow": _power,
-    **{op: partial(_at_zero, 1) for op in ("exp", "cos")},
-    **{op: partial(_at_zero, 0) for op in ("sin", "tan", "asin", "atan")},
 }
 """What fractions make a fraction of; None where they do not."""
 
-_SIMPLEST = {"add", "sub", "mul", "div", "pow", "neg", "sin", "cos", "tan"}
+_SIMPLEST = {"add", "sub", "mul", "div", "pow", "neg", "exp", "sin", "cos", "tan", "asin", "atan"}
 
 
 def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911, PLR0912
@@ -320,11 +314,11 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
     match op, *fractions:
         case ("add", 0, _) | ("mul", 1, _):
             return last
-        case ("add" | "sub", _, 0) | ("mul" | "div" | "pow", _, 1):
+        case ("add" | "sub", _, 0) | ("mul" | "div" | "pow", _, 1) | ("sin" | "tan" | "asin" | "atan", 0):
             return first
         case ("mul", 0, _) | ("mul", _, 0) if first.total and last.total:
             return constant(0)
-        case ("pow", _, 0) if first.total:
+        case ("pow", _, 0) | ("exp" | "cos", 0) if first.total:
             return constant(1)
         case ("sub", _, _) if first is last and first.total:
             return constant(0)

@@ -1,5 +1,6 @@
 """Arrays of numbers with bounds of their errors, which every operation carries on."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -85,9 +86,7 @@ class Bounded:
         n = float(exponent.value) if np.ndim(exponent.value) == 0 and not np.any(exponent.error) else np.nan
         if not (n.is_integer() and abs(n) <= _WHOLE):
             return (self.log() * exponent).exp()
-        result = Bounded(np.ones_like(self.value))
-        for _ in range(int(abs(n))):
-            result = result * self
+        result = math.prod([self] * int(abs(n)), start=Bounded(np.ones_like(self.value)))
         return 1.0 / result if n < 0 else result
 
     def __rpow__(self, base: Any) -> "Bounded":
