@@ -40,13 +40,13 @@ def sketch(parameters: Mapping[str, float]) -> Sketch:
 
     H is projected on the axis as a vector, so that ν_H here does not repeat the formula that the model uses.
     """
-    p = dict(parameters)
+    p = Table(parameters)
     front, H = np.array([1.0, 0.0]), np.array([p["chi_H"], p["zeta_H"]])
     axis = -np.array([np.sin(p["lambda_s"]), np.cos(p["lambda_s"])])  # a positive tilt leans it back
     forward = np.array([-axis[1], axis[0]])
     foot = front + np.dot(H - front, axis) * axis
     return Sketch(
-        parameters=Table(p),
+        parameters=p,
         rear=np.zeros(2),
         front=front,
         B=np.array([p["chi_B"], p["zeta_B"]]),

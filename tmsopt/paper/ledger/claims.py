@@ -12,7 +12,7 @@ A claim about a printed decimal is one table in that file, and nothing else:
     value = "ep4.Fr"
 
 The head of the file tells the other rules and what a table may have. What the expressions of `language` cannot tell
-becomes a function of `algebra`, and a word of `vocabulary`.
+becomes a function of `algebra`, which is a word of `vocabulary`.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,7 @@
-"""What the expressions of `claims.toml` may call, by name, besides the definitions in that file."""
+"""Words of the expressions of `claims.toml`, besides the definitions there: all of `algebra`, and what stands here."""
 
 from collections.abc import Mapping
+from inspect import getmembers, isfunction
 from typing import Any
 
 import flint
@@ -15,20 +16,12 @@ from tmsopt.roots.polynomial import evaluate, product, quadratic_pencil, shift
 
 _FUNCTIONS = (
     *(abs, all, any, dict, int, len, list, max, min, range, sum),
-    *(algebra.differentiate, algebra.depends_on, algebra.substitute, algebra.evaluate_at, algebra.vanishes_modulo),
-    *(algebra.is_positive, algebra.list_coefficients, algebra.degree_in, algebra.factorise, algebra.resultant),
-    *(
-        algebra.is_stable,
-        algebra.is_heavily_damped,
-        algebra.count_real_roots,
-        algebra.certified_roots,
-        algebra.ball_roots,
-    ),
-    *(algebra.tangent, algebra.kernel, algebra.det, algebra.sqrt, algebra.is_zero, algebra.round_to_six),
     *(copo, matrices, quadratic_pencil, Tilt, product, shift, evaluate, describe_design, draw_sample),
 )
 
-VOCABULARY: Mapping[str, Any] = {function.__name__: function for function in _FUNCTIONS} | {
+VOCABULARY: Mapping[str, Any] = {
+    **dict(getmembers(algebra, isfunction)),
+    **{function.__name__: function for function in _FUNCTIONS},
     "laws": vars(laws),  # as the paper prints them; laws.NAME
     "SI_PARAMETERS": [name for name in tms.sets[1].names if name != "g"],
     "verdict_on": lambda printed, value: judge_decimal(printed, value).verdict,
