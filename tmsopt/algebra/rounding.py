@@ -47,9 +47,6 @@ class Bounded:
     def __neg__(self) -> "Bounded":
         return Bounded(-self.value, self.error)
 
-    def __pos__(self) -> "Bounded":
-        return self
-
     def __abs__(self) -> "Bounded":
         return Bounded(np.abs(self.value), self.error)
 

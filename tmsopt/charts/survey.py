@@ -101,24 +101,22 @@ class Survey:
     """What to compute of every design of a grid.
 
     Attributes:
-        layers: names among `LAYERS`.
+        dtypes: layer → the kind of its numbers; layers are names among `LAYERS`, and quantities.
         quantities: name → expression, further layers.
-        dtypes: layer → the kind of its numbers.
         before, after: what is computed before the roots, coefficients among it, and what takes them.
     """
 
     problem: Posed
     grid: Grid
-    layers: tuple[str, ...]
-    quantities: Mapping[str, str]
     dtypes: Mapping[str, np.dtype[Any]]
+    quantities: Mapping[str, str]
     before: ArrayFunction = field(repr=False)
     after: ArrayFunction = field(repr=False)
 
     def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
         """The layers of a few rows, shape (len(rows), n), and their counts."""
         model, shape = self.problem.model, (len(rows), self.grid.shape[-1])
-        columns, fallbacks, asked = {**self.problem.fixed, **self.grid.columns(rows)}, 0, set(self.layers)
+        columns, fallbacks, asked = {**self.problem.fixed, **self.grid.columns(rows)}, 0, self.dtypes.keys()
         with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
             values = self.before(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
@@ -190,9 +188,8 @@ def survey(
     return Survey(
         problem,
         Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
-        tuple(dict.fromkeys(layers)),
-        dict(extra),
         {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in dtypes.items()},
+        dict(extra),
         before=array_function(problem, {n: e for n, e in wanted.items() if n not in late}),
         after=array_function(problem, late),
     )
