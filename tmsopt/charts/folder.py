@@ -115,7 +115,10 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
             move_aside(path)
     with _writing(path):
         if not path.exists():
-            _check_room(path, about, grid)
+            each = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
+            needed, free = each * grid.size, shutil.disk_usage(path.parent).free
+            if needed > free:
+                raise OSError(errno.ENOSPC, f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
             path.mkdir()
         elif not any((path / n).exists() for n in (_ABOUT, _LOCK)):
             raise _no_chart(path)
@@ -159,13 +162,6 @@ def _layer(name: str) -> str:
 
 def _no_chart(path: Path) -> InputError:
     return refusal(f"'{path}' is no chart: it has no {_ABOUT}; give a chart's folder, or a new name")
-
-
-def _check_room(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
-    each = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
-    needed, free = each * grid.size, shutil.disk_usage(path.parent).free
-    if needed > free:
-        raise OSError(errno.ENOSPC, f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
 
 
 def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:

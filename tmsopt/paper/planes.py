@@ -88,10 +88,10 @@ def surface() -> Swallowtail:
     return swallowtail(bicycle({}, box))
 
 
-def ep_set(step: float = 0.004) -> Trace:
+def ep_set() -> Trace:
     """The EP set of the paper, traced from the pattern alone."""
     free = {"Fr": FR, "chi_B": (1.01, 3.0), "lambda_s": TILT}
-    return trace(bicycle({}, free), "2EP2", step=step)
+    return trace(bicycle({}, free), "2EP2", step=0.004)
 
 
 def bicycle(fixed: Mapping[str, float], free: Mapping[str, tuple[float, float]]) -> Problem:

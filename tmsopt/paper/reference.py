@@ -32,10 +32,10 @@ class ReferenceBicycle:
     omega0: float = math.nan
 
 
-def benchmark(Fr: float | None = None) -> ReferenceBicycle:
-    """The benchmark (equation bench), by default at its critical speed (equation flus), as it has no other."""
+def benchmark() -> ReferenceBicycle:
+    """The benchmark (equation bench) at its critical speed (equation flus), as it has no other."""
     native = from_si({**laws.bench, "v": 0.0, "g": GRAVITY})
-    native["Fr"] = float(laws.Fr_c(*(native[n] for n in _GEOMETRY))) if Fr is None else Fr
+    native["Fr"] = laws.Fr_c(*(native[n] for n in _GEOMETRY))
     return ReferenceBicycle("benchmark", Table({name: float(value) for name, value in native.items()}))
 
 
