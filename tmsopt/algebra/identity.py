@@ -68,10 +68,10 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
         return Quotient(-self.over, self.under)
 
     def __sub__(self, other: Any) -> "Quotient":
-        return self + -other
+        return self + (-self._other(other))
 
     def __rsub__(self, other: Any) -> "Quotient":
-        return -self + other
+        return self._other(other) - self
 
     def __rtruediv__(self, other: Any) -> "Quotient":
         return self._other(other) / self
