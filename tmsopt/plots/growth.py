@@ -56,6 +56,9 @@ _ALONG = 0.7, 0.17  # of the width of a plot: where the first name stands, and h
 
 _INNER = 0.3, 0.9  # of a curve: between them, not at its ends
 
+_Curve = tuple[Mode, Array]
+"""A mode, and its growth rates or frequencies as they stand on the axis."""
+
 _ROOM = 0.08  # of all that is shown of H, above and below it
 
 
@@ -128,28 +131,28 @@ def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     scale = scale_over(data.problem.posed, data.over)
     draw_bands(ax, scale.of(data.stable), scale.of(data.heavily_damped))
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _reached(m, data.design))))
-    for mode in data.modes:
-        if part == "imag" and not (_of_H(data) or mode.roots.imag.any()):
-            continue
+    shown = [m for m in data.modes if part == "real" or _of_H(data) or m.roots.imag.any()]
+    curves = [(m, _heights(data, m.values, m.roots, part)) for m in shown]
+    for mode, y in curves:
         colour, style = _STYLES.get(mode.name, _OTHERS[names.index(mode.name) % len(_OTHERS)])
         level = 2 + 0.01 * names.index(mode.name)  # whole lines below dashed ones
-        x, y = scale.of(mode.values), _part(data, mode, part)
-        ax.plot(x, y, color=colour, linewidth=1.4, linestyle=style, zorder=level)
+        ax.plot(scale.of(mode.values), y, color=colour, linewidth=1.4, linestyle=style, zorder=level)
     _marks(ax, data, scale, part)
     label = _LABELS[part][data.rate is not None]
     first = min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0]
     ax.set(ylabel=OF_H[part] if _of_H(data) else label, xlabel=scale.label, xlim=scale.of([first, data.values[-1]]))
-    _focus(ax, data, part)
-    return _names(ax, data, scale, part, names)
-
-
-def _part(data: Growth, mode: Mode, part: str) -> Array:
-    """Growth rates or frequencies of a mode as they stand on the axis."""
-    return _heights(data, mode.values, mode.roots, part)
+    ax.set_ylim(_focus(data, curves, part))
+    found = _names(ax, scale, curves, names)
+    if _of_H(data):
+        kind = "EP{}" if "EP" in data.structure else "{}-fold"
+        for root, (own, z) in zip(data.multiple, _multiple(data), strict=True):
+            height = float(_heights(data, own, z, part).item())
+            found.append(Name(kind.format(root.multiplicity), float(scale.of(own)), height))
+    return found
 
 
 def _heights(data: Growth, at: Any, roots: Any, part: str) -> Array:
-    """The same of roots at values of the parameter; of H the eigenfrequencies are ω = i s."""
+    """Growth rates or frequencies as they stand on the axis, of roots at values of the parameter; of H ω = i s."""
     rate = np.ones(1) if data.rate is None else np.interp(at, data.values, data.rate)
     unit = -1.0 if _of_H(data) else 1.0 if data.rate is None else 2 * np.pi
     return np.asarray(getattr(np.asarray(roots), part) * rate / (1.0 if part == "real" else unit), dtype=float)
@@ -175,44 +178,40 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     met = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind] + _multiple(data)
     if met:
         places, roots = zip(*met, strict=True)
-        label = f"{'eigenfrequencies' if _of_H(data) else 'roots'} meet"
+        label = "eigenfrequencies meet" if _of_H(data) else "roots meet"
         x, y = scale.of(places), _heights(data, places, roots, part)
         ax.plot(x, y, "o", markersize=4.5, color=LINE, markerfacecolor="white", zorder=4, label=label)
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
 
 
-def _focus(ax: Axes, data: Growth, part: str) -> None:
-    """Limits that show the roots around the design and the events, even where others run away."""
-    if _of_H(data):  # all there is
-        every = np.concatenate([_part(data, m, part) for m in data.modes] + [np.zeros(1 if part == "real" else 0)])
-        bottom, top = every.min(), every.max()
-        margin = _ROOM * (top - bottom) or _ROOM * abs(top) or _ROOM
-        ax.set_ylim(bottom - margin, top + margin)
-        return
+def _focus(data: Growth, curves: Sequence[_Curve], part: str) -> tuple[float, float]:
+    """Limits that show the roots around the design and the events, even where others run away; of H all there is."""
+    if _of_H(data):
+        every = np.concatenate([*(y for _, y in curves), [0.0] if part == "real" else []])
+        bottom, top = float(every.min()), float(every.max())
+        margin = _ROOM * (top - bottom or abs(top) or 1)
+        return bottom - margin, top + margin
     centres = [data.design, *(c.at for c in data.events if c.kind in ("weave", "capsize"))]
     low, high = min(centres), max(centres)
     room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
-    shown = [
-        _part(data, m, part)[(part == "imag") | ((m.values >= low - room) & (m.values <= high + room))]
-        for m in data.modes
-        if part == "real" or m.roots.imag.any()
-    ]
-    near = np.concatenate([*shown, np.zeros(1)])
-    bottom, top = (float(np.percentile(near, q)) for q in ((1, 99) if part == "real" else (0, 99)))
+    shown = [y[(part == "imag") | ((m.values >= low - room) & (m.values <= high + room))] for m, y in curves]
+    bottom, top = np.percentile(np.concatenate([*shown, [0.0]]), (1, 99)).tolist()
+    if part == "imag":
+        return 0.0, 1.2 * top or 0.1
     margin = 0.2 * (top - bottom) or 0.1
-    ax.set_ylim(bottom - margin if part == "real" else 0.0, top + margin)
+    return bottom - margin, top + margin
 
 
-def _names(ax: Axes, data: Growth, scale: AxisScale, part: str, names: list[str]) -> list[Name]:
+def _names(ax: Axes, scale: AxisScale, curves: Sequence[_Curve], names: Sequence[str]) -> list[Name]:
     """Each mode's name where the longest of its curves is in sight, those of several modes spread out."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     found = []
     for k, name in enumerate(names):
         pieces = []
-        for mode in data.modes:
-            x, y = scale.of(mode.values), _part(data, mode, part)
-            seen = (x > left) & (x < right) & (y > bottom) & (y < top) & ((part == "real") | _of_H(data) | (y > 0))
+        for mode, y in curves:
+            x = scale.of(mode.values)
+            seen = (x > left) & (x < right) & (y > bottom) & (y < top)
             if mode.name == name and seen.any():
                 pieces.append((x[seen], y[seen]))
         if pieces:
@@ -220,10 +219,6 @@ def _names(ax: Axes, data: Growth, scale: AxisScale, part: str, names: list[str]
             place = left + (_ALONG[0] - _ALONG[1] * k) * (right - left)
             at = int(np.abs(x - np.clip(place, *np.quantile([x[0], x[-1]], _INNER))).argmin())
             found.append(Name(name, float(x[at]), float(y[at])))
-    kind = "EP{}" if "EP" in data.structure else "{}-fold"
-    for root, (own, z) in zip(data.multiple, _multiple(data), strict=True) if _of_H(data) else ():
-        height = float(_heights(data, own, z, part).item())
-        found.append(Name(kind.format(root.multiplicity), float(scale.of(own)), height))
     return found
 
 
