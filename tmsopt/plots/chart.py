@@ -1,12 +1,13 @@
 """Stability charts drawn with their exact boundary curves."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import BoundaryNorm, CenteredNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -18,29 +19,28 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.chart import Chart
 from tmsopt.errors import refusal, suggest
-from tmsopt.models import Model, in_words_of
-from tmsopt.plots.labels import AxisScale, Name, abscissa_label, events_of, finished, scale_of
-from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, entry, figure_of, on_axes
+from tmsopt.models import Model, in_words_of, tms
+from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, events_of, finished, plane_over
+from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
-from tmsopt.problem.unit_system import Unit
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES
 from tmsopt.search.solve import solve
 from tmsopt.tracing.domain import Domain
 
-Plane = tuple[AxisScale, AxisScale]
-"""The horizontal and the vertical axis."""
+Legend = tuple[list[Name], list[Artist]]
+"""Names to place, and legend entries."""
 
 CLASS_COLOURS = ("#FFFFFF", "#BBBBBB", "#E6E6E6", "#A6D5F0", "#F2C45A")
 """Fills of the classes, undefined to heavily damped, told apart by lightness too."""
 
-_BOUNDARIES = {
-    "between capsize and weave": (CAPSIZE, 1.2),
-    "edge of stability": (CRITICAL, 1.8),
-    "edge of heavy damping": (LINE, 1.4),
-}
-"""Colour and width of the boundaries, in the order of a domain."""
+_BOUNDARIES = (
+    ("parting", "between capsize and weave", CAPSIZE, 1.2),
+    ("stability", "edge of stability", CRITICAL, 1.8),
+    ("heavy_damping", "edge of heavy damping", LINE, 1.4),
+)
+"""Boundaries of a domain, with words, colour and width, in the order in which they are drawn."""
 
 _SHOWN = (1, 95)  # percentiles of a layer between which colours change: poles of the abscissa must not take them all
 
@@ -48,23 +48,15 @@ _KINDS: Mapping[str, tuple[LineStyleType, str]] = {
     "capsize": ("-.", " (root 0)"),
     "infinity": (":", " (root at infinity)"),
 }
-_OTHER: tuple[LineStyleType, str] = ("-", "")
-"""Line of an arc by its kind, and words for it."""
+"""Line of an arc by its kind, and words for it; others are drawn through."""
 
-LAYERS = {
-    "kind": "kind of motion",
-    "abscissa": "spectral abscissa",
-    "damping_ratio": "damping ratio",
-    "real_roots": "number of real roots",
-}
-"""What can be drawn of a chart."""
+_LAYERS = {"damping_ratio": "damping ratio", "real_roots": "number of real roots"}
+"""Words for layers of numbers; quantities have their own name."""
 
 
-def fill_classes(ax: Axes, chart: Chart, plane: Plane) -> None:
+def fill_classes(ax: Axes, chart: Chart, plane: PlaneAxes) -> None:
     """The class of every grid point as a colour."""
-    norm = BoundaryNorm(np.arange(len(CLASSES) + 1) - 0.5, len(CLASSES))
-    shades = ListedColormap(CLASS_COLOURS)
-    ax.pcolormesh(*_grid(chart, plane), chart.kind, cmap=shades, norm=norm, rasterized=True)
+    _fill_counts(ax, chart, plane, "kind", CLASS_COLOURS)
 
 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
@@ -77,42 +69,38 @@ def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
     ]
 
 
-def domain_curves(ax: Axes, domain: Domain, plane: Plane) -> list[Name]:
-    """Boundaries of stability and of heavy damping as curves, their corners marked; names to place."""
-    boundaries = (domain.parting, domain.stability, domain.heavy_damping)
-    for arcs, (colour, width) in zip(boundaries, _BOUNDARIES.values(), strict=True):
-        for arc in arcs:
-            style, _ = _KINDS.get(arc.kind, _OTHER)
-            ax.plot(
-                *(scale.of(arc.points[scale.name]) for scale in plane),
-                color=colour,
-                linewidth=width,
-                linestyle=style,
-                path_effects=[withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)],
-            )
-    names = [Name(c.name, *(float(s.of(c.parameters[s.name])) for s in plane)) for c in domain.corners]
-    for name in names:
-        ax.plot(name.x, name.y, "o", color=MARK, markersize=4, zorder=5)
-    return names
+def domain_curves(ax: Axes, domain: Domain | None, plane: PlaneAxes, model: Model = tms) -> Legend:
+    """Boundaries of stability and of heavy damping as curves, their corners marked; names to place, legend entries.
+
+    Args:
+        model: in whose words.
+    """
+    names: list[Name] = []
+    handles: list[Artist] = []
+    if domain is None:
+        return names, handles
+    for name, words, colour, width in _BOUNDARIES:
+        for arc in getattr(domain, name):
+            style, how = _KINDS.get(arc.kind, ("-", ""))
+            around = withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)
+            look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width}
+            ax.plot(*plane.of(arc.points), path_effects=[around], **look)
+            handles.append(Line2D([], [], label=words + how, **look))
+    for corner in domain.corners:
+        x, y = plane.of(corner.parameters)
+        ax.plot(x, y, "o", color=MARK, markersize=4, zorder=5)
+        names.append(Name(in_words_of(model, corner.name), x, y))
+    return names, handles
 
 
-def domain_handles(domain: Domain) -> list[Artist]:
-    """Legend entries of the boundaries that occur."""
-    boundaries = (domain.parting, domain.stability, domain.heavy_damping)
-    return [
-        entry(words + how, colour, style, linewidth=width)
-        for arcs, (words, (colour, width)) in zip(boundaries, _BOUNDARIES.items(), strict=True)
-        for style, how in dict.fromkeys(_KINDS.get(arc.kind, _OTHER) for arc in arcs)
-    ]
-
-
-def frame(ax: Axes, chart: Chart, plane: Plane) -> None:
+def frame(ax: Axes, chart: Chart, plane: PlaneAxes) -> None:
     """Symbols and units of the two parameters, and limits at the ends of the grid."""
     x, y = _grid(chart, plane)
-    ax.set(xlabel=plane[0].label, ylabel=plane[1].label, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    plane.label(ax)
+    ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
 
 
-def plane_of(chart: Chart) -> Plane:
+def plane_of(chart: Chart) -> PlaneAxes:
     """The two axes of a chart, in the units of its file.
 
     Raises:
@@ -121,8 +109,7 @@ def plane_of(chart: Chart) -> Plane:
     if len(chart.axes) != 2:
         message = f"found {len(chart.axes)} parameters; a picture shows a plane: chart two, with the third one fixed"
         raise refusal(message, "axes")
-    first, second = chart.axes
-    return scale_of(chart.problem.posed, first), scale_of(chart.problem.posed, second)
+    return plane_over(chart.problem.posed, *chart.axes)
 
 
 def draw_domain(
@@ -146,17 +133,10 @@ def draw_domain(
     """
     arcs = (*data.stability, *data.heavy_damping, *data.parting)
     varying = [n for n in (arcs[0].points if arcs else ()) if any(np.ptp(a.points[n]) > 0 for a in arcs)]
-    chosen = [*(n for n in (horizontal, vertical) if n), *varying, "", ""][:2]
-    first, second = (scale_of(problem.posed, n) if problem else AxisScale(n, n, Unit()) for n in chosen)
+    plane = plane_over(problem.posed if problem else None, horizontal, vertical, *varying)
     drawn = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
-    names = _in_words(domain_curves(drawn, data, (first, second)), problem)
-    drawn.set(xlabel=first.label, ylabel=second.label)
-    return finished(drawn, ax is None, names, domain_handles(data))
-
-
-def _in_words(names: list[Name], problem: Problem | None) -> list[Name]:
-    """Names of corners as users of a problem read them."""
-    return [replace(n, text=in_words_of(problem.model, n.text)) for n in names] if problem else names
+    plane.label(drawn)
+    return finished(drawn, ax is None, *domain_curves(drawn, data, plane, problem.model if problem else tms))
 
 
 def draw_chart(
@@ -188,23 +168,18 @@ def draw_chart(
     if layer not in data.layers:
         raise refusal(f"found '{layer}'; {suggest(layer, data.layers)}", "layer")
     drawn = on_axes(ax, 6.4, 5.4, data.problem.title)
-    handles: list[Artist] = []
     if layer == "kind":
         fill_classes(drawn, data, plane)
-        handles += class_handles(data.kind, data.problem.model)
     else:
         _fill_layer(drawn, data, plane, layer)
-    names: list[Name] = []
-    if data.domain is not None:
-        names = _in_words(domain_curves(drawn, data.domain, plane), data.problem)
-        handles += domain_handles(data.domain)
-    violated = _violated(drawn, data, plane)
-    handles += [violated] if violated else []
+    names, curves = domain_curves(drawn, data.domain, plane, data.problem.model)
+    classes = class_handles(data.kind, data.problem.model) if layer == "kind" else []
+    handles: list[Artist] = [*classes, *curves, *_violated(drawn, data, plane)]
     if layer == "abscissa" and optimum:
         handles += _optimum(drawn, data, plane)
     if design is not None:
-        x, y = (float(scale.of(design.parameters[scale.name])) for scale in plane)
-        handles += _mark(drawn, x, y, "D", f"the design ({design.structure})")
+        x, y = at = plane.of(design.parameters)
+        handles += _mark(drawn, at, "D", f"the design ({design.structure})")
         names.append(Name("design", x, y))
     frame(drawn, data, plane)
     return finished(drawn, ax is None, names, handles)
@@ -223,34 +198,40 @@ def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = No
     return figure_of(draw_chart(chart, None, layer, design))
 
 
-def _grid(chart: Chart, plane: Plane) -> tuple[Array, Array]:
+def _grid(chart: Chart, plane: PlaneAxes) -> tuple[Array, Array]:
     first, second = (scale.of(values) for scale, values in zip(plane, chart.grid, strict=True))
     return first, second
 
 
-def _violated(ax: Axes, chart: Chart, plane: Plane) -> Patch | None:
+def _violated(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Patch]:
     """Hatching where a constraint does not hold, and a line where it just does; its legend entry."""
     if "satisfied" not in chart.layers or chart.satisfied.all():
-        return None
+        return []
     grid = _grid(chart, plane)
     hatched = ax.contourf(*grid, ~chart.satisfied, levels=[0.5, 1.5], colors="none", hatches=["//"])
     hatched.set(edgecolor=(0.4, 0.4, 0.4, 0.7), linewidth=0)
     if "margin" in chart.layers and np.any(chart.margin > 0) and np.any(chart.margin < 0):
         ax.contour(*grid, chart.margin, levels=[0], colors="0.3", linewidths=0.8)
-    return Patch(facecolor="none", edgecolor="0.4", hatch="//", linewidth=0, label="constraint violated")
+    return [Patch(facecolor="none", edgecolor="0.4", hatch="//", linewidth=0, label="constraint violated")]
 
 
-def _fill_layer(ax: Axes, chart: Chart, plane: Plane, layer: str) -> None:
+def _fill_counts(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, colours: Sequence[str] | Array) -> QuadMesh:
+    """A layer of whole numbers from 0 on, each as a colour."""
+    norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
+    shades = ListedColormap(colours)
+    return ax.pcolormesh(*_grid(chart, plane), chart.layers[layer], cmap=shades, norm=norm, rasterized=True)
+
+
+def _fill_layer(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
     """The abscissa, damping ratio, number of real roots or a quantity, with its colour bar."""
     grid, figure = _grid(chart, plane), figure_of(ax)
-    values = np.asarray(chart.layers[layer], dtype=float)
+    label = _LAYERS.get(layer, layer)
     if layer == "real_roots":
         counts = np.arange(chart.problem.model.degree + 1)
-        shades = ListedColormap(colormaps["cividis"](np.linspace(0, 1, len(counts))))
-        whole = BoundaryNorm(np.arange(len(counts) + 1) - 0.5, len(counts))
-        mesh = ax.pcolormesh(*grid, values, cmap=shades, norm=whole, rasterized=True)
-        figure.colorbar(mesh, ax=ax, label=LAYERS[layer], ticks=counts)
+        shades = colormaps["cividis"](np.linspace(0, 1, len(counts)))
+        figure.colorbar(_fill_counts(ax, chart, plane, layer, shades), ax=ax, label=label, ticks=counts)
         return
+    values = np.asarray(chart.layers[layer], dtype=float)
     known = values[np.isfinite(values)]
     low, high = (float(np.percentile(known, q)) for q in _SHOWN) if known.size else (0.0, 1.0)
     if layer == "abscissa":
@@ -265,29 +246,28 @@ def _fill_layer(ax: Axes, chart: Chart, plane: Plane, layer: str) -> None:
         figure.colorbar(mesh, ax=ax, label=abscissa_label(chart.problem.posed), extend="both")
         return
     mesh = ax.pcolormesh(*grid, values, cmap="cividis", vmin=low, vmax=high, rasterized=True)
-    label = LAYERS.get(layer, layer)
     figure.colorbar(mesh, ax=ax, label=label, extend="both" if low > known.min(initial=low) else "max")
 
 
-def _optimum(ax: Axes, chart: Chart, plane: Plane) -> list[Line2D]:
+def _optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
     """The best design of the plane, solved for or of the grid: a star, and the legend says which."""
     problem = chart.problem.posed.nominal
     if problem.objective is not None or problem.pattern is not None:
         found = solve(problem, throw=False, interruptible=False)
         if found.status == "optimal":
-            x, y = (float(scale.of(found.parameters[scale.name])) for scale in plane)
             word = "abscissa" if problem.model.carrier is None else "largest Im ω"
-            return _mark(ax, x, y, "*", f"optimum ({found.structure}), {word} {found.abscissa:.4g}")
+            label = f"optimum ({found.structure}), {word} {found.abscissa:.4g}"
+            return _mark(ax, plane.of(found.parameters), "*", label)
     allowed = chart.satisfied if "satisfied" in chart.layers else np.ones(chart.abscissa.shape, bool)
     values = np.where(allowed & np.isfinite(chart.abscissa), chart.abscissa, np.inf)
     row, column = np.unravel_index(int(values.argmin()), values.shape)
     if not np.isfinite(values[row, column]):
         return []
-    x, y = (axis[k] for axis, k in zip(_grid(chart, plane), (column, row), strict=True))
+    x, y = _grid(chart, plane)
     word = "least abscissa" if problem.model.carrier is None else "best Im ω"
-    return _mark(ax, float(x), float(y), "*", f"{word} on the grid, {values[row, column]:.4g}")
+    return _mark(ax, (x[column], y[row]), "*", f"{word} on the grid, {values[row, column]:.4g}")
 
 
-def _mark(ax: Axes, x: float, y: float, marker: str, label: str) -> list[Line2D]:
+def _mark(ax: Axes, at: Iterable[float], marker: str, label: str) -> list[Line2D]:
     size, yellow = 12 if marker == "*" else 6, "#F0E442"
-    return ax.plot(x, y, marker, color=yellow, mec=LINE, markersize=size, zorder=6, label=label, clip_on=False)
+    return ax.plot(*at, marker, color=yellow, mec=LINE, markersize=size, zorder=6, label=label, clip_on=False)

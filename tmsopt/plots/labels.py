@@ -1,8 +1,9 @@
 """Names of marked points, units and labels of axes, words for modes, and legends."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import textalloc
@@ -58,6 +59,27 @@ class AxisScale:
     def of(self, values: ArrayLike) -> Array:
         """Numbers as they stand on the axis."""
         return np.asarray(values, dtype=float) / self.unit.one
+
+
+class PlaneAxes(NamedTuple):
+    """The axes of a plane."""
+
+    horizontal: AxisScale
+    vertical: AxisScale
+
+    def of(self, values: Mapping[str, ArrayLike]) -> Array:
+        """Where points stand on both axes, of shape (2, …), by the values of what is on them."""
+        return np.array([axis.of(values[axis.name]) for axis in self])
+
+    def label(self, ax: Axes) -> None:
+        """Write what is on the axes."""
+        ax.set(xlabel=self.horizontal.label, ylabel=self.vertical.label)
+
+
+def plane_over(problem: Posed | None, *names: str | None) -> PlaneAxes:
+    """The plane of the first two names that are given, in the units of a problem; without one in SI and rad."""
+    first, second, *_ = (*filter(None, names), "", "")
+    return PlaneAxes(*(scale_of(problem, n) if problem else AxisScale(n, n, Unit()) for n in (first, second)))
 
 
 def scale_of(problem: Posed, text: str) -> AxisScale:

@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from tmsopt.models import Model, in_words_of, tms
-from tmsopt.plots.labels import AxisScale, Name, abscissa_label, finished, scale_of
+from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, finished, plane_over
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, figure_of, on_axes
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
@@ -42,50 +42,45 @@ def draw_trace(data: Trace, ax: Axes | None = None, horizontal: str | None = Non
 
     More: docs/how_to/tracing.md
     """
-    first, second, *_ = [*(n for n in (horizontal, vertical) if n), *data.varying, *data.problem.free]
-    plane = scale_of(data.problem.posed, first), scale_of(data.problem.posed, second)
+    plane = plane_over(data.problem.posed, horizontal, vertical, *data.varying, *data.problem.free)
     model = data.problem.model
     drawn = on_axes(ax, 6.4, 5.0, data.problem.title or in_words_of(model, data.pattern))
     _bands(drawn, data, plane)
     for branch in data.branches:
         draw_branch(drawn, branch, plane, width=1.2, tint=LINE, model=model)
-    marked = [e for e in data.events if e.name not in _UNLABELLED]
-    names = [Name(in_words_of(model, e.name), *(float(s.of(e.parameters[s.name])) for s in plane)) for e in marked]
+    names = [
+        Name(in_words_of(model, e.name), *plane.of(e.parameters)) for e in data.events if e.name not in _UNLABELLED
+    ]
     for name in names:
         drawn.plot(name.x, name.y, "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
-    drawn.set(xlabel=plane[0].label, ylabel=plane[1].label)
+    plane.label(drawn)
     return finished(drawn, ax is None, names)
 
 
 def draw_branch(
-    ax: Axes,
-    branch: Branch,
-    plane: tuple[AxisScale, AxisScale],
-    width: float = 1.4,
-    tint: str | None = None,
-    model: Model = tms,
+    ax: Axes, branch: Branch, plane: PlaneAxes, width: float, tint: str | None = None, model: Model = tms
 ) -> None:
     """One branch as lines, cut where its pattern, its stability or a constraint changes; pale where unstable.
 
     Args:
         model: in whose words.
     """
-    x, y = (scale.of(branch.parameters[scale.name]) for scale in plane)
+    points = plane.of(branch.parameters)
     states = list(zip(kinds_along(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
     events = {e.index for e in branch.events}
     start, said = 0, {True: (), False: ("constraint violated",)}
     for (kind, stable, satisfied), run in groupby(states):
         stop = start + len(list(run))
-        first = start - 1 if start and start - 1 in events else start
-        end = stop if stop - 1 in events else stop + 1  # no gap: an event belongs to both of its sides
+        first = start - (start - 1 in events)
+        end = stop + (stop - 1 not in events)  # no gap: an event belongs to both of its sides
+        label = ", ".join([in_words_of(model, kind), *["unstable"] * (not stable), *said[satisfied]])
         ax.plot(
-            x[first:end],
-            y[first:end],
+            *points[:, first:end],
+            "--" if kind.startswith("CEP") else "-" if satisfied else ":",
             color=tint or colour(kind),
             linewidth=width if satisfied else width / 2,
-            linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":",
             alpha=1.0 if stable else 0.35,
-            label=_label(ax, ", ".join([in_words_of(model, kind), *["unstable"] * (not stable), *said[satisfied]])),
+            label=None if label in ax.get_legend_handles_labels()[1] else label,
         )
         start = stop
 
@@ -110,11 +105,11 @@ def trace_figure(trace: Trace, horizontal: str | None = None, vertical: str | No
     return figure_of(draw_trace(trace, None, horizontal, vertical))
 
 
-def _bands(ax: Axes, data: Trace, plane: tuple[AxisScale, AxisScale]) -> None:
+def _bands(ax: Axes, data: Trace, plane: PlaneAxes) -> None:
     """Segments coloured by the abscissa of their ends, with the colour bar."""
     segments, values, widths = [], [], []
     for branch in data.branches:
-        points = np.stack([scale.of(branch.parameters[scale.name]) for scale in plane], axis=-1)
+        points = plane.of(branch.parameters).T
         segments.append(np.stack([points[:-1], points[1:]], axis=1))
         values.append((branch.abscissa[:-1] + branch.abscissa[1:]) / 2)
         widths += [_BANDS[bool(s)] for s in branch.stable[:-1] & branch.stable[1:]]
@@ -125,7 +120,3 @@ def _bands(ax: Axes, data: Trace, plane: tuple[AxisScale, AxisScale]) -> None:
         drawn.set_array(np.concatenate(values))
         ax.add_collection(drawn)
         figure_of(ax).colorbar(drawn, ax=ax, label=abscissa_label(data.problem.posed))
-
-
-def _label(ax: Axes, text: str) -> str | None:
-    return None if any(line.get_label() == text for line in ax.get_lines()) else text

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.paper.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, Plane, chi_B_plane, tilt_plane
-from tmsopt.plots.chart import class_handles, domain_curves, domain_handles, fill_classes, frame, plane_of
+from tmsopt.plots.chart import Legend, class_handles, domain_curves, fill_classes, frame, plane_of
 from tmsopt.plots.labels import Name, place_all, place_names
 from tmsopt.plots.style import COMPLEX, HEAVY, MARK, REAL, STABLE, entry, legend_below, new_figure
 from tmsopt.plots.trace import draw_branch
@@ -25,7 +25,7 @@ _LEAST, _GREATEST = -1.9, 0.1  # of the abscissa in colours
 
 _ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}_4} = 0.4107$ rad")
 
-EP_SET_HANDLES = [entry("2EP2", REAL, linewidth=2), entry("CEP2", COMPLEX, "--", linewidth=2)]
+_EP_SET_HANDLES = [entry("2EP2", REAL, linewidth=2), entry("CEP2", COMPLEX, "--", linewidth=2)]
 """Legend entries of the EP set."""
 
 
@@ -66,23 +66,18 @@ def abscissa_figure() -> Figure:
     return figure
 
 
-def draw_plane(ax: Axes, plane: Plane) -> list[Name]:
-    """Classes, exact boundaries with corners, the EP set and the marked points of a plane; names to place."""
+def draw_plane(ax: Axes, plane: Plane) -> Legend:
+    """Classes, exact boundaries with corners, the EP set and the marked points of a plane; names, legend entries."""
     chart, axes = plane.chart, plane_of(plane.chart)
     fill_classes(ax, chart, axes)
-    names = domain_curves(ax, chart.domain, axes) if chart.domain is not None else []
-    for branch in plane.ep_set.branches if plane.ep_set is not None else ():
-        draw_branch(ax, branch, axes, width=2.0)
+    names, handles = domain_curves(ax, chart.domain, axes)
+    handles = [*class_handles(chart.kind, chart.problem.model), *handles]
+    if plane.ep_set is not None:
+        handles += _EP_SET_HANDLES
+        for branch in plane.ep_set.branches:
+            draw_branch(ax, branch, axes, width=2.0)
     frame(ax, chart, axes)
-    return names + _draw_marked(ax, plane)
-
-
-def plane_handles(plane: Plane) -> list[Artist]:
-    """Legend entries of the classes and the curves of a plane."""
-    chart = plane.chart
-    boundaries = domain_handles(chart.domain) if chart.domain is not None else []
-    ep_set = EP_SET_HANDLES if plane.ep_set is not None else []
-    return [*class_handles(chart.kind, chart.problem.model), *boundaries, *ep_set]
+    return names + _draw_marked(ax, plane), handles
 
 
 def _planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
@@ -94,11 +89,15 @@ def _planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
 
 def draw_planes(figure: Figure, panels: Sequence[Axes], planes: Sequence[Plane], titles: Sequence[str]) -> None:
     """Planes with their titles, one legend for all, and their names."""
-    names = [draw_plane(ax, plane) for ax, plane in zip(panels, planes, strict=True)]
-    for ax, title in zip(panels, titles, strict=True):
+    found: list[tuple[Axes, list[Name]]] = []
+    entries: list[Artist] = []
+    for ax, plane, title in zip(panels, planes, titles, strict=True):
+        names, handles = draw_plane(ax, plane)
         ax.set_title(title, fontsize=10)
-    legend_below(figure, [h for plane in planes for h in plane_handles(plane)])
-    place_all([*zip(panels, names, strict=True)])
+        found.append((ax, names))
+        entries += handles
+    legend_below(figure, entries)
+    place_all(found)
 
 
 def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
