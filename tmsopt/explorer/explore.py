@@ -82,13 +82,13 @@ def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
     told = options.get("progress")
     if isinstance(problem, Solution):
         return _explorer(problem.problem.posed, problem, {}, told)
-    typed = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
+    model = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
     posed = pose(problem)
     if posed.pareto:
         posed = posed.derive(pareto=(), minimize=posed.pareto[0])
     asked = posed.sense != "evaluate" or not posed.free
     solution = solve(posed, throw=False, stability=0.0, **options) if asked else None
-    return _explorer(posed, solution, typed if isinstance(typed, dict) else {}, told)
+    return _explorer(posed, solution, model if isinstance(model, dict) else {}, told)
 
 
 def page_of(

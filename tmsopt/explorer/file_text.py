@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import starmap
 from typing import Any
 
 from tmsopt.guide import toml_key, toml_text
@@ -16,15 +17,15 @@ def around(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
     Args:
         model: the table that states the model, as typed; without one it is written from the model itself.
     """
-    before = [f"title = {toml_text(problem.title)}"]
+    before = [_line("title", problem.title)]
     if problem.model.statement is None:
-        before.append(f"model = {toml_text(problem.model.name)}")
+        before.append(_line("model", problem.model.name))
     else:
         before += ["", *_model(model or _stated(problem))]
-    limits = [f"{toml_key(name)} = {toml_text(text)}" for name, text in problem.constraints.items()]
-    weights = [f"{toml_key(name)} = {weight!r}" for name, weight in problem.weights.items()]
-    after = ["", "[constraints]", *limits] if limits else []
-    after += ["", "[weights]", *weights] if weights else []
+    after = []
+    for name in ("constraints", "weights"):
+        if entries := getattr(problem, name):
+            after += ["", f"[{name}]", *starmap(_line, entries.items())]
     if problem.nominal is not problem:
         before.append("# one design, at its nominal values: bands and tolerances are left out")
     return {"before": "\n".join([*before, "", "[parameters]", ""]), "after": "\n".join([*after, ""])}
@@ -33,9 +34,9 @@ def around(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
 def _model(table: Mapping[str, Any]) -> Iterator[str]:
     yield "[model]"
     inner = {n: v for n, v in table.items() if isinstance(v, Mapping)}
-    yield from (f"{toml_key(n)} = {_value(v)}" for n, v in table.items() if n not in inner)
+    yield from (_line(n, v) for n, v in table.items() if n not in inner)
     for name, values in inner.items():
-        yield from ("", f"[model.{toml_key(name)}]", *(f"{toml_key(n)} = {_value(v)}" for n, v in values.items()))
+        yield from ("", f"[model.{toml_key(name)}]", *starmap(_line, values.items()))
 
 
 def _stated(problem: Posed) -> dict[str, Any]:
@@ -58,9 +59,5 @@ def _stated(problem: Posed) -> dict[str, Any]:
     return found | {n: rows[0] for n, rows in found.items() if n == "coefficients"}
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, str):
-        return toml_text(value)
-    return repr(value).lower() if isinstance(value, bool) else repr(value)
+def _line(key: str, value: Any) -> str:
+    return f"{toml_key(key)} = {toml_text(value)}"

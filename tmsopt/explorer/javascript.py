@@ -3,7 +3,9 @@
 Results that are used once stand where they are used, the others get names t0, t1, …; no name comes from a file.
 """
 
+import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -114,11 +116,8 @@ def function(name: str, arguments: Sequence[str], asked: Formula, inputs: Mappin
 
 
 def _number(value: float) -> Text:
-    """A double, to the last bit."""
-    if math.isfinite(value):
-        text = repr(float(value)).removesuffix(".0")
-    else:
-        text = "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    """A double, to the last bit; JSON writes it as JavaScript does, NaN and infinities too."""
+    text = json.dumps(float(value)).removesuffix(".0")
     return Text(text, 8 if text.startswith("-") else 9)
 
 
@@ -205,7 +204,7 @@ def _power(named: Callable[[Text], Text], base: Text, exponent: Text) -> Text:
 
 def _is_result(text: str) -> bool:
     """Whether a text is neither a name, nor an entry such as ``x[3]``, nor a number."""
-    return not text.replace(".", "").replace("[", "").replace("]", "").isalnum()
+    return re.fullmatch(r"[\w.\[\]]+", text) is None
 
 
 def _operand(spelling: Spelling, place: int, given: Text) -> str:

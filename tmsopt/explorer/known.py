@@ -57,16 +57,14 @@ def known_designs(
         search: whether to look for an exceptional point, unless the optimum is one or no design is stable.
         others: names and parameters of designs that were found otherwise, which are answers too.
     """
-    optimum = [_of_solution(solution)] if solution is not None else []
+    optimum = _of_solution(solution) if solution is not None else None
     worth = solution is None or (solution.stable and "EP" not in solution.structure)
     found = _exceptional(problem) if search and worth else None
     named = [Known(name, values, _structure(problem, values), (), True) for name, values in others]
-    every = [k for k in (*optimum, *named, found, _benchmark(problem)) if k is not None]
-    return [k if k.meetings else replace(k, meetings=_meetings(problem, k)) for k in every]
-
-
-def _meetings(problem: Posed, known: Known) -> tuple[MultipleRoot, ...]:
-    return meetings(problem.nominal, known.parameters, problem.nominal.values(known.parameters)["structure"].roots)
+    every = [k for k in (optimum, *named, found, _benchmark(problem)) if k is not None]
+    of = problem.nominal
+    own = [k.meetings or meetings(of, k.parameters, of.values(k.parameters)["structure"].roots) for k in every]
+    return [replace(k, meetings=met) for k, met in zip(every, own, strict=True)]
 
 
 def _of_solution(solution: Solution) -> Known:

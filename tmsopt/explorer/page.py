@@ -1,7 +1,6 @@
 """The page as one file: what is the same in every page, with the formulas and the data of this one."""
 
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
@@ -14,6 +13,7 @@ from tmsopt.explorer.kernel import kernel_script
 from tmsopt.explorer.known import Known
 from tmsopt.explorer.subject import subject
 from tmsopt.problem import Posed
+from tmsopt.records import plain
 
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
 _BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
@@ -26,12 +26,8 @@ def html_of(problem: Posed, designs: Sequence[Known], model: Mapping[str, Any], 
     """The page of a problem; arguments as of `subject`."""
     script = model_script(problem)
     data = subject(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
-    parts = [
-        script.text,
-        kernel_script(problem.model.degree),
-        f"const DATA = {_json(data)};",
-    ]
-    parts += [_read(f"{name}.js") for name in _PARTS.split()]
+    own = script.text, kernel_script(problem.model.degree), f"const DATA = {_json(data)};"
+    parts = [*own, *(_read(f"{name}.js") for name in _PARTS.split())]
     marks = {
         "<!-- title -->": escape(problem.title or problem.model.title),
         "/* style */": _BLANKS.sub(r"\1\2", _read("page.css")),
@@ -63,17 +59,9 @@ def _tight(lines: Sequence[str]) -> Iterator[str]:
             yield "".join(t if k % 2 else _AROUND.sub(r"\1\2", t) for k, t in enumerate(parts))
 
 
-def _json(data: Any) -> str:
+def _json(data: Mapping[str, Any]) -> str:
     """JSON that no text in it can end or change a script with; a number that does not exist is null."""
-    text = json.dumps(_plain(data), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    text = json.dumps(plain(data), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for letter in "<>&\u2028\u2029":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
     return text
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {n: _plain(v) for n, v in value.items()}
-    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value

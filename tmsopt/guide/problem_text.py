@@ -42,9 +42,9 @@ def toml_problem(problem: Posed, comments: Iterable[str] = ()) -> str:
     return "\n".join([*lines, ""])
 
 
-def toml_text(text: str) -> str:
-    """A TOML text: JSON has the same escapes."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+def toml_text(value: object) -> str:
+    """A text, a number, a truth or a list of these as TOML: JSON has the same signs and escapes."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
 
 
 def toml_key(name: str) -> str:
