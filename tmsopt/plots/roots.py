@@ -1,8 +1,7 @@
 """Roots in the complex plane, and how a multiple one splits."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -49,49 +48,43 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     ax.set_title(title, fontsize=9.5)
     ax.axhline(0, color="grey", linewidth=0.6)
     if _of_H(data):
+        found = {(0.0 - im, re): m for (re, im), m in found.items()}
         problem = getattr(data, "problem", None)
-        scale = abs(problem.model.carrier or 1.0) if problem else 1.0
-        _draw_frequencies(ax, {(0.0 - im, re): m for (re, im), m in found.items()}, 1e-12 * scale)
-        return finished(ax, own)
-    found |= {(re, -im): m for (re, im), m in found.items()}
-    size = rate * max((math.hypot(*z) for z in found), default=1.0) * 1.3 or 1.0
-    ax.axvspan(0, size, color="0.92", zorder=0)
-    ax.axvline(0, color="grey", linewidth=0.6)
-    _mark(ax, {(rate * re, rate * im): m for (re, im), m in found.items()})
-    right = max([0.3 * size, *(1.2 * rate * re for re, _ in found)])
-    ax.set(xlim=(-size, right), ylim=(-size, size))
-    ax.set(xlabel=rf"$\mathrm{{Re}}\,s${unit}", ylabel=rf"$\mathrm{{Im}}\,s${unit}")
-    return finished(ax, own)
-
-
-def _draw_frequencies(ax: Axes, found: Mapping[tuple[float, float], int], nothing: float) -> None:
-    """Eigenfrequencies with their multiplicities, and the real axis, above which motion grows.
-
-    Args:
-        nothing: less is 0 but for rounding.
-    """
-    x, y = np.array([*found]).reshape(-1, 2).T
-    middle, ends = float(np.mean(x)), (min(0.0, *y), max(0.0, *y))
-    size = max(np.ptp(x), ends[1] - ends[0])
-    size = size if size > nothing else max(abs(middle), 1e12 * nothing)
-    ax.axhspan(0, ends[1] + size, color="0.92", zorder=0)
-    _mark(ax, found)
-    ax.set(xlim=(middle - 0.8 * size, middle + 0.8 * size), ylim=(ends[0] - 0.3 * size, ends[1] + 0.3 * size))
-    ax.set(xlabel=OF_H["imag"], ylabel=OF_H["real"])
-
-
-def _mark(ax: Axes, found: Mapping[tuple[float, float], int]) -> None:
+        _frame_frequencies(ax, found, abs(problem.model.carrier or 1.0) if problem else 1.0)
+    else:
+        found = {(rate * re, rate * im * side): m for (re, im), m in found.items() for side in (1, -1)}
+        size = max((math.hypot(*z) for z in found), default=1.0) * 1.3 or 1.0
+        ax.axvspan(0, size, color="0.92", zorder=0)
+        ax.axvline(0, color="grey", linewidth=0.6)
+        ax.set(xlim=(-size, max([0.3 * size, *(1.2 * re for re, _ in found)])), ylim=(-size, size))
+        ax.set(xlabel=rf"$\mathrm{{Re}}\,s${unit}", ylabel=rf"$\mathrm{{Im}}\,s${unit}")
     for place, m in found.items():
         ax.plot(*place, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
         if m > 1:
             note(ax, f"{m}-fold", place, (7, 7), fontsize=9)
+    return finished(ax, own)
 
 
-def _of_H(data: Any) -> bool:
+def _frame_frequencies(ax: Axes, found: Iterable[tuple[float, float]], scale: float) -> None:
+    """Limits around eigenfrequencies, and the half of the plane above the real axis, where motion grows.
+
+    Args:
+        scale: of the problem: less than 1e-12 of it is 0 but for rounding.
+    """
+    x, y = np.array([*found]).reshape(-1, 2).T
+    middle, low, high = float(np.mean(x)), min(0.0, *y), max(0.0, *y)
+    size = max(np.ptp(x), high - low)
+    size = size if size > 1e-12 * scale else max(abs(middle), scale)
+    ax.axhspan(0, high + size, color="0.92", zorder=0)
+    ax.set(xlim=(middle - 0.8 * size, middle + 0.8 * size), ylim=(low - 0.3 * size, high + 0.3 * size))
+    ax.set(xlabel=OF_H["imag"], ylabel=OF_H["real"])
+
+
+def _of_H(data: Solution | Proof | Optimality) -> bool:
     """Whether roots are those of a complex system, which have no conjugates."""
-    if getattr(data, "eigenfrequencies", ()):
-        return True
-    return any(getattr(root, "eigenfrequency", None) is not None for root in data.roots)
+    if isinstance(data, Optimality):
+        return any(root.eigenfrequency is not None for root in data.roots)
+    return bool(data.eigenfrequencies)
 
 
 def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
