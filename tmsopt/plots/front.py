@@ -1,7 +1,6 @@
 """A Pareto front as a curve of two objectives, or as coloured points of three."""
 
 import re
-from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -62,8 +61,14 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
     scales = [scale_of(data.problem.posed, text) for text in data.objectives]
     values = np.stack([s.of([p.objectives[k] for p in data.points]) for k, s in enumerate(scales)], axis=-1)
     drawn.set(xlabel=scales[0].label, ylabel=scales[1].label)
-    (_draw_two if len(scales) == 2 else _draw_three)(drawn, data, values)
-    _ring_unstable(drawn, data, values)
+    if len(scales) == 2:
+        _draw_curve(drawn, data, values)
+    else:
+        coloured = drawn.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap="viridis", s=22, zorder=3)
+        figure_of(drawn).colorbar(coloured, ax=drawn, label=scales[2].label)
+    rings = values[[not p.stable for p in data.points], :2]
+    if len(rings):  # not stable, or not known to be
+        drawn.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
     drawn.margins(0.08)
     return finished(drawn, ax is None, _names(data.points, values))
 
@@ -82,34 +87,24 @@ def front_figure(front: Front) -> Figure:
     return figure_of(draw_front(front))
 
 
-def _draw_two(ax: Axes, front: Front, values: Array) -> None:
+def _draw_curve(ax: Axes, front: Front, values: Array) -> None:
+    """Two objectives: the curve, cut at gaps, and points by the structure of their roots."""
     gaps = {gap.index: gap for gap in front.gaps}
     stable = [bool(p.stable) for p in front.points]
-    for k, (a, b) in enumerate(pairwise(values)):
+    for k in range(len(values) - 1):
+        piece = values[k : k + 2].T
         if k not in gaps:
             colour, style = (LINE, "-") if stable[k] and stable[k + 1] else (MARK, "--")
-            ax.plot(*np.stack([a, b]).T, style, color=colour, linewidth=1, zorder=2)
+            ax.plot(*piece, style, color=colour, linewidth=1, zorder=2)
         else:
             label = "not solved" if gaps[k].failed else "gap: no efficient design"
-            ax.plot(*np.stack([a, b]).T, color=CAPSIZE, linewidth=0.8, linestyle=":", zorder=1, label=label)
+            ax.plot(*piece, ":", color=CAPSIZE, linewidth=0.8, zorder=1, label=label)
     for structure in dict.fromkeys(p.structure for p in front.points):
         colour, marker = _style(structure)
         for kept, fill in ((True, colour), (False, "white")):
             own = values[[p.structure == structure and s is kept for p, s in zip(front.points, stable, strict=True)]]
             if len(own):
                 ax.plot(*own.T, marker, color=colour, markerfacecolor=fill, markersize=4, zorder=3, label=structure)
-
-
-def _draw_three(ax: Axes, front: Front, values: Array) -> None:
-    drawn = ax.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap="viridis", s=22, zorder=3)
-    figure_of(ax).colorbar(drawn, ax=ax, label=scale_of(front.problem.posed, front.objectives[2]).label)
-
-
-def _ring_unstable(ax: Axes, front: Front, values: Array) -> None:
-    """A ring around each design that is not stable, or is not known to be."""
-    rings = values[[not p.stable for p in front.points], :2]
-    if len(rings):
-        ax.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
 
 
 def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:

@@ -35,12 +35,14 @@ def draw_rounding(data: Explanation, ax: Axes | None = None) -> Axes:
     More: docs/how_to/report.md
     """
     own = ax is None
-    rows = [(f"all to {row.digits} digits", row) for row in data.precision]
-    rows += [(f"{name} to {row.digits} digits", row) for name, row in data.rounding.items()]
+    rows = [("all", row) for row in data.precision] + [*data.rounding.items()]
     ax = on_axes(ax, 6.0, 1.3 + 0.32 * len(rows), "what rounding does to the abscissa")
-    names = [name + (f"\nviolates {', '.join(row.violations)}" if row.violations else "") for name, row in rows]
-    words = ("rises: decays more slowly", "falls: decays faster")
+    names = [
+        f"{name} to {row.digits} digits" + (f"\nviolates {', '.join(row.violations)}" if row.violations else "")
+        for name, row in rows
+    ]
     sizes = [max(abs(row.loss), _LEAST) for _, row in rows]
+    words = ("rises: decays more slowly", "falls: decays faster")
     _bars(ax, names, sizes, [row.loss <= 0 for _, row in rows], words)
     decades = [np.floor(np.log10(min(sizes, default=1.0))), np.ceil(np.log10(max(sizes, default=1.0)) + 1e-9)]
     ax.set(xscale="log", xlim=np.power(10.0, decades), xlabel="change of the abscissa")

@@ -8,16 +8,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from tmsopt.plots.labels import AxisScale, abscissa_label, finished, scale_of
+from tmsopt.plots.labels import abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
-from tmsopt.problem import Unit, status_text
+from tmsopt.problem import status_text
 from tmsopt.records import Array, Truth
 from tmsopt.search.solve import solve
 from tmsopt.studies import Results, header
 
 _BINS = 25
 _FAR = 6  # widths of the middle half of the values: farther ones are counted, not shown
-_PLAIN = Unit()
 
 
 def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
@@ -47,15 +46,13 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     rate, names = problem.posed.parameter_set.rate, problem.posed.parameter_set.names
     values = rows.values("abscissa")
     values = _shown(values, {n: rows.values(header("parameters", n)) for n in names}, rate)
-    known = np.isfinite(values)
-    beyond = known & ~_near(values)
-    known &= ~beyond
+    known, near = np.isfinite(values), _near(values)
     stable = rows.column("stable").filled(False)
     nominal = solve(problem, throw=False, interruptible=False)
-    edges = _edges(values[known])
+    edges = _edges(values[near])
     for chosen, colour, hatch, label in (
-        (stable & known, STABLE, "", "stable"),
-        (~stable & known, MARK, "//", "not stable"),
+        (stable & near, STABLE, "", "stable"),
+        (~stable & near, MARK, "//", "not stable"),
     ):
         if chosen.any():
             ax.hist(
@@ -66,7 +63,7 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
     words = abscissa_label(problem.posed) if rate is None else "decay rate in 1/s (negative: growth)"
     ax.set(ylabel="designs", xlabel=words)
-    counts = (beyond, "far beyond the axis"), (~known & ~beyond, "without roots")
+    counts = (known & ~near, "far beyond the axis"), (~known, "without roots")
     left_out = "".join(f", {np.count_nonzero(which)} {where}" for which, where in counts if which.any())
     share = f"{stable.sum()} of {len(stable)} stable ({100 * stable.mean():.3g} %)" if len(stable) else "no rows"
     return share + left_out
@@ -97,24 +94,19 @@ def _edges(values: Array) -> Array:
 
 def _over_what_varies(ax: Axes, data: Results) -> str:
     study, rows = data.study, data.rows
-    first, second = [*study.columns, None, None][:2]
     problem = study.problem.posed
     sense = problem.minimize or problem.maximize
     found = rows.values("status") == "optimal"
-    scale = scale_of(problem, sense) if sense else AxisScale("abscissa", abscissa_label(problem), _PLAIN)
+    scale = scale_of(problem, sense or "abscissa")
     y = scale.of(rows.values("objective" if sense else "abscissa")[found])
-
-    def varied(name: str) -> Array:
-        return np.asarray(rows.values(header("varied", name))[found])
-
-    across = scale_of(problem, first) if first else None
-    x = across.of(varied(across.name)) if across else rows.numbers[found]
-    if second is None or not found.any():
-        ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
+    axes = [scale_of(problem, name) for name in [*study.columns][:2]]
+    varied = [axis.of(rows.values(header("varied", axis.name))[found]) for axis in axes]
+    x, *colours = varied or [rows.numbers[found]]
+    if colours and found.any():
+        drawn = ax.scatter(x, y, c=colours[0], s=26, cmap="cividis", edgecolors="0.3")
+        figure_of(ax).colorbar(drawn, ax=ax, label=axes[1].label)
     else:
-        aside = scale_of(study.problem.posed, second)
-        drawn = ax.scatter(x, y, c=aside.of(varied(second)), s=26, cmap="cividis", edgecolors="0.3")
-        figure_of(ax).colorbar(drawn, ax=ax, label=aside.label)
-    ax.set(xlabel=across.label if across else "row", ylabel=scale.label)
+        ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
+    ax.set(xlabel=axes[0].label if axes else "row", ylabel=scale.label)
     ax.xaxis.set_major_locator(MaxNLocator(6))
-    return f"{np.count_nonzero(found)} of {len(found)} rows {status_text(study.problem.posed, 'optimal')}"
+    return f"{np.count_nonzero(found)} of {len(found)} rows {status_text(problem, 'optimal')}"
