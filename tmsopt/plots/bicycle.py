@@ -77,7 +77,7 @@ def draw_distance(data: Sketch, ax: Axes | None = None) -> Axes:
     _line(ax, data.H, data.foot, color=LINE, linewidth=1.6, gid="distance")
     across = (data.H - data.foot) / max(abs(data.nu_H), 1e-12)
     _line(ax, *(data.foot + 0.07 * half * side for side in (across, across - data.axis, -data.axis)), **_THIN)
-    ax.add_patch(Circle((data.H[0], data.H[1]), 0.06 * half, facecolor=FRONT_FRAME, edgecolor="black", zorder=5))
+    ax.add_patch(Circle(tuple(data.H), 0.06 * half, facecolor=FRONT_FRAME, edgecolor="black", zorder=5))
     ax.plot(*data.front, "o", markersize=4, color="black", zorder=5)
     _text(ax, data.H, "$H$", (0.17 * half, 0))
     ax.annotate(
@@ -139,7 +139,7 @@ def _frames(ax: Axes, data: Sketch, reach: float) -> None:
         skate = contact + np.array([[-0.055, -0.03], [0.055, -0.03], [0.03, 0.0], [-0.03, 0.0]])
         look: dict[str, Any] = {"facecolor": colour, "edgecolor": "black", "linewidth": 0.8, "zorder": 6}
         ax.add_patch(Polygon(skate, closed=True, **look))
-        ax.add_patch(Circle((mass[0], mass[1]), radius, gid=name, **look))
+        ax.add_patch(Circle(tuple(mass), radius, gid=name, **look))
         _text(ax, mass, rf"$m_{name}$", (0.1, -0.05), zorder=7)
 
 

@@ -38,11 +38,12 @@ _STYLES = dict(zip(("weave", "capsize", "castering", "capsize + castering"), _OT
 _STYLES["second pair"] = (COMPLEX, _DASHED)
 """Colours and lines of modes: of a bicycle by name, of others in their order at the design."""
 
-_EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
+EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
     "weave": (CRITICAL, "--"),
     "capsize": (MARK, "-."),
     "infinity": (CAPSIZE, (0, (1, 1))),
 }
+"""Colour and line of events at which a design loses stability."""
 
 _LABELS = {
     "real": (r"growth rate $\mathrm{Re}\,s$", "growth rate in 1/s"),
@@ -166,7 +167,7 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     """Lines where a mode loses stability and at the design, and circles where roots meet."""
     unit = f" {scale.unit.text}" if scale.unit.text else ""
     words = events_of(data.problem.model)
-    for kind, (colour, style) in _EVENTS.items():
+    for kind, (colour, style) in EVENTS.items():
         at = scale.of([c.at for c in data.events if c.kind == kind])
         label = f"{words[kind]} at {', '.join(dict.fromkeys(f'{x:.4g}' for x in at))}{unit}"
         for k, x in enumerate(at):

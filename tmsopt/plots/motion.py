@@ -1,5 +1,7 @@
 """The motion of a design over time, and the path of its wheels."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,6 +12,7 @@ from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, new_f
 
 _COLOURS = (CRITICAL, MARK, REAL, HEAVY, COMPLEX, LINE)
 _LATEX = {"phi": r"lean $\varphi$", "delta": r"steer $\delta$", "T_phi": r"lean torque", "T_delta": r"steer torque"}
+_TORQUES = ("T_phi", "T_delta")
 _TITLE = 11
 
 
@@ -39,8 +42,8 @@ def motion_figure(motion: Simulation) -> Figure:
 
     More: docs/how_to/motion.md
     """
-    torques = [n for n in ("T_phi", "T_delta") if n in motion.columns]
-    parts = [_angles, *([_torques] if torques else []), *([_path] if "x" in motion.columns else [])]
+    known = {*motion.columns}
+    parts = [_angles, *[_torques] * bool(known & {*_TORQUES}), *[_path] * ("x" in known)]
     figure = new_figure(6.4, 1.0 + 2.4 * len(parts))
     axes = figure.subplots(len(parts), 1, squeeze=False)[:, 0]
     axes[0].set_title(motion.problem.title, fontsize=_TITLE)
@@ -61,7 +64,7 @@ def _angles(motion: Simulation, ax: Axes) -> None:
 
 
 def _torques(motion: Simulation, ax: Axes) -> None:
-    _lines(motion, ax, [n for n in ("T_phi", "T_delta") if n in motion.columns], 1.0)
+    _lines(motion, ax, _TORQUES, 1.0)
     ax.set_ylabel(f"torque in {motion.units['T_delta']}")
 
 
@@ -73,8 +76,8 @@ def _path(motion: Simulation, ax: Axes) -> None:
     ax.set(xlabel=f"way of the rear contact in {unit}", ylabel=f"to the right in {unit}")
 
 
-def _lines(motion: Simulation, ax: Axes, names: list[str], scale: float) -> None:
-    for k, name in enumerate(names):
+def _lines(motion: Simulation, ax: Axes, names: Sequence[str], scale: float) -> None:
+    for k, name in enumerate(n for n in names if n in motion.columns):
         x, y, style = motion["t"], scale * np.asarray(motion[name]), "-" if k < 6 else "--"
         ax.plot(x, y, style, color=_COLOURS[k % 6], linewidth=1.2, label=_LATEX.get(name, name))
     ax.axhline(0, color="0.6", linewidth=0.6, zorder=0, label="_0")

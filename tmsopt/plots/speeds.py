@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tmsopt.dynamics.speeds import Speeds
+from tmsopt.plots.growth import EVENTS
 from tmsopt.plots.labels import events_of, finished, scale_over
-from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, REAL, draw_bands, note, on_axes
+from tmsopt.plots.style import LINE, REAL, draw_bands, note, on_axes
 
-_COLOURS = {"weave": CRITICAL, "capsize": MARK, "infinity": CAPSIZE}
 _LEVELS = 3  # heights at which names stand in turn
 _MARGIN = 1.15  # times the last event
 
@@ -37,7 +37,7 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
     draw_bands(ax, scale.of(stable), scale.of(damped), (1, 1), 0.25)
     for k, event in enumerate(data.found):
         x, height = float(scale.of(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
-        colour = _COLOURS.get(event.kind, REAL)
+        colour, _ = EVENTS.get(event.kind, (REAL, ""))
         ax.plot([x, x], [0, height], color=colour, linewidth=2.0 if event.changes else 0.9)
         side = 3 if event.at < (data.lower + high) / 2 else -3
         note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")

@@ -90,7 +90,7 @@ def entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Ar
 def note(ax: Axes, text: str, place: ArrayLike, offset: tuple[float, float], **look: Any) -> None:
     """A text beside a point, by an offset in points."""
     look = {"fontsize": 8, "horizontalalignment": "right" if offset[0] < 0 else "left", **look}
-    ax.annotate(text, _point(place), offset, textcoords="offset points", **look)
+    ax.annotate(text, tuple(np.asarray(place)), offset, textcoords="offset points", **look)
 
 
 def arrow(
@@ -104,12 +104,7 @@ def arrow(
     """An arrow from point to point, its head (width, length) in parts of a letter."""
     style = "-|>,head_width={},head_length={}".format(*head)
     arrowprops = {"arrowstyle": style, "shrinkA": 0, "shrinkB": 0, **look}
-    ax.annotate("", _point(end), _point(start), arrowprops=arrowprops, zorder=zorder)
-
-
-def _point(place: ArrayLike) -> tuple[float, float]:
-    x, y = np.asarray(place, dtype=float)
-    return float(x), float(y)
+    ax.annotate("", tuple(np.asarray(end)), tuple(np.asarray(start)), arrowprops=arrowprops, zorder=zorder)
 
 
 def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
@@ -130,7 +125,6 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
     """
     path = path_of(path, "the file to write")
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
-    assert figure is not None, "Axes without a figure"
     ending = path.suffix.lstrip(".").lower()
     with write_atomic(path) as temporary:
         temporary.write_bytes(rendered(figure, ending))

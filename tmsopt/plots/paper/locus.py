@@ -40,7 +40,6 @@ def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> None:
         tracks = [s for m in data.modes for s in ([m.roots, m.roots.conj()] if m.roots.imag.any() else [m.roots])]
         for s in tracks:
             ax.plot(s.real, s.imag, color=colour, linewidth=width, solid_capstyle="round", gid="track")
-        for s in tracks:
             _arrows(ax, s, colour, 2 if colour == LINE else arrows)
     _marks(ax, row.loci[0], omega0)
 
@@ -122,22 +121,19 @@ def _marks(ax: Axes, data: Growth, omega0: float) -> None:
 
 
 def _name(ax: Axes, name: str, s: complex, offset: tuple[float, float], omega0: float) -> None:
-    """The name of a multiple root inside the axes, with a leader where it stands off."""
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    if left < s.real < right and low < s.imag < high:
-        circle = name == "EP2" and abs(abs(s.real) - abs(omega0)) < 1e-6
-        note(
-            ax,
-            (r"$-\omega_0$" if s.real > 0 else r"$\omega_0$") if circle else NAMES[name],
-            (s.real, s.imag),
-            offset,
-            fontsize=8.5,
-            zorder=6,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
-            arrowprops={"arrowstyle": "-", "linewidth": 0.5, "color": "0.3", "shrinkA": 0, "shrinkB": 3}
-            if np.hypot(*offset) > 20
-            else None,
-        )
+    """The name of a multiple root, drawn inside the axes alone, with a leader where it stands off."""
+    circle = name == "EP2" and abs(abs(s.real) - abs(omega0)) < 1e-6
+    leader = {"arrowstyle": "-", "linewidth": 0.5, "color": "0.3", "shrinkA": 0, "shrinkB": 3}
+    note(
+        ax,
+        (r"$-\omega_0$" if s.real > 0 else r"$\omega_0$") if circle else NAMES[name],
+        (s.real, s.imag),
+        offset,
+        fontsize=8.5,
+        zorder=6,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
+        arrowprops=leader if np.hypot(*offset) > 20 else None,
+    )
 
 
 def _arrows(ax: Axes, s: Complex, colour: str, count: int) -> None:
