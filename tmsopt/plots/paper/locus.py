@@ -1,5 +1,6 @@
 """Root loci in the complex plane, drawn into Axes that the caller made."""
 
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,9 @@ NAMES = {"EP4": r"$\mathrm{EP}_4$", "2EP2": r"$2\mathrm{EP}_2$", "CEP2": r"$\mat
 
 _PLACES = {"EP4": ((-34, 9),), "2EP2": ((22, 26), (1, 33)), "CEP2": ((10, -17), (10, 12)), "EP2": ((6, -13),)}
 """Where the names stand beside the roots, in points, by ascending real and imaginary part."""
+
+_LEADER = {"arrowstyle": "-", "linewidth": 0.5, "color": "0.3", "shrinkA": 0, "shrinkB": 3}
+"""From a multiple root to a name that stands off."""
 
 _CIRCLE: dict[str, Any] = {"color": "0.55", "linewidth": 3.5, "alpha": 0.45}
 _CROSSING: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white", "markeredgecolor": LINE}
@@ -108,32 +112,26 @@ def _key(omega0: float) -> list[Artist]:
 
 
 def _marks(ax: Axes, data: Growth, omega0: float) -> None:
-    """The multiple roots of one locus by name, and its crossings of the imaginary axis."""
+    """The multiple roots of one locus by name, drawn inside the axes alone, and its crossings of the imaginary axis."""
     found = sorted(multiple_roots(data), key=lambda mark: (mark[2].real, mark[2].imag))
-    for name in dict.fromkeys(name for name, _, _ in found):
-        for k, s in enumerate(s for own, _, s in found if own == name):
+    for name, places in _PLACES.items():
+        for s, offset in zip([s for own, _, s in found if own == name], cycle(places), strict=False):
             ax.plot(s.real, s.imag, "o", color=COMPLEX if s.imag else REAL, markersize=6, zorder=5, gid=name, **EDGE)
-            _name(ax, name, s, _PLACES[name][k if name != "EP2" else 0], omega0)
+            circle = name == "EP2" and abs(abs(s.real) - abs(omega0)) < 1e-6
+            note(
+                ax,
+                (r"$-\omega_0$" if s.real > 0 else r"$\omega_0$") if circle else NAMES[name],
+                (s.real, s.imag),
+                offset,
+                fontsize=8.5,
+                zorder=6,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
+                arrowprops=_LEADER if np.hypot(*offset) > 20 else None,
+            )
     for event in data.events:
         if event.changes:
             y = event.root.im
             ax.plot([0, 0], [y, -y], "D", zorder=5, gid="crossing", **_CROSSING)
-
-
-def _name(ax: Axes, name: str, s: complex, offset: tuple[float, float], omega0: float) -> None:
-    """The name of a multiple root, drawn inside the axes alone, with a leader where it stands off."""
-    circle = name == "EP2" and abs(abs(s.real) - abs(omega0)) < 1e-6
-    leader = {"arrowstyle": "-", "linewidth": 0.5, "color": "0.3", "shrinkA": 0, "shrinkB": 3}
-    note(
-        ax,
-        (r"$-\omega_0$" if s.real > 0 else r"$\omega_0$") if circle else NAMES[name],
-        (s.real, s.imag),
-        offset,
-        fontsize=8.5,
-        zorder=6,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
-        arrowprops=leader if np.hypot(*offset) > 20 else None,
-    )
 
 
 def _arrows(ax: Axes, s: Complex, colour: str, count: int) -> None:

@@ -39,8 +39,7 @@ def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
     ranges = np.array([data.problem.free[n] for n in data.axes])
     width = ranges[:, 1] - ranges[:, 0]
     for patch in data.patches:
-        points = np.stack([patch.points[n] for n in data.axes], axis=-1)
-        pieces = quadrilaterals(points)
+        pieces = quadrilaterals(np.stack([patch.points[n] for n in data.axes], axis=-1))
         quads.append(pieces)
         colours.append(_shaded(pieces / width, HEAVY if patch.heavily_damped else STABLE))
     fills = np.concatenate(colours)

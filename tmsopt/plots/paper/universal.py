@@ -37,8 +37,6 @@ _LIMIT, _LOW, _HIGH = 8.0, -3.0, 18.0
 _EP_SET = ((0.0, 4.0, COMPLEX, "--"), (4.0, _LIMIT, REAL, "-"))
 """Least and largest A1, colour and line of CEP2 and 2EP2."""
 
-_SHADE: dict[str, Any] = {"alpha": 0.55, "linewidth": 0}
-
 
 def draw_box(ax: Axes3D, paths: Sequence[UniversalPath], faces: Sequence[Array]) -> None:
     """The spire of heavy damping, the EP set and the paths in the space (A1, A3, A2)."""
@@ -81,20 +79,19 @@ def draw_section(ax: Axes, paths: Sequence[UniversalPath]) -> None:
     """The plane A1 = A3: stability, heavy damping, the EP set, and the paths."""
     ax.fill_between([0, _LIMIT], 2, _HIGH, color=STABLE, alpha=0.18, linewidth=0)
     a = np.linspace(4, _LIMIT, 200)
-    ax.fill_between(a, *heavy_section(a), color=HEAVY, **_SHADE)
+    ax.fill_between(a, *heavy_section(a), color=HEAVY, alpha=0.55, linewidth=0)
     ax.plot(a, 2 * a - 2, color=_EDGE, linewidth=1.3)
     for low, high, colour, style in _EP_SET:
-        A = ep_set(np.linspace(low, high, 100))
-        ax.plot(A[:, 0], A[:, 1], style, color=colour, linewidth=2.0, gid="ep-set")
+        ax.plot(*ep_set(np.linspace(low, high, 100)).T[:2], style, color=colour, linewidth=2.0, gid="ep-set")
     ax.axhline(2, color=STABLE, linewidth=1.3)
     for path, colour in zip(paths, _COLOURS, strict=True):
-        ax.plot(path.A[:, 0], path.A[:, 1], color=colour, linewidth=1.5, gid="path")
+        ax.plot(*path.A.T[:2], color=colour, linewidth=1.5, gid="path")
         shown = path.A[_inside(path.A), :2]
         for fraction in (0.2, 0.8):
             k = _along(shown / (_LIMIT, _HIGH), fraction)
             arrow(ax, shown[k], shown[k + 1], color=colour)
         for marker, fill, at, name in _events(path):
-            ax.plot(at[0], at[1], marker, mfc=fill, mec=colour, markersize=6.5, mew=1.2, zorder=5, gid=name)
+            ax.plot(*at[:2], marker, mfc=fill, mec=colour, markersize=6.5, mew=1.2, zorder=5, gid=name)
     ax.set(xlim=(0, _LIMIT), ylim=(_LOW, _HIGH), yticks=range(0, 16, 5), xlabel="$A_1 = A_3$", ylabel="$A_2$")
     dark = "0.15"
     for x, y, text, colour, side in (
