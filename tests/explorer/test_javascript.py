@@ -464,6 +464,14 @@ def test_hostile_names_and_every_function_of_the_language():
     assert script.text.count("MODEL") == 1
 
 
+def test_a_limit_may_have_the_name_of_a_quantity():
+    model = from_coefficients(["1", "c", "1"], quantities={"twice": "2*c"})
+    script = model_script(Problem(model, free={"c": (0.1, 1.0)}, constraints={"twice": "twice <= 1"}).posed)
+    assert (script.quantities, script.constraints) == (("twice",), ("twice",))
+    assert "y[0]=2*x[0];" in script.text
+    assert "y[1]=" in script.text
+
+
 @pytest.mark.slow
 def test_random_expressions_have_the_values_that_python_computes():
     rng = np.random.default_rng(7)

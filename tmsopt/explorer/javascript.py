@@ -69,10 +69,9 @@ def model_script(problem: Posed) -> Script:
     coefficients = coefficient_formula(model, of.name)
     quantities = tuple(q.name for q in (*model.quantities, *of.quantities))
     limits = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
-    asked = list(nodes_of(problem, {**{n: n for n in quantities}, **limits}).values())
-    margins = [
-        x if c.sign < 0 or c.equality else -x for c, x in zip(limits.values(), asked[len(quantities) :], strict=True)
-    ]
+    derived = [*nodes_of(problem, dict(zip(quantities, quantities, strict=True))).values()]
+    margins = zip(limits.values(), nodes_of(problem, limits).values(), strict=True)
+    derived += [x if c.sign < 0 or c.equality else -x for c, x in margins]
     entries = {n: f"x[{k}]" for k, n in enumerate(of.names)}
     every = entries | {n: f"r[{k}]" for k, n in enumerate(q.name for q in ROOT_QUANTITIES)}
     pencil, size, order = _pencil(problem)
@@ -81,7 +80,7 @@ def model_script(problem: Posed) -> Script:
     parts = [
         f"degree: {model.degree}, size: {size}, order: {order}",
         function("coefficients", ("x", "a"), coefficients, entries),
-        function("derived", ("x", "r", "y"), formula([*asked[: len(quantities)], *margins]), every),
+        function("derived", ("x", "r", "y"), formula(derived), every),
         function("pencil", ("x", "m"), pencil, entries) if pencil else "pencil: null",
         function("rate", ("x",), rate, entries, fills=False),
         function("ride", ("x", "y"), ride, entries) if ride else "ride: null",
