@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from os import PathLike
-from typing import Any, Unpack
+from typing import Unpack
 
 from tmsopt.errors import refusal
 from tmsopt.explorer.known import known_designs
@@ -13,7 +13,7 @@ from tmsopt.files import path_of, write_text
 from tmsopt.problem import Given, Posed, Problem, Solution, pose
 from tmsopt.problem.toml import read_page
 from tmsopt.program.options import Asked
-from tmsopt.progress import Listener, start_steps
+from tmsopt.progress import start_steps
 from tmsopt.search import solve
 
 _HEIGHT = 900  # pixels of the frame in a notebook: header and the first row of pictures
@@ -80,15 +80,18 @@ def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
     More: docs/how_to/explorer.md
     """
     told = options.get("progress")
-    if isinstance(problem, Solution):
-        return _explorer(problem.problem.posed, problem, {}, told)
     model = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
-    posed = pose(problem)
-    if posed.pareto:
-        posed = posed.derive(pareto=(), minimize=posed.pareto[0])
-    asked = posed.sense != "evaluate" or not posed.free
-    solution = solve(posed, throw=False, stability=0.0, **options) if asked else None
-    return _explorer(posed, solution, model if isinstance(model, dict) else {}, told)
+    posed, solution = pose(problem), problem if isinstance(problem, Solution) else None
+    if solution is None:
+        if posed.pareto:
+            posed = posed.derive(pareto=(), minimize=posed.pareto[0])
+        if posed.sense != "evaluate" or not posed.free:
+            solution = solve(posed, throw=False, stability=0.0, **options)
+    start_steps(told, "looking for designs worth going to")
+    designs = known_designs(posed, solution, search=True)
+    start_steps(told, "writing the page")
+    html = html_of(posed, designs, model if isinstance(model, dict) else {}, trace_curves=True)
+    return Explorer(posed.problem, solution, html)
 
 
 def page_of(
@@ -113,10 +116,3 @@ def frame(html: str, title: str) -> str:
         f'<iframe title="{escape(title or "explorer")}" sandbox="allow-scripts allow-downloads" '
         f'style="width:100%;height:{_HEIGHT}px;border:0" srcdoc="{escape(html)}"></iframe>'
     )
-
-
-def _explorer(problem: Posed, solution: Solution | None, model: Mapping[str, Any], told: Listener | None) -> Explorer:
-    start_steps(told, "looking for designs worth going to")
-    designs = known_designs(problem, solution, search=True)
-    start_steps(told, "writing the page")
-    return Explorer(problem.problem, solution, html_of(problem, designs, model, trace_curves=True))

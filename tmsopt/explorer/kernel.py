@@ -5,6 +5,7 @@ The names `where` and `one` mean something else in these functions. Those of qua
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
@@ -46,26 +47,12 @@ def kernel_script(degree: int) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _where(condition: Any, yes: Any, no: Any) -> Any:
-    return made("choose", condition, yes, no)
-
-
-_KNOWN: dict[str, Any] = {"where": _where, "one": lambda condition: _where(condition, 1, 0)}
-for _each in (
-    factors.ordered,
-    factors.largest_root,
-    factors.monic,
-    factors.start,
-    factors.error,
-    factors.newton,
-    factors.abscissa,
-    factors.damping_ratio,
-    factors.root_pair,
-    signs.stable,
-    signs.chain,
-    signs.classes,
-):  # each uses only those before it
-    _KNOWN[_each.__name__] = FunctionType(_each.__code__, {**_each.__globals__, **_KNOWN}, _each.__name__)
+_where = partial(made, "choose")
+_KNOWN: dict[str, Any] = {**vars(factors), **vars(signs)}
+for _name, _each in [*_KNOWN.items()]:
+    if isinstance(_each, FunctionType):
+        _KNOWN[_name] = FunctionType(_each.__code__, _KNOWN, _name)  # so that each calls the others here
+_KNOWN |= {"where": _where, "one": lambda condition: _where(condition, 1, 0)}
 _OF = SimpleNamespace(**_KNOWN)
 
 

@@ -165,29 +165,21 @@ def _over(problem: Posed) -> str:
 
 def _curves(problem: Posed, plane: Sequence[str], start: Mapping[str, float]) -> Iterator[dict[str, Any]]:
     """Traced curves in the plane of the chart: the boundaries of both domains, and the set that the problem locates."""
-    names = problem.parameter_set.names
-    axes = [names.index(n) for n in plane]
-    if problem.locate and degrees_of_freedom(problem.nominal).count == 1 and set(plane) <= set(problem.free):
-        along = [names.index(n) for n in problem.free if n not in plane]
-        for branch in trace(problem.nominal, starts=_STARTS).branches:
-            yield {"kind": problem.locate, "set": "EP set", "axes": axes, "along": along} | _points(
-                branch.parameters, plane
-            )
     if len(plane) < 2 or not set(plane) <= set(problem.free):
         return
+    names, nominal = problem.parameter_set.names, problem.nominal
+    found: list[tuple[str, str, Mapping[str, Array]]] = []
+    if problem.locate and degrees_of_freedom(nominal).count == 1:
+        found += [(problem.locate, "EP set", b.parameters) for b in trace(nominal, starts=_STARTS).branches]
     others = {n: v for n, v in start.items() if n not in plane}
-    asked = problem.nominal.derive(pareto=(), fixed=others, free={n: problem.free[n] for n in plane})
-    found = domain(asked, starts=_STARTS)
-    for title, arcs in (("stability", found.stability), ("heavy damping", found.heavy_damping)):
-        for arc in arcs:
-            yield {"kind": arc.kind, "set": title, "axes": axes, "along": []} | _points(arc.points, plane)
-
-
-def _points(columns: Mapping[str, Array], plane: Sequence[str]) -> dict[str, list[float]]:
-    """A curve by some of its points, both ends among them."""
-    count = len(columns[plane[0]])
-    some = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
-    return {
-        axis: [float(f"{v:.{_DIGITS}g}") for v in columns[n][some].tolist()]
-        for axis, n in zip("xy", plane, strict=True)
-    }
+    asked = nominal.derive(pareto=(), fixed=others, free={n: problem.free[n] for n in plane})
+    near = domain(asked, starts=_STARTS)
+    for title, arcs in (("stability", near.stability), ("heavy damping", near.heavy_damping)):
+        found += [(arc.kind, title, arc.points) for arc in arcs]
+    for kind, title, columns in found:
+        along = [n for n in problem.free if n not in plane] if title == "EP set" else []
+        count = len(columns[plane[0]])
+        some = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))  # both ends among them
+        x, y = ([float(f"{v:.{_DIGITS}g}") for v in columns[n][some].tolist()] for n in plane)
+        places = {"axes": [names.index(n) for n in plane], "along": [names.index(n) for n in along]}
+        yield {"kind": kind, "set": title, **places, "x": x, "y": y}
