@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from tmsopt.algebra.formula import Formula, Kind, fold, formula, symbol, trace
 from tmsopt.algebra.kinds import ROUNDING, as_double
@@ -17,31 +17,6 @@ from tmsopt.models.bicycles.bicycle import contact_path
 from tmsopt.problem.evaluate import coefficient_formula, nodes_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_QUANTITIES
-
-
-class Text(NamedTuple):
-    """A number or a truth as JavaScript.
-
-    Attributes:
-        binding: how strongly the text binds, from 1 (a choice) to 9 (a name, a number, a call).
-    """
-
-    text: str
-    binding: int = 9
-
-
-class Spelling(NamedTuple):
-    """How an operation is written.
-
-    Attributes:
-        template: with {0}, {1}, … for the operands.
-        binding: see `Text`.
-        operands: how strongly that of each operand must bind, else it stands in parentheses.
-    """
-
-    template: str
-    binding: int = 9
-    operands: tuple[int, ...] = (0, 0, 0)
 
 
 @dataclass(frozen=True)
@@ -103,60 +78,50 @@ def function(name: str, arguments: Sequence[str], asked: Formula, inputs: Mappin
     """
     lines: list[str] = []
 
-    def named(given: Text) -> Text:
-        lines.append(f"const t{len(lines)}={given.text};")
-        return Text(f"t{len(lines) - 1}")
+    def named(text: str) -> str:
+        lines.append(f"const t{len(lines)}={_bare(text)};")
+        return f"t{len(lines) - 1}"
 
-    operations = {op: partial(_spelled, spelling, named) for op, spelling in _OPERATIONS.items()}
-    kind = Kind(operations | {"pow": partial(_power, named)}, lambda x: _number(as_double(x)), Text)
-    texts = [x.text for x in fold(asked, inputs, kind, named)]
-    ends = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {texts[0]};"]
+    operations = {op: partial(_spelled, template, named) for op, template in _OPERATIONS.items()}
+    kind = Kind(operations | {"pow": partial(_power, named)}, lambda x: _number(as_double(x)))
+    texts = map(_bare, fold(asked, inputs, kind, named))
+    ends = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {next(texts)};"]
     return "\n".join([f"{name}({', '.join(arguments)}) {{", *lines, *ends, "}"])
 
 
-def _number(value: float) -> Text:
+def _number(value: float) -> str:
     """A double, to the last bit; JSON writes it as JavaScript does, NaN and infinities too."""
     text = json.dumps(float(value)).removesuffix(".0")
-    return Text(text, 8 if text.startswith("-") else 9)
+    return f"({text})" if text.startswith("-") else text
 
 
-def _call(name: str, count: int = 1) -> Spelling:
-    """A function of JavaScript's Math."""
-    return Spelling(f"Math.{name}({', '.join(f'{{{k}}}' for k in range(count))})")
-
-
-_POWERS = {
-    "-1": Spelling("1/{0}", 7, (8,)),
-    "3": Spelling("{0}*{0}*{0}", 7, (8,)),
-    "4": Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
-}
+_POWERS = {"(-1)": "(1/{0})", "3": "({0}*{0}*{0})", "4": "({0}*{0}*({0}*{0}))"}
 """Small powers, as floats have them."""
 
-_QUOTIENT = "{1}===0?NaN:{0}/{1}"
-
-_OPERATIONS: Mapping[str, Spelling] = {
-    "add": Spelling("{0}+{1}", 6, (6, 7)),
-    "sub": Spelling("{0}-{1}", 6, (6, 7)),
-    "mul": Spelling("{0}*{1}", 7, (7, 8)),
-    "div": Spelling("{0}/{1}", 7, (7, 8)),
-    "neg": Spelling("-{0}", 8, (9,)),
-    "square": Spelling("{0}*{0}", 7, (8,)),
-    "less": Spelling("{0}<{1}", 5, (6, 6)),
-    "at_most": Spelling("{0}<={1}", 5, (6, 6)),
-    "equal": Spelling("{0}==={1}", 4, (6, 6)),
-    "both": Spelling("{0}&&{1}", 3, (3, 4)),
-    "either": Spelling("{0}||{1}", 2, (2, 3)),
-    "not": Spelling("!{0}", 8, (9,)),
-    "choose": Spelling("{0}?{1}:{2}", 1, (2, 1, 1)),
-    "quotient": Spelling(_QUOTIENT, 1, (7, 8)),
-    "ratio": Spelling(f"{{0}}===0?0:{_QUOTIENT}", 1, (7, 8)),
-    "positive_part": Spelling("({0}+Math.abs({0}))/2", 7, (6,)),
-    "negligible": Spelling(f"Math.abs({{0}})<={ROUNDING!r}*{{1}}", 5, (0, 8)),
-    "min": _call("min", 2),  # NaN where either is
-    "max": _call("max", 2),
-    **{name: _call(name) for name in ("sqrt", "cbrt", "abs", "sign", "exp", "log")},
-    **{name: _call(name) for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
+_OPERATIONS: Mapping[str, str] = {
+    "add": "({0}+{1})",
+    "sub": "({0}-{1})",
+    "mul": "({0}*{1})",
+    "div": "({0}/{1})",
+    "neg": "(-{0})",
+    "square": "({0}*{0})",
+    "less": "({0}<{1})",
+    "at_most": "({0}<={1})",
+    "equal": "({0}==={1})",
+    "both": "({0}&&{1})",
+    "either": "({0}||{1})",
+    "not": "(!{0})",
+    "choose": "({0}?{1}:{2})",
+    "quotient": "({1}===0?NaN:{0}/{1})",
+    "ratio": "({0}===0?0:{1}===0?NaN:{0}/{1})",
+    "positive_part": "(({0}+Math.abs({0}))/2)",
+    "negligible": f"(Math.abs({{0}})<={ROUNDING!r}*{{1}})",
+    "min": "Math.min({0}, {1})",  # NaN where either is
+    "max": "Math.max({0}, {1})",
+    **{name: f"Math.{name}({{0}})" for name in ("sqrt", "cbrt", "abs", "sign", "exp", "log")},
+    **{name: f"Math.{name}({{0}})" for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
 }
+"""Operations with {0}, {1}, … for their operands; what is not a call stands in parentheses."""
 
 _LONGEST = 160
 """Characters of a result that stands where it is used."""
@@ -187,26 +152,22 @@ def _ride(problem: Posed, p: Mapping[str, Any]) -> list[Any]:
     return [-b * scale, a * scale, yaw, yaw_of_rate, speed * length, ahead * length, aside * length]
 
 
-def _spelled(spelling: Spelling, named: Callable[[Text], Text], *given: Text) -> Text:
+def _spelled(template: str, named: Callable[[str], str], *given: str) -> str:
     """The text of an operation; operands that it takes twice, and what is long, are named."""
-    twice = [spelling.template.count(f"{{{k}}}") > 1 and _is_result(x.text) for k, x in enumerate(given)]
-    operands = [named(x) if often else x for x, often in zip(given, twice, strict=True)]
-    text = spelling.template.format(*(_operand(spelling, k, x) for k, x in enumerate(operands)))
-    found = Text(text, spelling.binding)
-    return named(found) if len(text) > _LONGEST else found
+    often = [template.count(f"{{{k}}}") > 1 and _is_result(text) for k, text in enumerate(given)]
+    text = template.format(*(named(text) if twice else text for text, twice in zip(given, often, strict=True)))
+    return named(text) if len(text) > _LONGEST else text
 
 
-def _power(named: Callable[[Text], Text], base: Text, exponent: Text) -> Text:
-    small = _POWERS.get(exponent.text)
-    return _spelled(small, named, base) if small else _spelled(_call("pow", 2), named, base, exponent)
+def _power(named: Callable[[str], str], base: str, exponent: str) -> str:
+    return _spelled(_POWERS.get(exponent, "Math.pow({0}, {1})"), named, base, exponent)
+
+
+def _bare(text: str) -> str:
+    """A result where nothing stands around it: without its parentheses."""
+    return text[1:-1] if text.startswith("(") else text
 
 
 def _is_result(text: str) -> bool:
     """Whether a text is neither a name, nor an entry such as ``x[3]``, nor a number."""
     return re.fullmatch(r"[\w.\[\]]+", text) is None
-
-
-def _operand(spelling: Spelling, place: int, given: Text) -> str:
-    """The text of an operand, in parentheses where it binds less than it must."""
-    minus_minus = spelling.template == "{0}-{1}" and place == 1 and given.text.startswith("-")
-    return f"({given.text})" if given.binding < spelling.operands[place] or minus_minus else given.text
