@@ -37,7 +37,9 @@ def draw_bicycle(data: Sketch | Solution, ax: Axes | None = None) -> Axes:
     reach = max(
         0.62, 0.24 - float(data.B[1]), 0.3 - float(data.H[1])
     )  # the top of the steer axis, clear of both masses
-    _ground(ax, -0.12, ahead + 0.42)
+    _line(ax, (-0.12, 0), (ahead + 0.42, 0), color="0.4", linewidth=1.2, zorder=1)
+    x = np.arange(-0.09, ahead + 0.42, 0.045)
+    ax.plot([x, x - 0.025], [0 * x, 0 * x + 0.025], color="0.6", linewidth=0.6, zorder=1)  # hatched: the ground
     _frames(ax, data, reach)
     _dimensions(ax, data, ahead)
     radius = 0.86 * reach
@@ -112,12 +114,6 @@ def _text(ax: Axes, at: ArrayLike, text: str, offset: ArrayLike = 0, **look: Any
 def _top(data: Sketch, height: float) -> Array:
     """The point of the steer axis at a height."""
     return data.on_axis(height / max(-float(data.axis[1]), 0.3))
-
-
-def _ground(ax: Axes, low: float, high: float) -> None:
-    _line(ax, (low, 0), (high, 0), color="0.4", linewidth=1.2, zorder=1)
-    x = np.arange(low + 0.03, high, 0.045)
-    ax.plot([x, x - 0.025], [0 * x, 0 * x + 0.025], color="0.6", linewidth=0.6, zorder=1)
 
 
 def _frames(ax: Axes, data: Sketch, reach: float) -> None:

@@ -48,13 +48,17 @@ class Name:
     y: float
 
 
-@dataclass(frozen=True)
-class AxisScale:
-    """An axis: the parameter or expression on it, its label, and the unit in which the problem was written."""
+class AxisScale(NamedTuple):
+    """An axis: the parameter or expression on it, its symbol, and the unit in which the problem was written."""
 
     name: str
-    label: str
-    unit: Unit
+    symbol: str
+    unit: Unit = Unit()
+
+    @property
+    def label(self) -> str:
+        """Symbol and unit."""
+        return self.symbol + (f" in {self.unit.text}" if self.unit.text else "")
 
     def of(self, values: ArrayLike) -> Array:
         """Numbers as they stand on the axis."""
@@ -79,7 +83,7 @@ class PlaneAxes(NamedTuple):
 def plane_over(problem: Posed | None, *names: str | None) -> PlaneAxes:
     """The plane of the first two names that are given, in the units of a problem; without one in SI and rad."""
     first, second, *_ = (*filter(None, names), "", "")
-    return PlaneAxes(*(scale_of(problem, n) if problem else AxisScale(n, n, Unit()) for n in (first, second)))
+    return PlaneAxes(*(scale_of(problem, n) if problem else AxisScale(n, n) for n in (first, second)))
 
 
 def scale_of(problem: Posed, text: str) -> AxisScale:
@@ -88,9 +92,9 @@ def scale_of(problem: Posed, text: str) -> AxisScale:
     name = plain.removeprefix("-").strip()
     unit, of = unit_of(problem, name), problem.parameter_set
     if name == "abscissa":
-        return AxisScale(plain, ("−" if name != plain else "") + abscissa_label(problem), Unit())
+        return AxisScale(plain, ("−" if name != plain else "") + abscissa_label(problem))
     symbol = f"${'-' if name != plain else ''}{of[name].latex}$" if name in of.names else plain
-    return AxisScale(plain, symbol + (f" in {unit.text}" if unit.text else ""), unit)
+    return AxisScale(plain, symbol, unit)
 
 
 def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
@@ -98,8 +102,9 @@ def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
     if parameter.name in problem.parameter_set.names:
         found = scale_of(problem, parameter.name)
     else:
-        found = AxisScale(parameter.name, axis_label(parameter), Unit("" if parameter.unit == "1" else parameter.unit))
-    return AxisScale("Fr", FROUDE, found.unit) if parameter.name == "Fr" else found
+        unit = "" if parameter.unit == "1" else parameter.unit
+        found = AxisScale(parameter.name, f"${parameter.latex}$", Unit(unit))
+    return AxisScale("Fr", FROUDE) if parameter.name == "Fr" else found
 
 
 def abscissa_label(problem: Posed, words: str = "spectral abscissa") -> str:
@@ -209,8 +214,3 @@ def _seen(ax: Axes, xy: ArrayLike) -> list[Array]:
     drawn = Path(np.asarray(xy, dtype=float)).to_polygons(ax.transData, width, height, closed_only=False)
     pieces = (np.asarray(piece, dtype=float) for piece in drawn)
     return [np.asarray(ax.transData.inverted().transform(piece)) for piece in pieces if len(piece) > 1]
-
-
-def axis_label(parameter: Parameter) -> str:
-    """Symbol and unit of a parameter."""
-    return f"${parameter.latex}$" + ("" if parameter.unit == "1" else f" in {parameter.unit}")

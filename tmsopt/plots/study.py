@@ -55,9 +55,7 @@ def _drawn_around(ax: Axes, data: Results) -> str:
         (~stable & near, MARK, "//", "not stable"),
     ):
         if chosen.any():
-            ax.hist(
-                values[chosen], edges.tolist(), color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label
-            )
+            ax.hist(values[chosen], edges, color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label)
     at = float(_shown(np.float64(nominal.abscissa), nominal.parameters, rate))
     ax.axvline(at, color=LINE, linestyle="--", linewidth=1.2, label=f"nominal design, {at:.4g}")
     ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
@@ -82,14 +80,14 @@ def _near(values: Array) -> Truth:
     return near
 
 
-def _edges(values: Array) -> Array:
+def _edges(values: Array) -> list[float]:
     """Edges of bins, one of them 0 where values lie on both sides, so that no bin holds growth and decay."""
     if not values.size:
-        return np.array([0.0, 1.0])
+        return [0.0, 1.0]
     low, high = float(values.min()), float(values.max())
     width = (high - low) / _BINS or 1e-3 * (abs(high) or 1.0)
     first = math.floor(low / width)
-    return np.array([width * k for k in range(first, math.floor(high / width) + 2)])
+    return [width * k for k in range(first, math.floor(high / width) + 2)]
 
 
 def _over_what_varies(ax: Axes, data: Results) -> str:
