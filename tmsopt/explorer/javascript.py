@@ -76,17 +76,19 @@ def function(name: str, arguments: Sequence[str], asked: Formula, inputs: Mappin
     Args:
         inputs: name of an input → its text.
     """
-    lines: list[str] = []
+    results: list[str] = []
 
     def named(text: str) -> str:
-        lines.append(f"const t{len(lines)}={_bare(text)};")
-        return f"t{len(lines) - 1}"
+        results.append(f"t{len(results)}={_bare(text)}")
+        return f"t{len(results) - 1}"
 
     operations = {op: partial(_spelled, template, named) for op, template in _OPERATIONS.items()}
     kind = Kind(operations | {"pow": partial(_power, named)}, lambda x: _number(as_double(x)))
     texts = map(_bare, fold(asked, inputs, kind, named))
     ends = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {next(texts)};"]
-    return "\n".join([f"{name}({', '.join(arguments)}) {{", *lines, *ends, "}"])
+    if results:
+        ends = [f"const {','.join(results)};", *ends]
+    return "\n".join([f"{name}({', '.join(arguments)}) {{", *ends, "}"])
 
 
 def _number(value: float) -> str:
@@ -116,8 +118,8 @@ _OPERATIONS: Mapping[str, str] = {
     "ratio": "({0}===0?0:{1}===0?NaN:{0}/{1})",
     "positive_part": "(({0}+Math.abs({0}))/2)",
     "negligible": f"(Math.abs({{0}})<={ROUNDING!r}*{{1}})",
-    "min": "Math.min({0}, {1})",  # NaN where either is
-    "max": "Math.max({0}, {1})",
+    "min": "Math.min({0},{1})",  # NaN where either is
+    "max": "Math.max({0},{1})",
     **{name: f"Math.{name}({{0}})" for name in ("sqrt", "cbrt", "abs", "sign", "exp", "log")},
     **{name: f"Math.{name}({{0}})" for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
 }
@@ -160,7 +162,7 @@ def _spelled(template: str, named: Callable[[str], str], *given: str) -> str:
 
 
 def _power(named: Callable[[str], str], base: str, exponent: str) -> str:
-    return _spelled(_POWERS.get(exponent, "Math.pow({0}, {1})"), named, base, exponent)
+    return _spelled(_POWERS.get(exponent, "Math.pow({0},{1})"), named, base, exponent)
 
 
 def _bare(text: str) -> str:
