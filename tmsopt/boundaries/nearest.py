@@ -208,12 +208,12 @@ def robustness_at(problem: Posed, parameters: Numbers) -> Robustness:
 
     IPOPT, which searches for designs, has no part in it.
     """
-    return _at(problem, Table(parameters))
+    return _at(problem, Table(parameters), Table(problem.weights))
 
 
 @lru_cache(maxsize=_KEPT)
-def _at(problem: Posed, parameters: Table[float]) -> Robustness:
-    return _surveyed(placed(problem, parameters, problem.weights or None), STABILITY, sqp)
+def _at(problem: Posed, parameters: Table[float], weights: Table[float]) -> Robustness:
+    return _surveyed(placed(problem, parameters, weights or None), STABILITY, sqp)
 
 
 def _surveyed(place: WeightedDesign, kinds: Sequence[str] = KINDS, method: Method = ipopt) -> Robustness:
