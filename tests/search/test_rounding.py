@@ -9,6 +9,7 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients
+from tmsopt.roots import Root
 
 x = ca.SX.sym("x")
 PLAIN = tmsopt.Problem(from_coefficients([1, 3 + x, 2]), free={"x": (0.0, 1.0)}, minimize="abscissa")
@@ -16,7 +17,7 @@ PLAIN = tmsopt.Problem(from_coefficients([1, 3 + x, 2]), free={"x": (0.0, 1.0)},
 
 def unclear(roots, stored, asked="abscissa"):
     """Of real roots with multiplicities, the rightmost of which the stored design has elsewhere."""
-    listed = [SimpleNamespace(re=re, im=0.0, multiplicity=m) for re, m in roots]
+    listed = [Root(re, 0.0, m) for re, m in roots]
     structure = SimpleNamespace(roots=listed, abscissa=max(re for re, _ in roots))
     checked = SimpleNamespace(structure=structure, realised=stored)
     problem = replace(PLAIN, minimize=None, maximize=asked) if asked == "damping_ratio" else PLAIN

@@ -270,7 +270,7 @@ RESCUES = (
     ),
     Rescue("real roots", "hard 3", is_mixed, search_real_roots),
     Rescue("positive roots", "hard 7, systems 1, variety 4", may_have_positive_roots, search_positive_roots),
-    Rescue("aside", "narrow 14, hard 4, variety 1", claims_more, move_aside),
+    Rescue("aside", "narrow 19, hard 4, variety 1", claims_more, move_aside),
     Rescue("infinity", "hard 9", is_open, search_singular),
     Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.fallback is None, keep_rival),
 )
