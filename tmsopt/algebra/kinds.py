@@ -43,16 +43,18 @@ ARITHMETIC: Operations = {
     "square": lambda x: x * x,
 }
 
-_ALIKE: Operations = {
-    **ARITHMETIC,
-    "abs": abs,
-    "less": operator.lt,
-    "at_most": operator.le,
-    "equal": operator.eq,
-    "positive_part": lambda x: (x + abs(x)) / 2,
-    "negligible": lambda x, size: abs(x) <= ROUNDING * size,
-}
-"""Operations that NumPy and CasADi write as Python does."""
+
+def _alike(absolute: Callable[[Any], Any]) -> Operations:
+    """Operations that NumPy and CasADi write as Python does, but for |x|, which CasADi's symbols have by name alone."""
+    return {
+        **ARITHMETIC,
+        "abs": absolute,
+        "less": operator.lt,
+        "at_most": operator.le,
+        "equal": operator.eq,
+        "positive_part": lambda x: (x + absolute(x)) / 2,
+        "negligible": lambda x, size: absolute(x) <= ROUNDING * size,
+    }
 
 
 # Floats and arrays.
@@ -104,7 +106,7 @@ def _quotient(a: Any, b: Any) -> Any:
 
 FLOATS = Kind(
     {
-        **_ALIKE,
+        **_alike(abs),
         "pow": _power,
         **{name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sign")},
         **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan")},
@@ -140,7 +142,7 @@ def _symbolic_ratio(a: Any, b: Any) -> Any:
 
 CASADI = Kind(
     {
-        **_ALIKE,
+        **_alike(ca.fabs),
         "pow": operator.pow,
         **{name: getattr(ca, name) for name in ("sqrt", "exp", "log", "sin", "cos", "asin", "acos", "atan", "sign")},
         "tan": _tangent,
