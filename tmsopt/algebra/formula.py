@@ -118,7 +118,7 @@ class Formula:
     @cached_property
     def uses(self) -> tuple[int, ...]:
         """How often the result of each step is taken by others."""
-        counted = Counter(chain.from_iterable(step.operands for step in self.steps))
+        counted = Counter(chain.from_iterable([step.operands for step in self.steps]))
         return tuple(map(counted.__getitem__, range(len(self.steps))))
 
 

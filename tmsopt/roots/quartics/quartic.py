@@ -117,7 +117,7 @@ def columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     Raises:
         ValueError: for shapes that cannot be broadcast.
     """
-    given = np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in coefficients))
+    given = np.broadcast_arrays(*[np.asarray(c, dtype=float) for c in coefficients])
     return [np.ascontiguousarray(c).reshape(-1) for c in given], given[0].shape
 
 
