@@ -55,8 +55,9 @@ def started(at):
     return replace(tmsopt.POLICY, starts=lambda state: iter([tmsopt.Start({"x": at})] * 64))
 
 
-def test_a_search_in_the_wrong_basin_is_taken_up_again():
-    design = tmsopt.solve(problem(WELLS, WIDE), policy=started(0.9))
+@pytest.mark.parametrize("objective", ["abscissa", "x**4/4 - x**2/2 + x/10 - 1"])
+def test_a_search_in_the_wrong_basin_is_taken_up_again(objective):
+    design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective), policy=started(0.9))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"
 
@@ -74,12 +75,9 @@ def test_the_neighbourhood_of_an_end_is_looked_at_too():
     assert design.status == "optimal"
 
 
-@pytest.mark.parametrize(
-    ("objective", "policy"), [("abscissa", stuck(0.9)), ("x**4/4 - x**2/2 + x/10 - 1", started(0.9))]
-)
-def test_an_end_that_a_design_contradicts_is_no_optimum(objective, policy):
+def test_an_end_that_a_design_contradicts_is_no_optimum():
     """If no start leaves the basin on the right, what was looked at on the left is said, and that it is no optimum."""
-    design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective), throw=False, policy=policy)
+    design = tmsopt.solve(problem(WELLS, WIDE), throw=False, policy=stuck(0.9))
     assert design.status == "not_converged"
     assert not design.violations
     assert any("the best design that was looked at" in note for note in design.notes)

@@ -113,6 +113,20 @@ def least_worth(state: SearchState, lost: float | None = None) -> float:
     return worth - lost * (best.end.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
 
 
+def appeal(state: SearchState, policy: Policy) -> SearchState:
+    """Starts from designs that are better than the best end, as long as that helps."""
+    for _ in range(state.tuning.appeals):
+        rivals = rivals_of(state)
+        if not rivals or not state.sample:
+            break
+        before = state.best
+        starts = (Start(design) for design in state.sample.box.designs(rivals.best(state.tuning.rivals_seen)))
+        state = search_again(state, try_all(policy), starts)
+        if state.best is before:
+            break
+    return state
+
+
 def claims_more(state: SearchState) -> bool:
     """Whether an end claims to be better than its design is, or a root of it is 0, whose damping ratio may jump."""
     goal, best, least = state.problem.objective, state.best, least_worth(state)
@@ -270,7 +284,8 @@ RESCUES = (
     ),
     Rescue("real roots", "hard 3", is_mixed, search_real_roots),
     Rescue("positive roots", "hard 7, systems 1, variety 4", may_have_positive_roots, search_positive_roots),
-    Rescue("aside", "narrow 19, hard 4, variety 1", claims_more, move_aside),
+    Rescue("appeals", "sixfold 14", lambda s: bool(rivals_of(s)), appeal),
+    Rescue("aside", "narrow 14, hard 4, variety 1", claims_more, move_aside),
     Rescue("infinity", "hard 9", is_open, search_singular),
     Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.fallback is None, keep_rival),
 )

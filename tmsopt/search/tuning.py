@@ -102,6 +102,7 @@ class Tuning:
     leads: int = number(3, "designs", "with roots of full multiplicity that are started from", "hard")
     leadless: int = number(4, "starts", "that led to none, after which no more are tried", "hard")
     chains: int = number(16, "starts", "for an exceptional point where the nearest one is a crossing", "statements")
+    appeals: int = number(8, "times", "that better designs are started from", "sixfold")
     rivals_seen: int = number(2, "designs", "better than the best end, towards which others lie", "hard")
     lost: float = number(1e-7, "relative", "difference of the objective that makes a design better", "hard")
     asides: int = number(3, "optima", "the best that ends claim, beside which designs are looked for", "hard")

@@ -24,12 +24,12 @@ from benchmarks.timing import over_processes
 _STATUSES = ("optimal", "infeasible", "not_converged")
 _DROPPED = """\
 Gone on 2026-11-28, with how often they stepped in on these problems: multiple roots (654; kept where sectors
-and half-planes meet), through a0 = 0 (248), designs sought for stability (203), appeals (61), ideal roots (55),
-off plateau (44), opposite faces (5), attained ends (2), and the least abscissa as a start; and, in the program,
-powers taken apart where they must be 0 (0). One by now: start kept (59), off the edge (48) and nudge (12), as
-*aside*; unbounded (15) and runaway (6), in the judgement of an end. Stages by now: restarts, basins, designs
-sought for limits, ways and exchanges of contacts. Beside version 1.1 no true optimum is lost; one relaxation,
-of hard 1 203, is larger than need be."""
+and half-planes meet), through a0 = 0 (248), designs sought for stability (203), ideal roots (55), off plateau
+(44), opposite faces (5), attained ends (2), and the least abscissa as a start; and, in the program, powers taken
+apart where they must be 0 (0). One by now: start kept (59), off the edge (48) and nudge (12), as *aside*;
+unbounded (15) and runaway (6), in the judgement of an end. Stages by now: restarts, basins, designs sought for
+limits, ways and exchanges of contacts. Beside version 1.1 no true optimum is lost; one relaxation, of hard 1
+203, is larger than need be."""
 _SAME = 1e-7  # relative difference of values, and 1e-8 where they are small
 _HARD_SEEDS = (1, 2, 3)
 _SUITES = {
