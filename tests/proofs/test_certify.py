@@ -21,6 +21,7 @@ from scipy.optimize import brentq  # type: ignore[import-untyped]
 from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, certify, load, models, solve
 from tmsopt.cli import every as main
+from tmsopt.evaluation.bound import instant_bound
 from tmsopt.global_search import SCIP, GlobalSolver, SolverPool
 from tmsopt.problem import Band, Bound
 from tmsopt.report import design_report
@@ -626,3 +627,20 @@ def test_command_for_a_front(tmp_path):
     assert (code, out) == (2, "")
     assert "--certify" in err
     assert "front" in err
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "design"),
+    [
+        (["a - 0.5", "b", "1"], {"a": 0.51, "b": 0.2}),  # a0 changes its sign between the ends
+        (["(a - 0.3)*(a - 0.7)", "b", "a - 0.5"], {"a": 0.71, "b": 2 * (0.0041 * 0.21) ** 0.5}),  # twice, aₙ between
+    ],
+)
+def test_the_product_of_the_roots_bounds_nothing_where_a0_vanishes(coefficients, design):
+    """Next to a0 = 0 a double root is as far left as one likes, whatever aₙ/a0 is at the ends of the box."""
+    a, b, c = (eval(text, {}, design) for text in coefficients)
+    root = -b / (2 * a)
+    assert a * root * root + b * root + c == pytest.approx(0, abs=1e-12)
+    model = models.from_coefficients(coefficients)
+    asked = Problem(model, free={"a": (0, 1), "b": (0, 2)}, minimize="abscissa")
+    assert instant_bound(asked.posed, 0.0).value <= root  # asked of a worse design, which does not contradict it
