@@ -39,7 +39,7 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
     """A quotient of two polynomials; equal to another if the cross products are."""
 
     over: Any
-    under: Any = None  # 1
+    under: Any = None  # the polynomial 1, where it is left out
 
     def __post_init__(self) -> None:
         if self.under is None:

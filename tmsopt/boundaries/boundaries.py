@@ -44,7 +44,7 @@ class Rest:
         return self.degree % 2 if self.degree > 2 else 0
 
     def factors(self, u: Sequence[Any]) -> list[list[Any]]:
-        """Of the unknowns."""
+        """Coefficients of each factor, from the unknowns."""
         more = self._odd + 3
         linear, scaled = u[: self._odd], ([u[k], u[k + 1], 1 - u[k] - u[k + 1]] for k in range(more, len(u), 2))
         return [*([f, 1 - f] for f in linear), list(u[self._odd : more]), *scaled]
