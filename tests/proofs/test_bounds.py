@@ -92,7 +92,8 @@ def test_all_roots_on_the_axis(pairs, zeros):
     c = product(*([Fraction(1), Fraction(0), Fraction(x)] for x in pairs), *[[Fraction(1), Fraction(0)]] * zeros)
     squares = pairs[: unknowns(len(c) - 1)]
     assert holds(c, squares)
-    assert holds(c, [Fraction(x).limit_denominator() for x in squares_of([float(x) for x in c])])
+    found = squares_of([float(x) for x in c])  # a triple root scatters by 6e-6, the cube root of a rounding
+    assert holds(c, [Fraction(x).limit_denominator(1000) for x in found])
 
 
 @pytest.mark.parametrize("c", [(1, 0, 1, 0, 1), (1, 0, -5, 0, 4), (1, 0, 3, 0, -4), (1, 0, 1, 0, 1, 0)])
