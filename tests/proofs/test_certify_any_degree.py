@@ -155,6 +155,15 @@ def test_the_bound_by_the_product_of_the_roots_holds_for_any_formula(last):
     assert -math.inf < bound <= -(largest ** (1 / 3)) * (1 - 1e-15)
 
 
+def test_the_product_of_the_roots_may_be_greatest_inside():
+    """x/(1 + x²) is at most 1/2, at x = 1."""
+    x, y = symbols("x y")
+    problem = boxed(from_coefficients([1 + x * x, x, y, x]), 0.5, 3.0, minimize="abscissa")
+    bound = omega0_bound(problem.posed, math.inf).value
+    assert bound <= -(0.5 ** (1 / 3))
+    assert bound == pytest.approx(-(0.5 ** (1 / 3)), rel=1e-12)
+
+
 def test_more_parameters_than_have_corners():
     """Twelve of thirteen coefficients free: the product is the last one, at most 1."""
     problem = boxed(free_polynomial(12, a1=lambda a: a[2] * a[3]), 0.0, 1.0, minimize="abscissa")

@@ -19,7 +19,7 @@ from tmsopt.search import begin_search
 accepting, driver, states = (import_module(f"tmsopt.search.{name}") for name in ("accept", "policy", "state"))
 
 x = ca.SX.sym("x")
-LEFT, _, RIGHT = sorted(np.roots([1, 0, -1, 0.1]).real.tolist())
+LEFT, RIDGE, RIGHT = sorted(np.roots([1, 0, -1, 0.1]).real.tolist())
 BOX = {"x": (-2.0, 2.0)}
 POLICY = tmsopt.POLICY
 
@@ -191,6 +191,16 @@ def test_starts_that_lead_to_the_same_end_are_not_run():
     rows = [row for row in tried if row >= 0]
     assert len(rows) == len(set(rows))
     assert design.starts.tried > len(tried)  # led ones count
+
+
+@pytest.mark.parametrize(("at", "side"), [(0.7, 1), (-1.3, -1)])
+def test_a_start_beyond_the_ridge_does_not_lead_to_an_end(at, side):
+    state = begun()
+    state = replace(state, sample=POLICY.sample(state))
+    end = POLICY.local(state, tmsopt.Start({"x": at}))
+    designs = [state.sample.box.design(state.sample.leaders, row)["x"] for row in end.led]
+    assert len(designs) > 2
+    assert all(side * (x - RIDGE) > 0 for x in designs)
 
 
 # Rescues
