@@ -52,6 +52,7 @@ charted(sys.argv[1], tile=97)
 """
 
 
+@pytest.mark.slow
 def test_a_killed_process_loses_no_recorded_tile(whole, tmp_path):
     """Killed as it is about to bring a layer, or the record, to the disk; then the same call goes on."""
     path = tmp_path / "killed.chart"

@@ -170,6 +170,7 @@ class Fatal(str):
         return os.abort, ()
 
 
+@pytest.mark.slow
 def test_a_worker_that_crashes_ends_the_chart(tmp_path):
     fatal = Quantity("fatal", "1", Fatal("ends a process that it is handed to"), "", lambda v: v["k"])
     problem = Problem(

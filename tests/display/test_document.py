@@ -197,6 +197,7 @@ def test_headings_go_down_one_by_one(name):
     assert all(after <= before + 1 for before, after in pairwise(levels))
 
 
+@pytest.mark.slow
 @each
 def test_pictures_lead_nowhere_either(name):
     """Drawings are read as XML; what they refer to is in themselves."""

@@ -316,6 +316,7 @@ def test_a_flat_end_of_three_objectives_is_on_the_front():
     assert found.points[0].solution.parameters["chi_B"] == pytest.approx(1.5, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_points_of_three_objectives_are_limits_on_each_of_two():
     told = []
     found = tmsopt.pareto(problem(**FLAT), 3, workers=1, progress=told.append)

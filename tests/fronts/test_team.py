@@ -29,6 +29,7 @@ def each(function, items, workers):
     return dict(team.each(workers, function, ASK, items))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [here, lambda: processes(3)])
 def test_every_item_has_its_answer(workers):
     with workers() as side_by_side:
@@ -36,6 +37,7 @@ def test_every_item_has_its_answer(workers):
     assert {k: square for k, (square, _) in found.items()} == {k: k**2 for k in range(9)}
 
 
+@pytest.mark.slow
 def test_processes_share_the_work():
     with processes(2) as side_by_side:
         workers = [pid for _, pid in each(shares.slowly_squared, range(8), side_by_side).values()]
@@ -43,6 +45,7 @@ def test_processes_share_the_work():
     assert os.getpid() not in workers
 
 
+@pytest.mark.slow
 def test_an_item_that_ends_its_processes_is_an_error():
     with processes(2) as side_by_side, pytest.raises(EngineError, match="exit code 3"):
         each(shares.dying_at_two, range(9), side_by_side)

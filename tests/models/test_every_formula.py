@@ -126,6 +126,7 @@ def _symbolic(own, x):
     return fold(own, {n: x[k] for k, n in enumerate(own.names)}, CASADI)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize(("name", "of"), SETS)
 def test_intervals_scip_and_fractions_hold_the_ball(name, of, count):

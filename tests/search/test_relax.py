@@ -270,6 +270,7 @@ def test_the_amount_of_one_limit_is_the_least_by_a_search():
     assert sum(relaxation.amounts.values()) <= 1.5 * max(slowest - 1.2, fastest + 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["equal, above", "slow and stable"])
 def test_each_amount_alone_frees_the_problem(key):
     for name, amount in failed(key).relaxation.alone.items():

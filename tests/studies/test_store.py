@@ -101,6 +101,7 @@ def test_no_acknowledged_row_is_lost_by_kill_9(path):
     assert acknowledged > 0
 
 
+@pytest.mark.slow
 def test_reading_while_another_process_writes(path):
     with writer(path) as (process, _):
         for _ in range(5):
