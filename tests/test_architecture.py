@@ -26,14 +26,14 @@ FLOORS = (
     ("proofs", "analysis", "fronts", "studies"),
     ("dynamics",),
     ("paper",),
-    ("report", "plots", "guide"),
+    ("plots", "guide"),
     ("explorer",),
-    ("display",),
+    ("documents",),
     ("cli",),
 )
 """From the ground up. A package may import what lies below it, and its own rooms; nobody on its own floor."""
 
-ASKED_ABOVE = {("tmsopt.records", "tmsopt.display")}
+ASKED_ABOVE = {("tmsopt.records", "tmsopt.documents")}
 """A result asks who shows it when it is shown, and knows nothing of them: the one import that may run up."""
 
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names}
@@ -228,7 +228,7 @@ def test_what_is_asked_above_is_asked_when_it_is_needed():
     """By name and inside a function, so that a result carries nobody who shows it."""
     script = "import sys, tmsopt.problem.solution, tmsopt.tracing.branch; print(*sys.modules)"
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, check=True)
-    assert not {"tmsopt.display", "tmsopt.report", "tmsopt.plots", "matplotlib"} & set(ended.stdout.split())
+    assert not {"tmsopt.documents", "tmsopt.plots", "matplotlib"} & set(ended.stdout.split())
 
 
 def test_a_class_name_has_one_meaning():
@@ -242,7 +242,7 @@ def test_a_class_name_has_one_meaning():
 
 def test_no_package_has_the_name_of_a_public_function():
     """A package tmsopt/solve would take the place of tmsopt.solve; some are public as packages."""
-    assert set(FLOOR) & set(import_module(PACKAGE).__all__) == {"laws", "models", "plots", "report", "roots"}
+    assert set(FLOOR) & set(import_module(PACKAGE).__all__) == {"laws", "models", "plots", "roots"}
 
 
 def test_tests_open_packages_by_their_faces():
@@ -311,8 +311,8 @@ def test_files_are_written_whole():
         "tmsopt.charts.folder.sync",
         "tmsopt.charts.folder._create",  # recorded last
         "tmsopt.files.write_atomic",  # itself
-        "tmsopt.display.page._picture",
-        "tmsopt.display.pictures._image",
+        "tmsopt.documents.html._thumbnail",
+        "tmsopt.documents.html._image",
         "tmsopt.plots.style.rendered",  # in memory
         "tmsopt.killable.serve",  # a pipe
         "tmsopt.studies.export._csv",

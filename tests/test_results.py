@@ -14,7 +14,7 @@ import pytest
 from matplotlib.axes import Axes
 
 import tmsopt
-from tmsopt.display import WRITERS
+from tmsopt.documents import HOME
 from tmsopt.models import from_coefficients
 
 mpl.use("Agg")
@@ -155,7 +155,7 @@ def test_every_result_is_here():
     """Every public class that shows itself, and no writer without a class; an Explorer is a page already."""
     shown = {n for n in tmsopt.__all__ if inspect.isclass(c := getattr(tmsopt, n)) and hasattr(c, "_repr_html_")}
     shown -= {"Explorer"}
-    assert shown == set(WRITERS) == {type(made(name)).__name__ for name in RESULTS}
+    assert shown == set(HOME) == {type(made(name)).__name__ for name in RESULTS}
 
 
 @each
@@ -182,7 +182,7 @@ def test_it_is_drawn_into_axes(name):
         with pytest.raises(tmsopt.InputError, match=f"no picture of a {name} alone"):
             result.plot()
         return
-    draw = getattr(tmsopt.plots, WRITERS[type(result).__name__].picture, None)
+    draw = getattr(tmsopt.plots, HOME[type(result).__name__].picture, None)
     if draw is None or "ax" in list(inspect.signature(draw).parameters)[:1]:
         pytest.skip("nothing draws it yet")
     assert isinstance(result.plot(), Axes)
@@ -212,7 +212,7 @@ def test_new_figures_are_shown_by_pyplot(monkeypatch):
         ax.plot([0, 1], [0, 1])
         return ax
 
-    monkeypatch.setattr(tmsopt.plots, WRITERS["Solution"].picture, draws, raising=False)
+    monkeypatch.setattr(tmsopt.plots, HOME["Solution"].picture, draws, raising=False)
     before = plt.get_fignums()
     ax = design().plot()
     assert plt.gcf() is ax.get_figure()
@@ -238,7 +238,7 @@ def test_a_picture_that_fails_does_not_break_the_page(monkeypatch):
         raise RuntimeError
 
     whole = str(design())
-    monkeypatch.setattr(tmsopt.plots, WRITERS["Solution"].picture, fails, raising=False)
+    monkeypatch.setattr(tmsopt.plots, HOME["Solution"].picture, fails, raising=False)
     assert "img" not in Page(design()._repr_html_()).tags
     assert str(design()) == whole
 

@@ -1,4 +1,4 @@
-from . import laws as laws, models as models, plots as plots, report as report, roots as roots
+from . import laws as laws, models as models, plots as plots, roots as roots
 from .proofs import certify as certify
 from .charts import Chart as Chart, chart as chart, open_chart as open_chart
 from .dynamics import Growth as Growth, Speeds as Speeds, growth as growth, speeds as speeds
@@ -8,7 +8,7 @@ from .problem import (
     Starts as Starts, load as load,
 )
 from .analysis import Diagnosis as Diagnosis, diagnose as diagnose
-from .display import save_report as save_report
+from .documents import save_report as save_report
 from .errors import Fault as Fault, InputError as InputError
 from .analysis import (
     Explanation as Explanation, Optimality as Optimality, explain as explain, optimality as optimality,

@@ -30,7 +30,7 @@ class Printable(Protocol):
 
     def report(self, full: bool = False) -> str:
         """The text that the command line prints; with all the rest where it is `full`."""
-        return str(_display().report(self, full))
+        return str(_documents().report(self, full))
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw it, into the given Axes or into new ones, which a notebook and ``plt.show()`` show.
@@ -38,17 +38,17 @@ class Printable(Protocol):
         Raises:
             InputError: where there is no picture of it.
         """
-        axes: Axes = _display().plotted(self, ax)
+        axes: Axes = _documents().plot(self, ax)
         return axes
 
     def __str__(self) -> str:
         return self.report()
 
     def __repr__(self) -> str:
-        return str(_display().headline(self))
+        return str(_documents().headline(self))
 
     def _repr_html_(self) -> str:
-        return str(_display().page(self))
+        return str(_documents().fragment(self))
 
 
 class Tabular(Printable, Protocol):
@@ -68,8 +68,8 @@ class Tabular(Printable, Protocol):
 
 
 def asked_above(name: str, *given: Any, **options: Any) -> Any:
-    """What a function of the display gives, for a result that has it as a method and knows nothing of its maker."""
-    return getattr(_display(), name)(*given, **options)
+    """Call a function of `tmsopt.documents` for a method of a result, which knows nothing of what stands above it."""
+    return getattr(_documents(), name)(*given, **options)
 
 
 def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
@@ -82,8 +82,8 @@ def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
     return made
 
 
-def _display() -> Any:
-    return import_module("tmsopt.display")
+def _documents() -> Any:
+    return import_module("tmsopt.documents")
 
 
 class Table(Mapping[str, V]):

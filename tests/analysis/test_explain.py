@@ -17,9 +17,9 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.analysis import moved, natural_step, rounded, step_within
 from tmsopt.cli import every as main
+from tmsopt.documents import rounding_line
 from tmsopt.models import Range, from_coefficients, tms
 from tmsopt.problem import Unit, unit_of
-from tmsopt.report import explained_lines, rounding_line
 
 ZETA_B, ZETA_H = -0.4, -0.2
 CHI_H_1 = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": 0.1}
@@ -30,7 +30,7 @@ def explained(**asked):
     solution = tmsopt.solve(tmsopt.Problem(tms, units={"lambda_s": "deg"}, **asked), throw=False)
     explanation = tmsopt.explain(solution)
     json.dumps(explanation.to_json(), allow_nan=False)
-    assert explained_lines(explanation)
+    assert explanation.report().splitlines()
     return solution, explanation, {lever.name: lever for lever in explanation.levers}
 
 

@@ -15,7 +15,6 @@ import tmsopt
 from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, UNDECIDED
 from tmsopt.cli import every as main
 from tmsopt.models import tms
-from tmsopt.report import optimality_lines
 
 NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
 CHI_H_1 = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -30,7 +29,7 @@ def solved(**asked):
 def judged(solution):
     found = tmsopt.optimality(solution)
     json.dumps(found.to_json(), allow_nan=False)
-    assert optimality_lines(found)
+    assert found.report().splitlines()
     return found
 
 
@@ -374,7 +373,7 @@ def test_what_is_not_covered_is_said_in_a_line(asked, words):
     found = judged(solved(**asked))
     assert found.verdict == NOT_COVERED
     assert words in found.reason
-    (line,) = optimality_lines(found)
+    (line,) = found.report().splitlines()
     assert line.startswith("local optimality: not judged")
 
 

@@ -20,7 +20,6 @@ from tmsopt.evaluation import cover, omega0_bound
 from tmsopt.models import Model, Parameter, ParameterSet, from_coefficients
 from tmsopt.plots import chart_figure, growth_figure
 from tmsopt.problem import Problem
-from tmsopt.report import chart_table
 from tmsopt.roots import (
     CLASSES,
     classify,
@@ -252,7 +251,7 @@ def test_a_chart_of_a_cubic_is_that_of_the_routh_condition():
     heavy = found.kind == CLASSES.index("heavily damped")
     assert np.array_equal(heavy[clear], (stable & (discriminant > 0))[clear])
     assert np.array_equal((found.real_roots == 3)[clear], (discriminant > 0)[clear])
-    assert "heavily damped" in chart_table(found)
+    assert "heavily damped" in found.report()
     assert len(chart_figure(found, "real_roots").axes) == 2
 
 

@@ -15,11 +15,11 @@ from helpers.oracles import polynomial_exact, symbolic_copo
 import tmsopt
 from tmsopt import laws
 from tmsopt.boundaries import nearest, robustness
+from tmsopt.documents import robustness_line
 from tmsopt.errors import InputError
 from tmsopt.evaluation import recheck
 from tmsopt.models import from_coefficients, from_matrices, tms, to_si
 from tmsopt.problem import Problem
-from tmsopt.report import robustness_line, robustness_table
 from tmsopt.roots import roots
 
 pytestmark = pytest.mark.slow
@@ -311,7 +311,7 @@ def test_a_solution_is_accepted():
     written = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert written["radius"] == found.radius
     assert set(written["nearest"]) == set(KINDS)
-    assert robustness_table(found).startswith("robustness: ")
+    assert found.report().startswith("robustness: ")
     with pytest.raises(InputError, match="give their values"):
         tmsopt.robustness(free)
 
@@ -364,7 +364,7 @@ def test_an_oscillator_without_damping_is_on_the_edge(m, c, k, edges, zeros):
         assert found.limit.distance == found.radius == found.to_stability == 0
         told = f"at its edge already: {zeros[0]} = 0" if zeros else "none, on the edge of stability already"
         assert robustness_line(found).startswith(told)
-        assert "-0" not in robustness_table(found)
+        assert "-0" not in found.report()
 
 
 def test_what_a_change_does_is_said_in_the_words_of_a_model():

@@ -285,7 +285,7 @@ def test_a_front_that_is_stopped_leaves_what_is_known(run, monkeypatch):
 @pytest.mark.slow
 def test_what_is_said_beside_a_design_may_be_stopped(run, monkeypatch):
     monkeypatch.setattr(
-        import_module("tmsopt.report.solution.findings"), "explain", lambda *_, **__: (press(), time.sleep(LONG))
+        import_module("tmsopt.documents.analysis"), "explain", lambda *_, **__: (press(), time.sleep(LONG))
     )
     status, out, err = run("solve", "problems/ep4.toml")
     assert (status, err) == (130, "")

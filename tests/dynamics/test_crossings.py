@@ -8,7 +8,6 @@ import pytest
 import tmsopt
 from tmsopt.dynamics import crossings, stable_speeds
 from tmsopt.models import from_matrices
-from tmsopt.report import speeds_table
 
 
 def _speeds(free, between, *, A=None, M=None, D=None, K=None):
@@ -77,7 +76,7 @@ def test_a_leading_coefficient_that_is_0_for_every_value():
 
 
 def test_what_is_said_of_roots_that_stay_on_the_axis():
-    said = speeds_table(_speeds("g", (0, 5), A=lambda g: [[g, -1, 0], [1, 0, -1], [0, 1, -g]]))
+    said = str(_speeds("g", (0, 5), A=lambda g: [[g, -1, 0], [1, 0, -1], [0, 1, -g]]))
     assert re.search(r"EP3 +1\.414213562373", said)
     assert "s = 0 is a root for every g" in said
     assert "marginally stable (no root right of the imaginary axis, those on it simple): to 1.4142136" in said
@@ -89,7 +88,7 @@ def test_what_is_said_of_roots_that_stay_on_the_axis():
         D=lambda d: [[d, -d], [-d, d]],
         K=lambda d: [[3, -3], [-3, 3]],
     )
-    said = speeds_table(masses)
+    said = masses.report()
     assert "2.8284271247461" in said
     assert "s = 0 is a root for every d, 2-fold" in said
     assert "stable but for the 2-fold root 0: everywhere" in said

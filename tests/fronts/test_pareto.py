@@ -417,7 +417,7 @@ def test_designs_that_are_not_stable_are_marked(tmp_path, objectives):
     front.write_csv(tmp_path / "front.csv")
     rows = csv.DictReader((tmp_path / "front.csv").read_text(encoding="utf-8").splitlines())
     assert [row["stable"] for row in rows] == [str(s).lower() for s in stable]
-    table = tmsopt.report.front_table(front).splitlines()
+    table = front.report().splitlines()
     at = next(line for line in table if " stable" in line).index("stable")
     assert [line[at:].split()[0] for line in table if line[at : at + 3] in ("yes", "no ", "no")] == [
         "yes" if s else "no" for s in stable

@@ -18,6 +18,7 @@ from mpmath import mp
 
 from tmsopt import laws
 from tmsopt.cli import every as main
+from tmsopt.documents import ledger_page
 from tmsopt.paper.ledger import (
     VERDICTS,
     compute,
@@ -30,7 +31,6 @@ from tmsopt.paper.ledger import (
     select_claims,
     verify,
 )
-from tmsopt.report import ledger_page, ledger_table
 
 EXACT, HOLDS, OFF, CONDITIONAL, FAILS = VERDICTS
 PAGE = Path(__file__).parents[2] / "problems" / "paper.md"
@@ -519,7 +519,7 @@ def test_the_machine_of_the_photograph_has_an_EP4(by_key):
 
 
 def test_the_text_fits_the_page_and_counts(ledger):
-    text = ledger_table(ledger)
+    text = ledger.report()
     assert max(map(len, text.splitlines())) <= 100
     for entry in ledger.entries:
         assert f"{entry.key}:" in text

@@ -23,7 +23,6 @@ from tmsopt import InputError, Problem, certify, load, models, solve
 from tmsopt.cli import every as main
 from tmsopt.global_search import SCIP, GlobalSolver, SolverPool
 from tmsopt.problem import Band, Bound
-from tmsopt.report import design_report
 
 answering = import_module("tmsopt.global_search.answer")
 bounding = import_module("tmsopt.evaluation.bound")
@@ -554,7 +553,7 @@ def test_another_global_solver_is_asked_and_named(slow_plane, monkeypatch):
     bound = certify(slow_plane, seconds=8.0).bound  # its process takes one of them to start
     assert (bound.method, bound.value, bound.proven) == ("omega0", slow_plane.bound.value, False)
     assert (bound.solver, bound.nodes > 0) == ("Timid", True)
-    report = design_report(replace(slow_plane, bound=bound), full=True)
+    report = replace(slow_plane, bound=bound).report(full=True)
     assert re.search(r"branch and bound with Timid, \d+ nodes, .* s found none better in time", report)
     assert "optimal, proved" not in report
 

@@ -18,10 +18,10 @@ from mpmath import mp
 import tmsopt
 from tmsopt.algebra import Number, Refused, enclosed, number, refined
 from tmsopt.cli import every as main
+from tmsopt.documents import number_rows
 from tmsopt.models import decimal
 from tmsopt.problem import Case
 from tmsopt.proofs import Factored, Proof, prove_design
-from tmsopt.report import proof_text
 from tmsopt.roots import exact_roots, product
 
 factored = import_module("tmsopt.proofs.factored")
@@ -279,8 +279,8 @@ def test_an_angle_in_degrees_is_exact_where_it_is_given_so():
         assert holds(exact.parameters["Fr"], truth)
         assert not holds(plain.parameters["Fr"], truth)
     assert exact.held["lambda_s"] == "20 deg"
-    assert "not an angle in degrees" in proof_text(problem, plain)
-    assert "not an angle in degrees" not in proof_text(problem, exact)
+    assert "not an angle in degrees" in plain.report()
+    assert "not an angle in degrees" not in exact.report()
 
 
 def fractions(**changed):
@@ -445,12 +445,12 @@ def test_numbers_in_the_unit_of_the_roots_have_it():
     """In SI the roots are per √(g/w); a dimensionless design has no such unit."""
     design = solved("point_mass_robot")
     proof = tmsopt.prove(design)
-    units = {row[0]: row[3] for row in tmsopt.report.number_rows(design.problem.posed, proof)}
+    units = {row[0]: row[3] for row in number_rows(design.problem.posed, proof)}
     assert {units[n] for n in ("abscissa", "r")} == {"√(g/w)"}
     assert proof.to_json()["units"]["abscissa"] == "√(g/w)"
     r, times = float(proof.abscissa), math.sqrt(design.parameters["g"] / design.parameters["w"])
     assert r * times == pytest.approx(-design.quantities["decay_rate"], rel=1e-9)
-    free = tmsopt.report.number_rows(solved("ep4").problem.posed, tmsopt.prove(solved("ep4")))
+    free = number_rows(solved("ep4").problem.posed, tmsopt.prove(solved("ep4")))
     assert {row[3] for row in free if row[0] in ("abscissa", "r")} == {""}
 
 
@@ -616,7 +616,7 @@ def test_a_band_is_proved_in_its_worst_case():
     assert proof.proved
     assert proof.parameters["Fr"] == Number("1.2", "0")
     assert (proof.stable.holds, proof.inside.holds) == (True, True)
-    assert "worst case" in proof_text(problem.posed, proof)
+    assert "worst case" in proof.report()
 
 
 def run(*arguments):

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 import tmsopt
 from tmsopt.cli import every as main
+from tmsopt.documents import event_rows
 from tmsopt.models import from_hamiltonian
 
 EXACT = 1e-12
@@ -253,7 +254,7 @@ def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real():
     assert found.beyond_axis == 0
     assert found.to_json()["stable"] is False
     assert found.notes == ()
-    report = tmsopt.report.design_report(found)
+    report = found.report()
     assert "found: marginally stable\n" in report
     assert f"neither loss nor gain; {real:.5g} is real" in report
 
@@ -266,7 +267,7 @@ def test_a_threshold_of_a_lossier_mode_is_not_the_edge():
     assert gain > 0.01
     assert found.beyond_axis == pytest.approx(gain, abs=EXACT)
     assert found.notes == (f"not the edge of stability: another eigenfrequency has gain {gain:.2g}",)
-    report = tmsopt.report.design_report(found)
+    report = found.report()
     assert "one eigenfrequency has the most gain" in report
     assert "least damped" not in report
 
@@ -281,7 +282,7 @@ def test_a_weave_of_a_real_system_says_whether_it_is_the_edge(rest, beyond):
     assert found.stable is False
     assert found.beyond_axis == pytest.approx(beyond, abs=EXACT)
     assert found.notes == (("not the edge of stability: another root has real part 1",) if beyond else ())
-    assert ("marginally stable\n" in tmsopt.report.design_report(found)) is not bool(beyond)
+    assert ("marginally stable\n" in found.report()) is not bool(beyond)
 
 
 def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold():
@@ -302,7 +303,7 @@ def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold():
     assert str(common.branches.exponent) == "1"
     assert common.branches.size == pytest.approx(1, rel=1e-9)
     assert (common.below, common.above) == (1, 1)  # it is exact
-    text = "\n".join(tmsopt.report.diagnosis_lines([found], details=True))
+    text = found.report(full=True)
     assert "not move it" not in text
     assert "nowhere sampled" not in text
 
@@ -315,13 +316,13 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met():
     near = [e for e in traced.events if abs(e.parameters["g"] - math.sqrt(2)) < 1e-3 and abs(e.parameters["d"]) < 1e-3]
     assert near
     for branch in traced.branches:
-        for row in tmsopt.report.event_rows(branch, {"g": tmsopt.problem.Unit()}, model)[1:]:
+        for row in event_rows(branch, {"g": tmsopt.problem.Unit()}, model)[1:]:
             value = float(row[1])
             if abs(value - math.sqrt(2)) < 1e-3 and "g" in row[-1].split(", "):
                 assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(row[1].split(".")[1])
     branch, event = next((b, e) for b in traced.branches for e in b.events if e in near)
     met = replace(event, parameters={**event.parameters, "g": math.sqrt(2) + 3.8e-10}, residual=6e-11)
-    cells = tmsopt.report.event_rows(replace(branch, events=(met,)), {"g": tmsopt.problem.Unit()}, model)[1]
+    cells = event_rows(replace(branch, events=(met,)), {"g": tmsopt.problem.Unit()}, model)[1]
     assert cells[1] == "1.4142136"  # two digits fewer than met
 
 
@@ -336,7 +337,7 @@ def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix():
         constraints={"c": "k <= 0.6"},
         tolerances={"g1": 0.05, "k": 0.02},
     )
-    report = tmsopt.report.design_report(tmsopt.solve(asked))
+    report = str(tmsopt.solve(asked))
     assert "worst case" in report
     assert "damping ratio" not in report
 

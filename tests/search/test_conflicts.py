@@ -11,8 +11,8 @@ import pytest
 from helpers.oracles import routh_exact
 
 import tmsopt
+from tmsopt.analysis import infeasible_sentences
 from tmsopt.records import Table
-from tmsopt.report import infeasible_lines
 
 FOLD = 8
 NAMES = [f"x{k}" for k in range(1, FOLD + 1)]
@@ -68,7 +68,7 @@ def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may
 
 def test_where_a0_may_vanish_a_search_is_not_said_to_tell():
     design = tmsopt.solve(DAMPED, throw=False, alone=False, stability=0.0)
-    first = " ".join(infeasible_lines(design)[:1])
+    first = " ".join(infeasible_sentences(design)[:1])
     assert set(design.relaxation.conflict) >= {*DAMPED.constraints} or not design.relaxation.irreducible
     assert "no design was found" in first
     assert "cannot" not in first
@@ -164,5 +164,5 @@ def test_a_limit_that_is_moved_by_its_seventh_digit_is_shown_as_it_is():
     """s² + 2xs + 1 comes to −1 and no further."""
     oscillator = tmsopt.models.from_coefficients([1, "2*x", 1])
     asked = tmsopt.Problem(oscillator, free={"x": (0, 5)}, minimize="x", constraints={"c": "abscissa <= -1.000001"})
-    lines = infeasible_lines(tmsopt.solve(asked, throw=False))
+    lines = infeasible_sentences(tmsopt.solve(asked, throw=False))
     assert "smallest change found: abscissa <= -1 instead of -1.000001 (c)" in lines

@@ -9,8 +9,8 @@ from helpers import hunt
 
 import tmsopt
 from tmsopt import laws
+from tmsopt.analysis import infeasible_sentences
 from tmsopt.models import tms
-from tmsopt.report import infeasible_lines
 
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
 SLOW = tmsopt.Problem(
@@ -43,10 +43,10 @@ def test_the_least_speed_at_which_a_design_is_stable(slow):
     assert not slow.need.most
     assert slow.need.value == pytest.approx(least_weave(), rel=1e-9)
     assert json.loads(json.dumps(slow.to_json()))["need"]["value"] == slow.need.value
-    shown = float(infeasible_lines(slow)[0].rsplit(" ", 1)[1])
+    shown = float(infeasible_sentences(slow)[0].rsplit(" ", 1)[1])
     assert shown == pytest.approx(slow.need.value, rel=1e-4)
     assert shown >= slow.need.value
-    assert "no stable design" in infeasible_lines(slow)[0]
+    assert "no stable design" in infeasible_sentences(slow)[0]
 
 
 @pytest.mark.slow
@@ -62,10 +62,10 @@ def test_the_least_speed_for_a_decay(speed):
     for Fr, any_ in ((0.98 * design.need.value, False), (1.02 * design.need.value, True)):
         scanned = hunt.abscissa({**FIXED, "Fr": Fr, "chi_B": chi_B, "lambda_s": lambda_s})
         assert (scanned.min() <= -0.8) == any_
-    first, *others = infeasible_lines(design)
+    first, *others = infeasible_sentences(design)
     assert first.startswith("no design with decay (abscissa <= -0.8) was found")
     assert others == []
-    assert any("abscissa <= " in line for line in infeasible_lines(design, full=True)[1:])
+    assert any("abscissa <= " in line for line in infeasible_sentences(design, full=True)[1:])
 
 
 def test_a_speed_in_the_unit_in_which_it_was_typed(tmp_path):
@@ -76,7 +76,7 @@ def test_a_speed_in_the_unit_in_which_it_was_typed(tmp_path):
                        x_B = { min = 1.01, max = 3 }, lambda_s = { min = 0.1, max = 1.2 } }
         objective = { minimize = "abscissa" }""".replace("\\\n", "")
     )
-    line = infeasible_lines(tmsopt.solve(file, throw=False))[0]
+    line = infeasible_sentences(tmsopt.solve(file, throw=False))[0]
     assert line.endswith(" km/h")
     assert float(line.split()[-2]) == pytest.approx(3.6 * least_weave() * np.sqrt(9.81), rel=1e-4)
 
@@ -95,7 +95,7 @@ def test_the_speed_plays_no_part_where_the_loads_conflict_or_a_limit_is_about_it
         design = tmsopt.solve(problem, throw=False)
         assert design.status == "infeasible"
         assert design.need is None
-    line, conflict, change = infeasible_lines(tmsopt.solve(replace(loads, minimize="lambda_s"), throw=False))
+    line, conflict, change = infeasible_sentences(tmsopt.solve(replace(loads, minimize="lambda_s"), throw=False))
     assert line == "load (load_rear >= 0) needs chi_B at most 1 (at least 1.01 is allowed)"
     assert conflict == "in conflict: load (load_rear >= 0), chi_B >= 1.01"
     assert change == "smallest change found: load_rear >= -0.009091 instead of 0 (load)"  # 1 − (1.01 + 0.1)/1.1
@@ -112,4 +112,4 @@ def test_no_speed_helps_where_the_product_of_the_roots_forbids_it():
 def test_a_design_that_answers_has_nothing_to_say():
     design = tmsopt.solve(replace(SLOW, fixed={**FIXED, "Fr": 3.0}))
     assert design.need is None
-    assert infeasible_lines(design) == []
+    assert infeasible_sentences(design) == []

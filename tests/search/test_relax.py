@@ -12,9 +12,9 @@ from helpers.hunt import abscissa
 
 import tmsopt
 from tmsopt import laws
+from tmsopt.analysis import infeasible_sentences
 from tmsopt.problem import moved_limits, with_limits
 from tmsopt.records import Table
-from tmsopt.report import design_report, infeasible_lines
 
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
@@ -335,7 +335,7 @@ def test_the_headline_names_what_is_out_of_reach_and_not_what_has_no_value_for_i
     design = tmsopt.solve(written(tmp_path, ROBOT + limits), throw=False, alone=False)
     assert set(design.relaxation.conflict) == {"far", "x_H.max"}
     for shown in (design, replace(design, abscissa=1.0, stable_elsewhere=None)):
-        assert infeasible_lines(shown)[0].startswith("far (x_H >= 200 cm) is out of reach: ")
+        assert infeasible_sentences(shown)[0].startswith("far (x_H >= 200 cm) is out of reach: ")
 
 
 def test_a_limit_that_must_go_down_to_nothing_is_shown_as_0():
@@ -345,7 +345,7 @@ def test_a_limit_that_must_go_down_to_nothing_is_shown_as_0():
     written = (Table(moved_limits(asked, amounts)),)
     moved = replace(design.relaxation, amounts=amounts, conflict=("arm",), remedies=written)
     design = replace(design, relaxation=moved)
-    assert infeasible_lines(design)[-1] == "smallest change found: abs(nu_H) >= 0 instead of 0.02 (arm)"
+    assert infeasible_sentences(design)[-1] == "smallest change found: abs(nu_H) >= 0 instead of 0.02 (arm)"
 
 
 def test_what_is_proved_of_all_limits_is_not_said_of_some():
@@ -353,7 +353,7 @@ def test_what_is_proved_of_all_limits_is_not_said_of_some():
     limits = {"decay": "abscissa <= -1", "slow": "Fr <= 1", "wide": "chi_B >= 0.5"}
     design = replace(failed("two bounds"), problem=problem(constraints=limits), bound=tmsopt.Bound(proven=True))
     two, three = (replace(design.relaxation, remedies=(), conflict=tuple(limits)[:k]) for k in (2, 3))
-    said = [infeasible_lines(replace(design, relaxation=r))[0] for r in (two, three)]
+    said = [infeasible_sentences(replace(design, relaxation=r))[0] for r in (two, three)]
     assert said[0] == "no design was found that meets both decay (abscissa <= -1) and slow (Fr <= 1)"
     assert said[1].endswith("wide (chi_B >= 0.5) cannot all be met")
 
@@ -364,7 +364,7 @@ def test_what_is_proved_of_all_limits_is_not_said_of_some():
 def test_what_a_search_cannot_tell_of_a_conflict_is_said(irreducible, said):
     design = failed("two bounds")
     design = replace(design, relaxation=replace(design.relaxation, conflict=("high", "low"), irreducible=irreducible))
-    assert infeasible_lines(design)[1] == f"{said}high (chi_B >= 1.8), low (chi_B <= 1.5)"
+    assert infeasible_sentences(design)[1] == f"{said}high (chi_B >= 1.8), low (chi_B <= 1.5)"
 
 
 @pytest.mark.parametrize(
@@ -372,4 +372,4 @@ def test_what_a_search_cannot_tell_of_a_conflict_is_said(irreducible, said):
 )
 def test_a_proof_that_none_is_stable_is_no_proof_that_none_is_feasible(known, said):
     design = replace(failed("faster than omega0"), bound=tmsopt.Bound(), abscissa=1.0, stable_elsewhere=known)
-    assert f"{said} no design is feasible; --certify looks for one" in " ".join(design_report(design).split())
+    assert f"{said} no design is feasible; --certify looks for one" in " ".join(design.report().split())

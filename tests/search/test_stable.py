@@ -11,7 +11,6 @@ import pytest
 import tmsopt
 from tmsopt.global_search import SCIP
 from tmsopt.models import from_coefficients
-from tmsopt.report import design_report
 
 solving = import_module("tmsopt.search.solve")
 
@@ -31,7 +30,7 @@ def found(most, coefficients=(1, X - 2, 1), stability=10.0, **asked):
 
 def headline(design):
     """How it ended, and what is said of stability."""
-    first = re.match(r"[^\n]*\n((?:[^\n]|\n  (?! ))*)", design_report(design))  # wrapped lines go on two columns in
+    first = re.match(r"[^\n]*\n((?:[^\n]|\n  (?! ))*)", design.report())  # wrapped lines go on two columns in
     assert first
     return [*" ".join(first[1].split()).split(": "), ""]
 

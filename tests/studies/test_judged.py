@@ -15,10 +15,10 @@ import pytest
 from helpers.rows import assert_same
 
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
+from tmsopt.documents import row_sentence
 from tmsopt.errors import InputError
 from tmsopt.evaluation import LAWS, law_rows, verdicts
 from tmsopt.plots import draw_histogram
-from tmsopt.report import design_report, row_lines, study_table
 from tmsopt.studies import RowTable, Solver, open_store, part_of, solve_row, summary, view_store
 
 judge = import_module("tmsopt.studies.solving")
@@ -195,9 +195,9 @@ def test_what_is_judged_is_called_feasible_and_not_optimal(study):
     assert row.row.status == "optimal"
     assert row.solution is not None
     told = [
-        study_table(study, results.summary, results.rows),
-        row_lines(study, row.row),
-        design_report(row.solution),
+        results.report(),
+        row_sentence(study, row.row),
+        row.solution.report(),
         repr(results),
         repr(row.solution),
     ]

@@ -27,7 +27,6 @@ from tmsopt.executor import Crash
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
 from tmsopt.records import Table
-from tmsopt.report import study_table
 from tmsopt.search import solve
 from tmsopt.studies import (
     Row,
@@ -502,8 +501,9 @@ def test_rows_that_a_study_cannot_have_are_refused(number, tmp_path):
 
 def test_what_a_row_says_is_printable(tmp_path):
     study = over_grid("problems/ep4.toml", {"mu": [0.1]})
-    rows = RowTable(study, [part_of([Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")])])
-    assert "\ufffd[31mred\ufffd" in study_table(study, summary(rows), rows)
+    with open_store(tmp_path / "s.sqlite", study) as store:
+        store.add(part_of([Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")]))
+    assert "\ufffd[31mred\ufffd" in str(stored(study, tmp_path / "s.sqlite"))
 
 
 # By the clock

@@ -18,7 +18,6 @@ from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.plots import trace_figure
 from tmsopt.problem import Problem, load
-from tmsopt.report import trace_table
 from tmsopt.roots import product, shift
 from tmsopt.roots.patterns import in_words
 from tmsopt.search import solve
@@ -408,7 +407,7 @@ def test_curves_of_the_benchmark_bicycle_start_at_its_published_speeds(name, spe
 
 
 def test_table_figure_and_command(real_pairs, tmp_path):
-    assert "EP2: 2 branches" in trace_table(real_pairs)
+    assert "EP2: 2 branches" in real_pairs.report()
     mixed = traced(pair(), "2EP2", {"d": (3.0, 6.0), "k1": (0.5, 12.0), "q": (0.01, 4.0)}, {"k2": 1.0})
     assert trace_figure(mixed, "d", "k1").axes
     file = tmp_path / "pair.toml"

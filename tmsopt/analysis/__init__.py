@@ -1,6 +1,6 @@
 """What an answer means: is it optimal, what limits cost, what rounding does, how multiple roots split.
 
-In: a solution. Out: an `Explanation` and a `Diagnosis` of each multiple root, as data; `tmsopt.report` has their words.
+In: a solution. Out: an `Explanation` and a `Diagnosis` of each multiple root, as data; `tmsopt.documents` shows them.
 Open `explain` first, then `diagnosis`.
 """
 

@@ -10,3 +10,5 @@ from .steps import natural_step as natural_step, step_within as step_within
 from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose, diagnosed as diagnosed
 from .puiseux import branches as branches
 from .splitting import Response as Response
+from .infeasible import infeasible_sentences as infeasible_sentences
+from .sentences import bound_lines as bound_lines, proof_line as proof_line, structure_line as structure_line

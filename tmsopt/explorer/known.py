@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from tmsopt.analysis import proof_line
 from tmsopt.errors import InputError
 from tmsopt.guide import example
 from tmsopt.models.user_spectrum import user_structure
@@ -13,7 +14,6 @@ from tmsopt.problem.files import problem_from_tables
 from tmsopt.problem.verdict.meetings import meetings
 from tmsopt.problem.verdict.stability import MultipleRoot
 from tmsopt.problem.verdict.status import status_in_words, verdict_in_words
-from tmsopt.report.solution.limits import proof_line
 from tmsopt.roots import Structure
 from tmsopt.search import solve
 
@@ -72,7 +72,7 @@ def _of_solution(solution: Solution) -> Known:
     problem = solution.problem.posed
     names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
     words = status_in_words(solution), verdict_in_words(solution)
-    facts, proof = [": ".join(filter(None, words)), *solution.notes], proof_line(solution)
+    facts, proof = [": ".join(filter(None, words)), *solution.notes], f"proof: {proof_line(solution)}"
     proved = proof if solution.bound.proven else ""
     if problem.nominal is problem:
         known = Structure(solution.structure, solution.roots, 0.0)

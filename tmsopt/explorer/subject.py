@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.analysis import structure_line
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.explorer.file_text import around
 from tmsopt.explorer.javascript import Script, is_bicycle
@@ -16,7 +17,6 @@ from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
 from tmsopt.problem import Posed, degrees_of_freedom, limit_of, unit_of
 from tmsopt.problem.validate import SMALLEST
 from tmsopt.records import Array
-from tmsopt.report.solution.rows import structure_line
 from tmsopt.roots import Structure
 from tmsopt.tracing import domain, trace
 

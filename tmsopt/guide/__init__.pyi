@@ -1,8 +1,6 @@
 from .conversion import convert as convert, converted_file as converted_file
 from .describing import describe as describe
-from .description import (
-    Description as Description, Word as Word, Words as Words, description_text as description_text,
-)
+from .description import Description as Description, Word as Word, Words as Words
 from .examples import (
     SCHEMA_FILE as SCHEMA_FILE, STARTS as STARTS, companions as companions, example as example, examples as examples,
     new_problem as new_problem, schema_text as schema_text,

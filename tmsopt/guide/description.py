@@ -1,11 +1,9 @@
 """A description as data: the symbols of a model or problem, each with unit, meaning and range."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tmsopt.guide.text import matrix, table, wrapped
-from tmsopt.models.expression import COMPARISONS
 from tmsopt.records import Printable, Table, plain
 from tmsopt.versions import SCHEMA
 
@@ -83,44 +81,3 @@ class Description(Printable):
         """Plain data for ``json.dumps``."""
         names = "title model meaning degree omits sets patterns functions conventions sketch matrices asked feedback"
         return {"schema": SCHEMA} | plain(self, names)
-
-
-def description_text(found: Description) -> str:
-    """Title, sketch, signs, what is asked, symbols, patterns and functions, at most 100 columns wide."""
-    name = f"{found.title}\n{found.model}" if found.title else found.model
-    parts = [f"{name}: {found.meaning}, degree {found.degree}" if found.meaning != found.model else name]
-    if found.omits:
-        parts.append(f"the model is {found.omits}")
-    if found.sketch:
-        parts.append(found.sketch.strip("\n"))
-    if found.conventions:
-        parts.append("\n".join(["signs", *wrapped(found.conventions)]))
-    if found.matrices:
-        parts.append("\n".join(line for n, rows in found.matrices.items() for line in matrix(n, rows)))
-    parts += ["\n".join([section, *table(list(keys.items()))]) for section, keys in found.asked.items()]
-    shown: set[str] = set()
-    for of in found.sets:
-        alone = "" if of.name == "stated" else f", {of.name}"
-        parts.append("\n".join([f"parameters{alone}", *_words(of.parameters)]))
-        new = [q for q in of.quantities if q.name not in shown and not _is_parameter(q, found)]
-        shown |= {q.name for q in new}
-        parts.append("\n".join([f"quantities{alone}", *_words(new)]))
-    for of in found.feedback:
-        parts.append("\n".join([f"[feedback], {of.name}", *_words((*of.parameters, *of.quantities))]))
-    roots = "eigenfrequencies" if "H" in found.matrices else "roots"
-    parts.append("\n".join([f"patterns of {roots}, for locate", *table(list(found.patterns.items()))]))
-    parts.append(
-        "\n".join(
-            ["expressions", *wrapped([f"+ - * / **   {' '.join(COMPARISONS.values())}   {' '.join(found.functions)}"])]
-        )
-    )
-    return "\n\n".join(parts)
-
-
-def _is_parameter(quantity: Word, found: Description) -> bool:
-    """Whether a quantity of one set, in a table of its own, is a parameter of another."""
-    return any(quantity.name == p.name for of in found.sets for p in of.parameters)
-
-
-def _words(words: Iterable[Word]) -> Iterator[str]:
-    return table([(w.name, "" if w.unit == "1" else w.unit, w.given, w.range, w.meaning) for w in words])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from tmsopt.models import inertia_margin
@@ -152,6 +153,11 @@ class Solution(Printable):
     multiple_as_rounded: bool = False
     without_best: bool = False
     si: Table[Reading] = Table()
+
+    @cached_property
+    def analysis(self) -> Any:
+        """What a report says beyond these numbers, each part computed when it is first asked for, and kept."""
+        return asked_above("analyse", self)
 
     @property
     def stability(self) -> StabilityVerdict:

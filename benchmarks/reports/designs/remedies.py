@@ -12,7 +12,7 @@ from benchmarks.judges import FEASIBLE, exactly, verdict
 from benchmarks.reports.tables import Asked, median, page, share, table
 from benchmarks.suites.statements.remedies import File, infeasible_files, toml
 from tmsopt import Solution, load, solve
-from tmsopt.report import infeasible_lines
+from tmsopt.analysis import infeasible_sentences
 
 _ROOTS = ("abscissa", "decay", "damping_ratio")
 _CHANGE = re.compile(r"(?P<left>.+?) (?P<sign><=|>=|==) (?P<new>.+?)(?: instead of \S+)? \((?P<name>\w+)(?:, in .+)?\)")
@@ -43,7 +43,7 @@ def obey(asked: tuple[str, File]) -> Obeyed:
     if first.status != "infeasible":
         return Obeyed(name, first.status, first.seconds)
     found = {}
-    for line in infeasible_lines(first, full=True):
+    for line in infeasible_sentences(first, full=True):
         if changed := _changed(file, line):
             found[line] = _judged(changed, file)
     return Obeyed(name, first.status, first.seconds, found)

@@ -94,10 +94,10 @@ problem = tmsopt.Problem(model, fixed=dict(zip(sum(names, []), drawn.ravel().tol
 work = lambda: tmsopt.robustness(problem).radius""",
     "default report of realistic.toml": """
 solution = solved("realistic")
-work = lambda: len(tmsopt.report.design_report(solution, tmsopt.report.findings(solution)))""",
+work = lambda: len(solution.report())""",
     "everything of realistic.toml (--full)": """
 solution = solved("realistic")
-work = lambda: len(tmsopt.report.findings(solution, True).diagnoses)""",
+work = lambda: len(solution.analysis.diagnoses)""",
     "growth over the speed, realistic.toml": """
 solution = solved("realistic")
 work = lambda: len(tmsopt.growth(solution).events)""",

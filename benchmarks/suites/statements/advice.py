@@ -30,7 +30,7 @@ OBEY = """
 import re, subprocess, sys, tomllib
 from pathlib import Path
 import tmsopt
-from tmsopt.report import infeasible_lines
+from tmsopt.analysis import infeasible_sentences
 
 def again(text):
     Path("again.toml").write_text(text)
@@ -48,7 +48,7 @@ except tmsopt.InputError as error:
             sys.exit(f"refused: {error}")
     print("helps")
     sys.exit()
-for line in infeasible_lines(found, full=True):
+for line in infeasible_sentences(found, full=True):
     head = re.match(r"smallest change found: |  or alone: ", line)
     if not head:
         continue

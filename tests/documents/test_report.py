@@ -1,0 +1,275 @@
+"""What the report of a design says, line by line, in words and in the units that a builder reads."""
+
+import json
+import math
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+from helpers.designs import ROBOT
+
+import tmsopt
+from tmsopt.documents import document_of, si_parameters, to_text
+from tmsopt.models import tms
+from tmsopt.problem import Relaxation
+from tmsopt.records import Table
+
+BENCHMARK = dict(tmsopt.load("problems/benchmark.toml").fixed)
+CEP2 = {
+    "Fr": 11 / 6,
+    "mu": 0.1,
+    "chi_B": 2.0,
+    "chi_H": 1.0,
+    "zeta_B": -2.0,
+    "zeta_H": -0.5,
+    "lambda_s": math.atan(11 / 12),
+}
+"""Equation copo gives a0 … a4 = (11/6)(1, 2, 3, 2, 1), that is (s² + s + 1)² up to a factor."""
+TWO_PAIRS = {
+    "Fr": 44 / 13,
+    "mu": 0.1,
+    "chi_B": 28 / 13,
+    "chi_H": 1.0,
+    "zeta_B": -1.0,
+    "zeta_H": -0.25,
+    "lambda_s": math.atan(528 / 169),
+}
+"""Likewise (s² + s + 1)(s² + s + 4)."""
+UNITS = {"x_B": "cm", "z_B": "cm", "x_H": "cm", "z_H": "cm", "v": "km/h", "lambda_s": "deg"}
+
+
+def solved(**changes):
+    """The benchmark bicycle in SI, with changes; nothing is free, so this is an evaluation."""
+    return tmsopt.solve(tmsopt.Problem(tms, fixed={**BENCHMARK, **changes}, units=UNITS))
+
+
+def full(solution, *scale):
+    si = si_parameters(solution, *scale) if scale else None
+    return to_text(document_of(solution, "full", si=si))
+
+
+def rows(report):
+    """Cells of each line that belongs to a table."""
+    return [re.split(r"\s{2,}", line.strip()) for line in report.splitlines() if line.startswith("  ")]
+
+
+def read(report, symbol):
+    """Number and unit that follow a symbol in a table."""
+    if also := re.search(rf"  {symbol} = (\S+) (\S+)", report):
+        return float(also[1]), also[2]
+    cells = next(row[row.index(symbol) :] for row in rows(report) if symbol in row)
+    return float(cells[1]), cells[2]
+
+
+def line(report, start):
+    """The one line that begins so, with what it is continued by."""
+    found = re.findall(rf"^{start}.*(?:\n  .*)*", report, re.MULTILINE)
+    assert len(found) == 1
+    return " ".join(str(found[0]).split())
+
+
+def balance(solution):
+    """Of the loads, what follows the numbers."""
+    return line(solution.report(), "loads: front wheel ").split("; ", 1)[1]
+
+
+def test_lengths_speeds_and_angles_read_as_they_were_written():
+    report = full(solved())
+    expected = {
+        "x_B": (120, "cm"),
+        "z_B": (-40, "cm"),
+        "x_H": (102, "cm"),
+        "z_H": (-20, "cm"),
+        "w": (1, "m"),
+        "m_H": (1, "kg"),
+        "m_B": (10, "kg"),
+        "v": (14.4, "km/h"),
+        "lambda_s": (5, "deg"),
+    }
+    assert {symbol: read(report, symbol) for symbol in expected} == expected
+
+
+def test_loads_u_H_and_critical_speed_of_the_benchmark():
+    """By hand: moments 10·0.2 + 1·0.02 kg m about the front contact, 13.02 about the rear one, of 11 kg."""
+    report = full(solved())
+    assert next(r[:3] for r in rows(report) if r[0] == "load_front") == ["load_front", "118.364", "%"]  # 13.02/11
+    assert read(report, "N_F") == (pytest.approx(13.02 * 9.81, rel=1e-11), "N")
+    assert read(report, "N_R") == (pytest.approx(-2.02 * 9.81, rel=1e-11), "N")
+    u_H = 2 * math.cos(math.radians(5)) + 20 * math.sin(math.radians(5))
+    assert read(report, "u_H") == (pytest.approx(u_H, rel=1e-11), "cm")
+    assert read(report, "v_c") == (pytest.approx(2.8410083233664 * 3.6, rel=1e-11), "km/h")
+    margin = next(float(row[1]) for row in rows(report) if row[0] == "mass_margin")
+    assert 0 < margin < 0.1 * (u_H / 100) ** 2  # below M22, as a Rayleigh quotient
+    assert line(str(solved()), "loads: front wheel ").startswith(
+        "loads: front wheel 127.7 N (118.4 %), rear wheel -19.82 N"
+    )
+
+
+def test_a_bicycle_that_pitches_over_the_front_is_told_its_ballast():
+    assert balance(solved()).startswith(
+        "pitches over the front wheel, unless ballast of 2.02 kg is at the rear contact"
+    )
+
+
+def test_a_bicycle_that_pitches_over_the_rear_is_told_its_ballast():
+    """x_B = -0.3 m: -10·0.3 + 1.02 = -1.98 kg m about the rear contact."""
+    text = balance(solved(x_B=-0.3))
+    assert text.startswith("pitches over the rear wheel, unless ballast of 1.98 kg is at the front contact")
+
+
+def test_a_bicycle_on_both_wheels():
+    assert balance(solved(x_B=0.5)) == "stands on both wheels"
+
+
+@pytest.mark.parametrize(("x_B", "lifted"), [(0.998, "rear"), (-0.102, "front")])
+def test_a_wheel_that_carries_nothing_is_named(x_B, lifted):
+    """Moments 10·0.002 = 1·0.02 about the front contact; 10·0.102 = 1·1.02 about the rear one: 0 up to rounding."""
+    assert f"the {lifted} wheel carries no load" in balance(solved(x_B=x_B))
+    assert f"{lifted} wheel 0 N (0 %)" in line(str(solved(x_B=x_B)), "loads: front wheel ")
+
+
+def test_a_stable_oscillation_has_decay_time_and_frequency():
+    design = solved()
+    text = line(design.report(), "motion: decay time ")
+    rate = math.sqrt(9.81)
+    assert f"decay time {-1 / (design.abscissa * rate):.4g} s" in text
+    assert f"frequency {design.roots[0].im * rate / (2 * math.pi):.4g} Hz" in text
+    assert "growth time" not in design.report()
+
+
+def test_two_pairs_have_two_frequencies():
+    """√3/2 and √15/2 √(g/w), in either order: their real parts are the same."""
+    text = line(str(tmsopt.solve(tmsopt.Problem(tms, fixed=TWO_PAIRS))), "motion: decay time ")
+    found = re.search(r"angular frequencies (\S+) and (\S+) √\(g/w\)", text)
+    assert found
+    assert sorted(found.groups()) == sorted(f"{math.sqrt(k) / 2:.4g}" for k in (3, 15))
+
+
+def test_an_unstable_bicycle_has_a_growth_time():
+    design = solved(v=2.0)
+    report = design.report()
+    assert f"growth time {1 / (design.abscissa * math.sqrt(9.81)):.4g} s" in report
+    assert "decay time" not in report
+    assert "as given: not stable" in report
+
+
+def test_a_double_pair_has_one_frequency_and_EP4_none():
+    """s = −1/2 ± i√3/2, twice: one frequency, √3/2. At EP4 nothing swings."""
+    cep2 = tmsopt.solve(tmsopt.Problem(tms, fixed=CEP2))
+    assert cep2.structure == "CEP2"
+    assert "angular frequency 0.866 √(g/w); damping ratio 0.5" in line(cep2.report(), "motion: decay time ")
+    assert line(str(tmsopt.solve("problems/ep4.toml")), "motion: decay time ").endswith("no oscillation")
+
+
+def test_wheelbase_and_rear_mass_scale_a_dimensionless_design():
+    """Twice the length: lengths ×2, speeds ×√2; three times the mass: loads ×3."""
+    design = tmsopt.solve(tmsopt.load("problems/ep4.toml"))
+    small, large = full(design, 1.0, 1.0), full(design, 2.0, 3.0)
+    for symbol, factor in (("x_B", 2), ("u_H", 2), ("x_T", 2), ("v", 2**0.5), ("v_c", 2**0.5), ("N_F", 3), ("N_R", 3)):
+        assert read(large, symbol)[0] == pytest.approx(factor * read(small, symbol)[0], rel=1e-10)
+    shown = to_text(document_of(design, si=si_parameters(design, 2.0, 3.0)))
+    assert ["chi_B", "1.4142", "x_B = 2.8284 m"] in rows(shown)  # 2 √2
+    assert "unless ballast of 0.4142 m_B" in " ".join(design.report().split())  # √2 − 1: chi_H = 1 has no part in it
+
+
+def test_a_singular_mass_matrix_is_reported_all_the_same():
+    """No front mass: a root at infinity, no time and no frequency, but loads."""
+    fixed = {**BENCHMARK, "z_H": 0.0, "x_H": 1.0}
+    design = tmsopt.solve(tmsopt.Problem(tms, fixed=fixed), throw=False)
+    assert next(r[:2] for r in rows(full(design)) if r[0] == "mass_margin") == ["mass_margin", "0"]
+    assert balance(design).startswith("pitches over the front wheel, unless ballast of 2 kg")
+    data = design.to_json()["si"]
+    assert (data["decay_time_s"], data["growth_time_s"], data["frequencies_Hz"]) == (None, None, [])
+    json.dumps(data, allow_nan=False)
+
+
+FILE = (
+    ROBOT
+    % """ballast = "m_ballast_rear <= 2"
+offset = "u_H >= 0.015"
+inertia = "mass_margin >= 1e-4\""""
+)
+
+
+@pytest.mark.slow
+def test_from_a_file_in_units_to_a_report_in_units(tmp_path):
+    """One file through the command line, as text and as JSON; v.max binds (a robot is steadier when faster)."""
+    file = tmp_path / "robot.toml"
+    file.write_text(FILE, encoding="utf-8")
+    command = [
+        sys.executable,
+        "-c",
+        "from tmsopt.cli import main; main()",
+        "solve",
+        str(file),
+        "--starts",
+        "6",
+        "--full",
+    ]
+    table, data = (
+        subprocess.run([*command, *more], capture_output=True, text=True, timeout=120, check=True, encoding="utf-8")
+        for more in ([], ["--json"])
+    )
+    si = json.loads(data.stdout)["si"]
+    assert (table.stderr, data.stderr) == ("", "")
+    assert si["w_mm"] == 800
+    assert si["m_B_kg"] == 10
+    assert si["v_kmh"] == pytest.approx(15, abs=1e-12)
+    assert 5 <= si["lambda_s_deg"] <= 30
+    assert si["m_ballast_rear_kg"] == pytest.approx(2, abs=1e-8)
+    assert si["N_R_N"] == pytest.approx(-2 * 9.81, abs=1e-7)
+    assert read(table.stdout, "w") == (80, "cm")
+    assert read(table.stdout, "v") == (15, "km/h")
+    assert "unless ballast of 2 kg is at the rear contact" in " ".join(table.stdout.split())
+
+
+def test_a_bicycle_that_pitches_over_in_its_worst_case_is_said_to():
+    """Moments about the front contact: m_B (w − x_B) against m_H (x_H − w), 1 against 0.75 kg m, and 0.25 with 15 kg less."""
+    numbers = {"w": 0.6, "v": 5.0, "m_B": 20.0, "x_B": 0.55, "z_B": -0.3, "m_H": 5.0, "x_H": 0.75, "z_H": -0.4}
+    problem = tmsopt.Problem(tms, fixed={**numbers, "lambda_s": -0.3})
+    assert balance(tmsopt.solve(problem)) == "stands on both wheels"
+    worst = tmsopt.solve(tmsopt.Problem(tms, fixed={**numbers, "lambda_s": -0.3}, tolerances={"m_B": 15.0}))
+    text = balance(worst)
+    needed = (0.75 - 0.25) / 0.6  # kg at the rear contact, a wheelbase from the front one
+    assert text.startswith("pitches over the front wheel in the worst case")
+    assert f"ballast of {needed:.4g} kg" in text
+
+
+def test_laws_charts_and_traces_are_of_the_nominal_design():
+    band = {"Fr": {"min": 1.2, "max": 2.4}}
+    heights = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
+    free = {"chi_B": (1.01, 3.0), "lambda_s": (0.05, 1.2)}
+    asked = tmsopt.Problem(
+        tms, fixed=heights, free=free, scenarios=band, tolerances={"chi_B": 0.01}, minimize="abscissa"
+    )
+    plain = tmsopt.Problem(tms, fixed={**heights, "Fr": 1.8}, free=free, minimize="abscissa")
+    assert (asked.posed.nominal.scenarios, asked.posed.nominal.tolerances) == ({}, {})
+    assert asked.posed.nominal.fixed == pytest.approx(plain.fixed, abs=1e-15)
+    assert plain.posed.nominal is plain.posed
+    assert tmsopt.compare(asked).design.abscissa == pytest.approx(tmsopt.solve(plain).abscissa, abs=1e-12)
+
+
+def test_a_limit_without_a_value_is_named_without_an_amount():
+    """As omega0 >= 0.3 has none at the edge of where omega0, negative wherever it is, exists."""
+    design = tmsopt.solve("problems/ep4.toml")
+    conflict = Relaxation(design.parameters, Table({"trail": math.inf}), ("trail",), Table({}))
+    report = str(replace(design, status="infeasible", relaxation=conflict))
+    assert "no change of limits was found that helps" in report
+
+
+@pytest.mark.slow
+def test_a_radius_out_of_reach_says_how_near_a_design_comes():
+    """What it says is the radius of the design that it shows, of another computation; 0.5 is far beyond it."""
+    asked = tmsopt.load("problems/tolerant.toml")
+    fixed = {**asked.fixed, "chi_B": 1.4, "lambda_s": 0.35}
+    found = tmsopt.solve(
+        replace(asked, fixed=fixed, free={"Fr": (0.5, 3.0)}, constraints={"stable": "radius >= 0.5"}), throw=False
+    )
+    report = " ".join(found.report().split())
+    (said,) = re.findall(r"the nearest design found has radius = ([0-9.]+)", report)
+    assert "branch and bound does not judge the robustness radius" in report
+    assert "--certify" not in report
+    there = tmsopt.robustness(tmsopt.Problem(tms, fixed=dict(found.parameters), minimize="abscissa"))
+    assert float(said) == pytest.approx(there.radius, rel=1e-3)

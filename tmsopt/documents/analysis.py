@@ -1,0 +1,95 @@
+"""What a report says of a solution beyond its numbers, each part computed when it is first asked for, and kept."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from tmsopt.analysis import Diagnosis, Explanation, diagnose, explain, infeasible_sentences
+from tmsopt.boundaries import Robustness, robustness, robustness_at
+from tmsopt.dynamics import stable_speeds
+from tmsopt.errors import InputError
+from tmsopt.problem.solution import Solution
+from tmsopt.progress import Listener, start_steps
+
+
+@dataclass(eq=False)
+class Analysis:
+    """Each part is None, or empty, where it does not apply.
+
+    Example:
+        >>> analysis = tmsopt.solve("problems/benchmark.toml").analysis
+        >>> [[f"{v:.6f} m/s" for v in band] for band in analysis.stable_speeds]  # above the weave speed
+        [['2.841008 m/s', 'inf m/s']]
+
+    More: docs/how_to/report.md
+    """
+
+    solution: Solution
+    _progress: Listener | None = None
+
+    @contextmanager
+    def reporting(self, progress: Listener | None) -> Iterator["Analysis"]:
+        """Tell a listener of the parts that are computed meanwhile."""
+        self._progress = progress
+        try:
+            yield self
+        finally:
+            self._progress = None
+
+    def skip(self) -> None:
+        """Leave out what is not computed yet, for a user who does not want to wait."""
+        empty: dict[str, Any] = {"diagnoses": (), "obstacles": ((), ())}
+        for name, part in vars(Analysis).items():
+            if isinstance(part, cached_property):
+                vars(self).setdefault(name, empty.get(name))
+
+    @cached_property
+    def explanation(self) -> Explanation | None:
+        """Active limits and their worth to first order, warnings, rounding, local optimality."""
+        return None if self.solution.interrupted else explain(self.solution, resolve=False, progress=self._progress)
+
+    @cached_property
+    def resolved(self) -> Explanation | None:
+        """The same with each active limit moved and the problem solved again."""
+        return None if self.solution.interrupted else explain(self.solution, progress=self._progress)
+
+    @cached_property
+    def robustness(self) -> Robustness | None:
+        """The nearest boundary of stability."""
+        if not self._sought:
+            return None
+        start_steps(self._progress, "looking for the nearest boundaries")
+        return robustness_at(self.solution.problem.posed, self.solution.parameters)
+
+    @cached_property
+    def boundaries(self) -> Robustness | None:
+        """The same, and the boundary of heavy damping."""
+        return robustness(self.solution, progress=self._progress) if self._sought else None
+
+    @cached_property
+    def stable_speeds(self) -> tuple[tuple[float, float], ...] | None:
+        """Bands of the speed in which the design is stable; None for one with several speeds, or without any."""
+        try:
+            return stable_speeds(self.solution) if self._sought else None
+        except InputError:
+            return None
+
+    @cached_property
+    def diagnoses(self) -> tuple[Diagnosis, ...]:
+        """How each multiple root splits."""
+        optimal = self.solution.status == "optimal" and not self.solution.interrupted
+        return diagnose(self.solution, progress=self._progress) if optimal else ()
+
+    @cached_property
+    def obstacles(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """What stands in the way of an answer, in short, and what there is to say beyond that."""
+        brief, full = (infeasible_sentences(self.solution, full) for full in (False, True))
+        return tuple(brief), tuple(full[len(brief) :])
+
+    @property
+    def _sought(self) -> bool:
+        found = self.solution
+        return math.isfinite(found.abscissa) and found.status != "infeasible" and not found.interrupted

@@ -1,0 +1,107 @@
+"""Charts: shares of the classes, the best grid point, boundaries and corners."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tmsopt import plots
+from tmsopt.charts.chart import Chart
+from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock
+from tmsopt.documents.curves import corner_grid, domain_blocks
+from tmsopt.documents.maker import Maker, untitled
+from tmsopt.documents.tables import MOST, asked_section, cell_text
+from tmsopt.models import in_words_of
+from tmsopt.problem.unit_system import unit_of, unit_of_all
+from tmsopt.roots import CLASSES
+
+_POINTS = 800 * 800  # of a chart that a picture shows
+
+
+def chart_words(chart: Chart) -> Iterator[Badge]:
+    """Its grid, and the commonest classes."""
+    yield Badge(f"{' × '.join(str(len(v)) for v in chart.grid)} designs over {', '.join(chart.axes)}")
+    for name, share in sorted(chart.shares.items(), key=lambda item: -item[1])[:2]:
+        yield Badge(f"{100 * share:.3g} % {name}")
+
+
+def chart_sections(chart: Chart, level: Level) -> Iterator[Chapter]:
+    """The classes with their shares, the best grid point, the boundaries of a plane in memory, and their corners."""
+    data: dict[str, Any] = chart.to_json()
+    problem = chart.problem.posed
+    plane = chart.path is None and len(chart.axes) == 2
+    over = " and ".join(chart.axes) if plane else ", ".join(chart.axes)
+    size = " × ".join(str(a["points"]) for a in data["axes"].values())
+    yield Chapter("answer", (Sentence(f"{size} designs over {over}", tone="answer"),))
+    yield Chapter("classes", tuple(_classes(chart, data, plane)))
+    if best := data["least_abscissa"]:
+        where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in chart.axes)
+        value = unit_of_all(problem, "abscissa").show(best["value"], 6)
+        yield Chapter("best", (Sentence(f"{value} at {where}", "least abscissa on the grid", "answer"),))
+    if chart.domain is not None and plane:
+        corners = (corner_grid(chart.domain, problem),) if chart.domain.corners else ()
+        yield Chapter("boundaries", (*domain_blocks(chart.domain, problem), *corners))
+    if data.get("designs"):
+        yield Chapter("speed", (Sentence(f"{data['per_second']:.3g} designs per second with {data['engine']}"),))
+    if level == "page":
+        plain = _spread(untitled(chart), _POINTS)
+        figures = (
+            Figure(lambda: plots.chart_figure(plain), f"Stability over {' and '.join(chart.axes)}"),
+            Figure(lambda: plots.chart_figure(plain, "abscissa"), f"Spectral abscissa over {' and '.join(chart.axes)}"),
+        )
+        yield Chapter("picture", figures, "Chart", "wide")
+        yield asked_section(problem)
+        yield _row_section(chart)
+
+
+def _classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Iterator[Block]:
+    rows = [(in_words_of(chart.problem.model, n), f"{100 * x:.2f}") for n, x in data["classes"].items() if x]
+    if rows:
+        yield TableBlock((("class", "share in %"), *rows), "Share of each class")
+    satisfied = data["satisfied"]
+    inequalities = len(chart.problem.constraints) > len(chart.left_aside) if plane else (satisfied or 1) < 1
+    if satisfied is not None and inequalities:
+        yield Sentence(f"the constraints hold on {100 * satisfied:.2f} %")
+    for name in chart.left_aside if plane else ():
+        yield Sentence(f"{name} is an equality, which holds on curves and not on a grid: left aside")
+
+
+def _row_section(chart: Chart) -> Chapter:
+    """Designs of the grid, every so many along each axis where they are too many."""
+    problem, shown = chart.problem, _spread(chart, MOST)
+    units = {n: unit_of(problem.posed, n) for n in (*chart.axes, "abscissa")}
+    grid = np.meshgrid(*reversed(shown.grid), indexing="ij")
+    columns: dict[str, list[Cell | str]] = {
+        f"{n} {units[n].text}".rstrip(): [Cell(x, units[n], 6) for x in values.ravel().tolist()]
+        for n, values in zip(chart.axes, reversed(grid), strict=True)
+    }
+    left_out = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
+    left_out += [] if problem.model.carrier is None else ["damping_ratio", "real_roots"]  # eigenfrequencies have none
+    for name, layer in ((n, layer) for n, layer in shown.layers.items() if n not in left_out):
+        values = np.asarray(layer).ravel().tolist()
+        if name == "kind":
+            columns["class"] = [in_words_of(problem.model, CLASSES[k]) for k in values]
+        elif name == "abscissa":
+            columns[f"abscissa {units[name].text}".rstrip()] = [Cell(x, units[name], 6) for x in values]
+        else:
+            columns[name.replace("_", " ")] = [cell_text(x) for x in values]
+    rows = [tuple(columns), *zip(*columns.values(), strict=True)]
+    left = math.prod(map(len, chart.grid))
+    note = f"{len(rows) - 1} of {left} designs, spread evenly over each axis; --output writes all."
+    notes = (Sentence(note),) if len(rows) <= left else ()
+    return Chapter("rows", (*notes, TableBlock(rows, "Designs of the grid")), "Designs", "whole")
+
+
+def _spread(chart: Chart, most: int) -> Chart:
+    """A chart with one in so many designs along each axis that there are no more than `most`."""
+    sizes = [len(values) for values in chart.grid]
+    step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= most)
+    if step == 1:
+        return chart
+    layers = {n: layer[(slice(None, None, step),) * len(sizes)] for n, layer in chart.layers.items()}
+    return replace(chart, grid=tuple(values[::step] for values in chart.grid), layers=layers)
+
+
+MAKERS: Mapping[str, Maker] = {"Chart": Maker(chart_words, chart_sections, "draw_chart")}

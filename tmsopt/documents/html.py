@@ -1,0 +1,225 @@
+"""A document as HTML: a page that needs nothing from elsewhere, or a fragment for a notebook.
+
+Whatever was given is text there, never markup.
+"""
+
+import base64
+import io
+import re
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from html import escape
+from importlib.resources import files as resources
+from itertools import groupby
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+
+from tmsopt.documents.blocks import Badge, Block, Chapter, Document, Figure, Listing, Sentence, TableBlock, Verbatim
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|none$")
+_UNSHOWN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+_LONG = 24  # characters of a cell in a column that stays wide
+_FILTERED = 12  # rows from which a table has a field that filters them
+_ON_PAPER = 100  # rows of a table at most, in document.css too
+_LARGEST = 500_000  # bytes of a drawing; one with more, such as of thousands of marks, is an image of dots
+_DOTS = 160  # an inch
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+"""Nothing is asked of any server, whatever the page holds."""
+_BADGE = "border:1px solid currentColor;border-radius:.7em;padding:0 .6em;margin-right:.4em;white-space:nowrap"
+_MARKS = {"good": "rgba(0,158,115,.35)", "bad": "rgba(213,94,0,.45)", "doubt": "rgba(230,159,0,.4)"}
+
+
+def to_page(document: Document, more: Iterable[tuple[Chapter, str]] = ()) -> str:
+    """The whole page.
+
+    Args:
+        more: further sections, with markup that stands in them.
+    """
+    title = words(document.title or "untitled")
+    parts = [(section, _blocks(section.blocks)) for section in document.sections] + list(more)
+    parts = [(section, body) for section, body in parts if body]
+    links = " ".join(f'<a href="#{section.name}">{words(section.title)}</a>' for section, _ in parts)
+    body = "\n".join(_section(section, markup) for section, markup in parts)
+    style, script = (resources("tmsopt.documents").joinpath("page_files", f"document.{e}") for e in ("css", "js"))
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>{title}</title>
+<link rel="icon" href="data:,">
+<style>
+{style.read_text(encoding="utf-8")}</style>
+</head>
+<body>
+<header>
+<h1>{title}</h1>
+<p class="badges">{badges(document.words)}</p>
+<nav aria-label="Parts of this {document.kind.lower()}">{links}</nav>
+</header>
+<main>
+{body}
+</main>
+<script>
+{script.read_text(encoding="utf-8")}</script>
+</body>
+</html>
+"""
+
+
+def to_fragment(document: Document, draw: Callable[[], Axes] | None = None) -> str:
+    """A fragment without colours of text or background of its own: it can be read in dark and in light.
+
+    Args:
+        draw: draws the picture at its end.
+    """
+    kind = f" <small>{document.kind}</small>" if document.title else ""
+    head = f"<div><strong>{words(document.title or document.kind)}</strong>{kind}</div>"
+    body = "\n".join(_blocks(section.blocks, plain=True) for section in document.sections)
+    image = _thumbnail(draw, document.kind) if draw else ""
+    return f'<div class="tmsopt">{head}<div style="margin:.4em 0">{badges(document.words)}</div>\n{body}{image}</div>'
+
+
+def badges(said: Iterable[Badge]) -> str:
+    """What a result is and how it ended, a mark for each word."""
+    return " ".join(
+        f'<span style="{_BADGE};background:{_MARKS.get(word.tone, "none")}">{words(word.text)}</span>' for word in said
+    )
+
+
+def words(text: str) -> str:
+    """A text inside an element or an attribute; controls, of what is shown too, become marks."""
+    return escape(_UNSHOWN.sub("\ufffd", text))
+
+
+def verbatim(text: str, label: str) -> str:
+    """A text as it is; it may be wider than the page, and is then reached by the keyboard too."""
+    return f'<pre tabindex="0" role="group" aria-label="{words(label)}">\n{words(text)}</pre>'
+
+
+def listing(items: Iterable[tuple[str, str]]) -> str:
+    """Labels with what there is to say of each."""
+    listed = "\n".join(f"<div><dt>{words(name)}</dt><dd>{words(said)}</dd></div>" for name, said in items if said)
+    return f"<dl>\n{listed}\n</dl>" if listed else ""
+
+
+def _section(section: Chapter, body: str) -> str:
+    kind, head = f' class="{section.width}"' if section.width else "", f"{section.name}-heading"
+    return (
+        f'<section id="{section.name}"{kind} aria-labelledby="{head}">\n<h2 id="{head}">{words(section.title)}</h2>\n'
+        f"{body}\n</section>"
+    )
+
+
+def _blocks(blocks: Sequence[Block], plain: bool = False) -> str:
+    return "\n".join(part for part in _markup(blocks, plain) if part)
+
+
+def _markup(blocks: Sequence[Block], plain: bool) -> Iterator[str]:
+    """Facts that follow each other are one list; pictures that do stand beside each other where there is room."""
+    for (kind, labelled), run in groupby(blocks, key=lambda b: (type(b), isinstance(b, Sentence) and bool(b.label))):
+        some: list[Any] = list(run)
+        if kind is Sentence and labelled:
+            yield listing((one.label, one.text) for one in some)
+        elif kind is Figure:
+            drawn = [picture(one) for one in some]
+            together = "\n".join(drawn)
+            yield f'<div class="beside">\n{together}\n</div>' if len(drawn) > 1 else together
+        else:
+            for one in some:
+                yield _one(one, plain)
+
+
+def _one(block: Any, plain: bool) -> str:
+    match block:
+        case Sentence(text, _, tone):
+            lead = ' class="lead"' if tone in ("answer", "good", "doubt", "bad") else ""
+            return f"<p{lead}>{words(text)}</p>"
+        case Listing(items, title):
+            return (f"<p><strong>{words(title)}</strong></p>\n" if title else "") + listing(items)
+        case Verbatim(text, label):
+            return verbatim(text.strip("\n"), label)
+    return _table(block, plain)
+
+
+def _table(grid: TableBlock, plain: bool) -> str:
+    """A table that can be sorted, a long one filtered too, without columns in which nothing stands."""
+    rows = grid.texts
+    rows = (
+        rows if not plain or grid.most is None or len(rows) <= grid.most else [*rows[: grid.most], ["…"] * len(rows[0])]
+    )
+    columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
+    if not columns:
+        return ""
+    kinds = [_kind(column[1:]) for column in columns]
+    headed = any(column[0] for column in columns)
+    heads = "".join(f'<th scope="col"{k}>{words(c[0] or "remark")}</th>' for c, k in zip(columns, kinds, strict=True))
+    body = [*zip(*(column[1:] for column in columns), strict=True)]
+    lines = "\n".join(f"<tr>{_cells(row, kinds)}</tr>" for row in body)
+    head = f"<thead><tr>{heads}</tr></thead>" if headed else ""
+    if plain:
+        return f"<table>{head}<tbody>{lines}</tbody></table>"
+    kind = "sortable filterable" if len(body) >= _FILTERED else "sortable"
+    said = f"On paper are the first {_ON_PAPER} of the rows that are shown."
+    paper = f'\n<p class="print">{said}</p>' if len(body) > _ON_PAPER else ""
+    caption = words(grid.caption)
+    kind = f' class="{kind}"' if headed else ""
+    return (
+        f'<div class="rows" role="group" tabindex="0" aria-label="{caption}"><table{kind}>\n'
+        f"<caption>{caption}</caption>\n{head}\n<tbody>\n{lines}\n</tbody>\n</table></div>{paper}"
+    )
+
+
+def _cells(row: Sequence[str], kinds: Sequence[str]) -> str:
+    first, *rest = (f"{kind}>{words(cell)}" for cell, kind in zip(row, kinds, strict=True))
+    return f'<th scope="row"{first}</th>' + "".join(f"<td{cell}</td>" for cell in rest)
+
+
+def _kind(cells: Sequence[str]) -> str:
+    """Whether a column is of numbers, of long words, or of short ones."""
+    if all(_NUMBER.match(cell) for cell in cells if cell):
+        return ' class="number"'
+    return ' class="long"' if max(map(len, cells)) > _LONG else ""
+
+
+def picture(figure: Figure) -> str:
+    """A figure with its caption; empty where it cannot be drawn, for the rest of the page says what there is.
+
+    Letters are outlines, and a drawing is an image apart from the page: nothing in it is markup of the page.
+    """
+    try:
+        drawn = figure.draw()
+        whole = drawn.figure.figure if isinstance(drawn, Axes) else drawn
+        data, kind = _image(whole, "svg"), "svg+xml"
+        if len(data) > _LARGEST:
+            data, kind = _image(whole, "png"), "png"
+    except Exception:  # of a design without roots, of a chart over three parameters, …
+        return ""
+    said, coded = words(figure.caption), base64.b64encode(data).decode()
+    return f'<figure><img alt="{said}" src="data:image/{kind};base64,{coded}"><figcaption>{said}</figcaption></figure>'
+
+
+def _thumbnail(draw: Callable[[], Axes], name: str) -> str:
+    """The picture for a notebook; none where it cannot be drawn: a display must not break over it."""
+    try:
+        image = io.BytesIO()
+        figure: Any = draw().get_figure()
+        figure.savefig(image, format="png", dpi=100, bbox_inches="tight")
+    except Exception:  # whatever it was, the rest says what the result is
+        return ""
+    coded = base64.b64encode(image.getvalue()).decode()
+    return f'<img alt="{words(name)}" style="max-width:100%" src="data:image/png;base64,{coded}">'
+
+
+def _image(figure: Any, kind: str) -> bytes:
+    """The same bytes for the same figure, whenever it is drawn."""
+    image = io.BytesIO()
+    about = {"Date": None} if kind == "svg" else {}
+    with rc_context({"svg.hashsalt": "tmsopt", "svg.fonttype": "path"}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # of letters that no font here has: boxes show that
+        figure.savefig(image, format=kind, dpi=_DOTS, bbox_inches="tight", metadata=about)
+    return image.getvalue()

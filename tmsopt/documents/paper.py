@@ -1,0 +1,129 @@
+"""A design compared with the laws of the paper, and the paper recomputed."""
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+
+from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Listing, Sentence, TableBlock, count_of
+from tmsopt.documents.maker import Maker
+from tmsopt.documents.solution import branch_lines, headline_of
+from tmsopt.models import tms
+from tmsopt.paper.compare import Comparison
+from tmsopt.paper.ledger import Entry, Ledger
+
+_ABOUT = (
+    "This page is what `tmsopt verify --markdown problems/paper.md` writes: every number and every statement that can "
+    "be verified, computed anew by a route that does not use the printed formula. Numbers are balls that contain the "
+    "true value, shown to 40 digits; general statements are proved by exact algebra, or refuted by a counterexample in "
+    "small fractions. Statements are read in their context: λ_s > 0 and the conditions `lscf`, where the section "
+    "assumes them. A statement about the literature is judged only where it can be computed."
+)
+
+
+def comparison_words(comparison: Comparison) -> Iterator[Badge]:
+    """How many laws apply and agree."""
+    applying = [row for row in comparison.laws if row.applies]
+    agree = sum(row.agrees is True for row in applying)
+    yield Badge(f"{agree} of {len(applying)} laws agree", "good" if agree == len(applying) else "bad")
+    yield Badge(f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation")
+
+
+def comparison_sections(comparison: Comparison, _level: Level) -> Iterator[Chapter]:
+    """Laws and numbers side by side where laws are known, then the two formulations."""
+    design = comparison.design
+    model = design.problem.model
+    answer: list[Block] = list(headline_of(design))
+    answer += [Sentence(model.omits, "model")] if model.omits else []
+    yield Chapter("answer", tuple(answer))
+    if model is tms:
+        yield Chapter("laws", tuple(_laws(comparison)), "", "wide")
+    else:
+        named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
+        of_skates = "" if model.carrier is not None else ", only of skates (tms)"
+        yield Chapter("laws", (Sentence(f"no laws are known of {named}{of_skates}"),))
+    if comparison.other is None:
+        other: list[Block] = [Sentence(f"none, {comparison.reason}", "other formulation")]
+    else:
+        names = f"{comparison.other.formulation} minus {design.formulation}"
+        differences = ((n, f"{d:.1e}") for n, d in comparison.differences.items())
+        other = [TableBlock((("formulations", names), *differences), "Differences of the formulations")]
+    yield Chapter("formulations", (*other, *map(Sentence, branch_lines(design))))
+
+
+def _laws(comparison: Comparison) -> Iterator[Block]:
+    rows: list[Sequence[Cell | str]] = [("law", "of", "numeric", "law says", "relative", "verdict")]
+    silent: dict[str, list[str]] = {}
+    for row in comparison.laws:
+        if row.applies:
+            verdict = "agrees" if row.agrees else "DIFFERS"
+            rows.append((row.label, row.subject, Cell(row.numeric), Cell(row.law), f"{row.relative:.1e}", verdict))
+        else:
+            silent.setdefault(row.reason, []).append(f"{row.label} ({row.subject})")
+    yield TableBlock(rows, "Laws and numbers", needs=(9, 5, 7, 7, 6, 8))
+    for reason, named in silent.items():
+        yield Sentence(f"{', '.join(named)}; {reason}", "not applicable to this design")
+
+
+def ledger_words(ledger: Ledger) -> Iterator[Badge]:
+    """Entries per verdict."""
+    yield Badge(count_of(len(ledger.entries), "entry", "entries"))
+    for verdict, count in ledger.counts.items():
+        if count:
+            yield Badge(f"{count} {verdict}")
+
+
+def ledger_sections(ledger: Ledger, level: Level) -> Iterator[Chapter]:
+    """Every entry under its section, with the number of entries per verdict at the end."""
+    if level == "brief":
+        yield Chapter("source", (Sentence(ledger.source),))
+    for number, (title, entries) in enumerate(groupby(ledger.entries, key=lambda entry: entry.section)):
+        heading = (Sentence(title, tone="answer"),) if level == "brief" else ()
+        yield Chapter(f"part-{number}", (*heading, *map(_entry, entries)), title, "wide")
+    counts = [*ledger.counts.items(), ("entries", len(ledger.entries))]
+    grid = TableBlock((("", ""), *((str(count), verdict) for verdict, count in counts)), "Entries per verdict")
+    yield Chapter("verdicts", (grid,))
+
+
+def _entry(entry: Entry) -> Listing:
+    verdict = ("verdict", entry.verdict.upper())
+    return Listing((verdict, *_rows(entry)), f"{entry.key}: {entry.statement} ({entry.place})")
+
+
+def _rows(entry: Entry) -> list[tuple[str, str]]:
+    said = {"printed": entry.printed, "computed": entry.computed, "route": entry.route, "remark": entry.remark}
+    return [(name, text) for name, text in said.items() if text]
+
+
+def ledger_page(ledger: Ledger) -> str:
+    """The ledger as a Markdown page: a summary, then every entry under its section."""
+    lines = [
+        "# The paper, recomputed",
+        "",
+        f"Source: {ledger.source}.",
+        "",
+        *textwrap.wrap(_ABOUT, 120),
+        "",
+        "| verdict | entries |",
+        "|---|---:|",
+        *(f"| {verdict} | {count} |" for verdict, count in ledger.counts.items()),
+        f"| all | {len(ledger.entries)} |",
+    ]
+    for title, entries in groupby(ledger.entries, key=lambda entry: entry.section):
+        lines += ["", f"## {title}"]
+        for entry in entries:
+            head = f"**`{entry.key}`** {_escaped(entry.statement)} ({_escaped(entry.place)}): **{entry.verdict}**"
+            lines += ["", head, "", *(f"- {name}: {_escaped(text)}" for name, text in _rows(entry))]
+    return "\n".join(lines) + "\n"
+
+
+def _escaped(text: str) -> str:
+    """Text in which Markdown reads no markup."""
+    for sign in ("\\", "*", "_", "|", "<", "^"):
+        text = text.replace(sign, f"\\{sign}")
+    return text
+
+
+MAKERS: Mapping[str, Maker] = {
+    "Comparison": Maker(comparison_words, comparison_sections, "draw_comparison"),
+    "Ledger": Maker(ledger_words, ledger_sections, "draw_ledger"),
+}

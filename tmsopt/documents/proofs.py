@@ -1,0 +1,246 @@
+"""Proofs, and all designs with a pattern: what is proved, and to how many digits."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from tmsopt import plots
+from tmsopt.algebra.balls import Number, fraction
+from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_of, yes_no
+from tmsopt.documents.design_rows import si_parameters, times_of
+from tmsopt.documents.maker import Maker, untitled
+from tmsopt.documents.solution import bicycle_sections, growth_sections, parameter_grid
+from tmsopt.documents.tables import asked_section
+from tmsopt.global_search import Completeness
+from tmsopt.models.user_spectrum import pattern_of
+from tmsopt.problem import unit_at
+from tmsopt.problem.problem import Posed
+from tmsopt.problem.unit_system import units_of
+from tmsopt.problem.verdict.stability import CROSSING
+from tmsopt.proofs.facts import NOTHING, Verdict
+from tmsopt.proofs.proof import Proof
+from tmsopt.search.all_designs import Coverage, Every
+
+if TYPE_CHECKING:
+    from tmsopt.problem import Solution
+
+_OF_OTHERS = re.compile(r"(.*\.)?[bcdW]\d+")  # of factors whose roots are listed
+
+
+def proof_words(proof: Proof) -> Iterator[Badge]:
+    """Whether it is proved, and what."""
+    yield Badge("proved", "good") if proof.proved else Badge("not proved", "bad")
+    yield Badge(proof.pattern or "nothing")
+    yield Badge(f"{proof.digits} digits")
+    if proof.stable.holds is not None:
+        yield Badge("stable", "good") if proof.stable.holds else Badge("not stable", "bad")
+
+
+def proof_sections(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Iterator[Chapter]:
+    """What is proved, the numbers with their radii, the facts that follow, and the numbers that were taken exactly.
+
+    Args:
+        design: what was proved: a page has its pictures and parameters too.
+    """
+    claim = Sentence(proof.claim, *(("proved", "good") if proof.proved else ("not proved", "bad")))
+    answer: list[Block] = [claim]
+    answer += [Sentence(proof.reason, "why")] if proof.reason else []
+    if proof.problem is None:
+        yield Chapter("answer", tuple(answer))
+        return
+    problem = proof.problem.posed
+    if problem.scenarios or problem.tolerances:
+        answer.append(Sentence("for the worst case that was found"))
+    yield Chapter("answer", tuple(answer))
+    if not proof.parameters:
+        return
+    if rows := number_rows(problem, proof):
+        head = ("number", "decimal", "radius", "unit")
+        stored = (Sentence("the design as stored:"),) if proof.stored and proof.reason else ()
+        digits = TableBlock((head, *rows), f"Numbers that were proved, to {proof.digits} digits", needs=(9, 8, 5, 6))
+        yield Chapter("digits", (*stored, digits), "", "wide")
+    if level == "page":
+        yield Chapter("roots", (Figure(lambda: plots.draw_roots(untitled(proof)), "Roots in the complex plane"),))
+    yield Chapter("method", tuple(_method(problem, proof)))
+    yield Chapter("facts", tuple(_facts(proof)))
+    yield Chapter("exact", tuple(_exact_numbers(problem, proof)), "Taken exactly")
+    if level == "page" and design is not None:
+        yield from bicycle_sections(design)
+        yield Chapter("parameters", (parameter_grid(design, si_parameters(design)),), "", "wide")
+        yield from growth_sections(design)
+    elif level == "page":
+        yield asked_section(problem)
+
+
+def number_rows(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
+    """What was solved for, and the roots: name, decimal, radius, unit."""
+    rows = []
+    units = _units(problem, proof)
+    per = units.get("abscissa", "")
+    for name in proof.moved:
+        unit = problem.parameter_set[name].unit
+        rows.append((name, *_cells(proof.parameters[name]), "" if unit == "1" else unit))
+        if name in proof.tangents:
+            rows.append((f"tan({name})", *_cells(proof.tangents[name]), ""))
+    own = ((name, x) for name, x in proof.unknowns.items() if not _OF_OTHERS.fullmatch(name))
+    rows += [(name, *_cells(x), units.get(name, "")) for name, x in own]
+    if proof.abscissa:
+        rows.append(("abscissa", *_cells(proof.abscissa), per))
+    if proof.eigenfrequencies:
+        for omega in proof.eigenfrequencies:
+            rows += [(f"eigenfrequency{times_of(omega.multiplicity)}, re", *_cells(omega.re), "")]
+            rows += [("  im", *_cells(omega.im), "")]
+        return rows
+    listed = {number.value for number in proof.unknowns.values()}
+    for root in (r for r in proof.roots if r.re.value not in listed or r.im.value != "0"):
+        times = times_of(root.multiplicity)
+        if root.im.value == "0":
+            rows.append((f"root{times}", *_cells(root.re), per))
+        elif not root.im.value.startswith("-"):
+            rows += [(f"pair{times}, re", *_cells(root.re), per), ("  im ±", *_cells(root.im), per)]
+    return rows
+
+
+def _units(problem: Posed, proof: Proof) -> dict[str, str]:
+    """The unit of each number that has one: of the unknowns of a pattern, powers of the unit of the roots."""
+    units = units_of(problem)
+    per = units.get("abscissa", "")
+    if per and proof.unknowns:
+        pattern = pattern_of(problem.model, proof.pattern)
+        for name, power in zip(pattern.unknowns, pattern.powers, strict=True):
+            unit = per if power == 1 else f"{per}^{power}"
+            units[f"{proof.pattern}.{name}" if f"{proof.pattern}.{name}" in proof.unknowns else name] = unit
+    return units
+
+
+def _method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+    """How it was proved, how near the stored design is, and how alone."""
+    if proof.method == "exact factorisation":
+        yield Sentence("square-free factorisation of the polynomial, whose coefficients are fractions", "method")
+    elif not proof.moved and proof.method != "Krawczyk":
+        yield Sentence("roots of the design as stored, isolated in balls", "method")
+    else:
+        equations = len(proof.unknowns) + len(proof.moved) > problem.model.degree
+        also = " and the == constraints" if equations else ""
+        yield Sentence(f"Krawczyk's interval Newton test on a_k = a0 c_k{also}", "method")
+        alone = f"the only one within {proof.uniqueness:.2g}"
+        yield Sentence(f"located to {proof.radius:.1e} before rounding to these digits; {alone}")
+        explained = f"rounding explains up to {proof.explained:.1e}"
+        yield Sentence(f"the stored design is {proof.distance:.1e} from it; {explained}")
+
+
+def _facts(proof: Proof) -> Iterator[Sentence]:
+    of = " (of the design as stored)" if proof.stored and proof.reason else ""
+    asked = "EP" in proof.pattern and proof.defective != NOTHING
+    if asked or proof.geometric_multiplicity is not None:
+        yield _verdict(f"defective{of}", proof.defective)
+    yield _verdict(f"stable{of}", proof.stable)
+    if not proof.eigenfrequencies:
+        yield _verdict(f"heavily damped{of}", proof.heavily_damped)
+    yield _verdict("in the box", proof.inside)
+    yield from (Sentence(str(verdict), name) for name, verdict in proof.limits.items())
+
+
+def _exact_numbers(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+    """Numbers that were taken exactly, and a word on angles."""
+    exact = [*(f"{name} = {_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
+    if exact:
+        yield Sentence(", ".join(exact), "taken exactly")
+    of = problem.parameter_set
+    angles = [n for n in proof.held if n in of.names and of[n].tangent and n not in proof.stated]
+    if angles := [n for n in angles if proof.parameters[n].value != "0"]:
+        yield Sentence("the decimal of the double in radians, not an angle in degrees", ", ".join(angles))
+
+
+def _fraction(text: str) -> str:
+    """A fraction; a decimal where that is shorter."""
+    try:
+        decimal = fraction(Fraction(text), 30)
+    except ValueError:  # degrees
+        return text
+    return decimal.value if decimal.radius == "0" and len(decimal.value) <= len(text) + 1 else text
+
+
+def _cells(number: Number) -> tuple[str, str]:
+    return number.value, "exact" if number.radius == "0" else f"± {number.radius}"
+
+
+def _verdict(label: str, verdict: Verdict) -> Sentence:
+    answer = {True: "yes", False: "no", None: "cannot be told"}[verdict.holds]
+    return Sentence(f"{answer}, {verdict.words}", label)
+
+
+def every_words(every: Every) -> Iterator[Badge]:
+    """How many designs, and whether they are all."""
+    yield Badge(count_of(len(every.solutions), "design"))
+    complete = every.completeness is not None and every.completeness.complete
+    yield Badge("proved to be all", "good") if complete else Badge("not proved to be all")
+
+
+def every_sections(every: Every, _level: Level) -> Iterator[Chapter]:
+    """All designs with a pattern, one column each, and what the proof or the search says about others."""
+    found, coverage, proof = every.solutions, every.coverage, every.completeness
+    complete = proof is not None and proof.complete
+    many = count_of(len(found), "solution")
+    effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
+    if not found:
+        none = f"no design in the box and within the limits has the pattern (proved; {effort})"
+        answer = Sentence(none if complete else "no single solution was met", tone="answer")
+        yield Chapter("answer", (answer,))
+    else:
+        all_of_them = f"these are all: {many} in the box (proved; {effort})"
+        located = all_of_them if complete else f"{many} in the box"
+        yield Chapter("answer", (Sentence(located, f"locate {found[0].problem.locate}", "answer"),))
+        yield Chapter("designs", (TableBlock(_design_rows(every, complete), "Designs with the pattern"),), "", "wide")
+    lines = [*(_proof_lines(proof, effort) if proof else ()), *(_search_lines(coverage) if coverage else ())]
+    yield Chapter("proof", tuple(map(Sentence, lines)))
+
+
+def _design_rows(every: Every, complete: bool) -> list[Sequence[Cell | str]]:
+    found, problem = every.solutions, every.solutions[0].problem
+    names = [n for n in found[0].parameters if n in problem.free]
+    off: Sequence[Mapping[str, float]] = every.errors or ({},) * len(found)
+    pairs = list(zip(found, off, strict=True))
+    rows: list[Sequence[Cell | str]] = [("design", *(str(k) for k in range(1, len(found) + 1)))]
+    rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
+    units = [unit_at(problem.posed, "abscissa", s.parameters) for s in found]
+    decays = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
+    rows += [(f"abscissa {units[0].text}".rstrip(), *decays), ("structure", *(s.structure for s in found))]
+    rows += [("met", *(str(h) for h in every.coverage.hits))] if every.coverage else []
+    rows += [("proved", *map(yes_no, every.proved))] if any(every.proved) and not complete else []
+    return rows
+
+
+def _proof_lines(proof: Completeness, effort: str) -> Iterator[str]:
+    for k, limit in enumerate(proof.limits, start=1):
+        if limit:
+            yield f"solution {k} lies on a limit, {limit}, as far as 25 digits tell: it may be just beyond"
+    if proof.complete:
+        return
+    many = f"; {len(proof.designs)} proved" if proof.designs else ""
+    yield f"proof that these are all: none, {proof.reason}{f' ({effort}{many})' if proof.boxes else ''}"
+    for place in proof.undecided:
+        yield f"undecided: {', '.join(f'{n} {Cell(lo)} … {Cell(hi)}' for n, (lo, hi) in place.ranges.items())}"
+
+
+def _search_lines(coverage: Coverage) -> Iterator[str]:
+    if coverage.crossings:
+        yield f"{coverage.crossings} starts ended where roots meet in a {CROSSING}"
+    doubt = (
+        f"; {coverage.singular} ended at designs with the pattern where its equations are singular: one of a "
+        "continuum of solutions, or one where two meet (tmsopt solve shows one)"
+        if coverage.singular
+        else ""
+    )
+    yield (
+        f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
+        f"{coverage.expected:.2f} solutions to be expected in all; "
+        f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
+    )
+
+
+MAKERS: Mapping[str, Maker] = {
+    "Proof": Maker(proof_words, proof_sections, "draw_roots"),
+    "Every": Maker(every_words, every_sections, "draw_designs"),
+}

@@ -1,0 +1,222 @@
+"""From a result to its document, its headline, its picture and its page: the table of all results."""
+
+import math
+import platform
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from importlib import import_module
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from tmsopt.documents.blocks import Chapter, Document, Level
+from tmsopt.documents.maker import Maker
+from tmsopt.documents.text import WIDTH, to_headline, to_text
+from tmsopt.errors import Fault, InputError, short
+from tmsopt.files import path_of, write_text
+from tmsopt.progress import Listener, start_steps
+from tmsopt.versions import installed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tmsopt.problem import Solution
+
+_HOMES = {
+    "solution": "Solution",
+    "explanation": "Explanation Optimality Diagnosis",
+    "robustness": "Robustness Nearest",
+    "speeds": "Speeds Growth",
+    "motion": "Simulation",
+    "curves": "Trace Branch Domain Swallowtail",
+    "charts": "Chart",
+    "fronts": "Front",
+    "studies": "Results",
+    "proofs": "Proof Every",
+    "paper": "Comparison Ledger",
+    "descriptions": "Description",
+}
+"""Module → the results that it shows; it is loaded when one of them is shown."""
+
+HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+"""Class of a result → the module that shows it."""
+
+ENDINGS = ("html", "htm")
+"""Of the name of a page."""
+
+_PACKAGES = ("tmsopt", "CasADi", "NumPy")
+
+
+def document_of(result: Any, level: Level = "brief", **options: Any) -> Document:
+    """The document of a result.
+
+    Args:
+        options: of its maker, such as `si` of a solution.
+    """
+    maker = maker_of(result)
+    sections = tuple(section for section in maker.sections(result, level, **options) if section.blocks)
+    return Document(type(result).__name__, title_of(result), tuple(maker.words(result)), level, sections)
+
+
+def maker_of(result: Any) -> Maker:
+    """Who shows a result."""
+    name = type(result).__name__
+    makers: Mapping[str, Maker] = import_module(f"tmsopt.documents.{HOME[name]}").MAKERS
+    return makers[name]
+
+
+def report(result: Any, full: bool = False) -> str:
+    """The text of a result."""
+    return to_text(document_of(result, "full" if full else "brief"))
+
+
+def headline(result: Any) -> str:
+    """What it is and how it ended, then its title as far as there is room."""
+    words = tuple(maker_of(result).words(result))
+    return to_headline(Document(type(result).__name__, title_of(result), words, "brief"), WIDTH)
+
+
+def title_of(result: Any) -> str:
+    """The title of a result, or of the study, problem or design that it is of, on one line; empty without one."""
+    designs = (getattr(result, "design", None), *getattr(result, "solutions", ()))
+    holders = (result, getattr(result, "study", None), *designs)
+    titled = (*holders, *(getattr(holder, "problem", None) for holder in holders))
+    known = getattr(result, "about", {}).get("title", "")  # of a chart, whose folder may not hold its problem
+    return " ".join(next((t for x in titled if (t := getattr(x, "title", ""))), known).split())
+
+
+def draw(result: Any, ax: "Axes | None" = None) -> "Axes":
+    """A result drawn into Axes.
+
+    Raises:
+        InputError: where nothing draws it, or for what are no Axes.
+    """
+    from matplotlib.axes import Axes
+
+    from tmsopt import plots
+
+    if not isinstance(ax, Axes | None):
+        raise InputError([Fault(f"found {type(ax).__name__}; accepted: Axes of Matplotlib, or None", ("ax",))])
+    if not (name := maker_of(result).picture):
+        advice = "plot a solution of it, or the result that it is a part of"
+        raise InputError([Fault(f"there is no picture of a {type(result).__name__} alone; {advice}")])
+    axes: Axes = getattr(plots, name)(result, ax=ax)
+    return axes
+
+
+def plot(result: Any, ax: "Axes | None" = None) -> "Axes":
+    """The same for a user: a new figure is one of pyplot's, which a notebook and ``plt.show()`` show.
+
+    Raises:
+        InputError: as `draw`.
+    """
+    axes = draw(result, ax)
+    if ax is None:
+        import matplotlib.pyplot as plt
+        from matplotlib._pylab_helpers import Gcf
+
+        blank = plt.figure()
+        number, canvas = blank.number, type(blank.canvas)
+        plt.close(blank)
+        figure: Any = axes.get_figure()
+        Gcf._set_new_active_manager(canvas.new_manager(figure, number))
+    return axes
+
+
+def fragment(result: Any) -> str:
+    """A result for a notebook: its words, its brief document, its picture."""
+    from tmsopt.documents.html import to_fragment
+
+    return to_fragment(document_of(result), lambda: draw(result))
+
+
+def save_report(
+    result: Any,
+    path: str | PathLike[str],
+    *,
+    command: str = "",
+    files: Mapping[str, str] | None = None,
+    seed: int | None = None,
+    full: bool = False,
+    design: "Solution | None" = None,
+    progress: Listener | None = None,
+) -> None:
+    """Write a result as one page: the answer, pictures, tables, the explorer, the report as text, and its origin.
+
+    Args:
+        path: ends in html or htm.
+        command: that found it, as typed.
+        files: name → text of the files that state the problem.
+        seed: of the starts.
+        full: with all that takes long: active limits moved and solved again, every number of the report.
+        design: the solution that a proof is about, for pictures and the explorer.
+        progress: called with a `tmsopt.Progress` now and then.
+
+    Raises:
+        InputError: for an object that is no result, or another ending.
+        OSError: when the file cannot be written.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     tmsopt.save_report(tmsopt.describe("tms"), f"{folder}/tms.html")
+        ...     "Froude number" in Path(folder, "tms.html").read_text(encoding="utf-8")
+        True
+
+    More: docs/how_to/hand_on.md
+    """
+    if type(result).__name__ not in HOME:
+        raise InputError([Fault(f"found {short(result)}; accepted: a result, such as a solution", ("result",))])
+    place = path_of(path, "the file to write")
+    if place.suffix.lstrip(".").lower() not in ENDINGS:
+        raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
+    from tmsopt.documents.html import to_page
+
+    steps = start_steps(progress, "writing the page", "part")
+    options: dict[str, dict[str, Any]] = {"Solution": {"full": full}, "Proof": {"design": design}}
+    document = document_of(result, "page", **options.get(type(result).__name__, {}))
+    if steps:
+        steps(1, math.nan, "the document is done")
+    more = _origin(result, command, files or {}, seed, full, design)
+    write_text(place, to_page(document, more))
+
+
+def _origin(
+    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
+) -> Iterator[tuple[Chapter, str]]:
+    """The explorer, the report as text, then versions, system, date, seed, command and files."""
+    from tmsopt.documents.explored import explorer_frame
+    from tmsopt.documents.html import listing, verbatim, words
+
+    yield Chapter("explorer", (), "Explorer", "whole"), explorer_frame(result, design)
+    text = verbatim(report(result, full), "report as text")
+    yield (
+        Chapter("text", (), "As text", "whole"),
+        f"<details><summary>The report as text</summary>{text}</details>",
+    )
+    seed = getattr(getattr(result, "study", None), "seed", seed)
+    about = {
+        **{name: found or "" for name, found in installed(_PACKAGES).items()},
+        "Python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}".strip(),
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "seed": "" if seed is None else str(seed),
+    }
+    texts = "\n".join(
+        f"<h3>{words(n)}</h3>\n{verbatim(t, n)}" for n, t in ({"command": command} | dict(files)).items() if t
+    )
+    yield Chapter("origin", (), "Where it is from", "whole"), listing(about.items()) + texts
+
+
+def response(solution: Any, **asked: Any) -> Any:
+    """The motion of a solution, for its method of that name."""
+    from tmsopt.dynamics import simulate  # and SciPy, which only this needs
+
+    return simulate(solution, **asked)
+
+
+def analyse(solution: Any) -> Any:
+    """What a report says beyond the numbers of a solution, for its attribute of that name."""
+    from tmsopt.documents.analysis import Analysis
+
+    return Analysis(solution)

@@ -1,0 +1,157 @@
+"""How far the boundaries of a design are."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from tmsopt.boundaries.nearest import Nearest, Robustness
+from tmsopt.documents.blocks import Badge, Cell, Chapter, Level, Sentence, TableBlock
+from tmsopt.documents.maker import Maker
+from tmsopt.models import Model, in_words_of, words_of
+from tmsopt.problem.unit_system import unit_of
+
+_MAIN = 0.5
+"""Share of the largest change above which a parameter is named in the headline."""
+_WIDE = 12
+"""Parameters up to which each has a column; of more, each has a row."""
+_LITTLE = 1e-3
+"""Share of the largest change below which one is 0."""
+_NAMED = 3
+"""Parameters named in the headline at most."""
+_VERBS = {"divergence": "diverge", "threshold": "reach its threshold"}
+"""Of words that are no verbs."""
+_OF_H = {"weave": "a real eigenfrequency"}
+_ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
+
+
+def robustness_words(found: Robustness) -> Iterator[Badge]:
+    """How far stability reaches, and to what."""
+    if found.stable is not None:
+        yield Badge("stable", "good") if found.stable else Badge("not stable", "bad")
+    yield Badge(_value("radius" if found.stable else "to stability", found.limit.distance))
+    if found.limit.found:
+        yield Badge(f"to {found.limit.kind}")
+
+
+def robustness_sections(found: Robustness, _level: Level) -> Iterator[Chapter]:
+    """The sentence, then the nearest point of every boundary."""
+    yield Chapter("answer", (Sentence(robustness_line(found), "robustness", "answer"),))
+    yield Chapter("boundaries", (robustness_grid(found),))
+
+
+def robustness_line(found: Robustness, on_edge: bool = False) -> str:
+    """How large a change ends stability, or brings it, how, and by which parameters mostly.
+
+    Args:
+        on_edge: whether the solution is on the edge of stability by more than its numbers as stored tell.
+    """
+    if found.edges:
+        edge = _ON_EDGE if found.problem.model.carrier is None else _OF_H
+        on = " and ".join(edge[kind] for kind in found.edges)
+        if found.zeros:
+            return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
+        return f"none, on the edge of stability already, with {on}"
+    if on_edge:
+        return "none, on the edge of stability already, as far as rounding tells"
+    limit, other = found.limit, "unstable" if found.stable else "stable"
+    if not limit.found:
+        return f"{'' if found.stable else 'not stable; '}no change in reach of the search makes it {other}"
+    if not found.stable:
+        return f"not stable; {_size(found)} makes it stable{_mostly(limit)}"
+    return f"{_size(found)} {_event(found.problem.model, limit.kind)}{_mostly(limit)}"
+
+
+def _event(model: Model, kind: str) -> str:
+    if kind == "infinity":
+        return "takes a root through infinity (a0 = 0)"
+    word = words_of(model)[kind]
+    return f"makes it {_VERBS.get(word, word)}"
+
+
+def robustness_grid(found: Robustness) -> TableBlock:
+    """The nearest point of every boundary: its distance and the change of each parameter."""
+    names = list(found.weights)
+    kinds: tuple[Nearest, ...] = (found.weave, found.capsize, found.infinity, found.heavy_damping)
+    kinds = kinds if found.problem.model.carrier is None else kinds[:1]
+    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
+    for n in kinds:
+        moves = _moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
+        rows.append((_row_name(n, found), _distance(n, found), *moves))
+    units = {name: unit_of(found.problem.posed, name) for name in names}
+    rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
+    for n in kinds:
+        if n.found and n.distance > 0:
+            at = "at" if n.kind == "infinity" else "with"
+            word = in_words_of(found.problem.model, n.kind)
+            rows.append((f"{at} {word}", "", *(units[name].show(n.parameters[name], 8) for name in names)))
+    transposed = len(names) > _WIDE
+    return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
+
+
+def nearest_words(nearest: Nearest) -> Iterator[Badge]:
+    """Which boundary, and how far."""
+    yield Badge(nearest.kind)
+    yield Badge(_value("distance", nearest.distance) if nearest.found else "none found")
+
+
+def nearest_sections(found: Nearest, _level: Level) -> Iterator[Chapter]:
+    """How far one boundary is, then its nearest point and the change of each parameter in weights."""
+    if not found.found:
+        yield Chapter("answer", (Sentence(f"no point of the boundary of {found.kind} was found"),))
+        return
+    crossing = "" if found.refined else ", the nearest crossing seen"
+    yield Chapter("answer", (Sentence(f"{found.distance:.6g} in weights{crossing}", f"to {found.kind}", "answer"),))
+    rows: list[Sequence[Cell | str]] = [("", "there", "change in weights")]
+    rows += [(n, Cell(found.parameters[n], digits=8), f"{change:+.4g}") for n, change in found.direction.items()]
+    yield Chapter("boundary", (TableBlock(rows, "Nearest point of the boundary"),))
+
+
+def _row_name(n: Nearest, found: Robustness) -> str:
+    to = "at the edge of" if n.distance == 0 else "to"
+    if n.kind != "heavy damping":
+        return f"{to} {in_words_of(found.problem.model, n.kind)}"
+    return f"{to} {n.kind}" if n.distance == 0 else f"{'out of' if found.heavily_damped else 'into'} {n.kind}"
+
+
+def _distance(n: Nearest, found: Robustness) -> str:
+    if not n.found:
+        return "none found"
+    if n.distance == 0:
+        return ""
+    return _percent(n.distance) if found.relative else f"{n.distance:.4g}"
+
+
+def _moves(n: Nearest, relative: bool) -> list[str]:
+    """The change of each parameter; 0 for one that is too little to matter."""
+    largest = max(map(abs, n.direction.values()))
+    shown = (x if abs(x) >= _LITTLE * largest else 0.0 for x in n.direction.values())
+    return ["0" if x == 0 else _percent(x, "+") if relative else f"{x:+.3g}" for x in shown]
+
+
+def _mostly(limit: Nearest) -> str:
+    """The parameters that change most."""
+    changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
+    largest = abs(changes[0][1])
+    named = [n for n, x in changes if largest > 0 and abs(x) >= _MAIN * largest]
+    return f", mostly {', '.join(named[:_NAMED])}" if named and len(changes) > 1 else ""
+
+
+def _size(found: Robustness) -> str:
+    if found.relative:
+        return f"{_percent(found.limit.distance)} of change"
+    return f"a change of {found.limit.distance:.2g} in {'your' if found.problem.weights else 'the'} weights"
+
+
+def _percent(x: float, sign: str = "") -> str:
+    """Two significant digits at least."""
+    digits = 1 if x == 0 else max(1 - math.floor(math.log10(abs(100 * x))), 0)
+    return f"{100 * x:{sign}.{digits}f} %"
+
+
+def _value(name: str, value: float) -> str:
+    return f"{name} = {value:.5g}" if math.isfinite(value) else f"no {name}"
+
+
+MAKERS: Mapping[str, Maker] = {
+    "Robustness": Maker(robustness_words, robustness_sections, "draw_robustness"),
+    "Nearest": Maker(nearest_words, nearest_sections, "draw_robustness"),
+}

@@ -1,0 +1,379 @@
+"""The report of a solution: the answer first, then what it does, its limits, how sure it is, and how to see more."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from tmsopt import plots
+from tmsopt.analysis import Lever, bound_lines, proof_line, structure_line
+from tmsopt.documents.analysis import Analysis
+from tmsopt.documents.blocks import (
+    ALL,
+    Badge,
+    Block,
+    Cell,
+    Chapter,
+    Figure,
+    Level,
+    Sentence,
+    TableBlock,
+    Tone,
+    Verbatim,
+)
+from tmsopt.documents.design_rows import (
+    at_worst,
+    inertia_line,
+    load_line,
+    motion_line,
+    parameter_rows,
+    pitch_line,
+    quantity_rows,
+    role,
+    roots_line,
+    si_parameters,
+    speed_in,
+    stored_lines,
+    tidy,
+)
+from tmsopt.documents.explanation import diagnosis_blocks, optimality_blocks, rounding_grid, rounding_line
+from tmsopt.documents.maker import Maker, untitled
+from tmsopt.documents.robustness import robustness_grid, robustness_line
+from tmsopt.documents.speeds import range_line
+from tmsopt.evaluation import abscissa_as_stored
+from tmsopt.guide import describe
+from tmsopt.models import tms
+from tmsopt.problem import NO_RADIUS, Case, Unit, amounts_text, show_at, status_text, unit_of, unit_of_all
+from tmsopt.problem.solution import Solution
+from tmsopt.problem.unit_system import limit_text
+from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
+from tmsopt.problem.verdict.status import status_in_words, verdict_in_words
+
+_DIGITS = 5
+_FOLD, _FIXED = 5, 14  # rows of free parameters below each other, and fixed ones named, of a brief report
+_LIMITS = 3  # limits that a brief report shows
+_OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
+
+Blocks = Iterator[Block]
+
+
+def solution_words(solution: Solution) -> Iterator[Badge]:
+    """Status, objective, structure, proof, stability."""
+    problem = solution.problem.posed
+    yield Badge(status_text(problem, solution.status), "good" if solution.status == "optimal" else "bad")
+    asked = problem.minimize or problem.maximize
+    name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
+    yield Badge(f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}")
+    if stored := abscissa_as_stored(solution):
+        yield Badge(stored)
+    if solution.missed:
+        yield Badge(f"misses {amounts_text(problem, solution.missed)}")
+    yield Badge(solution.structure)
+    if solution.bound.proven:
+        yield Badge("proved", "good")
+    if verdict := solution.stability.verdict:
+        rounded = ROUNDED if solution.stability.on_edge and not solution.edge_is_exact else ""
+        growth = f" as {solution.stability.growth}" if solution.stability.growth else ""
+        yield Badge(f"{verdict}{growth}{rounded}", _verdict_tone(solution))
+
+
+def solution_sections(
+    solution: Solution, level: Level, *, full: bool = False, si: Mapping[str, float] | None = None
+) -> Iterator[Chapter]:
+    """The parts of the report in order.
+
+    Args:
+        full: of a page, whether it has all that takes long.
+        si: parameters in SI, such as `si_parameters` gives for another scale: a brief report shows them then.
+    """
+    analysis, scaled = solution.analysis, si or si_parameters(solution)
+    full, page, brief = full or level == "full", level == "page", level == "brief"
+    first = "conflict" if solution.status == "infeasible" else "answer"
+    yield Chapter(first, tuple(_answer(solution, analysis, brief, full)))
+    if page:
+        yield from bicycle_sections(solution)
+    notes = (Sentence(note, "note") for note in solution.notes)
+    yield Chapter("design", (*_design(solution, scaled, brief, si is not None), *notes), "Parameters", "wide")
+    yield Chapter("motion", tuple(_motion(solution, analysis, scaled, brief)))
+    if page:
+        yield from growth_sections(solution)
+    yield Chapter("cases", tuple(_cases(solution)))
+    limits, sureness = _limits(solution, analysis, full, page), _sureness(solution, analysis, brief, full)
+    if brief:
+        yield Chapter("limits", (*limits, *sureness, _more(solution, analysis)))
+        return
+    yield Chapter("limits", tuple(limits), "", "wide")
+    yield Chapter("sureness", tuple(sureness), "How sure it is")
+    if full:
+        yield Chapter("roots", tuple(_roots(solution, analysis)))
+    rows = quantity_rows(solution, scaled)
+    head = ("quantity", "value", "unit", "in SI", "meaning")
+    yield Chapter("quantities", (TableBlock((head, *rows), "Quantities of the design"),), "Derived quantities", "wide")
+    yield Chapter("search", tuple(_search(solution)))
+
+
+def bicycle_sections(solution: Solution) -> Iterator[Chapter]:
+    """The bicycle to scale, or the sketch that its model has."""
+    if solution.problem.model is tms:
+        caption = "The bicycle from its right side, to scale, in wheelbases; z points down"
+        yield Chapter("bicycle", (Figure(lambda: plots.draw_bicycle(solution), caption),))
+    elif sketch := describe(solution).sketch:
+        yield Chapter("bicycle", (Verbatim(sketch, "sketch of the model, not to scale"),))
+
+
+def growth_sections(solution: Solution) -> Iterator[Chapter]:
+    """Growth rates and frequencies over the speed, or the first parameter."""
+    from tmsopt.dynamics import growth
+
+    try:
+        found = growth(untitled(solution))
+    except Exception:  # a root at infinity, or nothing that could vary: nothing to draw
+        return
+    caption = f"Growth rates and frequencies over {found.over.name}; stable where it is shaded"
+    figure = Figure(lambda: plots.growth_figure(found), caption)
+    yield Chapter("growth", (figure,), "Growth and frequencies")
+
+
+def parameter_grid(solution: Solution, si: Mapping[str, float]) -> TableBlock:
+    """Every parameter with its role, its range, what it is in the other set, and its meaning."""
+    ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
+    other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
+    rows: list[Sequence[Cell | str]] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
+    for name, value, unit, how, also, meaning in parameter_rows(solution, si):
+        rows.append((name, value, unit, how, ranges[str(name)] if how == "free" else "", also, meaning))
+    return TableBlock(rows, "Parameters of the design")
+
+
+def headline_of(solution: Solution) -> tuple[Sentence, Sentence]:
+    """How it ended, and what was asked, in words."""
+    problem = solution.problem.posed
+    text = problem.minimize or problem.maximize
+    value = show_at(problem, text, at_worst(solution), solution.value, 8) if text else ""
+    located = f"locate {problem.locate}" if problem.locate else ""
+    sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
+    asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
+    ended = ": ".join(part for part in (status_in_words(solution), verdict_in_words(solution)) if part)
+    structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
+    structure += ROUNDED if solution.multiple_as_rounded else ""
+    found = "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
+    return Sentence(ended, tone=_verdict_tone(solution)), Sentence(found, tone="answer")
+
+
+def _verdict_tone(solution: Solution) -> Tone:
+    if solution.status != "optimal" or solution.stability.verdict == UNSTABLE:
+        return "bad"
+    return "good" if solution.stability.verdict == STABLE else "doubt"
+
+
+def _answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
+    ended, asked = headline_of(solution)
+    obstacles, further = analysis.obstacles
+    if solution.status == "infeasible":
+        joined = ": " not in ended.text and obstacles
+        yield Sentence(f"{ended.text}: {obstacles[0]}" if joined else ended.text, tone="bad")
+        yield from map(Sentence, obstacles[1:] if joined else obstacles)
+        yield from (Sentence(text, "violated") for text in _violated(solution))
+        yield Sentence(asked.text, "nearest design")
+    else:
+        yield from (ended, asked, *map(Sentence, obstacles))
+    yield from map(Sentence, further if full else ())
+    yield Sentence(proof_line(solution), "proof")
+    active = [
+        f"{name} ({text})" if (text := limit_text(solution.problem.posed, name)) else name for name in solution.active
+    ]
+    if brief and active:
+        yield Sentence(", ".join(active), "active limits")
+
+
+def _violated(solution: Solution) -> Iterator[str]:
+    problem = solution.problem.posed
+    for name, value in solution.violations.items():
+        asked = limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
+        by = f" by {unit_of(problem, name).show(value, 4)}" if math.isfinite(value) else ", which has no value"
+        yield f"{name} ({asked}){by if name not in _OTHER else ''}"
+
+
+def _design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Blocks:
+    """Free parameters side by side where they are many, and the fixed ones in a sentence; or all in a table."""
+    if not brief:
+        yield parameter_grid(solution, si)
+        return
+    problem, of = solution.problem.posed, solution.problem.posed.parameter_set
+    other = {row[0]: row[4] for row in parameter_rows(solution, si, _DIGITS)} if scaled else {}
+    cells = {p.name: Cell(tidy(solution, p.name), unit_of(problem, p.name), _DIGITS, named=True) for p in of.parameters}
+    rows = [(p.name, cells[p.name], other.get(p.name, "")) for p in of.parameters if p.name in problem.free]
+    if rows:
+        yield TableBlock((("", "", ""), *rows), fold=_FOLD, tone="answer")
+    rest = [
+        f"{p.name} = {cells[p.name]}"
+        for p in of.parameters
+        if role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
+    ]
+    more = f", and {len(rest) - _FIXED} more" if len(rest) > _FIXED else ""
+    if rest:
+        yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
+
+
+def _motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Blocks:
+    at = speed_in(solution, solution.worst)
+    yield Sentence(f"{f'at {at}: ' if at else ''}{motion_line(solution)}", "motion")
+    if analysis.stable_speeds is not None:
+        yield Sentence(range_line(analysis.stable_speeds, solution))
+    label, text = roots_line(solution, _DIGITS)
+    yield Sentence(text, label)
+    if not brief:
+        yield from map(Sentence, stored_lines(solution))
+    if "load_rear" in solution.quantities:
+        yield Sentence(f"{load_line(solution)}; {pitch_line(solution, si)}", "loads")
+    if omits := solution.problem.model.omits:
+        yield Sentence(omits, "model")
+    if inertia := inertia_line(solution):
+        yield Sentence(inertia, "inertia at which it is no longer stable, each alone (radius of gyration)")
+
+
+def _cases(solution: Solution) -> Blocks:
+    """The worst case, and what is known of all of them."""
+    if solution.worst is None:
+        return
+    of, cover = solution.problem, solution.cover
+    yield Sentence(
+        f"{_place(solution, solution.worst)}; motion and roots are those there, the rest nominal", "worst case"
+    )
+    if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
+        label = "least damped case found" if of.tolerances else "least damped case"
+        yield Sentence(f"{_place(solution, solution.least_damped)}; the damping ratio is that there", label)
+    if solution.fastest is not None and solution.fastest != solution.worst:
+        text = f"{_place(solution, solution.fastest)}; limits on the frequency are on that there"
+        yield Sentence(text, "fastest case")
+    if cover is not None:
+        means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
+        unit = unit_of_all(of.posed, "abscissa")
+        yield Sentence(f"abscissa at most {Cell(cover.limit, unit, named=True)}, {means}", "every case")
+
+
+def _place(solution: Solution, case: Case) -> str:
+    """Values of scenarios and errors of parameters in a case."""
+    units = {n: unit_of(solution.problem.posed, n) for n in {**case.at, **case.offset}}
+    at = [f"{n} = {units[n].show(v, 6)}" for n, v in case.at.items()]
+    return ", ".join(
+        [*at, *(f"{n} {'+' if v >= 0 else '−'} {units[n].show(abs(v), 6)}" for n, v in case.offset.items())]
+    )
+
+
+def _limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Blocks:
+    found = analysis.resolved if full else analysis.explanation
+    if page and (rows := limit_rows(solution)):
+        yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
+    if found is not None and found.levers:
+        worth = [lever_cells(solution, lever) for lever in found.levers]
+        head = ("active limit", "stands at", "a move of it", "buys, to first order")
+        yield TableBlock((head, *worth), "What the active limits are worth", most=_LIMITS)
+        yield from (Sentence(lever.sentence) for lever in found.levers if full)
+    yield from (Sentence(text, "warning", "doubt") for text in (found.warnings if found else ()))
+
+
+def limit_rows(solution: Solution) -> list[tuple[str, str, str]]:
+    """Each constraint, and what else is violated: what it says, and whether it holds, is active or is violated."""
+    problem = solution.problem.posed
+    others = [name for name in solution.violations if name not in problem.constraints]
+    said = {
+        n: limit_text(problem, n) or ("pattern" if n in problem.located else "")
+        for n in (*problem.constraints, *others)
+    }
+    return [(name, text, _stands(solution, name)) for name, text in said.items()]
+
+
+def _stands(solution: Solution, name: str) -> str:
+    if name in solution.violations:
+        by, unit = solution.violations[name], unit_of(solution.problem.posed, name)
+        return f"violated by {unit.show(by, 4)}" if math.isfinite(by) else "has no value"
+    return "active" if name in solution.active else f"holds{_margin(solution, name)}"
+
+
+def _margin(solution: Solution, name: str) -> str:
+    """By how much an inequality holds, the least over the cases of the design; empty where that is no number."""
+    problem, condition = solution.problem.posed, solution.problem.posed.conditions[name]
+    if condition.equality:
+        return ""
+    cases = [case for case in problem.cases if not case.direction]
+    cases += [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
+    radius = {n: x for n, x in solution.quantities.items() if n == NO_RADIUS.name}  # the search for it is over
+    left = min(
+        -condition.sign * float(condition(problem.values(case.applied(solution.parameters)).with_known(radius)))
+        for case in cases or [Case()]
+    )
+    shares = {q.name for q in (*problem.model.quantities, *problem.parameter_set.quantities) if q.share}
+    unit = unit_of(problem, name)
+    unit = Unit("%", 0.01) if not unit.text and shares & {*condition.names} else unit
+    return f" by {unit.show(left, 4)}" if math.isfinite(left) else ""
+
+
+def lever_cells(solution: Solution, lever: Lever) -> tuple[str, ...]:
+    """An active limit: its name, what it says, a small move of it, and what that buys to first order."""
+    limit = limit_text(solution.problem.posed, lever.name)
+    if not lever.step:
+        return lever.name, limit, "a physical end", ""
+    step = unit_of(solution.problem.posed, lever.name).show(abs(lever.step), 4)
+    return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
+
+
+def _sureness(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
+    robust = analysis.boundaries if full else analysis.robustness
+    if robust is not None:
+        yield Sentence(robustness_line(robust, solution.stability.on_edge), "robustness")
+        if full:
+            yield robustness_grid(robust)
+    if (found := analysis.explanation) is not None and found.precision:
+        yield Sentence(rounding_line(found), "rounding")
+        if not brief:
+            yield rounding_grid(found)
+    if not brief:
+        yield from map(Sentence, bound_lines(solution))
+    if found is not None and not brief:
+        yield from optimality_blocks(found.optimality)
+
+
+def _roots(solution: Solution, analysis: Analysis) -> Blocks:
+    if solution.multiple_as_rounded:
+        yield Sentence("roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed")
+    for diagnosis in analysis.diagnoses:
+        yield from diagnosis_blocks(diagnosis, full=True)
+
+
+def _search(solution: Solution) -> Blocks:
+    free, starts, problem = solution.freedom, solution.starts, solution.problem
+    if problem.locate:
+        parameters = "parameter" if free.free == 1 else "parameters"
+        conditions = "condition" if free.conditions == 1 else "conditions"
+        yield Sentence(f"{free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}", "freedom")
+    yield from map(Sentence, branch_lines(solution))
+    if starts.tried:
+        led = starts.tried - starts.runs
+        also = f", {led} of which lead{'s' * (led == 1)} straight to where others ended" if starts.runs and led else ""
+        sampled = f"; {starts.looked} designs of a sample" if starts.looked else ""
+        tried = f"{starts.tried} tried{also}, {starts.converged} converged, {starts.at_best} at the best"
+        yield Sentence(f"{tried}{sampled}; {solution.seconds:.2f} s", "starts")
+
+
+def branch_lines(solution: Solution) -> list[str]:
+    """Other designs that solve the same equations, and what excludes them."""
+    problem, lines = solution.problem.posed, []
+    for branch in solution.branches:
+        where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL)}" for n in problem.free)
+        lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
+    return lines
+
+
+def _more(solution: Solution, analysis: Analysis) -> Sentence:
+    """How to see more, and the commands that have something to say of the same file."""
+    problem, solved = solution.problem.posed, solution.status == "optimal"
+    commands = {
+        "prove": solved,
+        "compare": problem.model is tms,
+        "speeds": analysis.stable_speeds is not None,
+        "chart": len(problem.free) in (2, 3),
+        "trace": bool(problem.locate) and solution.freedom.count == 1,
+    }
+    named = ", ".join(name for name, answers in commands.items() if answers)
+    return Sentence(f"--full; then tmsopt {named} with the same file" if named else "--full", "more", "dim")
+
+
+MAKERS: Mapping[str, Maker] = {"Solution": Maker(solution_words, solution_sections, "draw_growth")}

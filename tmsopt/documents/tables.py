@@ -1,0 +1,65 @@
+"""Tables that pages of several results have: what was asked, and records as they are."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
+from typing import Any, TypeVar
+
+import numpy as np
+
+from tmsopt.documents.blocks import Block, Chapter, Listing, Sentence, TableBlock, yes_no
+from tmsopt.guide import describe
+from tmsopt.problem import Posed
+
+T = TypeVar("T")
+
+MOST = 2000
+"""Rows of a table on a page."""
+_DIGITS = 6
+
+
+def asked_section(problem: Posed) -> Chapter:
+    """What was asked: parameters, values and ranges with their meaning, objective and limits."""
+    described = describe(problem)
+    given = [w for of in described.sets for w in of.parameters]
+    head = ("parameter", "value or range", "", "possible", "meaning")
+    rows = [(w.name, w.given, "free" if w.name in problem.free else "fixed", w.range, w.meaning) for w in given]
+    listed = tuple(
+        (part, "; ".join(f"{name}: {text}" for name, text in keys.items())) for part, keys in described.asked.items()
+    )
+    blocks = (TableBlock((head, *rows), "Parameters, with values and ranges"), Listing(listed))
+    return Chapter("parameters", blocks, "", "wide")
+
+
+def records_section(result: Any) -> Chapter:
+    """Records of a result as they are, numbers in rad and SI."""
+    records: list[Mapping[str, Any]] = [*islice(result.records(), MOST + 1)]
+    heads = tuple(records[0]) if records else ("",)
+    rows = [tuple(cell_text(record.get(n, "")) for n in heads) for record in records[:MOST]]
+    grid = TableBlock((heads, *rows), type(result).__name__)
+    note = (Sentence(f"the first {MOST} rows."),) if len(records) > MOST else ()
+    return Chapter("rows", (*note, grid), "", "whole")
+
+
+def thin_rows(rows: Sequence[T], name: str, whole: str, keep: Iterable[int] = ()) -> tuple[list[T], tuple[Block, ...]]:
+    """At most `MOST` rows, spread evenly, and a sentence that says so where some are left out.
+
+    Args:
+        whole: where all of them are.
+        keep: numbers of rows that stay.
+    """
+    if len(rows) <= MOST:
+        return [*rows], ()
+    chosen = {*np.linspace(0, len(rows) - 1, MOST).astype(int).tolist(), *keep}
+    kept = [rows[k] for k in sorted(chosen)]
+    return kept, (Sentence(f"{len(kept)} of {len(rows)} {name}, spread evenly; {whole}."),)
+
+
+def cell_text(value: Any) -> str:
+    """A value of a record as the cell of a table."""
+    match value:
+        case None | bool():
+            return yes_no(value)
+        case float():
+            return f"{value + 0.0:.{_DIGITS}g}" if math.isfinite(value) else "none"
+    return str(value)
