@@ -9,7 +9,7 @@ from .paper import ledger_page as ledger_page
 from .proofs import number_rows as number_rows
 from .results import (
     HOME as HOME, analyse as analyse, document_of as document_of, draw as draw, fragment as fragment,
-    headline as headline, plot as plot, report as report, response as response, save_report as save_report,
+    headline as headline, maker_of as maker_of, plot as plot, report as report, response as response, save_report as save_report,
 )
 from .robustness import robustness_line as robustness_line
 from .studies import row_sentence as row_sentence
