@@ -48,7 +48,7 @@ class Printable(Protocol):
         return str(_documents().headline(self))
 
     def _repr_html_(self) -> str:
-        return str(_documents().fragment(self))
+        return str(_documents().to_notebook(self))
 
 
 class Tabular(Printable, Protocol):

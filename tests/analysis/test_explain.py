@@ -17,7 +17,7 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.analysis import moved, natural_step, rounded, step_within
 from tmsopt.cli import every as main
-from tmsopt.documents import rounding_line
+from tmsopt.documents import describe_rounding
 from tmsopt.models import Range, from_coefficients, tms
 from tmsopt.problem import Unit, unit_of
 
@@ -373,7 +373,7 @@ def test_rounding_over_a_band_is_judged_between_its_speeds_too():
 def test_rounding_in_one_line_says_how_many_digits_are_enough():
     """By companion eigenvalues of the rounded designs: those with a simple rightmost root, which doubles resolve."""
     design = tmsopt.solve("problems/realistic.toml")
-    told = rounding_line(tmsopt.explain(design, resolve=False))
+    told = describe_rounding(tmsopt.explain(design, resolve=False))
     digits, share = map(int, re.findall(r"(\d) digits keep (\d+) %", told)[0])
     kept = {}
     for n in (2, 3, 4, 6):
@@ -397,7 +397,7 @@ def test_digits_that_are_enough_by_chance_are_not_told():
         short = {n: float(f"{x:.{digits}g}") for n, x in design.parameters.items() if n in design.problem.free}
         moved[digits] = np.roots(design.problem.model.coefficients({**design.parameters, **short})).real.max()
     assert moved[2] < 1e-7 < moved[6] < moved[4]
-    assert rounding_line(tmsopt.explain(design, resolve=False)) == (
+    assert describe_rounding(tmsopt.explain(design, resolve=False)) == (
         f"6 digits move the rightmost root by {moved[6]:.2g}"
     )
 
@@ -406,6 +406,6 @@ def test_rounding_that_makes_a_design_unstable_is_said_so():
     """s² + (x − 1.23456) s + 1 is stable for x > 1.23456 alone: two digits round 1.2346, the box's end, down to 1.2."""
     x = ca.SX.sym("x")
     problem = tmsopt.Problem(from_coefficients([1, x - 1.23456, 1]), free={"x": (1.0, 1.23466)}, minimize="abscissa")
-    told = rounding_line(tmsopt.explain(tmsopt.solve(problem), resolve=False))
+    told = describe_rounding(tmsopt.explain(tmsopt.solve(problem), resolve=False))
     assert told.startswith("3 digits make it unstable (x alone: 1.23); ")
     assert told.endswith("6 digits keep 100 % of the decay")

@@ -15,7 +15,7 @@ from helpers.oracles import polynomial_exact, symbolic_copo
 import tmsopt
 from tmsopt import laws
 from tmsopt.boundaries import nearest, robustness
-from tmsopt.documents import robustness_line
+from tmsopt.documents import describe_robustness
 from tmsopt.errors import InputError
 from tmsopt.evaluation import recheck
 from tmsopt.models import from_coefficients, from_matrices, tms, to_si
@@ -255,7 +255,7 @@ def test_an_unstable_design_has_no_radius():
     assert not found.stable
     assert found.radius == 0
     assert found.to_stability == pytest.approx(critical / 0.5 - 1, rel=1e-12)
-    assert "not stable" in robustness_line(found)
+    assert "not stable" in describe_robustness(found)
 
 
 @pytest.mark.parametrize("name", ["backward", "heavily damped"])
@@ -363,20 +363,20 @@ def test_an_oscillator_without_damping_is_on_the_edge(m, c, k, edges, zeros):
         assert found.limit.kind == edges[0]
         assert found.limit.distance == found.radius == found.to_stability == 0
         told = f"at its edge already: {zeros[0]} = 0" if zeros else "none, on the edge of stability already"
-        assert robustness_line(found).startswith(told)
+        assert describe_robustness(found).startswith(told)
         assert "-0" not in found.report()
 
 
 def test_what_a_change_does_is_said_in_the_words_of_a_model():
     """c = 0 is the nearest edge of m = 1, c = 0.1, k = 2, at 100 % like the others; of a bicycle it is weave."""
-    assert robustness_line(robustness(oscillator(1.0, 0.1, 2.0), weights={"c": 1.0})) == (
+    assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"c": 1.0})) == (
         "a change of 0.1 in the weights makes it flutter"
     )
-    assert robustness_line(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0})).endswith("makes it diverge")
-    assert robustness_line(robustness(oscillator(1.0, -0.1, 2.0), weights={"c": 0.05})) == (
+    assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0})).endswith("makes it diverge")
+    assert describe_robustness(robustness(oscillator(1.0, -0.1, 2.0), weights={"c": 0.05})) == (
         "not stable; a change of 2 in the weights makes it stable"
     )
-    assert robustness_line(robustness(problem(FORWARD), weights={"Fr": FORWARD["Fr"]})).endswith("makes it weave")
+    assert describe_robustness(robustness(problem(FORWARD), weights={"Fr": FORWARD["Fr"]})).endswith("makes it weave")
 
 
 def test_no_boundary_point_is_one_of_cancellation_alone():
@@ -386,7 +386,7 @@ def test_no_boundary_point_is_one_of_cancellation_alone():
     found = robustness(Problem(model=model, fixed={"x": 1.3, "y": 0.1, "c": 0.4}), weights={"x": 1.0, "y": 1.0})
     assert found.stable
     assert not found.limit.found
-    assert robustness_line(found) == "no change that was looked at makes it unstable"
+    assert describe_robustness(found) == "no change that was looked at makes it unstable"
 
 
 @pytest.mark.slow

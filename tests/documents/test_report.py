@@ -11,7 +11,7 @@ import pytest
 from helpers.designs import ROBOT
 
 import tmsopt
-from tmsopt.documents import document_of, si_parameters, to_text
+from tmsopt.documents import convert_to_si, document_of, to_text
 from tmsopt.models import tms
 from tmsopt.problem import Relaxation
 from tmsopt.records import Table
@@ -46,7 +46,7 @@ def solved(**changes):
 
 
 def full(solution, *scale):
-    si = si_parameters(solution, *scale) if scale else None
+    si = convert_to_si(solution, *scale) if scale else None
     return to_text(document_of(solution, "full", si=si))
 
 
@@ -169,7 +169,7 @@ def test_wheelbase_and_rear_mass_scale_a_dimensionless_design():
     small, large = full(design, 1.0, 1.0), full(design, 2.0, 3.0)
     for symbol, factor in (("x_B", 2), ("u_H", 2), ("x_T", 2), ("v", 2**0.5), ("v_c", 2**0.5), ("N_F", 3), ("N_R", 3)):
         assert read(large, symbol)[0] == pytest.approx(factor * read(small, symbol)[0], rel=1e-10)
-    shown = to_text(document_of(design, si=si_parameters(design, 2.0, 3.0)))
+    shown = to_text(document_of(design, si=convert_to_si(design, 2.0, 3.0)))
     assert ["chi_B", "1.4142", "x_B = 2.8284 m"] in rows(shown)  # 2 √2
     assert "unless ballast of 0.4142 m_B" in " ".join(design.report().split())  # √2 − 1: chi_H = 1 has no part in it
 

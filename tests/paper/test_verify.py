@@ -18,7 +18,7 @@ from mpmath import mp
 
 from tmsopt import laws
 from tmsopt.cli import every as main
-from tmsopt.documents import ledger_page
+from tmsopt.documents import write_ledger_page
 from tmsopt.paper.ledger import (
     VERDICTS,
     compute,
@@ -528,7 +528,7 @@ def test_the_text_fits_the_page_and_counts(ledger):
 
 def test_the_page_in_the_repository_is_the_ledger(ledger):
     again = "`tmsopt verify --markdown problems/paper.md` writes it anew"
-    assert PAGE.read_text(encoding="utf-8") == ledger_page(ledger), again
+    assert PAGE.read_text(encoding="utf-8") == write_ledger_page(ledger), again
 
 
 def test_the_documentation_counts_as_the_ledger(ledger):

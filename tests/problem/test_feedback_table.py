@@ -11,7 +11,7 @@ import pytest
 from helpers.bicycles import BENCHMARK, appendix
 
 import tmsopt
-from tmsopt.documents import si_parameters
+from tmsopt.documents import convert_to_si
 from tmsopt.explorer import page_of
 
 WHEELS = Path("problems/balance_assist.toml").read_text(encoding="utf-8")
@@ -273,7 +273,7 @@ def test_results_are_written_for_every_kind(kind, tmp_path):
     for text in (design.report(), design.report(full=True)):
         assert all(n in text for n in problem.free)
     if kind == "plain":  # one of κ is m_B g w, here 9.81 N m; of the rates, times √(w/g)
-        si = si_parameters(design)
+        si = convert_to_si(design)
         assert si["k_phi"] == pytest.approx(9.81 * design.parameters["kappa_phi"], rel=1e-14)
         assert si["k_phidot"] == pytest.approx(math.sqrt(9.81) * design.parameters["kappa_phidot"], rel=1e-14)
     assert set(design.to_json()["parameters"]) == set(problem.posed.parameter_set.names)

@@ -18,7 +18,7 @@ from mpmath import mp
 import tmsopt
 from tmsopt.algebra import Number, Refused, enclosed, number, refined
 from tmsopt.cli import every as main
-from tmsopt.documents import number_rows
+from tmsopt.documents import list_numbers
 from tmsopt.models import decimal
 from tmsopt.problem import Case
 from tmsopt.proofs import Factored, Proof, prove_design
@@ -445,12 +445,12 @@ def test_numbers_in_the_unit_of_the_roots_have_it():
     """In SI the roots are per √(g/w); a dimensionless design has no such unit."""
     design = solved("point_mass_robot")
     proof = tmsopt.prove(design)
-    units = {row[0]: row[3] for row in number_rows(design.problem.posed, proof)}
+    units = {row[0]: row[3] for row in list_numbers(design.problem.posed, proof)}
     assert {units[n] for n in ("abscissa", "r")} == {"√(g/w)"}
     assert proof.to_json()["units"]["abscissa"] == "√(g/w)"
     r, times = float(proof.abscissa), math.sqrt(design.parameters["g"] / design.parameters["w"])
     assert r * times == pytest.approx(-design.quantities["decay_rate"], rel=1e-9)
-    free = number_rows(solved("ep4").problem.posed, tmsopt.prove(solved("ep4")))
+    free = list_numbers(solved("ep4").problem.posed, tmsopt.prove(solved("ep4")))
     assert {row[3] for row in free if row[0] in ("abscissa", "r")} == {""}
 
 

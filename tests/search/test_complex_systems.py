@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 import tmsopt
 from tmsopt.cli import every as main
-from tmsopt.documents import event_rows
+from tmsopt.documents import list_events
 from tmsopt.models import from_hamiltonian
 
 EXACT = 1e-12
@@ -316,13 +316,13 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met():
     near = [e for e in traced.events if abs(e.parameters["g"] - math.sqrt(2)) < 1e-3 and abs(e.parameters["d"]) < 1e-3]
     assert near
     for branch in traced.branches:
-        for row in event_rows(branch, {"g": tmsopt.problem.Unit()}, model)[1:]:
+        for row in list_events(branch, {"g": tmsopt.problem.Unit()}, model)[1:]:
             value = float(row[1])
             if abs(value - math.sqrt(2)) < 1e-3 and "g" in row[-1].split(", "):
                 assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(row[1].split(".")[1])
     branch, event = next((b, e) for b in traced.branches for e in b.events if e in near)
     met = replace(event, parameters={**event.parameters, "g": math.sqrt(2) + 3.8e-10}, residual=6e-11)
-    cells = event_rows(replace(branch, events=(met,)), {"g": tmsopt.problem.Unit()}, model)[1]
+    cells = list_events(replace(branch, events=(met,)), {"g": tmsopt.problem.Unit()}, model)[1]
     assert cells[1] == "1.4142136"  # two digits fewer than met
 
 

@@ -156,11 +156,11 @@ class Document:
     sections: tuple[Chapter, ...] = field(default=())
 
 
-def count_of(count: int, one: str, many: str = "") -> str:
+def count_things(count: int, one: str, many: str = "") -> str:
     """A number of things in words, such as ``2 branches``."""
     return f"{count} {one if count == 1 else many or one + 's'}"
 
 
-def yes_no(value: bool | None) -> str:
+def say_whether(value: bool | None) -> str:
     """For a table; empty where it is not known."""
     return "" if value is None else "yes" if value else "no"

@@ -10,9 +10,9 @@ import numpy as np
 from tmsopt import plots
 from tmsopt.charts.chart import Chart
 from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock
-from tmsopt.documents.curves import corner_grid, domain_blocks
-from tmsopt.documents.maker import Maker, untitled
-from tmsopt.documents.tables import MOST, asked_section, cell_text
+from tmsopt.documents.curves import describe_domain, tabulate_corners
+from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.tables import MOST, format_value, write_question
 from tmsopt.models import in_words_of
 from tmsopt.problem.unit_system import unit_of, unit_of_all
 from tmsopt.roots import CLASSES
@@ -20,14 +20,14 @@ from tmsopt.roots import CLASSES
 _POINTS = 800 * 800  # of a chart that a picture shows
 
 
-def chart_words(chart: Chart) -> Iterator[Badge]:
+def summarise_chart(chart: Chart) -> Iterator[Badge]:
     """Its grid, and the commonest classes."""
     yield Badge(f"{' × '.join(str(len(v)) for v in chart.grid)} designs over {', '.join(chart.axes)}")
     for name, share in sorted(chart.shares.items(), key=lambda item: -item[1])[:2]:
         yield Badge(f"{100 * share:.3g} % {name}")
 
 
-def chart_sections(chart: Chart, level: Level) -> Iterator[Chapter]:
+def write_chart(chart: Chart, level: Level) -> Iterator[Chapter]:
     """The classes with their shares, the best grid point, the boundaries of a plane in memory, and their corners."""
     data: dict[str, Any] = chart.to_json()
     problem = chart.problem.posed
@@ -35,28 +35,28 @@ def chart_sections(chart: Chart, level: Level) -> Iterator[Chapter]:
     over = " and ".join(chart.axes) if plane else ", ".join(chart.axes)
     size = " × ".join(str(a["points"]) for a in data["axes"].values())
     yield Chapter("answer", (Sentence(f"{size} designs over {over}", tone="answer"),))
-    yield Chapter("classes", tuple(_classes(chart, data, plane)))
+    yield Chapter("classes", tuple(_write_classes(chart, data, plane)))
     if best := data["least_abscissa"]:
         where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in chart.axes)
         value = unit_of_all(problem, "abscissa").show(best["value"], 6)
         yield Chapter("best", (Sentence(f"{value} at {where}", "least abscissa on the grid", "answer"),))
     if chart.domain is not None and plane:
-        corners = (corner_grid(chart.domain, problem),) if chart.domain.corners else ()
-        yield Chapter("boundaries", (*domain_blocks(chart.domain, problem), *corners))
+        corners = (tabulate_corners(chart.domain, problem),) if chart.domain.corners else ()
+        yield Chapter("boundaries", (*describe_domain(chart.domain, problem), *corners))
     if data.get("designs"):
         yield Chapter("speed", (Sentence(f"{data['per_second']:.3g} designs per second with {data['engine']}"),))
     if level == "page":
-        plain = _spread(untitled(chart), _POINTS)
+        plain = _thin_chart(remove_titles(chart), _POINTS)
         figures = (
             Figure(lambda: plots.chart_figure(plain), f"Stability over {' and '.join(chart.axes)}"),
             Figure(lambda: plots.chart_figure(plain, "abscissa"), f"Spectral abscissa over {' and '.join(chart.axes)}"),
         )
         yield Chapter("picture", figures, "Chart", "wide")
-        yield asked_section(problem)
-        yield _row_section(chart)
+        yield write_question(problem)
+        yield _tabulate_designs(chart)
 
 
-def _classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Iterator[Block]:
+def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Iterator[Block]:
     rows = [(in_words_of(chart.problem.model, n), f"{100 * x:.2f}") for n, x in data["classes"].items() if x]
     if rows:
         yield TableBlock((("class", "share in %"), *rows), "Share of each class")
@@ -68,9 +68,9 @@ def _classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Iterator[Blo
         yield Sentence(f"{name} is an equality, which holds on curves and not on a grid: left aside")
 
 
-def _row_section(chart: Chart) -> Chapter:
+def _tabulate_designs(chart: Chart) -> Chapter:
     """Designs of the grid, every so many along each axis where they are too many."""
-    problem, shown = chart.problem, _spread(chart, MOST)
+    problem, shown = chart.problem, _thin_chart(chart, MOST)
     units = {n: unit_of(problem.posed, n) for n in (*chart.axes, "abscissa")}
     grid = np.meshgrid(*reversed(shown.grid), indexing="ij")
     columns: dict[str, list[Cell | str]] = {
@@ -86,7 +86,7 @@ def _row_section(chart: Chart) -> Chapter:
         elif name == "abscissa":
             columns[f"abscissa {units[name].text}".rstrip()] = [Cell(x, units[name], 6) for x in values]
         else:
-            columns[name.replace("_", " ")] = [cell_text(x) for x in values]
+            columns[name.replace("_", " ")] = [format_value(x) for x in values]
     rows = [tuple(columns), *zip(*columns.values(), strict=True)]
     left = math.prod(map(len, chart.grid))
     note = f"{len(rows) - 1} of {left} designs, spread evenly over each axis; --output writes all."
@@ -94,7 +94,7 @@ def _row_section(chart: Chart) -> Chapter:
     return Chapter("rows", (*notes, TableBlock(rows, "Designs of the grid")), "Designs", "whole")
 
 
-def _spread(chart: Chart, most: int) -> Chart:
+def _thin_chart(chart: Chart, most: int) -> Chart:
     """A chart with one in so many designs along each axis that there are no more than `most`."""
     sizes = [len(values) for values in chart.grid]
     step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= most)
@@ -104,4 +104,4 @@ def _spread(chart: Chart, most: int) -> Chart:
     return replace(chart, grid=tuple(values[::step] for values in chart.grid), layers=layers)
 
 
-MAKERS: Mapping[str, Maker] = {"Chart": Maker(chart_words, chart_sections, "draw_chart")}
+MAKERS: Mapping[str, Maker] = {"Chart": Maker(summarise_chart, write_chart, "draw_chart")}

@@ -2,20 +2,20 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from tmsopt.documents.blocks import Badge, Block, Chapter, Level, Listing, Sentence, TableBlock, Verbatim, count_of
+from tmsopt.documents.blocks import Badge, Block, Chapter, Level, Listing, Sentence, TableBlock, Verbatim, count_things
 from tmsopt.documents.maker import Maker
 from tmsopt.guide import Description, Word as Symbol
 from tmsopt.models.expression import COMPARISONS
 
 
-def description_words(found: Description) -> Iterator[Badge]:
+def summarise_description(found: Description) -> Iterator[Badge]:
     """The model, and of how many parameters."""
     yield Badge(found.model)
     yield Badge(f"degree {found.degree}")
-    yield Badge(" or ".join(count_of(len(of.parameters), "parameter") for of in found.sets))
+    yield Badge(" or ".join(count_things(len(of.parameters), "parameter") for of in found.sets))
 
 
-def description_sections(found: Description, level: Level) -> Iterator[Chapter]:
+def write_description(found: Description, level: Level) -> Iterator[Chapter]:
     """The model, its signs, what is asked, symbols, patterns and functions, each under its name."""
     about = f"{found.model}: {found.meaning}, degree {found.degree}" if found.meaning != found.model else found.model
     answer: list[Block] = [Sentence(about, tone="answer")]
@@ -23,27 +23,27 @@ def description_sections(found: Description, level: Level) -> Iterator[Chapter]:
     yield Chapter("answer", tuple(answer))
     if found.sketch:
         yield Chapter("sketch", (Verbatim(found.sketch.strip("\n"), "sketch of the model, not to scale"),))
-    for number, (title, blocks) in enumerate(_parts(found)):
+    for number, (title, blocks) in enumerate(_write_parts(found)):
         heading = (Sentence(title, tone="answer"),) if level == "brief" else ()
         yield Chapter(f"part-{number}", (*heading, *blocks), title.capitalize(), "wide")
 
 
-def _parts(found: Description) -> Iterator[tuple[str, Sequence[Block]]]:
+def _write_parts(found: Description) -> Iterator[tuple[str, Sequence[Block]]]:
     if found.conventions:
         yield "signs", [Sentence(text) for text in found.conventions]
     if found.matrices:
-        yield "matrices", [Verbatim(_matrix(n, rows), n) for n, rows in found.matrices.items()]
+        yield "matrices", [Verbatim(_format_matrix(n, rows), n) for n, rows in found.matrices.items()]
     for section, keys in found.asked.items():
         yield section, [Listing(tuple(keys.items()))]
     shown: set[str] = set()
     for of in found.sets:
         alone = "" if of.name == "stated" else f", {of.name}"
-        yield f"parameters{alone}", [_symbols(of.parameters)]
+        yield f"parameters{alone}", [_tabulate_symbols(of.parameters)]
         new = [q for q in of.quantities if q.name not in shown and not _is_parameter(q, found)]
         shown |= {q.name for q in new}
-        yield f"quantities{alone}", [_symbols(new)]
+        yield f"quantities{alone}", [_tabulate_symbols(new)]
     for of in found.feedback:
-        yield f"[feedback], {of.name}", [_symbols((*of.parameters, *of.quantities))]
+        yield f"[feedback], {of.name}", [_tabulate_symbols((*of.parameters, *of.quantities))]
     roots = "eigenfrequencies" if "H" in found.matrices else "roots"
     yield f"patterns of {roots}, for locate", [Listing(tuple(found.patterns.items()))]
     yield "expressions", [Sentence(f"+ - * / **   {' '.join(COMPARISONS.values())}   {' '.join(found.functions)}")]
@@ -54,12 +54,12 @@ def _is_parameter(quantity: Symbol, found: Description) -> bool:
     return any(quantity.name == p.name for of in found.sets for p in of.parameters)
 
 
-def _symbols(listed: Iterable[Symbol]) -> Block:
+def _tabulate_symbols(listed: Iterable[Symbol]) -> Block:
     rows = [(w.name, "" if w.unit == "1" else w.unit, w.given, w.range, w.meaning) for w in listed]
     return TableBlock((("", "", "", "", ""), *rows)) if rows else Sentence("none")
 
 
-def _matrix(name: str, rows: Sequence[Sequence[str]]) -> str:
+def _format_matrix(name: str, rows: Sequence[Sequence[str]]) -> str:
     """Columns under each other."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lead = f"{name} = "
@@ -69,4 +69,4 @@ def _matrix(name: str, rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-MAKERS: Mapping[str, Maker] = {"Description": Maker(description_words, description_sections)}
+MAKERS: Mapping[str, Maker] = {"Description": Maker(summarise_description, write_description)}

@@ -27,13 +27,13 @@ _OF_RANGE = 1e-12  # share of a range: less is rounding
 _PERCENT = Unit("%", 0.01)
 
 
-def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
+def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
     """SI parameters: as solved for, or of dimensionless skates for the given wheelbase, rear mass and gravity."""
     own = solution.problem.posed.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def parameter_rows(solution: Solution, si: Mapping[str, float], digits: int = ALL) -> list[TableRow]:
+def list_parameters(solution: Solution, si: Mapping[str, float], digits: int = ALL) -> list[TableRow]:
     """Name, number, unit, role, what it is in the other set, and meaning of each parameter.
 
     Parameters that are 0 by default are left out.
@@ -43,21 +43,21 @@ def parameter_rows(solution: Solution, si: Mapping[str, float], digits: int = AL
         digits: of what it is in the other set.
     """
     problem = solution.problem.posed
-    of, other = problem.parameter_set, _other(problem.model, problem.parameter_set)
+    of, other = problem.parameter_set, _other_set(problem.model, problem.parameter_set)
     values = {} if other is None else solution.dimensionless if other.rate is None else si
     rows: list[TableRow] = []
     for p in of.parameters:
-        x, how, unit = tidy(solution, p.name), role(solution, p.name), unit_of(problem, p.name)
+        x, how, unit = round_to_zero(solution, p.name), name_role(solution, p.name), unit_of(problem, p.name)
         if how == "fixed" and x == 0 == p.default:
             continue
-        twin = None if other is None else _counterpart(p, other)
-        also = "" if twin is None else _twin_text(twin, values[twin.name], digits)
+        twin = None if other is None else _find_counterpart(p, other)
+        also = "" if twin is None else _describe_twin(twin, values[twin.name], digits)
         meaning = "" if p.meaning == "parameter" else p.meaning
         rows.append((p.name, Cell(x, unit), unit.text, how, also, meaning))
     return rows
 
 
-def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
+def list_quantities(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
     """Name, number, unit, the same in SI for a dimensionless one, and meaning of each quantity that exists."""
     problem, found = solution.problem.posed, solution.quantities
     of = problem.parameter_set
@@ -69,32 +69,32 @@ def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]
         if not math.isfinite(x) or q.aside:
             continue
         twin, unit = q.counterpart, _PERCENT if q.share else unit_of(problem, q.name)
-        also = "" if twin is None or values is None else _twin_text(twin, float(twin.value(values)))
+        also = "" if twin is None or values is None else _describe_twin(twin, float(twin.value(values)))
         cell = Cell(x if abs(x) > FEASIBLE else 0.0, unit, 6) if q.share else Cell(x, unit)
         rows.append((q.name, cell, unit.text, also, q.meaning))
     return rows
 
 
-def tidy(solution: Solution, name: str) -> float:
+def round_to_zero(solution: Solution, name: str) -> float:
     """A parameter; 0 where it differs from that by less than a rounding of its range."""
     x, (lower, upper) = solution.parameters[name], solution.problem.free.get(name, (0.0, 0.0))
     return 0.0 if abs(x) <= _OF_RANGE * (upper - lower) else x
 
 
-def role(solution: Solution, name: str) -> str:
+def name_role(solution: Solution, name: str) -> str:
     """``free``, ``scenario`` or ``fixed``."""
     problem = solution.problem.posed
     return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
 
 
-def at_worst(solution: Solution) -> Mapping[str, float]:
+def parameters_of_worst_case(solution: Solution) -> Mapping[str, float]:
     """The parameters in the case that roots and abscissa belong to: of a band the worst one, else the design's own."""
     return solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
 
 
-def motion_line(solution: Solution) -> str:
+def describe_motion(solution: Solution) -> str:
     """How fast a disturbance dies out or grows, and at which frequencies it swings."""
-    rate, time, hertz = _clock(solution)
+    rate, time, hertz = _time_units(solution)
     abscissa = solution.abscissa * rate
     if solution.stable is None:
         return "no motion to describe: a root is at infinity"
@@ -107,7 +107,7 @@ def motion_line(solution: Solution) -> str:
     if solution.problem.model.carrier is not None:
         edge = growth if found.growth else "neither loss nor gain"
         gain = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
-        real = _real(solution) if found.on_edge or solution.beyond_axis else ""
+        real = _name_real(solution) if found.on_edge or solution.beyond_axis else ""
         return f"{edge if found.on_edge else gain}{real}"
     swings = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
     if not swings:
@@ -115,13 +115,13 @@ def motion_line(solution: Solution) -> str:
     shown = [f if hertz.text == "Hz" else 2 * math.pi * f for f in swings]
     name = ("" if hertz.text == "Hz" else "angular ") + ("frequency" if len(shown) == 1 else "frequencies")
     listed = " and ".join(f"{f:.4g}" for f in dict.fromkeys(shown))
-    ratio, least = solution.quantities["damping_ratio"], speed_in(solution, solution.least_damped)
-    at = f" at {least}" if least and least != speed_in(solution, solution.worst) else ""
+    ratio, least = solution.quantities["damping_ratio"], describe_speed(solution, solution.least_damped)
+    at = f" at {least}" if least and least != describe_speed(solution, solution.worst) else ""
     damping = f"damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}{at}"
     return f"{lasts}; {name} {listed} {hertz.text}".rstrip() + f"; {damping}"
 
 
-def speed_in(solution: Solution, case: Case | None) -> str:
+def describe_speed(solution: Solution, case: Case | None) -> str:
     """The speed of a case, where speeds differ from case to case; else empty."""
     name = speed_of(solution.problem.posed.parameter_set)
     if name is None or case is None or name not in {**case.at, **case.offset}:
@@ -129,7 +129,7 @@ def speed_in(solution: Solution, case: Case | None) -> str:
     return f"{name} = {unit_of(solution.problem.posed, name).show(case.applied(solution.parameters)[name])}"
 
 
-def load_line(solution: Solution) -> str:
+def describe_loads(solution: Solution) -> str:
     """What each wheel carries."""
     found, problem = solution.quantities, solution.problem.posed
     parts = []
@@ -142,7 +142,7 @@ def load_line(solution: Solution) -> str:
     return ", ".join(parts)
 
 
-def pitch_line(solution: Solution, si: Mapping[str, float]) -> str:
+def describe_pitching(solution: Solution, si: Mapping[str, float]) -> str:
     """Whether the bicycle pitches over, in any of its cases, and the ballast that prevents it."""
     problem, parameters = solution.problem.posed, solution.parameters
     listed = [case for case in problem.cases if not case.direction]
@@ -155,11 +155,11 @@ def pitch_line(solution: Solution, si: Mapping[str, float]) -> str:
         if abs(load) <= FEASIBLE:  # a limit chi_T <= 1 that is active is met within this
             return f"on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
         if load < 0:
-            return f"pitches over the {over} wheel{in_case}{_prevented(solution, each, lifted)}"
+            return f"pitches over the {over} wheel{in_case}{_describe_ballast(solution, each, lifted)}"
     return "on both wheels in every case listed" if listed else "stands on both wheels"
 
 
-def _prevented(solution: Solution, each: Sequence[Mapping[str, Any]], lifted: str) -> str:
+def _describe_ballast(solution: Solution, each: Sequence[Mapping[str, Any]], lifted: str) -> str:
     """The ballast at a wheel's contact that has no part in the lateral motion: with trail, at the rear one alone."""
     problem = solution.problem.posed
     if f"m_ballast_{lifted}" in problem.vocabulary:
@@ -172,7 +172,7 @@ def _prevented(solution: Solution, each: Sequence[Mapping[str, Any]], lifted: st
     return f", unless ballast of {needed} is at the {lifted} contact, which does not change the motion"
 
 
-def inertia_line(solution: Solution) -> str:
+def describe_inertia(solution: Solution) -> str:
     """How much of each moment of inertia a stable design of point masses bears, also as a radius of gyration √(I/m)."""
     length, parts = unit_of(solution.problem.posed, "w"), []
     for name, inertia in (solution.inertia_margin or {}).items():
@@ -181,87 +181,89 @@ def inertia_line(solution: Solution) -> str:
     return ", ".join(parts)
 
 
-def roots_line(solution: Solution, digits: int) -> tuple[str, str]:
+def describe_roots(solution: Solution, digits: int) -> tuple[str, str]:
     """A label, and the roots, or of a complex system its eigenfrequencies."""
     if solution.problem.model.carrier is None:
         problem = solution.problem.posed
-        unit, own = unit_at(problem, "abscissa", at_worst(solution)), unit_of(problem, "abscissa")
+        unit, own = unit_at(problem, "abscissa", parameters_of_worst_case(solution)), unit_of(problem, "abscissa")
         named = f"  in {unit.text}" if unit.text else ""
         named += f"; √(g/w) = {1 / unit.one:.{digits}g} {unit.text}" if unit != own else ""
-        return "roots", (", ".join(roots_of(solution.roots, digits, 1 / unit.one)) or "none") + named
+        return "roots", (", ".join(format_roots(solution.roots, digits, 1 / unit.one)) or "none") + named
     each, size = solution.eigenfrequencies, abs(solution.problem.model.carrier)
     middle = sum(z.re for z in each) / len(each) if each else 0.0
     spread = max((math.hypot(z.re - middle, z.im) for z in each), default=0.0) or 1.0
     digits = min(digits + max(0, math.ceil(math.log10(max(abs(middle), spread) / spread))), ALL)
-    return "eigenfrequencies", ", ".join(frequency_of(z.re, z.im, digits, z.multiplicity, size) for z in each)
+    return "eigenfrequencies", ", ".join(format_frequency(z.re, z.im, digits, z.multiplicity, size) for z in each)
 
 
-def frequency_of(re: float, im: float, digits: int, multiplicity: int = 1, size: float = 0.0) -> str:
+def format_frequency(re: float, im: float, digits: int, multiplicity: int = 1, size: float = 0.0) -> str:
     """An eigenfrequency as text; a part that is only rounding, compared with a size, is 0."""
     size = max(size, math.hypot(re, im))
     re, im = (x if abs(x) > NOTHING * size else 0.0 for x in (re, im))
     parts = ([f"{re:.{digits}g}"] if re or not im else []) + ([f"{abs(im):.{digits}g}i"] if im else [])
     sign = "-" if im < 0 else "+"
     value = f" {sign} ".join(parts) if len(parts) > 1 else f"{'-' if im < 0 else ''}{parts[0]}"
-    return value + times_of(multiplicity)
+    return value + format_multiplicity(multiplicity)
 
 
-def roots_of(roots: Sequence[Root], digits: int = 8, rate: float = 1.0) -> list[str]:
+def format_roots(roots: Sequence[Root], digits: int = 8, rate: float = 1.0) -> list[str]:
     """Roots as text, times a rate, a conjugate pair as one entry."""
     entries = []
     for root in roots:
         if root.im < 0:
             continue
         re, im = (x * rate if abs(x) > NOTHING * root.size else 0.0 for x in (root.re, root.im))
-        entries.append(f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "") + times_of(root.multiplicity))
+        entries.append(
+            f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "") + format_multiplicity(root.multiplicity)
+        )
     return entries
 
 
-def times_of(multiplicity: int) -> str:
+def format_multiplicity(multiplicity: int) -> str:
     """The multiplicity of a root, behind its value; nothing of a simple one."""
     return f" ({multiplicity}-fold)" if multiplicity > 1 else ""
 
 
-def stored_lines(solution: Solution) -> Iterator[str]:
+def describe_stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
-    problem, at = solution.problem.posed, at_worst(solution)
+    problem, at = solution.problem.posed, parameters_of_worst_case(solution)
     size = max((r.size for r in solution.of_polynomial.roots), default=1.0)
     ideal, stored = (x if abs(x) > NOTHING * size else 0.0 for x in (solution.abscissa, solution.abscissa_realised))
     realised = unit_at(problem, "abscissa", at).number(stored, ALL)
     shown = show_at(problem, "abscissa", at, ideal, ALL)
     yield f"abscissa {shown}; of the parameters as rounded to doubles {realised}"
-    yield ": ".join(roots_line(solution, ALL))
+    yield ": ".join(describe_roots(solution, ALL))
 
 
-def _clock(solution: Solution) -> tuple[float, Unit, Unit]:
+def _time_units(solution: Solution) -> tuple[float, Unit, Unit]:
     """What a rate of 1 is, and the units of times and of frequencies: s and Hz, or the model's own time."""
     of = solution.problem.posed.parameter_set
     if of.rate is not None:
-        return float(of.rate(at_worst(solution))), Unit("s"), Unit("Hz")
+        return float(of.rate(parameters_of_worst_case(solution))), Unit("s"), Unit("Hz")
     natural = any(s.rate is not None for s in solution.problem.model.sets)
     return 1.0, Unit("√(w/g)" if natural else ""), Unit("√(g/w)" if natural else "")
 
 
-def _real(solution: Solution) -> str:
+def _name_real(solution: Solution) -> str:
     """Which eigenfrequencies of a complex system are real."""
     model = solution.problem.model
     met = eigenfrequencies(model, on_axis(model, solution.roots))
-    real = [frequency_of(z.re, 0.0, 5, z.multiplicity, abs(model.carrier or 0.0)) for z in met]
+    real = [format_frequency(z.re, 0.0, 5, z.multiplicity, abs(model.carrier or 0.0)) for z in met]
     return f"; {' and '.join(real)} {'is' if len(real) == 1 else 'are'} real" if real else ""
 
 
-def _other(model: Model, of: ParameterSet) -> ParameterSet | None:
+def _other_set(model: Model, of: ParameterSet) -> ParameterSet | None:
     """The other set of a model that is dimensionless and in SI."""
     return next((s for s in model.sets if s is not of), None)
 
 
-def _counterpart(p: Parameter, other: ParameterSet) -> Parameter | None:
+def _find_counterpart(p: Parameter, other: ParameterSet) -> Parameter | None:
     """The parameter of the other set that says the same."""
     if p.name in other.names:
         return None
     return next((q for q in other.parameters if p.counterpart == q.name or q.counterpart == p.name), None)
 
 
-def _twin_text(twin: Parameter | Quantity, x: float, digits: int = ALL) -> str:
+def _describe_twin(twin: Parameter | Quantity, x: float, digits: int = ALL) -> str:
     """What a parameter or quantity is in the other set."""
     return f"{twin.name} = {Unit('' if twin.unit == '1' else twin.unit).show(x, digits)}"

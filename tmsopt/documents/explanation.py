@@ -10,8 +10,8 @@ from tmsopt.analysis.explain import Explanation
 from tmsopt.analysis.optimality import OnLine, Optimality
 from tmsopt.analysis.rounding import ALONE, Rounded
 from tmsopt.analysis.splitting import DEVIATION, Law
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Sentence, TableBlock, count_of
-from tmsopt.documents.design_rows import frequency_of, times_of
+from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Sentence, TableBlock, count_things
+from tmsopt.documents.design_rows import format_frequency, format_multiplicity
 from tmsopt.documents.maker import Maker
 
 _SHARE, _NIL = 0.05, 1e-9
@@ -25,35 +25,35 @@ _UNRESOLVED = (
 Blocks = Iterator[Block]
 
 
-def explanation_words(found: Explanation) -> Iterator[Badge]:
+def summarise_explanation(found: Explanation) -> Iterator[Badge]:
     """Structure, verdict, and how many limits and warnings there are."""
     yield Badge(found.structure)
-    yield from optimality_words(found.optimality)
-    yield Badge(count_of(len(found.levers), "limit"))
+    yield from summarise_optimality(found.optimality)
+    yield Badge(count_things(len(found.levers), "limit"))
     if found.warnings:
-        yield Badge(count_of(len(found.warnings), "warning"))
+        yield Badge(count_things(len(found.warnings), "warning"))
 
 
-def explanation_sections(found: Explanation, _level: Level) -> Iterator[Chapter]:
+def write_explanation(found: Explanation, _level: Level) -> Iterator[Chapter]:
     """The meaning, local optimality, warnings, what limits are worth, what rounding costs."""
     warnings = (Sentence(text, "warning", "doubt") for text in found.warnings)
     yield Chapter(
-        "meaning", (Sentence(found.summary, "meaning", "answer"), *optimality_blocks(found.optimality), *warnings)
+        "meaning", (Sentence(found.summary, "meaning", "answer"), *explain_optimality(found.optimality), *warnings)
     )
     if found.levers:
         head = Sentence("what moving a limit buys, solved again from the optimum:")
         yield Chapter("limits", (head, *(Sentence(lever.sentence) for lever in found.levers)))
-    yield Chapter("rounding", tuple(_rounding(found)))
+    yield Chapter("rounding", tuple(_write_rounding(found)))
 
 
-def _rounding(found: Explanation) -> Blocks:
+def _write_rounding(found: Explanation) -> Blocks:
     if found.precision:
-        yield rounding_grid(found)
+        yield tabulate_rounding(found)
     if found.worst:
         yield Sentence(f"rounding {found.worst} alone to {ALONE} digits costs most")
 
 
-def rounding_line(found: Explanation) -> str:
+def describe_rounding(found: Explanation) -> str:
     """The fewest digits that keep what was asked, what fewer cost, and the parameter that needs the most.
 
     Kept is a design that is stable as it was, within all its limits, and within 5 % in decay and objective.
@@ -67,13 +67,13 @@ def rounding_line(found: Explanation) -> str:
     three = next((row for row in rows if row.digits == ALONE), None)
     parts, unstable = [], False
     if stable and three and three.realised < 0 and (enough is None or enough.digits > ALONE):
-        parts.append(f"{ALONE} digits {_cost(three, found)}")
+        parts.append(f"{ALONE} digits {_describe_cost(three, found)}")
     if stable and three and not three.realised < 0:
         alone, unstable = found.rounding.get(found.worst), True
         worst = f" ({found.worst} alone: {alone.written[found.worst]})" if alone else ""
         parts.append(f"{ALONE} digits make it unstable{worst}")
     last = enough or rows[-1]
-    parts.append(f"{last.digits} digits {(_benefit if enough else _cost)(last, found)}")
+    parts.append(f"{last.digits} digits {(_describe_benefit if enough else _describe_cost)(last, found)}")
     needs = f"; {found.worst} needs the most" if found.worst and not unstable else ""
     return f"{'; '.join(parts)}{needs}"
 
@@ -89,40 +89,40 @@ def _is_near(row: Rounded, found: Explanation) -> bool:
     return good and not off > max(_SHARE * abs(found.value), _NIL)
 
 
-def _benefit(row: Rounded, found: Explanation) -> str:
+def _describe_benefit(row: Rounded, found: Explanation) -> str:
     if found.abscissa >= -_NIL:
         return f"move the rightmost root by {row.loss:.2g}" if row.loss > _NIL else "change next to nothing"
     share = min(math.floor(round(100 * row.realised / found.abscissa, 6)), 100)
     return f"keep {share} % of the decay"
 
 
-def _cost(row: Rounded, found: Explanation) -> str:
+def _describe_cost(row: Rounded, found: Explanation) -> str:
     """What digits that are not enough do."""
     if found.abscissa < -_NIL and row.realised >= 0:
         return "make it unstable"
     if _is_near(row, found) or found.abscissa >= -_NIL:
-        cost = _benefit(row, found)
+        cost = _describe_benefit(row, found)
     else:
         cost = f"lose {100 * row.loss / -found.abscissa:.2g} % of the decay"
     return f"{cost} but violate {', '.join(row.violations)}" if row.violations else cost
 
 
-def rounding_grid(found: Explanation) -> TableBlock:
+def tabulate_rounding(found: Explanation) -> TableBlock:
     """The design rounded, one parameter alone and then all together."""
     rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
-    rows += [_row(f"{name} alone", row.written[name], row) for name, row in found.rounding.items()]
-    rows += [_row("all", f"{row.digits} digits", row) for row in found.precision]
+    rows += [_list_rounded(f"{name} alone", row.written[name], row) for name, row in found.rounding.items()]
+    rows += [_list_rounded("all", f"{row.digits} digits", row) for row in found.precision]
     known = any(math.isfinite(row.damping_ratio) for row in (*found.rounding.values(), *found.precision))
     return TableBlock(rows if known else [(*row[:4], *row[5:]) for row in rows], "What rounding does")
 
 
-def _row(which: str, to: str, row: Rounded) -> tuple[str, ...]:
-    ratio, loss = _seen(row.damping_ratio), _seen(row.loss)
+def _list_rounded(which: str, to: str, row: Rounded) -> tuple[str, ...]:
+    ratio, loss = _drop_noise(row.damping_ratio), _drop_noise(row.loss)
     abscissa = str(Cell(row.realised, error=_ROUNDED))
     return which, to, abscissa, f"{loss:.2g}", f"{ratio:.4g}", ", ".join(row.violations)
 
 
-def optimality_words(found: Optimality) -> Iterator[Badge]:
+def summarise_optimality(found: Optimality) -> Iterator[Badge]:
     """The verdict."""
     tones = {STRICT: Badge(found.verdict, "good"), NOT_MINIMAL: Badge(found.verdict, "bad")}
     yield tones.get(found.verdict, Badge(found.verdict, "doubt"))
@@ -130,12 +130,12 @@ def optimality_words(found: Optimality) -> Iterator[Badge]:
         yield Badge(f"by order {found.order}")
 
 
-def optimality_sections(found: Optimality, _level: Level) -> Iterator[Chapter]:
+def write_optimality(found: Optimality, _level: Level) -> Iterator[Chapter]:
     """The verdict and its multipliers."""
-    yield Chapter("answer", tuple(optimality_blocks(found)))
+    yield Chapter("answer", tuple(explain_optimality(found)))
 
 
-def optimality_blocks(found: Optimality) -> Blocks:
+def explain_optimality(found: Optimality) -> Blocks:
     """The verdict, then the multipliers of each root on the rightmost line."""
     if found.verdict == NOT_COVERED:
         yield Sentence(f"not judged, for {found.reason}", "local optimality")
@@ -147,51 +147,51 @@ def optimality_blocks(found: Optimality) -> Blocks:
         balance = f"they balance within {found.residual:.1g}"
         yield Sentence(f"what it costs, per unit, to change {root} ({balance}):")
         head = ("root", f"to move it {'down' if of_H else 'left'}", "share of all", "to part it")
-        yield TableBlock((head, *map(_root_row, found.roots)), "Multipliers")
+        yield TableBlock((head, *map(_list_root, found.roots)), "Multipliers")
 
 
-def _root_row(root: OnLine) -> tuple[str, ...]:
-    place = _place(root.re, root.im, 5)
+def _list_root(root: OnLine) -> tuple[str, ...]:
+    place = _format_place(root.re, root.im, 5)
     if (omega := root.eigenfrequency) is not None:
-        place = frequency_of(omega.real, omega.imag, 5)
+        place = format_frequency(omega.real, omega.imag, 5)
     share = f"{100 * root.share:.3g} %" if root.share < 1 - 1e-9 else ""
-    kappa = f"{_seen(root.kappa, root.beta):.4g}" if root.multiplicity > 1 else ""
-    return place + times_of(root.multiplicity), f"{root.beta:.4g}", share, kappa
+    kappa = f"{_drop_noise(root.kappa, root.beta):.4g}" if root.multiplicity > 1 else ""
+    return place + format_multiplicity(root.multiplicity), f"{root.beta:.4g}", share, kappa
 
 
-def _place(re: float, im: float, digits: int) -> str:
+def _format_place(re: float, im: float, digits: int) -> str:
     """A root or a pair; a real part that is only rounding is 0."""
-    return f"{_seen(re, math.hypot(re, im)):.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
+    return f"{_drop_noise(re, math.hypot(re, im)):.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
 
 
-def _seen(x: float, size: float = 1.0) -> float:
+def _drop_noise(x: float, size: float = 1.0) -> float:
     """A number, or 0 for one that is only rounding compared with a size."""
     return 0.0 if abs(x) <= _ROUNDED * size else x
 
 
-def diagnosis_words(found: Diagnosis) -> Iterator[Badge]:
+def summarise_diagnosis(found: Diagnosis) -> Iterator[Badge]:
     """The root and its chains."""
     yield Badge(f"{found.algebraic}-fold {'pair' if found.im else 'root'}")
     yield Badge(f"{found.re:.5g}" + (f" ± {found.im:.5g}i" if found.im else ""))
     yield Badge(found.kind)
 
 
-def diagnosis_sections(found: Diagnosis, level: Level) -> Iterator[Chapter]:
+def write_diagnosis(found: Diagnosis, level: Level) -> Iterator[Chapter]:
     """The kind of the root, and how it splits."""
-    yield Chapter("answer", tuple(diagnosis_blocks(found, level != "brief")))
+    yield Chapter("answer", tuple(explain_diagnosis(found, level != "brief")))
 
 
-def diagnosis_blocks(found: Diagnosis, full: bool = False) -> Blocks:
+def explain_diagnosis(found: Diagnosis, full: bool = False) -> Blocks:
     """Two sentences: the kind of the root, and how it splits; the laws of every parameter where all is wanted."""
-    yield Sentence(_kind(found), tone="answer")
-    yield Sentence(_splitting(found, full))
+    yield Sentence(_describe_root(found), tone="answer")
+    yield Sentence(_describe_splitting(found, full))
     if full:
-        yield TableBlock(_law_rows(found), "How the root splits")
+        yield TableBlock(_list_laws(found), "How the root splits")
 
 
-def _kind(found: Diagnosis) -> str:
-    place = _place(found.re, found.im, 8)
-    vectors = count_of(found.geometric, "independent eigenvector")
+def _describe_root(found: Diagnosis) -> str:
+    place = _format_place(found.re, found.im, 8)
+    vectors = count_things(found.geometric, "independent eigenvector")
     if found.jordan is None:
         why = "there are no matrices to judge by, so one chain of eigenvectors, as for a companion matrix"
     else:
@@ -204,23 +204,23 @@ def _kind(found: Diagnosis) -> str:
     chains = f"Jordan chain{many} of length {lengths}" if found.partial else "chains not decided"
     what = "pair" if found.im else "root"
     if (omega := found.eigenfrequency) is not None:
-        what, place = "eigenfrequency", frequency_of(omega.real, omega.imag, 8)
+        what, place = "eigenfrequency", format_frequency(omega.real, omega.imag, 8)
     return f"{found.algebraic}-fold {what} {place}: {found.kind}, {chains} ({why})"
 
 
-def _splitting(found: Diagnosis, full: bool) -> str:
+def _describe_splitting(found: Diagnosis, full: bool) -> str:
     """Every parameter with its laws, the most sensitive first; that alone where a table has them all."""
     moving = [r for r in found.responses if r.laws]
     unsure = [r.parameter for r in found.responses if r.unresolved]
     still = [r.parameter for r in found.responses if not (r.laws or r.unresolved)]
-    others = [f"{r.parameter}{'' if r.relative else ' (absolute)'} by {_laws(r, found)}" for r in moving[1:]]
+    others = [f"{r.parameter}{'' if r.relative else ' (absolute)'} by {_describe_laws(r, found)}" for r in moving[1:]]
     parts: list[str] = []
     if moving:
         first = moving[0]
         change = "relative change" if first.relative else "change"
-        moves = f"a {change} ε of {first.parameter} moves it by {_laws(first, found)}"
+        moves = f"a {change} ε of {first.parameter} moves it by {_describe_laws(first, found)}"
         parts = [
-            f"{moves}, within {100 * DEVIATION:.0f} % {_range(first.laws[0])}, as sampled",
+            f"{moves}, within {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])}, as sampled",
             *([] if full else others),
         ]
     if still:
@@ -231,39 +231,40 @@ def _splitting(found: Diagnosis, full: bool) -> str:
     return "; ".join(parts)
 
 
-def _laws(response: Response, found: Diagnosis) -> str:
+def _describe_laws(response: Response, found: Diagnosis) -> str:
     return " and ".join(
-        _law(law) + (f" ({law.branches.roots} of {found.algebraic})" if law.branches.roots < found.algebraic else "")
+        _format_law(law)
+        + (f" ({law.branches.roots} of {found.algebraic})" if law.branches.roots < found.algebraic else "")
         for law in response.laws
     )
 
 
-def _law(law: Law) -> str:
+def _format_law(law: Law) -> str:
     exponent = str(law.branches.exponent)
     power = "ε" if exponent == "1" else f"ε^({exponent})" if "/" in exponent else f"ε^{exponent}"
     return f"{law.branches.size:.3g} {power}"
 
 
-def _range(law: Law) -> str:
+def _describe_range(law: Law) -> str:
     least = f"|ε| >= {law.least:.2g} and " if law.least else ""
     return f"while {least}|ε| <= {min(law.below, law.above):.2g}"
 
 
-def _law_rows(found: Diagnosis) -> list[Sequence[str]]:
+def _list_laws(found: Diagnosis) -> list[Sequence[str]]:
     rows: list[Sequence[str]] = [("parameter", "change", "roots", "shift", "holds for ε < 0", "holds for ε > 0")]
     for response in found.responses:
         change = "relative" if response.relative else "absolute"
         for law in response.laws:
             least = f"{law.least:.2g} <= " if law.least else ""
             ends = (f"{least}|ε| <= {x:.2g}" for x in (law.below, law.above))
-            rows.append((response.parameter, change, str(law.branches.roots), _law(law), *ends))
+            rows.append((response.parameter, change, str(law.branches.roots), _format_law(law), *ends))
         for count, word in ((response.unmoved, "none"), (response.unresolved, "not resolved")):
             rows += [(response.parameter, change, str(count), word, "", "")] if count else []
     return rows
 
 
 MAKERS: Mapping[str, Maker] = {
-    "Explanation": Maker(explanation_words, explanation_sections, "draw_rounding"),
-    "Optimality": Maker(optimality_words, optimality_sections, "draw_roots"),
-    "Diagnosis": Maker(diagnosis_words, diagnosis_sections, "draw_splitting"),
+    "Explanation": Maker(summarise_explanation, write_explanation, "draw_rounding"),
+    "Optimality": Maker(summarise_optimality, write_optimality, "draw_roots"),
+    "Diagnosis": Maker(summarise_diagnosis, write_diagnosis, "draw_splitting"),
 }

@@ -21,9 +21,9 @@ Named = tuple[str, Mapping[str, float]]
 _MOST = 8  # designs that have a button
 
 
-def explorer_frame(result: Any, design: Solution | None) -> str:
+def frame_explorer(result: Any, design: Solution | None) -> str:
     """The page that moves the design, in a frame from which nothing gets out; empty for a result without a problem."""
-    of, designs = explored(result, design)
+    of, designs = find_designs(result, design)
     if of is None:
         return ""
     from tmsopt.explorer import frame, page_of
@@ -38,7 +38,7 @@ def explorer_frame(result: Any, design: Solution | None) -> str:
     )
 
 
-def explored(result: Any, design: Solution | None) -> tuple[Posed | Solution | None, list[Named]]:
+def find_designs(result: Any, design: Solution | None) -> tuple[Posed | Solution | None, list[Named]]:
     """What the explorer of a result is about, None for one without a problem, and designs by their names."""
     name = type(result).__name__
     holder = getattr(result, "study", result)
@@ -48,10 +48,10 @@ def explored(result: Any, design: Solution | None) -> tuple[Posed | Solution | N
         return of, []
     problem = pose(of)
     names = set(problem.parameter_set.names)
-    return of, _listed((n, values) for n, values in _DESIGNS[name](result) if names <= set(values))
+    return of, _number_designs((n, values) for n, values in _DESIGNS[name](result) if names <= set(values))
 
 
-def _listed(designs: Iterable[Named]) -> list[Named]:
+def _number_designs(designs: Iterable[Named]) -> list[Named]:
     """The first of them; those with the same values are one, those with the same name are numbered."""
     found: dict[tuple[float, ...], Named] = {}
     for name, values in designs:
@@ -66,39 +66,39 @@ def _listed(designs: Iterable[Named]) -> list[Named]:
     return listed
 
 
-def _of_front(front: "Front") -> Iterator[Named]:
+def _list_front(front: "Front") -> Iterator[Named]:
     """The fastest decay, then both ends and what changes between them."""
     if front.points:
-        best = min(front.points, key=lambda p: _or_infinite(_decay(p.solution)))
+        best = min(front.points, key=lambda p: _replace_nan(_decay_rate(p.solution)))
         yield best.label or "least abscissa", best.solution.parameters
     yield from ((point.label, point.solution.parameters) for point in front.points if point.label)
 
 
-def _decay(solution: "Solution") -> float:
+def _decay_rate(solution: "Solution") -> float:
     """Abscissa by the clock, where there is one."""
     return solution.abscissa / unit_at(solution.problem.posed, "abscissa", solution.parameters).one
 
 
-def _of_trace(trace: "Trace") -> Iterator[Named]:
+def _list_trace(trace: "Trace") -> Iterator[Named]:
     """Events at which more roots meet, then the fastest decay, then what else happens; not where a limit ends it."""
     events = [(e, float(b.abscissa[e.index])) for b in trace.branches for e in b.events if e.name not in _ENDS]
-    events.sort(key=lambda found: ("EP" not in found[0].name, _or_infinite(found[1])))
+    events.sort(key=lambda found: ("EP" not in found[0].name, _replace_nan(found[1])))
     met = [(in_words_of(trace.problem.model, e.name), e.parameters, "EP" in e.name) for e, _ in events]
     yield from ((name, values) for name, values, meet in met if meet)
     points = [(float(x), branch, k) for branch in trace.branches for k, x in enumerate(branch.abscissa)]
     if points:
-        _, branch, k = min(points, key=lambda point: _or_infinite(point[0]))
+        _, branch, k = min(points, key=lambda point: _replace_nan(point[0]))
         yield "least abscissa", {n: float(column[k]) for n, column in branch.parameters.items()}
     yield from ((name, values) for name, values, meet in met if not meet)
 
 
-def _of_chart(chart: "Chart") -> Iterator[Named]:
+def _list_chart(chart: "Chart") -> Iterator[Named]:
     """The best design of the grid."""
     if best := chart.to_json()["least_abscissa"]:
         yield "least abscissa", chart.problem.posed.ordered({n: best[n] for n in chart.axes})
 
 
-def _of_results(results: "Results") -> Iterator[Named]:
+def _list_results(results: "Results") -> Iterator[Named]:
     """The best row, and the one that decays least."""
     known = [row for row in results.rows if math.isfinite(row.abscissa)]
     if known:
@@ -110,18 +110,18 @@ def _of_results(results: "Results") -> Iterator[Named]:
         yield f"greatest abscissa, row {last.number}", last.parameters
 
 
-def _of_proof(proof: "Proof") -> Iterator[Named]:
+def _list_proof(proof: "Proof") -> Iterator[Named]:
     """The design as it was proved, to the digits of a double."""
     if proof.parameters:
         yield "proved", {n: float(number.value) for n, number in proof.parameters.items()}
 
 
-def _of_every(every: "Every") -> Iterator[Named]:
+def _list_every(every: "Every") -> Iterator[Named]:
     """All but the first, at which the page opens anyway."""
     yield from ((f"design {k}", s.parameters) for k, s in enumerate(every.solutions[1:], start=2))
 
 
-def _or_infinite(value: float) -> float:
+def _replace_nan(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 
@@ -129,10 +129,10 @@ _ENDS = ("end", "constraint")
 """Events at which a branch only meets a limit."""
 
 _DESIGNS: Mapping[str, Callable[[Any], Iterator[Named]]] = {
-    "Chart": _of_chart,
-    "Every": _of_every,
-    "Front": _of_front,
-    "Proof": _of_proof,
-    "Results": _of_results,
-    "Trace": _of_trace,
+    "Chart": _list_chart,
+    "Every": _list_every,
+    "Front": _list_front,
+    "Proof": _list_proof,
+    "Results": _list_results,
+    "Trace": _list_trace,
 }

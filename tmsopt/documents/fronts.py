@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from tmsopt import plots
-from tmsopt.documents.blocks import Badge, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_of, yes_no
-from tmsopt.documents.maker import Maker, untitled
-from tmsopt.documents.tables import asked_section
+from tmsopt.documents.blocks import Badge, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_things, say_whether
+from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.tables import write_question
 from tmsopt.evaluation import missed_note
 from tmsopt.fronts.front import Front
 from tmsopt.problem.unit_system import unit_at, unit_of
@@ -13,29 +13,31 @@ from tmsopt.problem.unit_system import unit_at, unit_of
 _LABEL, _ROWS = 40, 20  # characters of what happens at a point, and points, of a brief report
 
 
-def front_words(front: Front) -> Iterator[Badge]:
+def summarise_front(front: Front) -> Iterator[Badge]:
     """Objectives and the number of points."""
     yield Badge(", ".join(front.objectives))
-    yield Badge(count_of(len(front), "point"))
+    yield Badge(count_things(len(front), "point"))
     if unstable := sum(not point.stable for point in front.points):
         yield Badge(f"{unstable} not stable", "bad")
 
 
-def front_sections(front: Front, level: Level) -> Iterator[Chapter]:
+def write_front(front: Front, level: Level) -> Iterator[Chapter]:
     """Points one a row: objectives, structure, ends and kinks, active limits, free parameters, whether stable."""
     problem, full = front.problem.posed, level != "brief"
     where = f", designs with {problem.locate}" if problem.locate else ""
     special = ((len(front.kinks), "kink"), (len(front.gaps), "gap"))
-    counted = "".join(f"{count_of(n, word)}, " for n, word in special if n)
+    counted = "".join(f"{count_things(n, word)}, " for n, word in special if n)
     least = f"front of least {', '.join(t.strip() for t in front.objectives)}{where}"
     effort = f"{front.solved} sub-problems; {front.seconds:.2f} s"
-    yield Chapter("answer", (Sentence(f"{least}: {count_of(len(front), 'point')}, {counted}{effort}", tone="answer"),))
+    yield Chapter(
+        "answer", (Sentence(f"{least}: {count_things(len(front), 'point')}, {counted}{effort}", tone="answer"),)
+    )
     if level == "page":
         caption = f"Front of {', '.join(front.objectives)}"
-        yield Chapter("picture", (Figure(lambda: plots.front_figure(untitled(front)), caption),), "Front")
-        yield asked_section(problem)
+        yield Chapter("picture", (Figure(lambda: plots.front_figure(remove_titles(front)), caption),), "Front")
+        yield write_question(problem)
     labelled = frozenset(k for k, p in enumerate(front.points) if p.label)
-    rows = front_rows(front, full)
+    rows = list_points(front, full)
     objectives = len(front.objectives)
     needs = [9] * objectives + [7, 6] + [4] * (len(rows[0]) - objectives - 4) + [5, 3]
     grid = TableBlock(rows, "Points of the front", needs, _ROWS, labelled, "--full, --csv")
@@ -46,7 +48,7 @@ def front_sections(front: Front, level: Level) -> Iterator[Chapter]:
     yield Chapter("notes", tuple(notes))
 
 
-def front_rows(front: Front, full: bool = False) -> list[Sequence[Cell | str]]:
+def list_points(front: Front, full: bool = False) -> list[Sequence[Cell | str]]:
     """Headings, and the cells of each point; all digits and whole labels where it is `full`."""
     texts = [t.strip() for t in front.objectives]
     free = [n for n in front.problem.free if n not in texts]
@@ -60,8 +62,8 @@ def front_rows(front: Front, full: bool = False) -> list[Sequence[Cell | str]]:
         numbers = [Cell(v, unit, digits) for unit, v in zip(each, p.objectives, strict=True)]
         design = [Cell(p.solution.parameters[n], units[n], digits) for n in free]
         label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
-        rows.append((*numbers, yes_no(p.stable), label, *design, p.structure, ", ".join(p.limits)))
+        rows.append((*numbers, say_whether(p.stable), label, *design, p.structure, ", ".join(p.limits)))
     return rows
 
 
-MAKERS: Mapping[str, Maker] = {"Front": Maker(front_words, front_sections, "draw_front")}
+MAKERS: Mapping[str, Maker] = {"Front": Maker(summarise_front, write_front, "draw_front")}

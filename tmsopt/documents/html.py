@@ -37,11 +37,11 @@ def to_page(document: Document, more: Iterable[tuple[Chapter, str]] = ()) -> str
     Args:
         more: further sections, with markup that stands in them.
     """
-    title = words(document.title or "untitled")
-    parts = [(section, _blocks(section.blocks)) for section in document.sections] + list(more)
+    title = escape_text(document.title or "untitled")
+    parts = [(section, _mark_up(section.blocks)) for section in document.sections] + list(more)
     parts = [(section, body) for section, body in parts if body]
-    links = " ".join(f'<a href="#{section.name}">{words(section.title)}</a>' for section, _ in parts)
-    body = "\n".join(_section(section, markup) for section, markup in parts)
+    links = " ".join(f'<a href="#{section.name}">{escape_text(section.title)}</a>' for section, _ in parts)
+    body = "\n".join(_mark_section(section, markup) for section, markup in parts)
     style, script = (resources("tmsopt.documents").joinpath("page_files", f"document.{e}") for e in ("css", "js"))
     return f"""<!doctype html>
 <html lang="en">
@@ -58,7 +58,7 @@ def to_page(document: Document, more: Iterable[tuple[Chapter, str]] = ()) -> str
 <body>
 <header>
 <h1>{title}</h1>
-<p class="badges">{badges(document.words)}</p>
+<p class="badges">{mark_badges(document.words)}</p>
 <nav aria-label="Parts of this {document.kind.lower()}">{links}</nav>
 </header>
 <main>
@@ -78,75 +78,78 @@ def to_fragment(document: Document, draw: Callable[[], Axes] | None = None) -> s
         draw: draws the picture at its end.
     """
     kind = f" <small>{document.kind}</small>" if document.title else ""
-    head = f"<div><strong>{words(document.title or document.kind)}</strong>{kind}</div>"
-    body = "\n".join(_blocks(section.blocks, plain=True) for section in document.sections)
-    image = _thumbnail(draw, document.kind) if draw else ""
-    return f'<div class="tmsopt">{head}<div style="margin:.4em 0">{badges(document.words)}</div>\n{body}{image}</div>'
-
-
-def badges(said: Iterable[Badge]) -> str:
-    """What a result is and how it ended, a mark for each word."""
-    return " ".join(
-        f'<span style="{_BADGE};background:{_MARKS.get(word.tone, "none")}">{words(word.text)}</span>' for word in said
+    head = f"<div><strong>{escape_text(document.title or document.kind)}</strong>{kind}</div>"
+    body = "\n".join(_mark_up(section.blocks, plain=True) for section in document.sections)
+    image = _draw_thumbnail(draw, document.kind) if draw else ""
+    return (
+        f'<div class="tmsopt">{head}<div style="margin:.4em 0">{mark_badges(document.words)}</div>\n{body}{image}</div>'
     )
 
 
-def words(text: str) -> str:
+def mark_badges(said: Iterable[Badge]) -> str:
+    """What a result is and how it ended, a mark for each word."""
+    return " ".join(
+        f'<span style="{_BADGE};background:{_MARKS.get(word.tone, "none")}">{escape_text(word.text)}</span>'
+        for word in said
+    )
+
+
+def escape_text(text: str) -> str:
     """A text inside an element or an attribute; controls, of what is shown too, become marks."""
     return escape(_UNSHOWN.sub("\ufffd", text))
 
 
-def verbatim(text: str, label: str) -> str:
+def mark_verbatim(text: str, label: str) -> str:
     """A text as it is; it may be wider than the page, and is then reached by the keyboard too."""
-    return f'<pre tabindex="0" role="group" aria-label="{words(label)}">\n{words(text)}</pre>'
+    return f'<pre tabindex="0" role="group" aria-label="{escape_text(label)}">\n{escape_text(text)}</pre>'
 
 
-def listing(items: Iterable[tuple[str, str]]) -> str:
+def mark_list(items: Iterable[tuple[str, str]]) -> str:
     """Labels with what there is to say of each."""
-    listed = "\n".join(f"<div><dt>{words(name)}</dt><dd>{words(said)}</dd></div>" for name, said in items if said)
+    listed = "\n".join(
+        f"<div><dt>{escape_text(name)}</dt><dd>{escape_text(said)}</dd></div>" for name, said in items if said
+    )
     return f"<dl>\n{listed}\n</dl>" if listed else ""
 
 
-def _section(section: Chapter, body: str) -> str:
+def _mark_section(section: Chapter, body: str) -> str:
     kind, head = f' class="{section.width}"' if section.width else "", f"{section.name}-heading"
-    return (
-        f'<section id="{section.name}"{kind} aria-labelledby="{head}">\n<h2 id="{head}">{words(section.title)}</h2>\n'
-        f"{body}\n</section>"
-    )
+    title = f'<h2 id="{head}">{escape_text(section.title)}</h2>'
+    return f'<section id="{section.name}"{kind} aria-labelledby="{head}">\n{title}\n{body}\n</section>'
 
 
-def _blocks(blocks: Sequence[Block], plain: bool = False) -> str:
-    return "\n".join(part for part in _markup(blocks, plain) if part)
+def _mark_up(blocks: Sequence[Block], plain: bool = False) -> str:
+    return "\n".join(part for part in _mark_up_runs(blocks, plain) if part)
 
 
-def _markup(blocks: Sequence[Block], plain: bool) -> Iterator[str]:
+def _mark_up_runs(blocks: Sequence[Block], plain: bool) -> Iterator[str]:
     """Facts that follow each other are one list; pictures that do stand beside each other where there is room."""
     for (kind, labelled), run in groupby(blocks, key=lambda b: (type(b), isinstance(b, Sentence) and bool(b.label))):
         some: list[Any] = list(run)
         if kind is Sentence and labelled:
-            yield listing((one.label, one.text) for one in some)
+            yield mark_list((one.label, one.text) for one in some)
         elif kind is Figure:
-            drawn = [picture(one) for one in some]
+            drawn = [draw_figure(one) for one in some]
             together = "\n".join(drawn)
             yield f'<div class="beside">\n{together}\n</div>' if len(drawn) > 1 else together
         else:
             for one in some:
-                yield _one(one, plain)
+                yield _mark_up_block(one, plain)
 
 
-def _one(block: Any, plain: bool) -> str:
+def _mark_up_block(block: Any, plain: bool) -> str:
     match block:
         case Sentence(text, _, tone):
             lead = ' class="lead"' if tone in ("answer", "good", "doubt", "bad") else ""
-            return f"<p{lead}>{words(text)}</p>"
+            return f"<p{lead}>{escape_text(text)}</p>"
         case Listing(items, title):
-            return (f"<p><strong>{words(title)}</strong></p>\n" if title else "") + listing(items)
+            return (f"<p><strong>{escape_text(title)}</strong></p>\n" if title else "") + mark_list(items)
         case Verbatim(text, label):
-            return verbatim(text.strip("\n"), label)
-    return _table(block, plain)
+            return mark_verbatim(text.strip("\n"), label)
+    return _mark_table(block, plain)
 
 
-def _table(grid: TableBlock, plain: bool) -> str:
+def _mark_table(grid: TableBlock, plain: bool) -> str:
     """A table that can be sorted, a long one filtered too, without columns in which nothing stands."""
     rows = grid.texts
     rows = (
@@ -155,18 +158,20 @@ def _table(grid: TableBlock, plain: bool) -> str:
     columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
     if not columns:
         return ""
-    kinds = [_kind(column[1:]) for column in columns]
+    kinds = [_classify_column(column[1:]) for column in columns]
     headed = any(column[0] for column in columns)
-    heads = "".join(f'<th scope="col"{k}>{words(c[0] or "remark")}</th>' for c, k in zip(columns, kinds, strict=True))
+    heads = "".join(
+        f'<th scope="col"{k}>{escape_text(c[0] or "remark")}</th>' for c, k in zip(columns, kinds, strict=True)
+    )
     body = [*zip(*(column[1:] for column in columns), strict=True)]
-    lines = "\n".join(f"<tr>{_cells(row, kinds)}</tr>" for row in body)
+    lines = "\n".join(f"<tr>{_mark_cells(row, kinds)}</tr>" for row in body)
     head = f"<thead><tr>{heads}</tr></thead>" if headed else ""
     if plain:
         return f"<table>{head}<tbody>{lines}</tbody></table>"
     kind = "sortable filterable" if len(body) >= _FILTERED else "sortable"
     said = f"On paper are the first {_ON_PAPER} of the rows that are shown."
     paper = f'\n<p class="print">{said}</p>' if len(body) > _ON_PAPER else ""
-    caption = words(grid.caption)
+    caption = escape_text(grid.caption)
     kind = f' class="{kind}"' if headed else ""
     return (
         f'<div class="rows" role="group" tabindex="0" aria-label="{caption}"><table{kind}>\n'
@@ -174,19 +179,19 @@ def _table(grid: TableBlock, plain: bool) -> str:
     )
 
 
-def _cells(row: Sequence[str], kinds: Sequence[str]) -> str:
-    first, *rest = (f"{kind}>{words(cell)}" for cell, kind in zip(row, kinds, strict=True))
+def _mark_cells(row: Sequence[str], kinds: Sequence[str]) -> str:
+    first, *rest = (f"{kind}>{escape_text(cell)}" for cell, kind in zip(row, kinds, strict=True))
     return f'<th scope="row"{first}</th>' + "".join(f"<td{cell}</td>" for cell in rest)
 
 
-def _kind(cells: Sequence[str]) -> str:
+def _classify_column(cells: Sequence[str]) -> str:
     """Whether a column is of numbers, of long words, or of short ones."""
     if all(_NUMBER.match(cell) for cell in cells if cell):
         return ' class="number"'
     return ' class="long"' if max(map(len, cells)) > _LONG else ""
 
 
-def picture(figure: Figure) -> str:
+def draw_figure(figure: Figure) -> str:
     """A figure with its caption; empty where it cannot be drawn, for the rest of the page says what there is.
 
     Letters are outlines, and a drawing is an image apart from the page: nothing in it is markup of the page.
@@ -194,16 +199,16 @@ def picture(figure: Figure) -> str:
     try:
         drawn = figure.draw()
         whole = drawn.figure.figure if isinstance(drawn, Axes) else drawn
-        data, kind = _image(whole, "svg"), "svg+xml"
+        data, kind = _save_image(whole, "svg"), "svg+xml"
         if len(data) > _LARGEST:
-            data, kind = _image(whole, "png"), "png"
+            data, kind = _save_image(whole, "png"), "png"
     except Exception:  # of a design without roots, of a chart over three parameters, …
         return ""
-    said, coded = words(figure.caption), base64.b64encode(data).decode()
+    said, coded = escape_text(figure.caption), base64.b64encode(data).decode()
     return f'<figure><img alt="{said}" src="data:image/{kind};base64,{coded}"><figcaption>{said}</figcaption></figure>'
 
 
-def _thumbnail(draw: Callable[[], Axes], name: str) -> str:
+def _draw_thumbnail(draw: Callable[[], Axes], name: str) -> str:
     """The picture for a notebook; none where it cannot be drawn: a display must not break over it."""
     try:
         image = io.BytesIO()
@@ -212,10 +217,10 @@ def _thumbnail(draw: Callable[[], Axes], name: str) -> str:
     except Exception:  # whatever it was, the rest says what the result is
         return ""
     coded = base64.b64encode(image.getvalue()).decode()
-    return f'<img alt="{words(name)}" style="max-width:100%" src="data:image/png;base64,{coded}">'
+    return f'<img alt="{escape_text(name)}" style="max-width:100%" src="data:image/png;base64,{coded}">'
 
 
-def _image(figure: Any, kind: str) -> bytes:
+def _save_image(figure: Any, kind: str) -> bytes:
     """The same bytes for the same figure, whenever it is drawn."""
     image = io.BytesIO()
     about = {"Date": None} if kind == "svg" else {}

@@ -24,8 +24,8 @@ class Maker:
     picture: str = ""
 
 
-def untitled(result: Any) -> Any:
+def remove_titles(result: Any) -> Any:
     """A result without its titles, which stand above its pictures already."""
     names = {f.name for f in fields(result) if f.init}
-    held = {n: untitled(v) for n in _HOLDERS if n in names and is_dataclass(v := getattr(result, n))}
+    held = {n: remove_titles(v) for n in _HOLDERS if n in names and is_dataclass(v := getattr(result, n))}
     return replace(result, **held, **({"title": ""} if "title" in names else {}))

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from tmsopt import plots
 from tmsopt.documents.blocks import Badge, Chapter, Figure, Level, Sentence, TableBlock
-from tmsopt.documents.design_rows import times_of
-from tmsopt.documents.maker import Maker, untitled
-from tmsopt.documents.tables import records_section
+from tmsopt.documents.design_rows import format_multiplicity
+from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.tables import tabulate_records
 from tmsopt.dynamics.speeds import speed_of
 from tmsopt.problem import unit_of
 from tmsopt.problem.verdict.stability import MARGINAL, UNSTABLE, power_of_t
@@ -23,7 +23,7 @@ _ROWS, _SHAPES = 8, 4  # of each table, coordinates of a shape, if not full
 _NOTHING = 1e-12  # of a root: a real part so small is rounding, and on the axis beside the largest
 
 
-def motion_words(motion: "Simulation") -> Iterator[Badge]:
+def summarise_motion(motion: "Simulation") -> Iterator[Badge]:
     """How long, and how far its first coordinates go."""
     yield Badge(f"over {motion['t'][-1]:.4g} {motion.units.get('t', '')}".rstrip())
     for measure in motion.measures[:2]:
@@ -33,27 +33,29 @@ def motion_words(motion: "Simulation") -> Iterator[Badge]:
         yield Badge("stable", "good") if motion.stable else Badge("not stable", "bad")
 
 
-def motion_sections(motion: "Simulation", level: Level) -> Iterator[Chapter]:
+def write_motion(motion: "Simulation", level: Level) -> Iterator[Chapter]:
     """What sets a design moving, peak, overshoot and settling time of each angle and torque, and the modes."""
-    time, name = _with(motion, "t", motion["t"][-1]), speed_of(motion.problem.posed.parameter_set)
+    time, name = _format_with_unit(motion, "t", motion["t"][-1]), speed_of(motion.problem.posed.parameter_set)
     at = f" at {name} = {unit_of(motion.problem.posed, name).show(motion.parameters[name])}" if name else ""
-    answer = [Sentence(f"motion over {time}{at} {_cause(motion)}")]
+    answer = [Sentence(f"motion over {time}{at} {_describe_cause(motion)}")]
     answer += [Sentence(motion.problem.model.omits, "model")] if motion.problem.model.omits else []
     yield Chapter("answer", tuple(answer))
     if level == "page":
-        yield Chapter("picture", (Figure(lambda: plots.draw_motion(untitled(motion)), "The motion"),))
-    yield Chapter("peaks", (TableBlock([*_measured(motion)], "Peaks and settling times", most=_ROWS),), "", "wide")
-    yield Chapter("modes", (TableBlock([*_modes(motion, level != "brief")], "Modes", most=_ROWS),), "", "wide")
-    yield Chapter("notes", tuple(map(Sentence, _notes(motion))))
+        yield Chapter("picture", (Figure(lambda: plots.draw_motion(remove_titles(motion)), "The motion"),))
+    yield Chapter("peaks", (TableBlock([*_list_peaks(motion)], "Peaks and settling times", most=_ROWS),), "", "wide")
+    yield Chapter("modes", (TableBlock([*_list_modes(motion, level != "brief")], "Modes", most=_ROWS),), "", "wide")
+    yield Chapter("notes", tuple(map(Sentence, _write_notes(motion))))
     if level == "page":
-        yield records_section(motion)
+        yield tabulate_records(motion)
 
 
-def _cause(motion: "Simulation") -> str:
+def _describe_cause(motion: "Simulation") -> str:
     """In words."""
     asked, time = motion.disturbance, motion.units.get("t", "")
     torque = "N m" if time == "s" else "m_B g w"
-    said = [f"{_named(name)} = {_with(motion, name, value)}" for name, value in asked.start.items()]
+    said = [
+        f"{_name_coordinate(name)} = {_format_with_unit(motion, name, value)}" for name, value in asked.start.items()
+    ]
     said += [
         f"an impulse of {n} torque of {x:.6g} {torque} {time}"
         for n, x in (("steer", asked.push), ("lean", asked.lean_push))
@@ -66,44 +68,49 @@ def _cause(motion: "Simulation") -> str:
     return ", ".join(said) + (", as nothing else was asked" if asked.default else "")
 
 
-def _measured(motion: "Simulation") -> Iterator[Sequence[str]]:
+def _list_peaks(motion: "Simulation") -> Iterator[Sequence[str]]:
     noisy = bool(motion.disturbance.noise)
     yield ("", "peak", "at", *(("in the long run",) if noisy else ("overshoot", "settled within 2 % at")))
     for m in motion.measures:
-        rest: tuple[str, ...] = (f"{100 * m.overshoot:.3g} %", _with(motion, "t", m.settling))
+        rest: tuple[str, ...] = (f"{100 * m.overshoot:.3g} %", _format_with_unit(motion, "t", m.settling))
         if noisy:
             deviation = motion.deviations.get(m.name, math.nan)
-            rest = (f"± {_with(motion, m.name, deviation)}" if math.isfinite(deviation) else "none",)
-        yield _named(m.name), _with(motion, m.name, m.peak), _with(motion, "t", m.at), *rest
+            rest = (f"± {_format_with_unit(motion, m.name, deviation)}" if math.isfinite(deviation) else "none",)
+        yield (
+            _name_coordinate(m.name),
+            _format_with_unit(motion, m.name, m.peak),
+            _format_with_unit(motion, "t", m.at),
+            *rest,
+        )
 
 
-def _modes(motion: "Simulation", full: bool) -> Iterator[Sequence[str]]:
+def _list_modes(motion: "Simulation", full: bool) -> Iterator[Sequence[str]]:
     bicycle = "phi" in motion.columns
     unit = {"s": "1/s", "√(w/g)": "√(g/w)"}.get(motion.units.get("t", ""), "")
     heads = ("steer per lean", "steer ahead of lean") if bicycle else ("amplitudes and phases",)
     yield f"{'eigenfrequency' if motion.problem.model.double else 'root'} {unit}".rstrip(), *heads
     for mode in motion.modes:
-        root = _root(motion, mode) + times_of(mode.multiplicity)
+        root = _format_root(motion, mode) + format_multiplicity(mode.multiplicity)
         if bicycle:
             ratio = f"{mode.steer_per_lean:.4g}" if math.isfinite(mode.steer_per_lean) else "no lean"
-            yield root, ratio, _degrees(mode.phases["delta"])
+            yield root, ratio, _format_degrees(mode.phases["delta"])
         else:
-            said = [f"{n} {x:.3g} at {_degrees(mode.phases[n])}" for n, x in mode.amplitudes.items() if x]
+            said = [f"{n} {x:.3g} at {_format_degrees(mode.phases[n])}" for n, x in mode.amplitudes.items() if x]
             left = len(said) - _SHAPES
             yield root, ", ".join(said if full or left <= 0 else [*said[:_SHAPES], f"… {left} more"])
 
 
-def _notes(motion: "Simulation") -> Iterator[str]:
+def _write_notes(motion: "Simulation") -> Iterator[str]:
     noisy = bool(motion.disturbance.noise)
     merged = {(m.re, m.im): m for m in motion.modes if m.multiplicity > 1}
-    yield from map(_merging, merged.values())
+    yield from map(_describe_merging, merged.values())
     if merged:
         what, moved = (
             "eigenfrequencies" if motion.problem.model.double else "roots",
             "which rounding moves by no more than itself",
         )
         yield f"{what}: of the ideal design; motion: of the design as stored, {moved}"
-    if not motion.stable and (words := _on_axis(motion)):
+    if not motion.stable and (words := _describe_axis(motion)):
         yield f"{words}; peaks are those of the time shown"
     elif not motion.stable:
         yield "not stable: it does not settle, and peaks are those of the time shown"
@@ -114,33 +121,34 @@ def _notes(motion: "Simulation") -> Iterator[str]:
     if "x" in motion.columns:
         end = {n: column[-1] for n, column in motion.columns.items()}
         side = "right" if end["y_rear"] >= 0 else "left"
-        where = f"{_with(motion, 'x', end['x'])} on, {_with(motion, 'y_rear', abs(end['y_rear']))} to the {side}"
+        ahead, aside = (_format_with_unit(motion, n, abs(end[n])) for n in ("x", "y_rear"))
+        where = f"{ahead} on, {aside} to the {side}"
         turned = "right" if end["psi"] >= 0 else "left"
-        yield f"at the end: {where}, heading {_with(motion, 'psi', abs(end['psi']))} to the {turned}"
+        yield f"at the end: {where}, heading {_format_with_unit(motion, 'psi', abs(end['psi']))} to the {turned}"
         angles = [abs(m.peak) for m in motion.measures if motion.units.get(m.name) == "rad"]
         if max(angles) > math.radians(_STEEP):
             yield f"beyond {_STEEP:.0f} deg the equations, which are linear, tell what a smaller push does, enlarged"
 
 
-def _root(motion: "Simulation", mode: "ModeShape") -> str:
+def _format_root(motion: "Simulation", mode: "ModeShape") -> str:
     """A root, or an eigenfrequency, of which a part that is rounding is 0."""
     if mode.eigenfrequency is not None:
-        least = _NOTHING * _largest(motion)
+        least = _NOTHING * _largest_size(motion)
         re, im = (0.0 if abs(x) <= least else x for x in (mode.eigenfrequency.real, mode.eigenfrequency.imag))
         return f"{re:.6g}" + (f" {'-' if im < 0 else '+'} {abs(im):.6g}i" if im else "")
     re = 0.0 if abs(mode.re) < _NOTHING * abs(mode.im) else mode.re
     return f"{re:.6g}" + (f" ± {mode.im:.6g}i" if mode.im else "")
 
 
-def _largest(motion: "Simulation") -> float:
+def _largest_size(motion: "Simulation") -> float:
     """A size beside which a root is none: of the roots of the polynomial, those of a complex H with its carrier."""
     carrier = motion.problem.model.carrier or 0.0
     return max(math.hypot(m.re, m.im - carrier) for m in motion.modes)
 
 
-def _on_axis(motion: "Simulation") -> str:
+def _describe_axis(motion: "Simulation") -> str:
     """The verdict, and what the rightmost modes do, where they lie on the axis but for rounding; else empty."""
-    least = _NOTHING * _largest(motion)
+    least = _NOTHING * _largest_size(motion)
     first = [m for m in motion.modes if abs(m.re) <= least]
     if any(m.re > least for m in motion.modes) or not first:
         return ""
@@ -151,7 +159,7 @@ def _on_axis(motion: "Simulation") -> str:
     return f"{MARGINAL}: {root}, and its motion neither grows nor dies out"
 
 
-def _merging(mode: "ModeShape") -> str:
+def _describe_merging(mode: "ModeShape") -> str:
     k, chains = mode.multiplicity, mode.partial
     of_H = mode.eigenfrequency is not None
     name = f"{'C' if mode.im and not of_H else ''}EP{k}"
@@ -166,11 +174,11 @@ def _merging(mode: "ModeShape") -> str:
     return f"{name}: {many} modes merge in one shape, a Jordan chain of {k}: the motion has terms up to {top} {wave}"
 
 
-def _named(name: str) -> str:
+def _name_coordinate(name: str) -> str:
     return _WORDS.get(name, name)
 
 
-def _with(motion: "Simulation", name: str, value: float) -> str:
+def _format_with_unit(motion: "Simulation", name: str, value: float) -> str:
     """A number with its unit, angles in degrees."""
     unit = motion.units.get(name, "")
     if not math.isfinite(value):
@@ -180,8 +188,8 @@ def _with(motion: "Simulation", name: str, value: float) -> str:
     return f"{value + 0.0:.5g} {unit}".rstrip()
 
 
-def _degrees(value: float) -> str:
+def _format_degrees(value: float) -> str:
     return f"{value + 0.0:.4g} deg" if math.isfinite(value) else "none"
 
 
-MAKERS: Mapping[str, Maker] = {"Simulation": Maker(motion_words, motion_sections, "draw_motion")}
+MAKERS: Mapping[str, Maker] = {"Simulation": Maker(summarise_motion, write_motion, "draw_motion")}

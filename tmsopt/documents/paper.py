@@ -4,9 +4,9 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Listing, Sentence, TableBlock, count_of
+from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Listing, Sentence, TableBlock, count_things
 from tmsopt.documents.maker import Maker
-from tmsopt.documents.solution import branch_lines, headline_of
+from tmsopt.documents.solution import list_branches, write_headline
 from tmsopt.models import tms
 from tmsopt.paper.compare import Comparison
 from tmsopt.paper.ledger import Entry, Ledger
@@ -20,7 +20,7 @@ _ABOUT = (
 )
 
 
-def comparison_words(comparison: Comparison) -> Iterator[Badge]:
+def summarise_comparison(comparison: Comparison) -> Iterator[Badge]:
     """How many laws apply and agree."""
     applying = [row for row in comparison.laws if row.applies]
     agree = sum(row.agrees is True for row in applying)
@@ -28,15 +28,15 @@ def comparison_words(comparison: Comparison) -> Iterator[Badge]:
     yield Badge(f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation")
 
 
-def comparison_sections(comparison: Comparison, _level: Level) -> Iterator[Chapter]:
+def write_comparison(comparison: Comparison, _level: Level) -> Iterator[Chapter]:
     """Laws and numbers side by side where laws are known, then the two formulations."""
     design = comparison.design
     model = design.problem.model
-    answer: list[Block] = list(headline_of(design))
+    answer: list[Block] = list(write_headline(design))
     answer += [Sentence(model.omits, "model")] if model.omits else []
     yield Chapter("answer", tuple(answer))
     if model is tms:
-        yield Chapter("laws", tuple(_laws(comparison)), "", "wide")
+        yield Chapter("laws", tuple(_write_laws(comparison)), "", "wide")
     else:
         named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
         of_skates = "" if model.carrier is not None else ", only of skates (tms)"
@@ -47,10 +47,10 @@ def comparison_sections(comparison: Comparison, _level: Level) -> Iterator[Chapt
         names = f"{comparison.other.formulation} minus {design.formulation}"
         differences = ((n, f"{d:.1e}") for n, d in comparison.differences.items())
         other = [TableBlock((("formulations", names), *differences), "Differences of the formulations")]
-    yield Chapter("formulations", (*other, *map(Sentence, branch_lines(design))))
+    yield Chapter("formulations", (*other, *map(Sentence, list_branches(design))))
 
 
-def _laws(comparison: Comparison) -> Iterator[Block]:
+def _write_laws(comparison: Comparison) -> Iterator[Block]:
     rows: list[Sequence[Cell | str]] = [("law", "of", "numeric", "law says", "relative", "verdict")]
     silent: dict[str, list[str]] = {}
     for row in comparison.laws:
@@ -64,37 +64,37 @@ def _laws(comparison: Comparison) -> Iterator[Block]:
         yield Sentence(f"{', '.join(named)}; {reason}", "not applicable to this design")
 
 
-def ledger_words(ledger: Ledger) -> Iterator[Badge]:
+def summarise_ledger(ledger: Ledger) -> Iterator[Badge]:
     """Entries per verdict."""
-    yield Badge(count_of(len(ledger.entries), "entry", "entries"))
+    yield Badge(count_things(len(ledger.entries), "entry", "entries"))
     for verdict, count in ledger.counts.items():
         if count:
             yield Badge(f"{count} {verdict}")
 
 
-def ledger_sections(ledger: Ledger, level: Level) -> Iterator[Chapter]:
+def write_ledger(ledger: Ledger, level: Level) -> Iterator[Chapter]:
     """Every entry under its section, with the number of entries per verdict at the end."""
     if level == "brief":
         yield Chapter("source", (Sentence(ledger.source),))
     for number, (title, entries) in enumerate(groupby(ledger.entries, key=lambda entry: entry.section)):
         heading = (Sentence(title, tone="answer"),) if level == "brief" else ()
-        yield Chapter(f"part-{number}", (*heading, *map(_entry, entries)), title, "wide")
+        yield Chapter(f"part-{number}", (*heading, *map(_write_entry, entries)), title, "wide")
     counts = [*ledger.counts.items(), ("entries", len(ledger.entries))]
     grid = TableBlock((("", ""), *((str(count), verdict) for verdict, count in counts)), "Entries per verdict")
     yield Chapter("verdicts", (grid,))
 
 
-def _entry(entry: Entry) -> Listing:
+def _write_entry(entry: Entry) -> Listing:
     verdict = ("verdict", entry.verdict.upper())
-    return Listing((verdict, *_rows(entry)), f"{entry.key}: {entry.statement} ({entry.place})")
+    return Listing((verdict, *_list_entry(entry)), f"{entry.key}: {entry.statement} ({entry.place})")
 
 
-def _rows(entry: Entry) -> list[tuple[str, str]]:
+def _list_entry(entry: Entry) -> list[tuple[str, str]]:
     said = {"printed": entry.printed, "computed": entry.computed, "route": entry.route, "remark": entry.remark}
     return [(name, text) for name, text in said.items() if text]
 
 
-def ledger_page(ledger: Ledger) -> str:
+def write_ledger_page(ledger: Ledger) -> str:
     """The ledger as a Markdown page: a summary, then every entry under its section."""
     lines = [
         "# The paper, recomputed",
@@ -111,12 +111,12 @@ def ledger_page(ledger: Ledger) -> str:
     for title, entries in groupby(ledger.entries, key=lambda entry: entry.section):
         lines += ["", f"## {title}"]
         for entry in entries:
-            head = f"**`{entry.key}`** {_escaped(entry.statement)} ({_escaped(entry.place)}): **{entry.verdict}**"
-            lines += ["", head, "", *(f"- {name}: {_escaped(text)}" for name, text in _rows(entry))]
+            head = f"**`{entry.key}`** {_escape(entry.statement)} ({_escape(entry.place)}): **{entry.verdict}**"
+            lines += ["", head, "", *(f"- {name}: {_escape(text)}" for name, text in _list_entry(entry))]
     return "\n".join(lines) + "\n"
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     """Text in which Markdown reads no markup."""
     for sign in ("\\", "*", "_", "|", "<", "^"):
         text = text.replace(sign, f"\\{sign}")
@@ -124,6 +124,6 @@ def _escaped(text: str) -> str:
 
 
 MAKERS: Mapping[str, Maker] = {
-    "Comparison": Maker(comparison_words, comparison_sections, "draw_comparison"),
-    "Ledger": Maker(ledger_words, ledger_sections, "draw_ledger"),
+    "Comparison": Maker(summarise_comparison, write_comparison, "draw_comparison"),
+    "Ledger": Maker(summarise_ledger, write_ledger, "draw_ledger"),
 }

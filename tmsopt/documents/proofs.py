@@ -7,11 +7,22 @@ from typing import TYPE_CHECKING
 
 from tmsopt import plots
 from tmsopt.algebra.balls import Number, fraction
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_of, yes_no
-from tmsopt.documents.design_rows import si_parameters, times_of
-from tmsopt.documents.maker import Maker, untitled
-from tmsopt.documents.solution import bicycle_sections, growth_sections, parameter_grid
-from tmsopt.documents.tables import asked_section
+from tmsopt.documents.blocks import (
+    Badge,
+    Block,
+    Cell,
+    Chapter,
+    Figure,
+    Level,
+    Sentence,
+    TableBlock,
+    count_things,
+    say_whether,
+)
+from tmsopt.documents.design_rows import convert_to_si, format_multiplicity
+from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.solution import tabulate_parameters, write_bicycle, write_growth_picture
+from tmsopt.documents.tables import write_question
 from tmsopt.global_search import Completeness
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem import unit_at
@@ -28,7 +39,7 @@ if TYPE_CHECKING:
 _OF_OTHERS = re.compile(r"(.*\.)?[bcdW]\d+")  # of factors whose roots are listed
 
 
-def proof_words(proof: Proof) -> Iterator[Badge]:
+def summarise_proof(proof: Proof) -> Iterator[Badge]:
     """Whether it is proved, and what."""
     yield Badge("proved", "good") if proof.proved else Badge("not proved", "bad")
     yield Badge(proof.pattern or "nothing")
@@ -37,7 +48,7 @@ def proof_words(proof: Proof) -> Iterator[Badge]:
         yield Badge("stable", "good") if proof.stable.holds else Badge("not stable", "bad")
 
 
-def proof_sections(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Iterator[Chapter]:
+def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Iterator[Chapter]:
     """What is proved, the numbers with their radii, the facts that follow, and the numbers that were taken exactly.
 
     Args:
@@ -55,54 +66,54 @@ def proof_sections(proof: Proof, level: Level, *, design: "Solution | None" = No
     yield Chapter("answer", tuple(answer))
     if not proof.parameters:
         return
-    if rows := number_rows(problem, proof):
+    if rows := list_numbers(problem, proof):
         head = ("number", "decimal", "radius", "unit")
         stored = (Sentence("the design as stored:"),) if proof.stored and proof.reason else ()
         digits = TableBlock((head, *rows), f"Numbers that were proved, to {proof.digits} digits", needs=(9, 8, 5, 6))
         yield Chapter("digits", (*stored, digits), "", "wide")
     if level == "page":
-        yield Chapter("roots", (Figure(lambda: plots.draw_roots(untitled(proof)), "Roots in the complex plane"),))
-    yield Chapter("method", tuple(_method(problem, proof)))
-    yield Chapter("facts", tuple(_facts(proof)))
-    yield Chapter("exact", tuple(_exact_numbers(problem, proof)), "Taken exactly")
+        yield Chapter("roots", (Figure(lambda: plots.draw_roots(remove_titles(proof)), "Roots in the complex plane"),))
+    yield Chapter("method", tuple(_describe_method(problem, proof)))
+    yield Chapter("facts", tuple(_write_facts(proof)))
+    yield Chapter("exact", tuple(_write_exact_numbers(problem, proof)), "Taken exactly")
     if level == "page" and design is not None:
-        yield from bicycle_sections(design)
-        yield Chapter("parameters", (parameter_grid(design, si_parameters(design)),), "", "wide")
-        yield from growth_sections(design)
+        yield from write_bicycle(design)
+        yield Chapter("parameters", (tabulate_parameters(design, convert_to_si(design)),), "", "wide")
+        yield from write_growth_picture(design)
     elif level == "page":
-        yield asked_section(problem)
+        yield write_question(problem)
 
 
-def number_rows(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
+def list_numbers(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
     """What was solved for, and the roots: name, decimal, radius, unit."""
     rows = []
-    units = _units(problem, proof)
+    units = _find_units(problem, proof)
     per = units.get("abscissa", "")
     for name in proof.moved:
         unit = problem.parameter_set[name].unit
-        rows.append((name, *_cells(proof.parameters[name]), "" if unit == "1" else unit))
+        rows.append((name, *_format_ball(proof.parameters[name]), "" if unit == "1" else unit))
         if name in proof.tangents:
-            rows.append((f"tan({name})", *_cells(proof.tangents[name]), ""))
+            rows.append((f"tan({name})", *_format_ball(proof.tangents[name]), ""))
     own = ((name, x) for name, x in proof.unknowns.items() if not _OF_OTHERS.fullmatch(name))
-    rows += [(name, *_cells(x), units.get(name, "")) for name, x in own]
+    rows += [(name, *_format_ball(x), units.get(name, "")) for name, x in own]
     if proof.abscissa:
-        rows.append(("abscissa", *_cells(proof.abscissa), per))
+        rows.append(("abscissa", *_format_ball(proof.abscissa), per))
     if proof.eigenfrequencies:
         for omega in proof.eigenfrequencies:
-            rows += [(f"eigenfrequency{times_of(omega.multiplicity)}, re", *_cells(omega.re), "")]
-            rows += [("  im", *_cells(omega.im), "")]
+            rows += [(f"eigenfrequency{format_multiplicity(omega.multiplicity)}, re", *_format_ball(omega.re), "")]
+            rows += [("  im", *_format_ball(omega.im), "")]
         return rows
     listed = {number.value for number in proof.unknowns.values()}
     for root in (r for r in proof.roots if r.re.value not in listed or r.im.value != "0"):
-        times = times_of(root.multiplicity)
+        times = format_multiplicity(root.multiplicity)
         if root.im.value == "0":
-            rows.append((f"root{times}", *_cells(root.re), per))
+            rows.append((f"root{times}", *_format_ball(root.re), per))
         elif not root.im.value.startswith("-"):
-            rows += [(f"pair{times}, re", *_cells(root.re), per), ("  im ±", *_cells(root.im), per)]
+            rows += [(f"pair{times}, re", *_format_ball(root.re), per), ("  im ±", *_format_ball(root.im), per)]
     return rows
 
 
-def _units(problem: Posed, proof: Proof) -> dict[str, str]:
+def _find_units(problem: Posed, proof: Proof) -> dict[str, str]:
     """The unit of each number that has one: of the unknowns of a pattern, powers of the unit of the roots."""
     units = units_of(problem)
     per = units.get("abscissa", "")
@@ -114,7 +125,7 @@ def _units(problem: Posed, proof: Proof) -> dict[str, str]:
     return units
 
 
-def _method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+def _describe_method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
     """How it was proved, how near the stored design is, and how alone."""
     if proof.method == "exact factorisation":
         yield Sentence("square-free factorisation of the polynomial, whose coefficients are fractions", "method")
@@ -130,21 +141,21 @@ def _method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
         yield Sentence(f"the stored design is {proof.distance:.1e} from it; {explained}")
 
 
-def _facts(proof: Proof) -> Iterator[Sentence]:
+def _write_facts(proof: Proof) -> Iterator[Sentence]:
     of = " (of the design as stored)" if proof.stored and proof.reason else ""
     asked = "EP" in proof.pattern and proof.defective != NOTHING
     if asked or proof.geometric_multiplicity is not None:
-        yield _verdict(f"defective{of}", proof.defective)
-    yield _verdict(f"stable{of}", proof.stable)
+        yield _write_verdict(f"defective{of}", proof.defective)
+    yield _write_verdict(f"stable{of}", proof.stable)
     if not proof.eigenfrequencies:
-        yield _verdict(f"heavily damped{of}", proof.heavily_damped)
-    yield _verdict("in the box", proof.inside)
+        yield _write_verdict(f"heavily damped{of}", proof.heavily_damped)
+    yield _write_verdict("in the box", proof.inside)
     yield from (Sentence(str(verdict), name) for name, verdict in proof.limits.items())
 
 
-def _exact_numbers(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+def _write_exact_numbers(problem: Posed, proof: Proof) -> Iterator[Sentence]:
     """Numbers that were taken exactly, and a word on angles."""
-    exact = [*(f"{name} = {_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
+    exact = [*(f"{name} = {_format_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
     if exact:
         yield Sentence(", ".join(exact), "taken exactly")
     of = problem.parameter_set
@@ -153,7 +164,7 @@ def _exact_numbers(problem: Posed, proof: Proof) -> Iterator[Sentence]:
         yield Sentence("the decimal of the double in radians, not an angle in degrees", ", ".join(angles))
 
 
-def _fraction(text: str) -> str:
+def _format_fraction(text: str) -> str:
     """A fraction; a decimal where that is shorter."""
     try:
         decimal = fraction(Fraction(text), 30)
@@ -162,27 +173,27 @@ def _fraction(text: str) -> str:
     return decimal.value if decimal.radius == "0" and len(decimal.value) <= len(text) + 1 else text
 
 
-def _cells(number: Number) -> tuple[str, str]:
+def _format_ball(number: Number) -> tuple[str, str]:
     return number.value, "exact" if number.radius == "0" else f"± {number.radius}"
 
 
-def _verdict(label: str, verdict: Verdict) -> Sentence:
+def _write_verdict(label: str, verdict: Verdict) -> Sentence:
     answer = {True: "yes", False: "no", None: "cannot be told"}[verdict.holds]
     return Sentence(f"{answer}, {verdict.words}", label)
 
 
-def every_words(every: Every) -> Iterator[Badge]:
+def summarise_every(every: Every) -> Iterator[Badge]:
     """How many designs, and whether they are all."""
-    yield Badge(count_of(len(every.solutions), "design"))
+    yield Badge(count_things(len(every.solutions), "design"))
     complete = every.completeness is not None and every.completeness.complete
     yield Badge("proved to be all", "good") if complete else Badge("not proved to be all")
 
 
-def every_sections(every: Every, _level: Level) -> Iterator[Chapter]:
+def write_every(every: Every, _level: Level) -> Iterator[Chapter]:
     """All designs with a pattern, one column each, and what the proof or the search says about others."""
     found, coverage, proof = every.solutions, every.coverage, every.completeness
     complete = proof is not None and proof.complete
-    many = count_of(len(found), "solution")
+    many = count_things(len(found), "solution")
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if not found:
         none = f"no design in the box and within the limits has the pattern (proved; {effort})"
@@ -192,12 +203,12 @@ def every_sections(every: Every, _level: Level) -> Iterator[Chapter]:
         all_of_them = f"these are all: {many} in the box (proved; {effort})"
         located = all_of_them if complete else f"{many} in the box"
         yield Chapter("answer", (Sentence(located, f"locate {found[0].problem.locate}", "answer"),))
-        yield Chapter("designs", (TableBlock(_design_rows(every, complete), "Designs with the pattern"),), "", "wide")
-    lines = [*(_proof_lines(proof, effort) if proof else ()), *(_search_lines(coverage) if coverage else ())]
+        yield Chapter("designs", (TableBlock(_list_designs(every, complete), "Designs with the pattern"),), "", "wide")
+    lines = [*(_describe_proof(proof, effort) if proof else ()), *(_describe_coverage(coverage) if coverage else ())]
     yield Chapter("proof", tuple(map(Sentence, lines)))
 
 
-def _design_rows(every: Every, complete: bool) -> list[Sequence[Cell | str]]:
+def _list_designs(every: Every, complete: bool) -> list[Sequence[Cell | str]]:
     found, problem = every.solutions, every.solutions[0].problem
     names = [n for n in found[0].parameters if n in problem.free]
     off: Sequence[Mapping[str, float]] = every.errors or ({},) * len(found)
@@ -208,11 +219,11 @@ def _design_rows(every: Every, complete: bool) -> list[Sequence[Cell | str]]:
     decays = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
     rows += [(f"abscissa {units[0].text}".rstrip(), *decays), ("structure", *(s.structure for s in found))]
     rows += [("met", *(str(h) for h in every.coverage.hits))] if every.coverage else []
-    rows += [("proved", *map(yes_no, every.proved))] if any(every.proved) and not complete else []
+    rows += [("proved", *map(say_whether, every.proved))] if any(every.proved) and not complete else []
     return rows
 
 
-def _proof_lines(proof: Completeness, effort: str) -> Iterator[str]:
+def _describe_proof(proof: Completeness, effort: str) -> Iterator[str]:
     for k, limit in enumerate(proof.limits, start=1):
         if limit:
             yield f"solution {k} lies on a limit, {limit}, as far as 25 digits tell: it may be just beyond"
@@ -224,7 +235,7 @@ def _proof_lines(proof: Completeness, effort: str) -> Iterator[str]:
         yield f"undecided: {', '.join(f'{n} {Cell(lo)} … {Cell(hi)}' for n, (lo, hi) in place.ranges.items())}"
 
 
-def _search_lines(coverage: Coverage) -> Iterator[str]:
+def _describe_coverage(coverage: Coverage) -> Iterator[str]:
     if coverage.crossings:
         yield f"{coverage.crossings} starts ended where roots meet in a {CROSSING}"
     doubt = (
@@ -241,6 +252,6 @@ def _search_lines(coverage: Coverage) -> Iterator[str]:
 
 
 MAKERS: Mapping[str, Maker] = {
-    "Proof": Maker(proof_words, proof_sections, "draw_roots"),
-    "Every": Maker(every_words, every_sections, "draw_designs"),
+    "Proof": Maker(summarise_proof, write_proof, "draw_roots"),
+    "Every": Maker(summarise_every, write_every, "draw_designs"),
 }

@@ -71,8 +71,8 @@ def report(result: Any, full: bool = False) -> str:
 
 def headline(result: Any) -> str:
     """What it is and how it ended, then its title as far as there is room."""
-    words = tuple(maker_of(result).words(result))
-    return to_headline(Document(type(result).__name__, title_of(result), words, "brief"), WIDTH)
+    escape_text = tuple(maker_of(result).words(result))
+    return to_headline(Document(type(result).__name__, title_of(result), escape_text, "brief"), WIDTH)
 
 
 def title_of(result: Any) -> str:
@@ -122,7 +122,7 @@ def plot(result: Any, ax: "Axes | None" = None) -> "Axes":
     return axes
 
 
-def fragment(result: Any) -> str:
+def to_notebook(result: Any) -> str:
     """A result for a notebook: its words, its brief document, its picture."""
     from tmsopt.documents.html import to_fragment
 
@@ -185,11 +185,11 @@ def _origin(
     result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
 ) -> Iterator[tuple[Chapter, str]]:
     """The explorer, the report as text, then versions, system, date, seed, command and files."""
-    from tmsopt.documents.explored import explorer_frame
-    from tmsopt.documents.html import listing, verbatim, words
+    from tmsopt.documents.explored import frame_explorer
+    from tmsopt.documents.html import escape_text, mark_list, mark_verbatim
 
-    yield Chapter("explorer", (), "Explorer", "whole"), explorer_frame(result, design)
-    text = verbatim(report(result, full), "report as text")
+    yield Chapter("explorer", (), "Explorer", "whole"), frame_explorer(result, design)
+    text = mark_verbatim(report(result, full), "report as text")
     yield (
         Chapter("text", (), "As text", "whole"),
         f"<details><summary>The report as text</summary>{text}</details>",
@@ -203,9 +203,11 @@ def _origin(
         "seed": "" if seed is None else str(seed),
     }
     texts = "\n".join(
-        f"<h3>{words(n)}</h3>\n{verbatim(t, n)}" for n, t in ({"command": command} | dict(files)).items() if t
+        f"<h3>{escape_text(n)}</h3>\n{mark_verbatim(t, n)}"
+        for n, t in ({"command": command} | dict(files)).items()
+        if t
     )
-    yield Chapter("origin", (), "Where it is from", "whole"), listing(about.items()) + texts
+    yield Chapter("origin", (), "Where it is from", "whole"), mark_list(about.items()) + texts
 
 
 def response(solution: Any, **asked: Any) -> Any:

@@ -23,22 +23,22 @@ _OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
 
-def robustness_words(found: Robustness) -> Iterator[Badge]:
+def summarise_robustness(found: Robustness) -> Iterator[Badge]:
     """How far stability reaches, and to what."""
     if found.stable is not None:
         yield Badge("stable", "good") if found.stable else Badge("not stable", "bad")
-    yield Badge(_value("radius" if found.stable else "to stability", found.limit.distance))
+    yield Badge(_format_value("radius" if found.stable else "to stability", found.limit.distance))
     if found.limit.found:
         yield Badge(f"to {found.limit.kind}")
 
 
-def robustness_sections(found: Robustness, _level: Level) -> Iterator[Chapter]:
+def write_robustness(found: Robustness, _level: Level) -> Iterator[Chapter]:
     """The sentence, then the nearest point of every boundary."""
-    yield Chapter("answer", (Sentence(robustness_line(found), "robustness", "answer"),))
-    yield Chapter("boundaries", (robustness_grid(found),))
+    yield Chapter("answer", (Sentence(describe_robustness(found), "robustness", "answer"),))
+    yield Chapter("boundaries", (tabulate_boundaries(found),))
 
 
-def robustness_line(found: Robustness, on_edge: bool = False) -> str:
+def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
     """How large a change ends stability, or brings it, how, and by which parameters mostly.
 
     Args:
@@ -56,26 +56,26 @@ def robustness_line(found: Robustness, on_edge: bool = False) -> str:
     if not limit.found:
         return f"{'' if found.stable else 'not stable; '}no change in reach of the search makes it {other}"
     if not found.stable:
-        return f"not stable; {_size(found)} makes it stable{_mostly(limit)}"
-    return f"{_size(found)} {_event(found.problem.model, limit.kind)}{_mostly(limit)}"
+        return f"not stable; {_describe_size(found)} makes it stable{_name_largest(limit)}"
+    return f"{_describe_size(found)} {_describe_event(found.problem.model, limit.kind)}{_name_largest(limit)}"
 
 
-def _event(model: Model, kind: str) -> str:
+def _describe_event(model: Model, kind: str) -> str:
     if kind == "infinity":
         return "takes a root through infinity (a0 = 0)"
     word = words_of(model)[kind]
     return f"makes it {_VERBS.get(word, word)}"
 
 
-def robustness_grid(found: Robustness) -> TableBlock:
+def tabulate_boundaries(found: Robustness) -> TableBlock:
     """The nearest point of every boundary: its distance and the change of each parameter."""
     names = list(found.weights)
     kinds: tuple[Nearest, ...] = (found.weave, found.capsize, found.infinity, found.heavy_damping)
     kinds = kinds if found.problem.model.carrier is None else kinds[:1]
     rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
     for n in kinds:
-        moves = _moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
-        rows.append((_row_name(n, found), _distance(n, found), *moves))
+        moves = _format_moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
+        rows.append((_name_row(n, found), _format_distance(n, found), *moves))
     units = {name: unit_of(found.problem.posed, name) for name in names}
     rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
     for n in kinds:
@@ -87,13 +87,13 @@ def robustness_grid(found: Robustness) -> TableBlock:
     return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
 
 
-def nearest_words(nearest: Nearest) -> Iterator[Badge]:
+def summarise_nearest(nearest: Nearest) -> Iterator[Badge]:
     """Which boundary, and how far."""
     yield Badge(nearest.kind)
-    yield Badge(_value("distance", nearest.distance) if nearest.found else "none found")
+    yield Badge(_format_value("distance", nearest.distance) if nearest.found else "none found")
 
 
-def nearest_sections(found: Nearest, _level: Level) -> Iterator[Chapter]:
+def write_nearest(found: Nearest, _level: Level) -> Iterator[Chapter]:
     """How far one boundary is, then its nearest point and the change of each parameter in weights."""
     if not found.found:
         yield Chapter("answer", (Sentence(f"no point of the boundary of {found.kind} was found"),))
@@ -105,29 +105,29 @@ def nearest_sections(found: Nearest, _level: Level) -> Iterator[Chapter]:
     yield Chapter("boundary", (TableBlock(rows, "Nearest point of the boundary"),))
 
 
-def _row_name(n: Nearest, found: Robustness) -> str:
+def _name_row(n: Nearest, found: Robustness) -> str:
     to = "at the edge of" if n.distance == 0 else "to"
     if n.kind != "heavy damping":
         return f"{to} {in_words_of(found.problem.model, n.kind)}"
     return f"{to} {n.kind}" if n.distance == 0 else f"{'out of' if found.heavily_damped else 'into'} {n.kind}"
 
 
-def _distance(n: Nearest, found: Robustness) -> str:
+def _format_distance(n: Nearest, found: Robustness) -> str:
     if not n.found:
         return "none found"
     if n.distance == 0:
         return ""
-    return _percent(n.distance) if found.relative else f"{n.distance:.4g}"
+    return _format_percent(n.distance) if found.relative else f"{n.distance:.4g}"
 
 
-def _moves(n: Nearest, relative: bool) -> list[str]:
+def _format_moves(n: Nearest, relative: bool) -> list[str]:
     """The change of each parameter; 0 for one that is too little to matter."""
     largest = max(map(abs, n.direction.values()))
     shown = (x if abs(x) >= _LITTLE * largest else 0.0 for x in n.direction.values())
-    return ["0" if x == 0 else _percent(x, "+") if relative else f"{x:+.3g}" for x in shown]
+    return ["0" if x == 0 else _format_percent(x, "+") if relative else f"{x:+.3g}" for x in shown]
 
 
-def _mostly(limit: Nearest) -> str:
+def _name_largest(limit: Nearest) -> str:
     """The parameters that change most."""
     changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
     largest = abs(changes[0][1])
@@ -135,23 +135,23 @@ def _mostly(limit: Nearest) -> str:
     return f", mostly {', '.join(named[:_NAMED])}" if named and len(changes) > 1 else ""
 
 
-def _size(found: Robustness) -> str:
+def _describe_size(found: Robustness) -> str:
     if found.relative:
-        return f"{_percent(found.limit.distance)} of change"
+        return f"{_format_percent(found.limit.distance)} of change"
     return f"a change of {found.limit.distance:.2g} in {'your' if found.problem.weights else 'the'} weights"
 
 
-def _percent(x: float, sign: str = "") -> str:
+def _format_percent(x: float, sign: str = "") -> str:
     """Two significant digits at least."""
     digits = 1 if x == 0 else max(1 - math.floor(math.log10(abs(100 * x))), 0)
     return f"{100 * x:{sign}.{digits}f} %"
 
 
-def _value(name: str, value: float) -> str:
+def _format_value(name: str, value: float) -> str:
     return f"{name} = {value:.5g}" if math.isfinite(value) else f"no {name}"
 
 
 MAKERS: Mapping[str, Maker] = {
-    "Robustness": Maker(robustness_words, robustness_sections, "draw_robustness"),
-    "Nearest": Maker(nearest_words, nearest_sections, "draw_robustness"),
+    "Robustness": Maker(summarise_robustness, write_robustness, "draw_robustness"),
+    "Nearest": Maker(summarise_nearest, write_nearest, "draw_robustness"),
 }

@@ -20,24 +20,24 @@ from tmsopt.documents.blocks import (
     Verbatim,
 )
 from tmsopt.documents.design_rows import (
-    at_worst,
-    inertia_line,
-    load_line,
-    motion_line,
-    parameter_rows,
-    pitch_line,
-    quantity_rows,
-    role,
-    roots_line,
-    si_parameters,
-    speed_in,
-    stored_lines,
-    tidy,
+    convert_to_si,
+    describe_inertia,
+    describe_loads,
+    describe_motion,
+    describe_pitching,
+    describe_roots,
+    describe_speed,
+    describe_stored,
+    list_parameters,
+    list_quantities,
+    name_role,
+    parameters_of_worst_case,
+    round_to_zero,
 )
-from tmsopt.documents.explanation import diagnosis_blocks, optimality_blocks, rounding_grid, rounding_line
-from tmsopt.documents.maker import Maker, untitled
-from tmsopt.documents.robustness import robustness_grid, robustness_line
-from tmsopt.documents.speeds import range_line
+from tmsopt.documents.explanation import describe_rounding, explain_diagnosis, explain_optimality, tabulate_rounding
+from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.robustness import describe_robustness, tabulate_boundaries
+from tmsopt.documents.speeds import describe_range
 from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.guide import describe
 from tmsopt.models import tms
@@ -55,7 +55,7 @@ _OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
 Blocks = Iterator[Block]
 
 
-def solution_words(solution: Solution) -> Iterator[Badge]:
+def summarise_solution(solution: Solution) -> Iterator[Badge]:
     """Status, objective, structure, proof, stability."""
     problem = solution.problem.posed
     yield Badge(status_text(problem, solution.status), "good" if solution.status == "optimal" else "bad")
@@ -72,10 +72,10 @@ def solution_words(solution: Solution) -> Iterator[Badge]:
     if verdict := solution.stability.verdict:
         rounded = ROUNDED if solution.stability.on_edge and not solution.edge_is_exact else ""
         growth = f" as {solution.stability.growth}" if solution.stability.growth else ""
-        yield Badge(f"{verdict}{growth}{rounded}", _verdict_tone(solution))
+        yield Badge(f"{verdict}{growth}{rounded}", judge_tone(solution))
 
 
-def solution_sections(
+def write_solution(
     solution: Solution, level: Level, *, full: bool = False, si: Mapping[str, float] | None = None
 ) -> Iterator[Chapter]:
     """The parts of the report in order.
@@ -84,33 +84,33 @@ def solution_sections(
         full: of a page, whether it has all that takes long.
         si: parameters in SI, such as `si_parameters` gives for another scale: a brief report shows them then.
     """
-    analysis, scaled = solution.analysis, si or si_parameters(solution)
+    analysis, scaled = solution.analysis, si or convert_to_si(solution)
     full, page, brief = full or level == "full", level == "page", level == "brief"
     first = "conflict" if solution.status == "infeasible" else "answer"
-    yield Chapter(first, tuple(_answer(solution, analysis, brief, full)))
+    yield Chapter(first, tuple(_write_answer(solution, analysis, brief, full)))
     if page:
-        yield from bicycle_sections(solution)
+        yield from write_bicycle(solution)
     notes = (Sentence(note, "note") for note in solution.notes)
-    yield Chapter("design", (*_design(solution, scaled, brief, si is not None), *notes), "Parameters", "wide")
-    yield Chapter("motion", tuple(_motion(solution, analysis, scaled, brief)))
+    yield Chapter("design", (*_write_design(solution, scaled, brief, si is not None), *notes), "Parameters", "wide")
+    yield Chapter("motion", tuple(_write_motion(solution, analysis, scaled, brief)))
     if page:
-        yield from growth_sections(solution)
-    yield Chapter("cases", tuple(_cases(solution)))
-    limits, sureness = _limits(solution, analysis, full, page), _sureness(solution, analysis, brief, full)
+        yield from write_growth_picture(solution)
+    yield Chapter("cases", tuple(_write_cases(solution)))
+    limits, sureness = _write_limits(solution, analysis, full, page), _write_sureness(solution, analysis, brief, full)
     if brief:
-        yield Chapter("limits", (*limits, *sureness, _more(solution, analysis)))
+        yield Chapter("limits", (*limits, *sureness, _suggest_more(solution, analysis)))
         return
     yield Chapter("limits", tuple(limits), "", "wide")
     yield Chapter("sureness", tuple(sureness), "How sure it is")
     if full:
-        yield Chapter("roots", tuple(_roots(solution, analysis)))
-    rows = quantity_rows(solution, scaled)
+        yield Chapter("roots", tuple(_write_roots(solution, analysis)))
+    rows = list_quantities(solution, scaled)
     head = ("quantity", "value", "unit", "in SI", "meaning")
     yield Chapter("quantities", (TableBlock((head, *rows), "Quantities of the design"),), "Derived quantities", "wide")
-    yield Chapter("search", tuple(_search(solution)))
+    yield Chapter("search", tuple(_write_search(solution)))
 
 
-def bicycle_sections(solution: Solution) -> Iterator[Chapter]:
+def write_bicycle(solution: Solution) -> Iterator[Chapter]:
     """The bicycle to scale, or the sketch that its model has."""
     if solution.problem.model is tms:
         caption = "The bicycle from its right side, to scale, in wheelbases; z points down"
@@ -119,12 +119,12 @@ def bicycle_sections(solution: Solution) -> Iterator[Chapter]:
         yield Chapter("bicycle", (Verbatim(sketch, "sketch of the model, not to scale"),))
 
 
-def growth_sections(solution: Solution) -> Iterator[Chapter]:
+def write_growth_picture(solution: Solution) -> Iterator[Chapter]:
     """Growth rates and frequencies over the speed, or the first parameter."""
     from tmsopt.dynamics import growth
 
     try:
-        found = growth(untitled(solution))
+        found = growth(remove_titles(solution))
     except Exception:  # a root at infinity, or nothing that could vary: nothing to draw
         return
     caption = f"Growth rates and frequencies over {found.over.name}; stable where it is shaded"
@@ -132,21 +132,21 @@ def growth_sections(solution: Solution) -> Iterator[Chapter]:
     yield Chapter("growth", (figure,), "Growth and frequencies")
 
 
-def parameter_grid(solution: Solution, si: Mapping[str, float]) -> TableBlock:
+def tabulate_parameters(solution: Solution, si: Mapping[str, float]) -> TableBlock:
     """Every parameter with its role, its range, what it is in the other set, and its meaning."""
     ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
     other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
     rows: list[Sequence[Cell | str]] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
-    for name, value, unit, how, also, meaning in parameter_rows(solution, si):
+    for name, value, unit, how, also, meaning in list_parameters(solution, si):
         rows.append((name, value, unit, how, ranges[str(name)] if how == "free" else "", also, meaning))
     return TableBlock(rows, "Parameters of the design")
 
 
-def headline_of(solution: Solution) -> tuple[Sentence, Sentence]:
+def write_headline(solution: Solution) -> tuple[Sentence, Sentence]:
     """How it ended, and what was asked, in words."""
     problem = solution.problem.posed
     text = problem.minimize or problem.maximize
-    value = show_at(problem, text, at_worst(solution), solution.value, 8) if text else ""
+    value = show_at(problem, text, parameters_of_worst_case(solution), solution.value, 8) if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
     sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
@@ -154,23 +154,23 @@ def headline_of(solution: Solution) -> tuple[Sentence, Sentence]:
     structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
     structure += ROUNDED if solution.multiple_as_rounded else ""
     found = "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
-    return Sentence(ended, tone=_verdict_tone(solution)), Sentence(found, tone="answer")
+    return Sentence(ended, tone=judge_tone(solution)), Sentence(found, tone="answer")
 
 
-def _verdict_tone(solution: Solution) -> Tone:
+def judge_tone(solution: Solution) -> Tone:
     if solution.status != "optimal" or solution.stability.verdict == UNSTABLE:
         return "bad"
     return "good" if solution.stability.verdict == STABLE else "doubt"
 
 
-def _answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
-    ended, asked = headline_of(solution)
+def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
+    ended, asked = write_headline(solution)
     obstacles, further = analysis.obstacles
     if solution.status == "infeasible":
         joined = ": " not in ended.text and obstacles
         yield Sentence(f"{ended.text}: {obstacles[0]}" if joined else ended.text, tone="bad")
         yield from map(Sentence, obstacles[1:] if joined else obstacles)
-        yield from (Sentence(text, "violated") for text in _violated(solution))
+        yield from (Sentence(text, "violated") for text in _list_violations(solution))
         yield Sentence(asked.text, "nearest design")
     else:
         yield from (ended, asked, *map(Sentence, obstacles))
@@ -183,7 +183,7 @@ def _answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> 
         yield Sentence(", ".join(active), "active limits")
 
 
-def _violated(solution: Solution) -> Iterator[str]:
+def _list_violations(solution: Solution) -> Iterator[str]:
     problem = solution.problem.posed
     for name, value in solution.violations.items():
         asked = limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
@@ -191,57 +191,60 @@ def _violated(solution: Solution) -> Iterator[str]:
         yield f"{name} ({asked}){by if name not in _OTHER else ''}"
 
 
-def _design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Blocks:
+def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Blocks:
     """Free parameters side by side where they are many, and the fixed ones in a sentence; or all in a table."""
     if not brief:
-        yield parameter_grid(solution, si)
+        yield tabulate_parameters(solution, si)
         return
     problem, of = solution.problem.posed, solution.problem.posed.parameter_set
-    other = {row[0]: row[4] for row in parameter_rows(solution, si, _DIGITS)} if scaled else {}
-    cells = {p.name: Cell(tidy(solution, p.name), unit_of(problem, p.name), _DIGITS, named=True) for p in of.parameters}
+    other = {row[0]: row[4] for row in list_parameters(solution, si, _DIGITS)} if scaled else {}
+    cells = {
+        p.name: Cell(round_to_zero(solution, p.name), unit_of(problem, p.name), _DIGITS, named=True)
+        for p in of.parameters
+    }
     rows = [(p.name, cells[p.name], other.get(p.name, "")) for p in of.parameters if p.name in problem.free]
     if rows:
         yield TableBlock((("", "", ""), *rows), fold=_FOLD, tone="answer")
     rest = [
         f"{p.name} = {cells[p.name]}"
         for p in of.parameters
-        if role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
+        if name_role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
     ]
     more = f", and {len(rest) - _FIXED} more" if len(rest) > _FIXED else ""
     if rest:
         yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
 
 
-def _motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Blocks:
-    at = speed_in(solution, solution.worst)
-    yield Sentence(f"{f'at {at}: ' if at else ''}{motion_line(solution)}", "motion")
+def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Blocks:
+    at = describe_speed(solution, solution.worst)
+    yield Sentence(f"{f'at {at}: ' if at else ''}{describe_motion(solution)}", "motion")
     if analysis.stable_speeds is not None:
-        yield Sentence(range_line(analysis.stable_speeds, solution))
-    label, text = roots_line(solution, _DIGITS)
+        yield Sentence(describe_range(analysis.stable_speeds, solution))
+    label, text = describe_roots(solution, _DIGITS)
     yield Sentence(text, label)
     if not brief:
-        yield from map(Sentence, stored_lines(solution))
+        yield from map(Sentence, describe_stored(solution))
     if "load_rear" in solution.quantities:
-        yield Sentence(f"{load_line(solution)}; {pitch_line(solution, si)}", "loads")
+        yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution, si)}", "loads")
     if omits := solution.problem.model.omits:
         yield Sentence(omits, "model")
-    if inertia := inertia_line(solution):
+    if inertia := describe_inertia(solution):
         yield Sentence(inertia, "inertia at which it is no longer stable, each alone (radius of gyration)")
 
 
-def _cases(solution: Solution) -> Blocks:
+def _write_cases(solution: Solution) -> Blocks:
     """The worst case, and what is known of all of them."""
     if solution.worst is None:
         return
     of, cover = solution.problem, solution.cover
     yield Sentence(
-        f"{_place(solution, solution.worst)}; motion and roots are those there, the rest nominal", "worst case"
+        f"{_describe_case(solution, solution.worst)}; motion and roots are those there, the rest nominal", "worst case"
     )
     if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
         label = "least damped case found" if of.tolerances else "least damped case"
-        yield Sentence(f"{_place(solution, solution.least_damped)}; the damping ratio is that there", label)
+        yield Sentence(f"{_describe_case(solution, solution.least_damped)}; the damping ratio is that there", label)
     if solution.fastest is not None and solution.fastest != solution.worst:
-        text = f"{_place(solution, solution.fastest)}; limits on the frequency are on that there"
+        text = f"{_describe_case(solution, solution.fastest)}; limits on the frequency are on that there"
         yield Sentence(text, "fastest case")
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
@@ -249,7 +252,7 @@ def _cases(solution: Solution) -> Blocks:
         yield Sentence(f"abscissa at most {Cell(cover.limit, unit, named=True)}, {means}", "every case")
 
 
-def _place(solution: Solution, case: Case) -> str:
+def _describe_case(solution: Solution, case: Case) -> str:
     """Values of scenarios and errors of parameters in a case."""
     units = {n: unit_of(solution.problem.posed, n) for n in {**case.at, **case.offset}}
     at = [f"{n} = {units[n].show(v, 6)}" for n, v in case.at.items()]
@@ -258,19 +261,19 @@ def _place(solution: Solution, case: Case) -> str:
     )
 
 
-def _limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Blocks:
+def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Blocks:
     found = analysis.resolved if full else analysis.explanation
-    if page and (rows := limit_rows(solution)):
+    if page and (rows := list_limits(solution)):
         yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
     if found is not None and found.levers:
-        worth = [lever_cells(solution, lever) for lever in found.levers]
+        worth = [list_lever(solution, lever) for lever in found.levers]
         head = ("active limit", "stands at", "a move of it", "buys, to first order")
         yield TableBlock((head, *worth), "What the active limits are worth", most=_LIMITS)
         yield from (Sentence(lever.sentence) for lever in found.levers if full)
     yield from (Sentence(text, "warning", "doubt") for text in (found.warnings if found else ()))
 
 
-def limit_rows(solution: Solution) -> list[tuple[str, str, str]]:
+def list_limits(solution: Solution) -> list[tuple[str, str, str]]:
     """Each constraint, and what else is violated: what it says, and whether it holds, is active or is violated."""
     problem = solution.problem.posed
     others = [name for name in solution.violations if name not in problem.constraints]
@@ -278,17 +281,17 @@ def limit_rows(solution: Solution) -> list[tuple[str, str, str]]:
         n: limit_text(problem, n) or ("pattern" if n in problem.located else "")
         for n in (*problem.constraints, *others)
     }
-    return [(name, text, _stands(solution, name)) for name, text in said.items()]
+    return [(name, text, _describe_standing(solution, name)) for name, text in said.items()]
 
 
-def _stands(solution: Solution, name: str) -> str:
+def _describe_standing(solution: Solution, name: str) -> str:
     if name in solution.violations:
         by, unit = solution.violations[name], unit_of(solution.problem.posed, name)
         return f"violated by {unit.show(by, 4)}" if math.isfinite(by) else "has no value"
-    return "active" if name in solution.active else f"holds{_margin(solution, name)}"
+    return "active" if name in solution.active else f"holds{_describe_margin(solution, name)}"
 
 
-def _margin(solution: Solution, name: str) -> str:
+def _describe_margin(solution: Solution, name: str) -> str:
     """By how much an inequality holds, the least over the cases of the design; empty where that is no number."""
     problem, condition = solution.problem.posed, solution.problem.posed.conditions[name]
     if condition.equality:
@@ -306,7 +309,7 @@ def _margin(solution: Solution, name: str) -> str:
     return f" by {unit.show(left, 4)}" if math.isfinite(left) else ""
 
 
-def lever_cells(solution: Solution, lever: Lever) -> tuple[str, ...]:
+def list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     """An active limit: its name, what it says, a small move of it, and what that buys to first order."""
     limit = limit_text(solution.problem.posed, lever.name)
     if not lever.step:
@@ -315,36 +318,36 @@ def lever_cells(solution: Solution, lever: Lever) -> tuple[str, ...]:
     return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
 
 
-def _sureness(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
+def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
     robust = analysis.boundaries if full else analysis.robustness
     if robust is not None:
-        yield Sentence(robustness_line(robust, solution.stability.on_edge), "robustness")
+        yield Sentence(describe_robustness(robust, solution.stability.on_edge), "robustness")
         if full:
-            yield robustness_grid(robust)
+            yield tabulate_boundaries(robust)
     if (found := analysis.explanation) is not None and found.precision:
-        yield Sentence(rounding_line(found), "rounding")
+        yield Sentence(describe_rounding(found), "rounding")
         if not brief:
-            yield rounding_grid(found)
+            yield tabulate_rounding(found)
     if not brief:
         yield from map(Sentence, bound_lines(solution))
     if found is not None and not brief:
-        yield from optimality_blocks(found.optimality)
+        yield from explain_optimality(found.optimality)
 
 
-def _roots(solution: Solution, analysis: Analysis) -> Blocks:
+def _write_roots(solution: Solution, analysis: Analysis) -> Blocks:
     if solution.multiple_as_rounded:
         yield Sentence("roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed")
     for diagnosis in analysis.diagnoses:
-        yield from diagnosis_blocks(diagnosis, full=True)
+        yield from explain_diagnosis(diagnosis, full=True)
 
 
-def _search(solution: Solution) -> Blocks:
+def _write_search(solution: Solution) -> Blocks:
     free, starts, problem = solution.freedom, solution.starts, solution.problem
     if problem.locate:
         parameters = "parameter" if free.free == 1 else "parameters"
         conditions = "condition" if free.conditions == 1 else "conditions"
         yield Sentence(f"{free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}", "freedom")
-    yield from map(Sentence, branch_lines(solution))
+    yield from map(Sentence, list_branches(solution))
     if starts.tried:
         led = starts.tried - starts.runs
         also = f", {led} of which lead{'s' * (led == 1)} straight to where others ended" if starts.runs and led else ""
@@ -353,7 +356,7 @@ def _search(solution: Solution) -> Blocks:
         yield Sentence(f"{tried}{sampled}; {solution.seconds:.2f} s", "starts")
 
 
-def branch_lines(solution: Solution) -> list[str]:
+def list_branches(solution: Solution) -> list[str]:
     """Other designs that solve the same equations, and what excludes them."""
     problem, lines = solution.problem.posed, []
     for branch in solution.branches:
@@ -362,7 +365,7 @@ def branch_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def _more(solution: Solution, analysis: Analysis) -> Sentence:
+def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
     """How to see more, and the commands that have something to say of the same file."""
     problem, solved = solution.problem.posed, solution.status == "optimal"
     commands = {
@@ -376,4 +379,4 @@ def _more(solution: Solution, analysis: Analysis) -> Sentence:
     return Sentence(f"--full; then tmsopt {named} with the same file" if named else "--full", "more", "dim")
 
 
-MAKERS: Mapping[str, Maker] = {"Solution": Maker(solution_words, solution_sections, "draw_growth")}
+MAKERS: Mapping[str, Maker] = {"Solution": Maker(summarise_solution, write_solution, "draw_growth")}

@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from tmsopt import plots
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_of
-from tmsopt.documents.design_rows import frequency_of, times_of
-from tmsopt.documents.maker import Maker, untitled
+from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_things
+from tmsopt.documents.design_rows import format_frequency, format_multiplicity
+from tmsopt.documents.maker import Maker, remove_titles
 from tmsopt.dynamics.crossings import Crossing, Stretch
 from tmsopt.dynamics.growth import Growth
 from tmsopt.dynamics.speeds import Speeds, speed_of
@@ -17,14 +17,14 @@ from tmsopt.problem.unit_system import Unit, unit_of, unit_of_all
 _DIGITS = 15
 
 
-def speeds_words(found: Speeds) -> Iterator[Badge]:
+def summarise_speeds(found: Speeds) -> Iterator[Badge]:
     """Where the design is stable."""
     yield Badge(found.parameter)
-    yield Badge(f"stable {_ranges(found.stable, unit_of(found.problem.posed, found.parameter))}")
-    yield Badge(count_of(len(found.found), "critical value"))
+    yield Badge(f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.parameter))}")
+    yield Badge(count_things(len(found.found), "critical value"))
 
 
-def speeds_sections(found: Speeds, level: Level) -> Iterator[Chapter]:
+def write_speeds(found: Speeds, level: Level) -> Iterator[Chapter]:
     """The stable and the heavily damped bands, and every speed with what happens there."""
     unit, real = unit_of(found.problem.posed, found.parameter), found.problem.model.carrier is None
     end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
@@ -33,20 +33,20 @@ def speeds_sections(found: Speeds, level: Level) -> Iterator[Chapter]:
     answer: list[Block] = [Sentence(f"{asked}, by exact root isolation for the numbers as stored")]
     answer += [Sentence(found.problem.model.omits, "model")] if found.problem.model.omits else []
     yield Chapter("range", tuple(answer), "Answer")
-    yield Chapter("speeds", (_crossings(found, unit, real),), "Critical speeds", "wide")
-    bands = [Sentence(text) for text in _identities(found)]
-    bands.append(Sentence(_bands(found, found.stable), "stable", "good" if found.stable else "bad"))
+    yield Chapter("speeds", (_tabulate_crossings(found, unit, real),), "Critical speeds", "wide")
+    bands = [Sentence(text) for text in _list_identities(found)]
+    bands.append(Sentence(_describe_bands(found, found.stable), "stable", "good" if found.stable else "bad"))
     if found.always and (found.zeros or "weave" in found.always):
-        bands.append(Sentence(_bands(found, found.marginal), _marginally(found), "doubt"))
+        bands.append(Sentence(_describe_bands(found, found.marginal), _describe_marginal(found), "doubt"))
     if real:
-        bands.append(Sentence(_bands(found, found.heavily_damped), "heavily damped"))
+        bands.append(Sentence(_describe_bands(found, found.heavily_damped), "heavily damped"))
     yield Chapter("bands", tuple(bands))
     if level == "page":
         caption = f"Roots over {found.parameter}"
-        yield Chapter("picture", (Figure(lambda: plots.draw_speeds(untitled(found)), caption),))
+        yield Chapter("picture", (Figure(lambda: plots.draw_speeds(remove_titles(found)), caption),))
 
 
-def _crossings(found: Speeds, unit: Unit, real: bool) -> Block:
+def _tabulate_crossings(found: Speeds, unit: Unit, real: bool) -> Block:
     if not found.found:
         root, axis = ("root", "imaginary") if real else ("eigenfrequency", "real")
         others = f"besides what holds for every {found.parameter}, " if found.always else ""
@@ -56,19 +56,19 @@ def _crossings(found: Speeds, unit: Unit, real: bool) -> Block:
     roots = f"root {per.text}".rstrip() if real else "eigenfrequency"
     rows: list[Sequence[Cell | str]] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
     for c in found.found:
-        place = _root(c, per) if real else frequency_of(-c.root.im, c.root.re, 12, c.root.multiplicity)
-        rows.append((in_words_of(found.problem.model, c.kind), Cell(c.at, unit, _DIGITS), place, _meaning(c)))
+        place = _format_root(c, per) if real else format_frequency(-c.root.im, c.root.re, 12, c.root.multiplicity)
+        rows.append((in_words_of(found.problem.model, c.kind), Cell(c.at, unit, _DIGITS), place, _describe_change(c)))
     return TableBlock(rows, "Speeds at which the motion changes", needs=(3, 3, 1, 2))
 
 
-def growth_words(found: Growth) -> Iterator[Badge]:
+def summarise_growth(found: Growth) -> Iterator[Badge]:
     """Where the design is stable."""
     yield Badge(f"over {found.over.name}")
-    yield Badge(f"stable {_ranges(found.stable, unit_of(found.problem.posed, found.over.name))}")
+    yield Badge(f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.over.name))}")
     yield Badge(found.structure)
 
 
-def growth_sections(found: Growth, _level: Level) -> Iterator[Chapter]:
+def write_growth(found: Growth, _level: Level) -> Iterator[Chapter]:
     """Over what, where the design stands, and the stable and the heavily damped bands."""
     unit, real = unit_of(found.problem.posed, found.over.name), found.problem.model.carrier is None
     critical = f", critical value {unit.show(found.critical, 8)}" if math.isfinite(found.critical) else ""
@@ -81,7 +81,7 @@ def growth_sections(found: Growth, _level: Level) -> Iterator[Chapter]:
     yield Chapter("answer", tuple(lines))
 
 
-def _identities(found: Speeds) -> Iterator[str]:
+def _list_identities(found: Speeds) -> Iterator[str]:
     """What holds whatever the parameter; the places in the table are those where more happens."""
     name = found.parameter
     if found.zeros:
@@ -95,7 +95,7 @@ def _identities(found: Speeds) -> Iterator[str]:
         yield f"a root is at infinity for every {name}"
 
 
-def _marginally(found: Speeds) -> str:
+def _describe_marginal(found: Speeds) -> str:
     """What the bands mean in which roots stay on the imaginary axis."""
     if found.zeros > 1:
         kind = "marginally stable" if "weave" in found.always else "stable"
@@ -103,32 +103,32 @@ def _marginally(found: Speeds) -> str:
     return "marginally stable (no root right of the imaginary axis, those on it simple)"
 
 
-def _root(c: Crossing, unit: Unit) -> str:
+def _format_root(c: Crossing, unit: Unit) -> str:
     if c.kind == "infinity":
         return "infinite"
-    times = times_of(c.root.multiplicity)
+    times = format_multiplicity(c.root.multiplicity)
     if not c.root.im:
         return f"{unit.number(c.root.re, 12)}{times}"
     real = f"{unit.number(c.root.re, 12)} " if c.root.re else ""
     return f"{real}± {unit.number(c.root.im, 12)}i{times}"
 
 
-def _meaning(c: Crossing) -> str:
+def _describe_change(c: Crossing) -> str:
     if c.changes:
         return "stability changes"
     return "rightmost" if c.rightmost else ""
 
 
-def _bands(found: Speeds, bands: Sequence[Stretch]) -> str:
-    return _band_text(bands, (found.lower, found.upper), unit_of(found.problem.posed, found.parameter))
+def _describe_bands(found: Speeds, bands: Sequence[Stretch]) -> str:
+    return _format_bands(bands, (found.lower, found.upper), unit_of(found.problem.posed, found.parameter))
 
 
-def _ranges(bands: Sequence[Stretch], unit: Unit) -> str:
+def _format_ranges(bands: Sequence[Stretch], unit: Unit) -> str:
     listed = ", ".join(f"{unit.number(low)} to {unit.number(high)}" for low, high in bands)
     return f"{listed} {unit.text}".strip() if listed else "nowhere"
 
 
-def _band_text(bands: Sequence[Stretch], within: Stretch, unit: Unit, digits: int = 8) -> str:
+def _format_bands(bands: Sequence[Stretch], within: Stretch, unit: Unit, digits: int = 8) -> str:
     """Bands as a reader writes them."""
     parts = []
     for low, high in bands:
@@ -140,17 +140,17 @@ def _band_text(bands: Sequence[Stretch], within: Stretch, unit: Unit, digits: in
     return text if text in ("nowhere", "everywhere") else f"{text} {unit.text}".rstrip()
 
 
-def range_line(stable: Sequence[Stretch], solution: Solution) -> str:
+def describe_range(stable: Sequence[Stretch], solution: Solution) -> str:
     """The bands of its speed in which a design is stable, and its own speed."""
     of = solution.problem.posed.parameter_set
     name = speed_of(of)
     assert name is not None
     unit, ends = unit_of(solution.problem.posed, name), of[name].range
-    bands = _band_text(stable, (ends.lower, ends.upper), unit, 5)
+    bands = _format_bands(stable, (ends.lower, ends.upper), unit, 5)
     return f"stable in {name}: {bands}; this design at {unit.show(solution.parameters[name])}"
 
 
 MAKERS: Mapping[str, Maker] = {
-    "Speeds": Maker(speeds_words, speeds_sections, "draw_speeds"),
-    "Growth": Maker(growth_words, growth_sections, "draw_growth"),
+    "Speeds": Maker(summarise_speeds, write_speeds, "draw_speeds"),
+    "Growth": Maker(summarise_growth, write_growth, "draw_growth"),
 }

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
-from tmsopt.documents.blocks import Badge, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_of, yes_no
-from tmsopt.documents.maker import Maker, untitled
-from tmsopt.documents.tables import asked_section, thin_rows
+from tmsopt.documents.blocks import Badge, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_things, say_whether
+from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.tables import thin_rows, write_question
 from tmsopt.problem import show_at, status_text, unit_at, unit_of
 from tmsopt.studies.rows import Row
 from tmsopt.studies.run import Results
@@ -21,46 +21,48 @@ _DIGITS = 6
 _SHARES = {"stable": "stable", "feasible": "every constraint met", "good": "both"}
 
 
-def results_words(results: Results) -> Iterator[Badge]:
+def summarise_results(results: Results) -> Iterator[Badge]:
     """Rows and how they ended."""
-    yield Badge(count_of(len(results.rows), "row"))
+    yield Badge(count_things(len(results.rows), "row"))
     for status, count in results.summary.counts.items():
         yield Badge(f"{count} {status_text(results.study.problem.posed, status)}")
 
 
-def results_sections(results: Results, level: Level) -> Iterator[Chapter]:
+def write_results(results: Results, level: Level) -> Iterator[Chapter]:
     """What varies, how the rows ended, the best one, what they say together, and the first rows."""
     study, found, page = results.study, results.summary, level == "page"
-    yield Chapter("answer", (Sentence(_headline(study, found), tone="answer"),))
+    yield Chapter("answer", (Sentence(_describe_study(study, found), tone="answer"),))
     if page:
         from tmsopt import plots
 
         random = study.method == "monte_carlo"
         caption = "How the designs are distributed" if random else "The objective over what varies"
-        yield Chapter("picture", (Figure(lambda: plots.draw_histogram(untitled(results)), caption),), "Rows together")
+        yield Chapter(
+            "picture", (Figure(lambda: plots.draw_histogram(remove_titles(results)), caption),), "Rows together"
+        )
     if page:
         rows, notes = thin_rows(results.rows, "rows", "tmsopt study FILE --export rows.csv writes all")
     else:
         rows, notes = list(islice(results.rows, _FIRST if level == "brief" else LISTED)), ()
         hidden = found.rows > len(rows)
         notes = (Sentence(f"… {found.rows} rows in all; --export rows.csv writes them"),) if hidden and rows else ()
-    cells = study_rows(study, rows)
+    cells = list_rows(study, rows)
     needs = [9, 8, *[7] * len(study.columns), 6, *[4] * (len(cells[0]) - len(study.columns) - 3)]
     grid = (TableBlock(cells, "Rows of the study", needs, rest="--export rows.csv"),) if rows else ()
     yield Chapter("rows", (*grid, *notes), "Rows", "whole")
-    yield Chapter("facts", tuple(_facts(study, found)), "Together")
+    yield Chapter("facts", tuple(_write_facts(study, found)), "Together")
     if page:
-        yield asked_section(study.problem.posed)
+        yield write_question(study.problem.posed)
 
 
-def row_sentence(study: Study, row: Row) -> str:
+def describe_row(study: Study, row: Row) -> str:
     """One row: its number, seed, what varies and how it ended."""
     given = ", ".join(f"{name} = {Cell(value)}" for name, value in row.varied.items())
     parts = [f"row {row.number}: {given}", f"seed {row.seed}", status_text(study.problem.posed, row.status), row.cause]
     return "; ".join(part for part in parts if part)
 
 
-def _headline(study: Study, found: Summary) -> str:
+def _describe_study(study: Study, found: Summary) -> str:
     """How the rows were made and how they ended."""
     names = ", ".join(study.columns)
     if study.grid_shape is not None:
@@ -71,7 +73,7 @@ def _headline(study: Study, found: Summary) -> str:
     return f"{made}; {counts or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
 
 
-def study_rows(study: Study, rows: Sequence[Row]) -> list[Sequence[Cell | str]]:
+def list_rows(study: Study, rows: Sequence[Row]) -> list[Sequence[Cell | str]]:
     """Headings, and the cells of each row, in the units in which the problem was written."""
     problem = study.problem.posed
     free = [name for name in problem.free if name not in study.columns]
@@ -83,10 +85,10 @@ def study_rows(study: Study, rows: Sequence[Row]) -> list[Sequence[Cell | str]]:
     units = {n: f"{n} {unit_at(problem, n, some).text}".rstrip() for n in names}
     varied, objective, rest = ([units[n] for n in listed] for listed in (study.columns, asked, (*free, *reports)))
     head = ["row", "stable", *varied, "status", *objective, units["abscissa"], "structure", *rest]
-    return [tuple(head), *(_cells(study, row, asked, free, reports) for row in rows)]
+    return [tuple(head), *(_list_row(study, row, asked, free, reports) for row in rows)]
 
 
-def _cells(
+def _list_row(
     study: Study, row: Row, asked: Sequence[str], free: Sequence[str], reports: Sequence[str]
 ) -> Sequence[Cell | str]:
     problem = study.problem.posed
@@ -98,7 +100,7 @@ def _cells(
     found = (row.parameters, row.reports) if known else ({}, {})
     return (
         str(row.number),
-        yes_no(row.stable) if known else "",
+        say_whether(row.stable) if known else "",
         *(cell(n, row.varied) for n in study.columns),
         status_text(problem, row.status),
         *(cell(n, {n: row.objective} if known else {}) for n in asked),
@@ -109,7 +111,7 @@ def _cells(
     )
 
 
-def _facts(study: Study, found: Summary) -> Iterator[Sentence]:
+def _write_facts(study: Study, found: Summary) -> Iterator[Sentence]:
     problem = study.problem.posed
     if found.best is not None and study.problem.free:
         given = ", ".join(f"{n} = {unit_of(problem, n).show(x, _DIGITS)}" for n, x in found.best.varied.items())
@@ -133,7 +135,7 @@ def _facts(study: Study, found: Summary) -> Iterator[Sentence]:
         yield Sentence(f"{len(found.laws)} laws apply; greatest relative residual {value:.0e} ({label})")
     if found.product is not None:
         for name, words in _SHARES.items():
-            yield Sentence(_share(getattr(found.product, name)), words)
+            yield Sentence(_describe_share(getattr(found.product, name)), words)
         values = found.clocked.get("quantiles", tuple(found.product.abscissa.values()))
         each = zip(found.product.abscissa, values, strict=True)
         at = ", ".join(f"{100 * float(q):g} % {Cell(value, digits=_DIGITS)}" for q, value in each)
@@ -146,7 +148,7 @@ def _facts(study: Study, found: Summary) -> Iterator[Sentence]:
     yield from map(Sentence, study.notes)
 
 
-def _share(share: Share) -> str:
+def _describe_share(share: Share) -> str:
     if not share.of:
         return "no row so far"
     low, high = share.interval
@@ -155,4 +157,4 @@ def _share(share: Share) -> str:
     )
 
 
-MAKERS: Mapping[str, Maker] = {"Results": Maker(results_words, results_sections, "draw_histogram")}
+MAKERS: Mapping[str, Maker] = {"Results": Maker(summarise_results, write_results, "draw_histogram")}

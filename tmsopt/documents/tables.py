@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tmsopt.documents.blocks import Block, Chapter, Listing, Sentence, TableBlock, yes_no
+from tmsopt.documents.blocks import Block, Chapter, Listing, Sentence, TableBlock, say_whether
 from tmsopt.guide import describe
 from tmsopt.problem import Posed
 
@@ -18,7 +18,7 @@ MOST = 2000
 _DIGITS = 6
 
 
-def asked_section(problem: Posed) -> Chapter:
+def write_question(problem: Posed) -> Chapter:
     """What was asked: parameters, values and ranges with their meaning, objective and limits."""
     described = describe(problem)
     given = [w for of in described.sets for w in of.parameters]
@@ -31,11 +31,11 @@ def asked_section(problem: Posed) -> Chapter:
     return Chapter("parameters", blocks, "", "wide")
 
 
-def records_section(result: Any) -> Chapter:
+def tabulate_records(result: Any) -> Chapter:
     """Records of a result as they are, numbers in rad and SI."""
     records: list[Mapping[str, Any]] = [*islice(result.records(), MOST + 1)]
     heads = tuple(records[0]) if records else ("",)
-    rows = [tuple(cell_text(record.get(n, "")) for n in heads) for record in records[:MOST]]
+    rows = [tuple(format_value(record.get(n, "")) for n in heads) for record in records[:MOST]]
     grid = TableBlock((heads, *rows), type(result).__name__)
     note = (Sentence(f"the first {MOST} rows."),) if len(records) > MOST else ()
     return Chapter("rows", (*note, grid), "", "whole")
@@ -55,11 +55,11 @@ def thin_rows(rows: Sequence[T], name: str, whole: str, keep: Iterable[int] = ()
     return kept, (Sentence(f"{len(kept)} of {len(rows)} {name}, spread evenly; {whole}."),)
 
 
-def cell_text(value: Any) -> str:
+def format_value(value: Any) -> str:
     """A value of a record as the cell of a table."""
     match value:
         case None | bool():
-            return yes_no(value)
+            return say_whether(value)
         case float():
             return f"{value + 0.0:.{_DIGITS}g}" if math.isfinite(value) else "none"
     return str(value)

@@ -29,8 +29,8 @@ def to_text(document: Document, width: int = WIDTH, colour: bool = False, ascii_
         colour: with escape codes that a terminal shows as colours.
         ascii_only: without letters that an encoding may not have.
     """
-    lines = [(line, tone) for line, tone in _lines(document, width, ascii_only)]
-    text = "\n".join(_coloured(line.rstrip(), tone) if colour else line.rstrip() for line, tone in lines)
+    lines = [(line, tone) for line, tone in _lay_out(document, width, ascii_only)]
+    text = "\n".join(_colour(line.rstrip(), tone) if colour else line.rstrip() for line, tone in lines)
     return re.sub(r"\n{3,}", "\n\n", text).strip("\n")
 
 
@@ -42,10 +42,10 @@ def to_headline(document: Document, width: int = WIDTH) -> str:
     return f"{document.kind}({text if len(text) <= room else text[: room - 1].rstrip() + '…'})"
 
 
-def _lines(document: Document, width: int, ascii_only: bool) -> Iterator[Line]:
+def _lay_out(document: Document, width: int, ascii_only: bool) -> Iterator[Line]:
     full = document.level != "brief"
     if document.title:
-        yield from ((line, "") for line in wrap(_spelled(document.title, ascii_only), width))
+        yield from ((line, "") for line in wrap(_spell(document.title, ascii_only), width))
     for section in document.sections:
         shown = [block for block in section.blocks if not isinstance(block, Figure)]
         if not shown:
@@ -53,23 +53,23 @@ def _lines(document: Document, width: int, ascii_only: bool) -> Iterator[Line]:
         if full:
             yield from (("", ""), (section.title, "answer"), ("-" * len(section.title), ""))
         for block in shown:
-            yield from _of_block(block, width, ascii_only, full)
+            yield from _lay_out_block(block, width, ascii_only, full)
         if not full:
             yield "", ""
 
 
-def _of_block(block: Block, width: int, ascii_only: bool, full: bool) -> Iterator[Line]:
+def _lay_out_block(block: Block, width: int, ascii_only: bool, full: bool) -> Iterator[Line]:
     match block:
         case Sentence(text, label, tone):
             said = f"{label}: {text}" if label else text
-            yield from ((line, tone) for line in wrap(_spelled(said, ascii_only), width))
+            yield from ((line, tone) for line in wrap(_spell(said, ascii_only), width))
         case Listing(items, title):
-            yield from ((line, "") for line in wrap(_spelled(title, ascii_only), width) if title)
-            yield from ((line, "") for line in _listed(items, width, ascii_only))
+            yield from ((line, "") for line in wrap(_spell(title, ascii_only), width) if title)
+            yield from ((line, "") for line in _lay_out_list(items, width, ascii_only))
         case TableBlock():
-            yield from ((line, block.tone) for line in _table(block, width, ascii_only, full))
+            yield from ((line, block.tone) for line in _lay_out_table(block, width, ascii_only, full))
         case Verbatim(text):
-            yield from ((_spelled(line, ascii_only)[:width], "") for line in text.splitlines())
+            yield from ((_spell(line, ascii_only)[:width], "") for line in text.splitlines())
 
 
 def wrap(text: str, width: int, first: str = "", rest: str = "  ") -> list[str]:
@@ -86,31 +86,31 @@ def wrap(text: str, width: int, first: str = "", rest: str = "  ") -> list[str]:
     return [line.replace(_TIED, " ") for line in lines] or [""]
 
 
-def _listed(items: Iterable[tuple[str, str]], width: int, ascii_only: bool) -> Iterator[str]:
-    items = [(_spelled(label, ascii_only), _spelled(text, ascii_only)) for label, text in items]
+def _lay_out_list(items: Iterable[tuple[str, str]], width: int, ascii_only: bool) -> Iterator[str]:
+    items = [(_spell(label, ascii_only), _spell(text, ascii_only)) for label, text in items]
     indent = 4 + max((len(label) for label, _ in items), default=0)
     indent = min(indent, max(width - _NARROW, 2))
     for label, text in items:
         yield from wrap(text, width, f"  {label}".ljust(indent), " " * indent)
 
 
-def _table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -> Iterator[str]:
-    rows = [[_spelled(cell, ascii_only) for cell in row] for row in grid.texts]
-    rows, left = (rows, 0) if full or grid.most is None else _thinned(rows, grid.most, grid.keep)
+def _lay_out_table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -> Iterator[str]:
+    rows = [[_spell(cell, ascii_only) for cell in row] for row in grid.texts]
+    rows, left = (rows, 0) if full or grid.most is None else _thin(rows, grid.most, grid.keep)
     used = [k for k in range(len(rows[0])) if any(row[k] for row in rows)]  # without empty columns
     rows = [[row[k] for k in used] for row in rows]
     head, *body = rows
     if not any(head):
-        yield from _laid_out(_folded(body, grid.fold, width), width)
+        yield from _align(_fold(body, grid.fold, width), width)
     elif full:
-        parts = list(_parts(rows, width))
+        parts = list(_split_columns(rows, width))
         for number, part in enumerate(parts):
-            yield from _laid_out(part, width)
+            yield from _align(part, width)
             yield from [""] * (number < len(parts) - 1)
     else:
         needs = [grid.needs[k] if grid.needs else 0 for k in used]
-        kept = _fitting(rows, needs, width)
-        yield from _laid_out([[row[k] for k in kept] for row in rows], width)
+        kept = _choose_columns(rows, needs, width)
+        yield from _align([[row[k] for k in kept] for row in rows], width)
         gone = [head[k] for k in range(len(head)) if k not in kept and head[k]]
         said = [f"{left} more row{'s' * (left > 1)}"] if left else []
         said += [f"more columns: {', '.join(gone)}"] if gone else []
@@ -119,7 +119,7 @@ def _table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -> Iterat
     yield from [f"  … {left} more: {grid.rest}"] if left else ()
 
 
-def _thinned(rows: list[list[str]], most: int, keep: Iterable[int]) -> tuple[list[list[str]], int]:
+def _thin(rows: list[list[str]], most: int, keep: Iterable[int]) -> tuple[list[list[str]], int]:
     head, *body = rows
     if len(body) <= most:
         return rows, 0
@@ -130,15 +130,15 @@ def _thinned(rows: list[list[str]], most: int, keep: Iterable[int]) -> tuple[lis
     return [head, *(body[k] for k in chosen)], len(body) - len(chosen)
 
 
-def _fitting(rows: list[list[str]], needs: Sequence[int], width: int) -> list[int]:
+def _choose_columns(rows: list[list[str]], needs: Sequence[int], width: int) -> list[int]:
     """Columns that fit; the last one counts as narrow, for its words are wrapped."""
     kept = list(range(len(rows[0])))
-    while len(kept) > 1 and _width([[row[k] for k in kept] for row in rows]) > width:
+    while len(kept) > 1 and _measure_width([[row[k] for k in kept] for row in rows]) > width:
         kept.remove(min(reversed(kept), key=lambda k: needs[k]))
     return kept
 
 
-def _width(rows: list[list[str]]) -> int:
+def _measure_width(rows: list[list[str]]) -> int:
     columns = [max(map(len, column)) for column in zip(*rows, strict=True)]
     words = any(" " in row[-1] for row in rows)
     last = (
@@ -147,12 +147,12 @@ def _width(rows: list[list[str]]) -> int:
     return sum(columns[:-1]) + 2 * len(columns) + last
 
 
-def _parts(rows: list[list[str]], width: int) -> Iterator[list[list[str]]]:
+def _split_columns(rows: list[list[str]], width: int) -> Iterator[list[list[str]]]:
     """The table as it is where it fits; else in parts below each other, each with the first column."""
     start = 1
     while True:
         end = start + 1
-        while end < len(rows[0]) and _width([[row[0], *row[start : end + 1]] for row in rows]) <= width:
+        while end < len(rows[0]) and _measure_width([[row[0], *row[start : end + 1]] for row in rows]) <= width:
             end += 1
         yield [[row[0], *row[start:end]] for row in rows] if len(rows[0]) > 1 else rows
         if end >= len(rows[0]):
@@ -160,7 +160,7 @@ def _parts(rows: list[list[str]], width: int) -> Iterator[list[list[str]]]:
         start = end
 
 
-def _folded(rows: list[list[str]], fold: int, width: int) -> list[list[str]]:
+def _fold(rows: list[list[str]], fold: int, width: int) -> list[list[str]]:
     """Rows side by side, down the first column first, where they are many and there is room."""
     if not fold or len(rows) <= fold:
         return rows
@@ -171,7 +171,7 @@ def _folded(rows: list[list[str]], fold: int, width: int) -> list[list[str]]:
     return [[cell for b in blocks for cell in (b[k] if k < len(b) else blank)] for k in range(height)]
 
 
-def _laid_out(rows: list[list[str]], width: int) -> Iterator[str]:
+def _align(rows: list[list[str]], width: int) -> Iterator[str]:
     """Columns as wide as their widest cells; the last one is wrapped."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     indent = 2 + sum(w + 2 for w in widths[:-1])
@@ -183,13 +183,13 @@ def _laid_out(rows: list[list[str]], width: int) -> Iterator[str]:
             yield from wrap(row[-1], width, before, " " * indent)
 
 
-def _spelled(text: str, ascii_only: bool) -> str:
+def _spell(text: str, ascii_only: bool) -> str:
     """Without controls, which may come from anybody's file, and where asked for without letters beyond ASCII."""
     text = "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)
     return text.translate(_LETTERS) if ascii_only else text
 
 
-def _coloured(line: str, tone: Tone) -> str:
+def _colour(line: str, tone: Tone) -> str:
     if not tone or not line:
         return line
     from rich.color import ColorSystem  # and nothing of it where nothing is coloured
