@@ -263,7 +263,7 @@ def test_every_parameter_is_listed_with_its_law_by_how_far_it_moves_the_root():
     a, b, c = symbols("a b c")
     found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
     assert [r.parameter for r in found.responses] == ["b", "a", "c"]
-    line = str(found)
+    line = " ".join(str(found).split())
     assert "of b moves it by 2 ε^(1/2)" in line
     assert "a (absolute) by 1 ε^(1/2)" in line
     assert "c (absolute) by 1 ε" in line

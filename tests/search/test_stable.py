@@ -30,7 +30,7 @@ def found(most, coefficients=(1, X - 2, 1), stability=10.0, **asked):
 
 def headline(design):
     """How it ended, and what is said of stability."""
-    first = re.match(r"[^\n]*\n((?:[^\n]|\n  (?! ))*)", design.report())  # wrapped lines go on two columns in
+    first = re.match(r"((?:[^\n]|\n  (?! ))*)", design.report())  # wrapped lines go on two columns in
     assert first
     return [*" ".join(first[1].split()).split(": "), ""]
 
