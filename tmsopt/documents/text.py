@@ -3,6 +3,7 @@
 import math
 import re
 import textwrap
+import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 
 from tmsopt.documents.blocks import Block, Document, Figure, Listing, Sentence, TableBlock, Tone, Verbatim
@@ -12,12 +13,12 @@ WIDTH = 100
 
 _NARROW, _TIED = 24, "\xa0"  # columns in which words are still wrapped; a space where no line is broken
 _STYLES: dict[Tone, str] = {"answer": "bold", "good": "green", "doubt": "yellow", "bad": "red", "dim": "dim"}
-_ASCII = {
-    **{"√": "sqrt", "±": "+-", "·": " ", "…": "...", "−": "-", "–": "-", "×": "x", "→": "->", "≤": "<=", "≥": ">="},
-    **{"ω": "omega", "ε": "epsilon", "λ": "lambda", "Δ": "delta ", "µ": "u", "π": "pi", "²": "^2", "³": "^3"},
-    **{"⁴": "^4", "½": "1/2", "°": " deg", "’": "'", "“": '"', "”": '"'},
-}
-_LETTERS = str.maketrans(_ASCII)
+_ASCII = str.maketrans(
+    {
+        **{"√": "sqrt", "±": "+-", "·": " ", "…": "...", "−": "-", "–": "-", "×": "x", "→": "->", "≤": "<=", "≥": ">="},
+        **{"²": "^2", "³": "^3", "⁴": "^4", "½": "1/2", "°": " deg", "’": "'", "µ": "u"},
+    }
+)
 
 Line = tuple[str, Tone]
 
@@ -114,9 +115,9 @@ def _lay_out_table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -
         gone = [head[k] for k in range(len(head)) if k not in kept and head[k]]
         said = [f"{left} more row{'s' * (left > 1)}"] if left else []
         said += [f"more columns: {', '.join(gone)}"] if gone else []
-        yield from wrap(f"… {'; '.join(said)} ({grid.rest})", width, "  ", "    ") if said else ()
+        yield from wrap(_spell(f"… {'; '.join(said)} ({grid.rest})", ascii_only), width, "  ", "    ") if said else ()
         return
-    yield from [f"  … {left} more: {grid.rest}"] if left else ()
+    yield from [_spell(f"  … {left} more: {grid.rest}", ascii_only)] if left else ()
 
 
 def _thin(rows: list[list[str]], most: int, keep: Iterable[int]) -> tuple[list[list[str]], int]:
@@ -186,7 +187,16 @@ def _align(rows: list[list[str]], width: int) -> Iterator[str]:
 def _spell(text: str, ascii_only: bool) -> str:
     """Without controls, which may come from anybody's file, and where asked for without letters beyond ASCII."""
     text = "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)
-    return text.translate(_LETTERS) if ascii_only else text
+    return "".join(map(_name_letter, text.translate(_ASCII))) if ascii_only else text
+
+
+def _name_letter(letter: str) -> str:
+    """A letter beyond ASCII by its name where it is Greek, else without its accents, or as a question mark."""
+    if letter.isascii():
+        return letter
+    if (name := unicodedata.name(letter, "")).startswith("GREEK SMALL LETTER "):
+        return name.removeprefix("GREEK SMALL LETTER ").lower()
+    return unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode() or "?"
 
 
 def _colour(line: str, tone: Tone) -> str:
