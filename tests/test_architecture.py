@@ -306,7 +306,7 @@ def test_files_are_written_whole():
     """A full disk or Ctrl-C leaves the earlier file; each exception says why it may."""
     found = {place for m, s in SOURCES.items() for place in written(m, s)}
     assert found == {
-        "tmsopt.cli.ending.streams",  # stdout
+        "tmsopt.cli.ending.open_streams",  # stdout
         "tmsopt.charts.folder.write",
         "tmsopt.charts.folder.sync",
         "tmsopt.charts.folder._create",  # recorded last

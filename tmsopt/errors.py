@@ -154,9 +154,9 @@ def suggest(name: Any, accepted: Iterable[str]) -> str:
     return f"{hint}accepted: {' '.join(names[:_NAMES])}{more}"
 
 
-def nearest(name: str, names: Iterable[str], cutoff: float = 0.5) -> list[str]:
-    """The name that is nearest by spelling, if one is; none for a name of more than 80 characters."""
-    return [] if len(name) > _NAME else get_close_matches(name, islice(names, _NAMES), n=1, cutoff=cutoff)
+def nearest(name: str, names: Iterable[str], cutoff: float = 0.5, most: int = 1) -> list[str]:
+    """The names that are nearest by spelling, at most so many; none for a name of more than 80 characters."""
+    return [] if len(name) > _NAME else get_close_matches(name, islice(names, _NAMES), n=most, cutoff=cutoff)
 
 
 def at_first(advise: Callable[..., str]) -> Callable[..., str]:

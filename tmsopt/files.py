@@ -18,7 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.errors import Fault, InputError, nearest, short
 
 LARGEST = 500_000
 """Bytes; a longer file is not a problem file."""
@@ -29,6 +29,7 @@ LARGEST_JSON = 24_000_000
 _DEEPEST, _MARKS = 100, 1_000_000  # lists and tables inside each other; lists, tables, texts and keys of JSON in all
 _WIDTH = 80  # of a value in a message
 _UNDECODED = re.compile("[\udc80-\udcff]")
+_NEAR = 3  # close names that a message offers
 _NEIGHBOURS = 1000  # files of a folder that are looked at for one that was meant
 
 
@@ -208,8 +209,8 @@ def _opened(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
             raise InputError([Fault(f"is a link to no file; accepted: a {kind}", file=file)])
         if not path.exists():
             others = path.parent.glob(f"*.{form.lower()}") if path.parent.is_dir() else ()
-            near = suggest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)))
-            hint = f"; {near}" if "did you mean" in near else ""
+            near = nearest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)), most=_NEAR)
+            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
             raise InputError([Fault(f"no such file{hint}", file=file)])
         if not path.is_file():
             raise InputError([Fault(f"is not a regular file; accepted: a {kind}", file=file)])

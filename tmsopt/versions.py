@@ -18,6 +18,7 @@ NEEDED = (
     "pydantic",
     "pint",
     "click",
+    "rich",
     "lazy-loader",
     "threadpoolctl",
     "loky",

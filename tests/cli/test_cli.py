@@ -157,6 +157,45 @@ def test_bad_usage_ends_a_process_with_2_and_no_traceback():
     assert "Traceback" not in done.stderr
 
 
+PICTURES = {
+    "speeds": "speeds problems/whipple_benchmark.toml",
+    "prove": "prove problems/ep4.toml",
+    "compare": "compare problems/ep4.toml",
+    "all": "solve problems/ep4_matching.toml --all",
+    "verify": "verify --only tab1-*",
+    "diagnose": "diagnose problems/ep4.toml",
+}
+"""Commands whose result has a picture, beside those tested elsewhere."""
+
+
+@pytest.mark.parametrize("name", ["speeds", *(pytest.param(n, marks=pytest.mark.slow) for n in PICTURES if n != "speeds")])
+def test_every_result_with_a_picture_is_drawn(name, tmp_path, run):
+    path = tmp_path / "picture.png"
+    status, out, err = run(*PICTURES[name].split(), "--plot", path)
+    assert (status, err) == (0, f"wrote {path}\n")
+    assert out
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_diagnose_says_how_each_multiple_root_splits(run):
+    status, out, err = run("diagnose", "problems/ep4.toml", "--json")
+    data = json.loads(out)
+    assert (status, err, data["schema"], data["status"]) == (0, "", 1, "optimal")
+    (root,) = data["diagnoses"]
+    assert (root["algebraic"], root["geometric"]) == (4, 1)
+    status, out, _ = run("diagnose", "problems/ep4.toml")
+    assert (status, "4" in out) == (0, True)
+
+
+def test_diagnose_of_simple_roots_says_so(run, tmp_path):
+    words = "diagnose", "problems/whipple_benchmark.toml"
+    assert json.loads(run(*words, "--json")[1])["diagnoses"] == []
+    status, out, err = run(*words, "--plot", tmp_path / "none.png")
+    assert (status, len(out.splitlines()), len(err.splitlines())) == (0, 1, 1)
+    assert "no root of this solution is multiple" in out
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("ending", ["png", *(pytest.param(e, marks=pytest.mark.slow) for e in ("pdf", "svg"))])
 def test_plot_is_written_whole(tmp_path, ending, run):
     path = tmp_path / f"growth.{ending}"
@@ -208,7 +247,7 @@ def test_what_would_have_no_effect_or_no_end_is_refused(run, words, said):
     assert said in err
 
 
-@pytest.mark.parametrize("option", ["--certify", "--full", "--plot=all.png", "--wheelbase=2", "--rear-mass=3"])
+@pytest.mark.parametrize("option", ["--certify", "--full", "--wheelbase=2", "--rear-mass=3"])
 def test_all_designs_are_not_one(run, option):
     code, out, err = run("solve", "problems/ep4_matching.toml", "--all", option)
     assert (code, out) == (2, "")
@@ -321,12 +360,12 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
 
 
 def test_the_rows_of_a_study_are_written_in_blocks_as_they_would_be_at_once(run, tmp_path, monkeypatch):
-    common = import_module("tmsopt.cli.common")
+    answers = import_module("tmsopt.cli.answers")
     text = 'problem = "{}"\n[study]\nmethod = "monte_carlo"\nrows = 7\n[tolerances]\nmu = 0.01\n'
     (tmp_path / "s.toml").write_text(text.format(Path("problems/ep4.toml").resolve()))
     written = []
     for size in (3, 100):
-        monkeypatch.setattr(common, "_BLOCK", size)
+        monkeypatch.setattr(answers, "_BLOCK", size)
         code, out, _ = run("study", tmp_path / "s.toml", "--json", "--store", tmp_path / "s.sqlite")
         assert code == 0
         written.append(json.loads(out))

@@ -25,7 +25,7 @@ pytestmark = [
 
 commands = import_module("tmsopt.cli.commands").every.commands
 ending = import_module("tmsopt.cli.ending")
-common = import_module("tmsopt.cli.common")
+answers = import_module("tmsopt.cli.answers")
 
 STOPPED = "stopped; what was printed before stands\n"
 LONG = 20.0  # seconds, of which a test that passes waits for none
@@ -59,16 +59,6 @@ def box(folder):
 
 def press(number=signal.SIGINT):
     os.kill(os.getpid(), number)
-
-
-@pytest.mark.parametrize("command", commands)
-def test_help_names_what_may_end_every_command(run, command):
-    status, out, _ = run(command, "--help")
-    said = " ".join(out.split("Of every command:")[1].split())
-    assert status == 0
-    assert [said.index(f"{number} ") for number in (1, 2, 130, 143, 129, 141)] == sorted(
-        said.index(f"{number} ") for number in (1, 2, 130, 143, 129, 141)
-    )
 
 
 @pytest.mark.parametrize(("number", "status"), ONCE)
@@ -204,7 +194,7 @@ def test_a_second_one_ends_what_the_first_has_left(run, monkeypatch):
             except KeyboardInterrupt:
                 pytest.fail("the second one is no invitation to leave something")
 
-    monkeypatch.setattr(ending.Heard, "_gone", lambda self: gone.append(self.status))
+    monkeypatch.setattr(ending.Signals, "_exit_soon", lambda self: gone.append(self.status))
     monkeypatch.setattr(ending, "_AGAIN", 0.0)
     at_work(monkeypatch, work)
     assert run("schema") == (130, "", "")
@@ -233,7 +223,7 @@ def test_an_answer_in_hand_is_written_as_a_whole(run, monkeypatch):
         return {"numbers": [*range(1000)]}
 
     def work():
-        common.answer(True, data, str)
+        answers.answer(True, "", data)
         time.sleep(LONG)
 
     at_work(monkeypatch, work)

@@ -8,12 +8,12 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from tmsopt import Progress
+from tmsopt.cli.terminal import describe_progress
 
 if os.name == "posix":
     import fcntl
@@ -86,6 +86,7 @@ COMMANDS = {
     "prove": ("prove {p}/ep4.toml", {"searching", "proving to 30 digits"}),
     "explore": ("explore {p}/ep4.toml -o page.html", {"looking for designs worth going to", "writing the page"}),
     "compare": ("compare {p}/ep4.toml", {"searching", "comparing"}),
+    "diagnose": ("diagnose {p}/ep4.toml", {"searching", "splitting roots"}),
     "simulate": ("simulate {p}/realistic.toml", {"searching", "following the motion"}),
     "speeds": ("speeds {p}/realistic.toml", {"searching", "isolating speeds"}),
     "verify": ("verify --only tab1-*", {"recomputing claims"}),
@@ -276,12 +277,11 @@ def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path, monkeypatch):
     ],
 )
 def test_a_record_in_words(told, since, line):
-    assert import_module("tmsopt.cli.terminal").words(told, since) == line
+    assert describe_progress(told, since) == line
 
 
 def test_what_does_not_fit_is_said_shorter_before_it_is_cut():
-    words = import_module("tmsopt.cli.terminal").words
     told = Progress("searching", 7, 64, "start", 3.0, 19.0, "best abscissa = -0.52")
-    assert words(told, 0.0, 80) == "searching: 7 of 64 starts, about 19 s left; best abscissa = -0.52 (3 s)"
-    assert words(told, 0.0, 39) == "searching: 7/64, 19 s left"
-    assert words(told, 0.0, 12) == "searching: 7"
+    assert describe_progress(told, 0.0, 80) == "searching: 7 of 64 starts, about 19 s left; best abscissa = -0.52 (3 s)"
+    assert describe_progress(told, 0.0, 39) == "searching: 7/64, 19 s left"
+    assert describe_progress(told, 0.0, 12) == "searching: 7"

@@ -1,8 +1,8 @@
-"""The tmsopt command: one thin room per command, over the public functions of the library.
+"""The tmsopt command: one small module for each command, over the public functions of the library.
 
-In: words of a command line. Out: text or JSON on stdout, progress and diagnostics on stderr, an exit status. Heavy
-imports stand inside commands, and this face imports next to nothing: signals are heard before the rest is loaded. Open
-`common` first: what commands share; `ending` has what ends them from outside.
+In: words of a command line. Out: text or JSON on stdout, progress and diagnostics on stderr, an exit status. This face
+imports next to nothing, so that signals are handled before the rest loads. Open `command` first: how a dataclass becomes
+a command; then `answers` and `outputs`: what commands print and write; `ending`: how signals end them.
 """
 
 import os
@@ -10,6 +10,9 @@ import signal
 import sys
 
 from tmsopt.threads import ONE_THREAD
+
+COLOUR, WORDS = "tmsopt.colour", "tmsopt.words"
+"""Keys under which click's context keeps what --color says, and the words of the command line."""
 
 TYPE_CHECKING = False  # typing takes as long to load as all else here
 if TYPE_CHECKING:
@@ -22,24 +25,24 @@ if TYPE_CHECKING:
 def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "NoReturn":
     """Run a command and exit with its status, or with 128 and the number of the signal that stopped it.
 
-    A process of its own has one thread for linear algebra, where the environment does not say otherwise.
+    A process of its own has one thread for linear algebra, unless the environment says otherwise.
 
     Args:
         args: words of the command line; by default those of this program, which then ends.
     """
-    if args is None:  # figures are drawn into files, whatever windows the user's own have; a notebook keeps its own
+    if args is None:  # figures go into files, whatever windows the user has; a notebook keeps its own
         os.environ.pop("MPLBACKEND", None)
         if not ONE_THREAD.keys() & os.environ:
             os.environ.update(ONE_THREAD)
-    if args is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the rest is loaded, as it is for SIGTERM
-    from tmsopt.cli.ending import ended, gone, listening, streams
-    from tmsopt.cli.terminal import showing
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the rest is loaded, as for SIGTERM
+    from tmsopt.cli.ending import exit_now, handle_signals, open_streams, report_end
+    from tmsopt.cli.terminal import show_progress
 
     status: int | str | None = 0
-    with listening(for_good=args is None) as heard:
+    with handle_signals(for_good=args is None) as heard:
         try:
-            with streams() as terminal, ended(), showing(terminal):
+            with open_streams() as terminal, report_end(), show_progress(terminal):
                 from tmsopt.cli.commands import every
 
                 every.main(args, prog_name)
@@ -48,12 +51,12 @@ def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "
         if heard.number is not None:
             status = heard.status
             if args is None:
-                gone(heard.status)
+                exit_now(heard.status)
     sys.exit(status)
 
 
 def __getattr__(name: str) -> object:
-    """The commands as click knows them, ``every``, for programs that call them themselves."""
+    """`every`, the commands as click knows them."""
     if name != "every":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from tmsopt.cli.commands import every

@@ -1,0 +1,30 @@
+"""Whether text has colours: --color on every command, NO_COLOR, and the terminal."""
+
+import os
+import sys
+
+import click
+
+from tmsopt.cli import COLOUR
+
+
+def colour_options() -> list[click.Parameter]:
+    """--color, and its British spelling, which the help leaves out."""
+
+    def keep(context: click.Context, _: click.Parameter, value: str | None) -> None:
+        context.meta[COLOUR] = value or context.meta.get(COLOUR)
+
+    kind, text = click.Choice(["auto", "always", "never"]), "Colour the text.  [default: auto]"
+    return [
+        click.Option([name], type=kind, callback=keep, expose_value=False, hidden=hidden, help=text)
+        for name, hidden in (("--color", False), ("--colour", True))
+    ]
+
+
+def is_coloured() -> bool:
+    """Whether --color, or else the terminal and its environment, ask for colours."""
+    context = click.get_current_context(silent=True)
+    asked = context and context.meta.get(COLOUR)
+    if asked in ("always", "never"):
+        return asked == "always"
+    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb" and not os.environ.get("NO_COLOR")

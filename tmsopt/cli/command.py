@@ -1,0 +1,199 @@
+"""Commands as frozen dataclasses: a field states an argument or an option once, the docstring is the help."""
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields
+from inspect import getdoc
+from pathlib import Path
+from typing import Any, Literal, dataclass_transform, get_args, get_origin
+
+import click
+
+from tmsopt.cli.colours import colour_options
+from tmsopt.cli.outputs import FIGURES, PAGES, check_output
+from tmsopt.cli.terminal import progress_listener
+from tmsopt.errors import MOST_STARTS, Fault, InputError
+
+_COLUMN = 32  # columns of an option in a help
+_RANGES: Mapping[Any, Any] = {int: click.IntRange, float: click.FloatRange}
+_BOUNDS, _OWN = {"min", "max", "min_open"}, {"text", "names", "endings", "example", "parse"}  # click knows the bounds
+
+
+def argument(default: Any = MISSING, **settings: Any) -> Any:
+    """A field that is an argument, with settings of `click.Argument`."""
+    return field(default=default, metadata=settings)
+
+
+def option(text: str, default: Any = None, *names: str, **settings: Any) -> Any:
+    """A field that is an option.
+
+    Args:
+        text: its help.
+        names: further names.
+        settings: `min`, `max` and `min_open` of a number; `endings` of a file to write; an `example` of NAME=VALUE; a
+            function that `parse`s the text; or settings of `click.Option`.
+    """
+    return field(default=default, metadata={"text": text, "names": names, **settings})
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(argument, option))
+class Command:
+    """A command with the values of its arguments and options; each subclass is a frozen dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, kw_only=True)(cls)
+
+    def run(self) -> Any:
+        """Do the work: an `Outcome`, or an exit status, which is 0 for None."""
+        raise NotImplementedError
+
+    def select(self, names: str) -> dict[str, Any]:
+        """The values that are not None, for a function with defaults of its own."""
+        return {name: value for name in names.split() if (value := getattr(self, name)) is not None}
+
+    def refuse_useless(self, *checks: tuple[object, str, str]) -> None:
+        """Refuse options without an effect: whether they have none, their names, what to do.
+
+        Raises:
+            InputError: naming each of them.
+        """
+        wrong = {name: text for useless, names, text in checks if useless for name in names.split()}
+        if faults := [Fault(wrong[n], (_flag_of(n),)) for n, value in vars(self).items() if n in wrong and value]:
+            raise InputError(faults)
+
+
+class FileCommand(Command):
+    file: Path = argument()
+
+
+class Picture(Command):
+    plot: Path | None = option("Draw it (png, pdf, svg).", endings=FIGURES)
+    json: bool = option("Write JSON to stdout instead of text.")
+
+
+class Page(Command):
+    report: Path | None = option("Write a page with pictures (html).", endings=PAGES)
+
+
+class Csv(Command):
+    csv: Path | None = option("Write the table (csv).", endings=("csv",))
+
+
+class Search(Command):
+    starts: int | None = option("Most starts to try.  [default: 64]", min=1, max=MOST_STARTS)
+    seed: int = option("Seed of the starts.", 0, min=0)
+
+    @property
+    def search(self) -> dict[str, Any]:
+        """What verbs that search take."""
+        return {"progress": progress_listener(), **self.select("starts seed")}
+
+
+class IpoptSearch(Search):
+    linear_solver: Literal["mumps", "spral"] = option("Linear solver of IPOPT.", "mumps")
+
+    @property
+    def search(self) -> dict[str, Any]:
+        return super().search | {"linear_solver": self.linear_solver}
+
+
+def build_command(kind: type[Command], name: str) -> click.Command:
+    """The command of a class."""
+    from tmsopt.cli.answers import Outcome, deliver
+
+    def call(**values: Any) -> None:
+        command = kind(**values)
+        found = command.run()
+        if status := deliver(command, found) if isinstance(found, Outcome) else found:
+            sys.exit(status)
+
+    summary, _, rest = (getdoc(kind) or "").partition("\n\n")
+    parameters = [*map(_build_parameter, fields(kind)), *colour_options()]  # type: ignore[arg-type]
+    return _ShortHelp(name, params=parameters, callback=call, help=summary, epilog=rest.replace("\n\nExit", "\nExit"))
+
+
+class _Option(click.Option):
+    """An option without its range in the help; the message about a number outside has it."""
+
+    def get_help_extra(self, ctx: click.Context) -> Any:
+        return {key: value for key, value in super().get_help_extra(ctx).items() if key != "range"}
+
+
+class _ShortHelp(click.Command):
+    """A command whose help has one line for each option, and the examples as they stand."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        options = (p.get_help_record(ctx) for p in self.get_params(ctx) if isinstance(p, click.Option))
+        with formatter.section("Options"):
+            formatter.write_dl([record for record in options if record], _COLUMN)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        formatter.write(f"\n{self.epilog}\nMore: docs/reference/commands.md\n")
+
+
+def _flag_of(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _build_parameter(of: Field[Any]) -> click.Parameter:
+    settings = {key: value for key, value in of.metadata.items() if key not in _OWN | _BOUNDS}
+    hint, default = of.type, None if of.default is MISSING else of.default
+    if type(None) in get_args(hint):
+        hint = get_args(hint)[0]
+    if "text" not in of.metadata:
+        return click.Argument([of.name], type=_type_of(hint), required=of.default is MISSING, **settings)
+    flag, kind = _flag_of(of.name), hint
+    if get_origin(hint) in (tuple, Mapping):
+        kind, settings = get_args(hint)[0], {"multiple": True, **settings}
+    elif hint is bool:
+        kind, settings["is_flag"] = None, True
+        flag += f"/--no-{of.name}" if default else ""
+    return _Option(
+        [of.name, flag, *of.metadata["names"]],
+        type=_type_of(kind, {key: value for key, value in of.metadata.items() if key in _BOUNDS}),
+        default=bool(default) if hint is bool else default,
+        help=of.metadata["text"],
+        callback=_make_reader(hint, of.metadata),
+        show_default=hint is not bool,
+        **settings,
+    )
+
+
+def _type_of(hint: Any, bounds: Mapping[str, Any] | None = None) -> Any:
+    if get_origin(hint) is Literal:
+        return click.Choice(get_args(hint))
+    if hint is Path:
+        return click.Path(path_type=Path)
+    return _RANGES[hint](**bounds) if bounds else str if hint is Any else hint
+
+
+def _make_reader(hint: Any, settings: Mapping[str, Any]) -> Callable[[click.Context, click.Parameter, Any], Any]:
+    """The callback of an option, which refuses a value before any work is done."""
+
+    def read(_context: click.Context, option: click.Parameter, value: Any) -> Any:
+        name, parse = option.opts[0], settings.get("parse")
+        if "endings" in settings:
+            check_output(name, value, settings["endings"])
+        if "example" in settings:
+            texts = [value] if isinstance(value, str) else value or ()
+            return _parse_pairs(name, texts, get_args(hint)[1], settings["example"])
+        return parse(value) if parse and value is not None else value
+
+    return read
+
+
+def _parse_pairs(option: str, texts: Sequence[str], kind: Any, example: str) -> dict[str, Any]:
+    """The values of NAME=VALUE by name."""
+    pairs: dict[str, Any] = {}
+    faults = []
+    for name, text in ([part.strip() for part in text.partition("=")[::2]] for text in texts):
+        try:
+            if not (name and text) or name in pairs:
+                faults.append(Fault(f"found '{name}'; accepted: NAME=VALUE, such as {example}, once", (option,)))
+            else:
+                pairs[name] = kind(text)
+        except ValueError:
+            faults.append(Fault(f"found '{text}'; accepted: a number", (option, name)))
+    if faults:
+        raise InputError(faults)
+    return pairs

@@ -1,0 +1,152 @@
+"""`tmsopt new`, `example`, `describe`, `schema`, `convert` and `import`: files to start from, and what they mean."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+import tmsopt
+from tmsopt import guide
+from tmsopt.cli.answers import answer
+from tmsopt.cli.command import Command, FileCommand, argument, option
+from tmsopt.cli.outputs import check_output, saving, write_new, write_with_companions
+from tmsopt.errors import refusal
+from tmsopt.files import write_text
+
+
+class New(FileCommand):
+    """Write FILE, a commented problem to start from, and tmsopt.schema.json for editors.
+
+    Examples:
+      tmsopt new robot.toml && tmsopt solve robot.toml
+      tmsopt new bicycle.toml --model whipple
+      tmsopt new absorber.toml --model own
+
+    Exit status: 0 done, 2 bad input, such as a FILE that is there already.
+    """
+
+    model: str = option("Its model.", "tms", metavar="[tms|whipple|own]")
+
+    def run(self) -> None:
+        check_output("FILE", self.file, ("toml",))
+        write_with_companions("FILE", self.file, guide.new_problem(self.model))
+
+
+def _complete_names(_context: Any, _argument: Any, incomplete: str) -> list[str]:
+    return [name for name in guide.examples() if name.startswith(incomplete)]
+
+
+class Toml(Command):
+    output: Path | None = option("A new file (toml).", None, "-o", endings=("toml",))
+
+
+class Example(Toml):
+    """Write the example NAME here, with the files it refers to; without a name, list all.
+
+    Examples:
+      tmsopt example
+      tmsopt example ep4 && tmsopt solve ep4.toml
+      tmsopt example delivery_robot --output mine.toml
+
+    Exit status: 0 done, 2 bad input, such as a file that is there already.
+    """
+
+    name: str | None = argument(None, shell_complete=_complete_names)
+    json: bool = option("Write the list as JSON.")
+
+    def run(self) -> None:
+        if self.name is not None:
+            path = self.output or Path(f"{self.name.removesuffix('.toml')}.toml")
+            write_with_companions("--output" if self.output else "NAME", path, guide.example(self.name))
+        elif self.output is not None:
+            raise refusal("found no NAME; tmsopt example lists all", "NAME")
+        else:
+            titles = guide.examples()
+            width = max(map(len, titles), default=0)
+            lines = "\n".join(f"{name.ljust(width)}  {title}" for name, title in titles.items())
+            answer(self.json, lines, lambda: titles)
+
+
+class Describe(Command):
+    """Show symbols, units, signs and meanings of a model, or of the problem or study in FILE.
+
+    Examples:
+      tmsopt describe tms
+      tmsopt describe whipple --json
+      tmsopt describe problems/delivery_robot.toml
+
+    Exit status: 0 done, 2 bad input.
+    """
+
+    what: str = argument(metavar="NAME|FILE")
+    json: bool = option("Write JSON to stdout instead of text.")
+
+    def run(self) -> None:
+        found = tmsopt.describe(self.what)
+        answer(self.json, found, found.to_json)
+
+
+class Schema(Command):
+    """Write the JSON Schema of problem and study files: editors complete and check by it.
+
+    Examples:
+      tmsopt schema --output tmsopt.schema.json
+      tmsopt schema | less
+
+    Exit status: 0 done, 2 bad input.
+    """
+
+    output: Path | None = option("A new file (json).  [default: stdout]", None, "-o", endings=("json",))
+
+    def run(self) -> None:
+        if self.output:
+            write_new("--output", self.output, guide.schema_text())
+        else:
+            click.echo(guide.schema_text(), nl=False)
+
+
+class Convert(Toml, FileCommand):
+    """Make a problem of Whipple's bicycle from the point masses of FILE (tms).
+
+    Examples:
+      tmsopt convert problems/point_mass_robot.toml -o robot.toml
+      tmsopt convert problems/point_mass_robot.toml --body 40x20x30cm -o robot.toml
+      tmsopt convert problems/point_mass_robot.toml --inertia none
+
+    Exit status: 0 done, 2 bad input, such as a file that is there already.
+    """
+
+    to: str = option("The other model.", "whipple", metavar="[whipple]")
+    inertia: str = option("Shape of a body.", "boxes", metavar="[boxes|none]")
+    body: str | None = option("Size of the rear frame, e.g. 40x20x30cm.")
+    front: str | None = option("Size of the front assembly, e.g. 10x10x30cm.")
+
+    def run(self) -> None:
+        text = guide.converted_file(self.file, self.to, self.inertia, self.body, self.front)
+        if self.output:
+            write_with_companions("--output", self.output, text)
+        else:
+            click.echo(text, nl=False)
+
+
+class Import(Toml, FileCommand):
+    """Make a problem file of a bicycle that BicycleParameters has measured.
+
+    Examples:
+      tmsopt import BrowserBenchmark.txt
+      tmsopt import benchmark-browser.yml --speed 4.6 --output browser.toml
+
+    Exit status: 0 done, 2 bad input.
+    """
+
+    speed: float | None = option("Speed in m/s.  [default: of FILE, or 5]", min=0)
+
+    def run(self) -> None:
+        from tmsopt.models import problem_text, read_bicycle
+
+        text = problem_text(read_bicycle(self.file), self.speed)
+        if self.output:
+            with saving("--output", self.output):
+                write_text(self.output, text)
+        else:
+            click.echo(text, nl=False)
