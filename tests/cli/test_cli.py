@@ -168,7 +168,9 @@ PICTURES = {
 """Commands whose result has a picture, beside those tested elsewhere."""
 
 
-@pytest.mark.parametrize("name", ["speeds", *(pytest.param(n, marks=pytest.mark.slow) for n in PICTURES if n != "speeds")])
+@pytest.mark.parametrize(
+    "name", ["speeds", *(pytest.param(n, marks=pytest.mark.slow) for n in PICTURES if n != "speeds")]
+)
 def test_every_result_with_a_picture_is_drawn(name, tmp_path, run):
     path = tmp_path / "picture.png"
     status, out, err = run(*PICTURES[name].split(), "--plot", path)

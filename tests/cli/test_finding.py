@@ -1,6 +1,7 @@
 """The commands by which one finds one's way, by their contract: streams, exit status, files never written over."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -86,6 +87,19 @@ def test_bad_input_is_answered(run, tmp_path, monkeypatch, arguments, said):
     assert (status, out) == (2, "")
     assert said in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_file_names_three_close_ones_at_most(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("robot1", "robot2", "robot3", "robot4", "robots", "absorber"):
+        (tmp_path / f"{name}.toml").write_text("")
+    status, out, err = run("solve", "robot.toml")
+    assert (status, out) == (2, "")
+    assert 1 <= len(set(re.findall(r"'(\w+\.toml)'", err))) <= 3
+    assert "absorber" not in err
+    assert "accepted" not in err
+    assert "tmsopt example ep4" in run("solve", "ep4.toml")[2]
+    assert "example" not in run("solve", "nothing_like_it.toml")[2]
 
 
 @pytest.mark.parametrize(

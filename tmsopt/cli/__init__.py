@@ -1,8 +1,8 @@
 """The tmsopt command: one small module for each command, over the public functions of the library.
 
 In: words of a command line. Out: text or JSON on stdout, progress and diagnostics on stderr, an exit status. This face
-imports next to nothing, so that signals are handled before the rest loads. Open `command` first: how a dataclass becomes
-a command; then `answers` and `outputs`: what commands print and write; `ending`: how signals end them.
+imports next to nothing, so that signals are handled before the rest loads. Open `command` first: how a dataclass
+becomes a command. Then `answers` and `outputs`: what commands print and write. Signals are in `ending`.
 """
 
 import os

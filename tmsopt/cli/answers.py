@@ -26,7 +26,7 @@ class Outcome:
 
     Attributes:
         result: a result, or a text.
-        data: makes the JSON; by default the `to_json` of the result.
+        data: the JSON; by default the `to_json` of the result.
         draw, write_csv: make the figure and the table; by default `plot` and `write_csv` of the result.
         page: options of `tmsopt.save_report`.
         shown: on stdout instead of the result: its document, or a list of results and texts.
@@ -35,7 +35,7 @@ class Outcome:
 
     result: Any
     status: int = 0
-    data: Callable[[], Any] | None = None
+    data: Any = None
     level: str = "brief"
     draw: Callable[[], Any] | None = None
     write_csv: Callable[[Path], object] | None = None
@@ -46,7 +46,7 @@ class Outcome:
 
 def deliver(command: Any, found: Outcome) -> int:
     """Write the answer of a command, then the files that its options name; its exit status."""
-    answer(command.json, found.shown or found.result, found.data or (lambda: found.result.to_json()), found.level)
+    answer(command.json, found.shown or found.result, lambda: found.data or found.result.to_json(), found.level)
     write_files(command, found)
     return found.status
 
@@ -59,8 +59,8 @@ def write_files(command: Any, found: Outcome, *files: Path) -> None:
     if path := paths.get("plot"):
         write_plot(path, found.draw or found.result.plot)
     if path := paths.get("report"):
-        page = {"seed": command.seed} if hasattr(command, "seed") else {}
-        write_report(found.result, path, *files or (command.file,), **page | found.page)
+        page: Mapping[str, Any] = {"seed": command.seed} if hasattr(command, "seed") else {}
+        write_report(found.result, path, *files or (command.file,), **page, **found.page)
 
 
 def answer(as_json: bool, shown: Any, data: Callable[[], Any], level: str = "brief") -> None:

@@ -26,5 +26,5 @@ def is_coloured() -> bool:
     context = click.get_current_context(silent=True)
     asked = context and context.meta.get(COLOUR)
     if asked in ("always", "never"):
-        return asked == "always"
+        return bool(asked == "always")
     return sys.stdout.isatty() and os.environ.get("TERM") != "dumb" and not os.environ.get("NO_COLOR")

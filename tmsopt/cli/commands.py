@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import click
@@ -111,7 +112,7 @@ class _Group(click.Group):
             try:
                 return super().invoke(ctx)
             except InputError as error:
-                click.echo(str(error), err=True)
+                click.echo(f"{error}{_offer_example(error)}", err=True)
                 sys.exit(BAD_INPUT)
             except RuntimeError as error:
                 from tmsopt import NotSolved
@@ -121,6 +122,17 @@ class _Group(click.Group):
                 problem, status = error.solution.problem, error.solution.status
                 click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)
                 sys.exit(STATUSES[status])
+
+
+def _offer_example(error: InputError) -> str:
+    """How to get a missing file that has the name of an example; else empty."""
+    fault = error.faults[0]
+    if not fault.message.startswith("no such file"):
+        return ""
+    from tmsopt.guide import examples
+
+    name = Path(fault.file).stem
+    return f"; tmsopt example {name} writes it here" if name in examples() else ""
 
 
 def _keep_json(ctx: click.Context, _: click.Parameter, given: bool) -> None:
@@ -171,7 +183,9 @@ def every() -> None:
     """
     import logging
 
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it may find no folder for its cache: figures stay the same
+    logging.getLogger("matplotlib").setLevel(
+        logging.ERROR
+    )  # it may find no folder for its cache: figures stay the same
 
 
 every.params += colour_options()

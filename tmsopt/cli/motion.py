@@ -72,7 +72,7 @@ class Simulate(Csv, Page, Picture, FileCommand):
         problem = tmsopt.load(self.file)
         note_scenarios(problem.posed, self.at)
         given = self.select("lean steer push lean_push noise seed seconds points")
-        states = {"start": self.start or None, "at": self.at or None}
+        states: Any = {"start": self.start or None, "at": self.at or None}
         motion = tmsopt.simulate(problem, **states, **given, progress=progress_listener())
         draw = partial(tmsopt.plots.motion_figure, motion)
         return Outcome(motion, draw=draw, write_csv=partial(motion.write_csv, whole=self.path))

@@ -13,6 +13,7 @@ from tmsopt.cli import WORDS
 from tmsopt.cli.ending import BAD_INPUT
 from tmsopt.cli.terminal import progress_listener, show_step
 from tmsopt.errors import refusal
+
 FIGURES, PAGES = ("png", "pdf", "svg"), ("html", "htm")
 """Endings of figures, and of pages to hand on."""
 

@@ -34,7 +34,7 @@ class Prove(Search, Page, Picture, FileCommand):
         proof = tmsopt.prove(solution, self.digits, exact=self.exact, progress=progress_listener())
         status = 0 if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE
         data = problem.heading | {"status": solution.status} | proof.to_json()
-        return Outcome(proof, status, lambda: data, page={"design": solution})
+        return Outcome(proof, status, data, page={"design": solution})
 
 
 class Diagnose(Search, Picture, FileCommand):
@@ -58,7 +58,7 @@ class Diagnose(Search, Picture, FileCommand):
             click.echo("--plot: nothing to draw, no root is multiple", err=True)
         shown = found or "no root of this solution is multiple, so none splits"
         without = "" if found else "plot"
-        return Outcome(found and found[0], 0, lambda: problem.heading | data, "full", shown=shown, without=without)
+        return Outcome(found and found[0], 0, problem.heading | data, "full", shown=shown, without=without)
 
 
 class Compare(IpoptSearch, Picture, FileCommand):

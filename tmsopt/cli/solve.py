@@ -86,7 +86,7 @@ class Solve(IpoptSearch, Csv, Page, Picture, FileCommand):
         if self.all:
             designs = tmsopt.solve_all(problem, **self.search, **self.select("seconds"))
             data = problem.heading | designs.to_json()
-            return Outcome(designs, 0 if designs.solutions else INFEASIBLE, lambda: data)
+            return Outcome(designs, 0 if designs.solutions else INFEASIBLE, data)
         if not problem.pareto:
             solution = tmsopt.solve(problem, throw=False, **self.search)
             if self.certify and not solution.interrupted:
@@ -124,7 +124,7 @@ class Solve(IpoptSearch, Csv, Page, Picture, FileCommand):
             click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         status = INTERRUPTED if solution.interrupted else STATUSES[solution.status]
         page = {"full": self.full}
-        return Outcome(solution, status, lambda: shown, draw=draw, page=page, without=without, shown=shown)
+        return Outcome(solution, status, shown, draw=draw, page=page, without=without, shown=shown)
 
     def _make_json(self, solution: tmsopt.Solution) -> dict[str, Any]:
         """The keys of the contract; with --full all of them, and what the analysis finds."""

@@ -82,11 +82,11 @@ class Study(Page, Picture, FileCommand):
         read = [*self._list_files(), *([self.file.parent / rows] if isinstance(rows, str) else [])]
         taken = {realpath(path): "what the study is read from" for path in read}
         exports = [("--export", target) for target in self.export]
-        for option, path in [("--store", store), *exports, ("--plot", self.plot), ("--report", self.report)]:
+        for name, path in [("--store", store), *exports, ("--plot", self.plot), ("--report", self.report)]:
             if path and (place := realpath(path)) in taken:
-                raise refusal(f"'{path}' is {taken[place]}; give another name", option)
+                raise refusal(f"'{path}' is {taken[place]}; give another name", name)
             if path:
-                taken[place] = f"what {option} writes"
+                taken[place] = f"what {name} writes"
 
     def _list_files(self) -> list[Path]:
         """The study, and the problem if it names one."""
