@@ -139,7 +139,7 @@ class Study(Page, Picture, FileCommand):
         answer(False, shown, dict)
 
     def _answer_row(self, study: tmsopt.Study, number: int) -> None:
-        from tmsopt.documents.studies import row_sentence
+        from tmsopt.documents import row_sentence
         from tmsopt.studies import solve_row
 
         show_step("solving the row")
