@@ -8,18 +8,20 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from tmsopt import Progress
-from tmsopt.cli.terminal import describe_progress
 
 if os.name == "posix":
     import fcntl
     import pty
     import struct
     import termios
+
+describe_progress = import_module("tmsopt.cli.terminal").describe_progress
 
 ROOT = Path(__file__).resolve().parents[2]
 PROBLEMS = ROOT / "problems"

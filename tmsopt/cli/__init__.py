@@ -11,9 +11,6 @@ import sys
 
 from tmsopt.threads import ONE_THREAD
 
-COLOUR, WORDS = "tmsopt.colour", "tmsopt.words"
-"""Keys under which click's context keeps what --color says, and the words of the command line."""
-
 TYPE_CHECKING = False  # typing takes as long to load as all else here
 if TYPE_CHECKING:
     from collections.abc import Sequence

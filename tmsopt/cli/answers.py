@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from tmsopt.cli.colours import is_coloured
+from tmsopt.cli.context import is_coloured
 from tmsopt.cli.ending import hold_signals
 from tmsopt.cli.outputs import write_file, write_plot, write_report
 from tmsopt.cli.terminal import count_columns, hide_progress, progress_listener, show_step
@@ -21,7 +21,7 @@ _LETTERS = "√±×…−ωε"  # of reports
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Reply:
     """What a command found.
 
     Attributes:
@@ -44,14 +44,14 @@ class Outcome:
     without: str = ""
 
 
-def deliver(command: Any, found: Outcome) -> int:
+def deliver(command: Any, found: Reply) -> int:
     """Write the answer of a command, then the files that its options name; its exit status."""
     answer(command.json, found.shown or found.result, lambda: found.data or found.result.to_json(), found.level)
     write_files(command, found)
     return found.status
 
 
-def write_files(command: Any, found: Outcome, *files: Path) -> None:
+def write_files(command: Any, found: Reply, *files: Path) -> None:
     """Write what the options of a command name; `files` state its problem, by default FILE."""
     paths = {n: getattr(command, n, None) for n in ("csv", "plot", "report") if n not in found.without}
     if path := paths.get("csv"):

@@ -1,15 +1,15 @@
 """Commands as frozen dataclasses: a field states an argument or an option once, the docstring is the help."""
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from inspect import getdoc
 from pathlib import Path
 from typing import Any, Literal, dataclass_transform, get_args, get_origin
 
 import click
 
-from tmsopt.cli.colours import colour_options
+from tmsopt.cli.context import colour_options
 from tmsopt.cli.outputs import FIGURES, PAGES, check_output
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.errors import MOST_STARTS, Fault, InputError
@@ -44,12 +44,12 @@ class Command:
         dataclass(frozen=True, kw_only=True)(cls)
 
     def run(self) -> Any:
-        """Do the work: an `Outcome`, or an exit status, which is 0 for None."""
+        """Do the work: an `Reply`, or an exit status, which is 0 for None."""
         raise NotImplementedError
 
     def select(self, names: str) -> dict[str, Any]:
-        """The values that are not None, for a function with defaults of its own."""
-        return {name: value for name in names.split() if (value := getattr(self, name)) is not None}
+        """The values that are there and not None, for a function with defaults of its own."""
+        return {name: value for name in names.split() if (value := getattr(self, name, None)) is not None}
 
     def refuse_useless(self, *checks: tuple[object, str, str]) -> None:
         """Refuse options without an effect: whether they have none, their names, what to do.
@@ -62,51 +62,51 @@ class Command:
             raise InputError(faults)
 
 
-class FileCommand(Command):
+class OnFile(Command):
     file: Path = argument()
 
 
-class Picture(Command):
+class WithPlot(Command):
     plot: Path | None = option("Draw it (png, pdf, svg).", endings=FIGURES)
     json: bool = option("Write JSON to stdout instead of text.")
 
 
-class Page(Command):
+class WithPage(Command):
     report: Path | None = option("Write a page with pictures (html).", endings=PAGES)
 
 
-class Csv(Command):
+class WithCsv(Command):
     csv: Path | None = option("Write the table (csv).", endings=("csv",))
 
 
-class Search(Command):
+class WithSearch(Command):
     starts: int | None = option("Most starts to try.  [default: 64]", min=1, max=MOST_STARTS)
     seed: int = option("Seed of the starts.", 0, min=0)
 
     @property
     def search(self) -> dict[str, Any]:
         """What verbs that search take."""
-        return {"progress": progress_listener(), **self.select("starts seed")}
+        return {"progress": progress_listener(), **self.select("starts seed linear_solver")}
 
 
-class IpoptSearch(Search):
+class WithIpopt(WithSearch):
     linear_solver: Literal["mumps", "spral"] = option("Linear solver of IPOPT.", "mumps")
-
-    @property
-    def search(self) -> dict[str, Any]:
-        return super().search | {"linear_solver": self.linear_solver}
 
 
 def build_command(kind: type[Command], name: str) -> click.Command:
     """The command of a class."""
-    from tmsopt.cli.answers import Outcome, deliver
+    from tmsopt.cli.answers import Reply, deliver
 
     def call(**values: Any) -> None:
         command = kind(**values)
-        found = command.run()
-        if status := deliver(command, found) if isinstance(found, Outcome) else found:
+        try:
+            found = command.run()
+        except InputError as error:
+            raise InputError([_name_option(fault, options) for fault in error.faults]) from error
+        if status := deliver(command, found) if isinstance(found, Reply) else found:
             sys.exit(status)
 
+    options = {f.name for f in fields(kind) if "text" in f.metadata}  # type: ignore[arg-type]
     summary, _, rest = (getdoc(kind) or "").partition("\n\n")
     parameters = [*map(_build_parameter, fields(kind)), *colour_options()]  # type: ignore[arg-type]
     return _ShortHelp(name, params=parameters, callback=call, help=summary, epilog=rest.replace("\n\nExit", "\nExit"))
@@ -133,6 +133,12 @@ class _ShortHelp(click.Command):
 
 def _flag_of(name: str) -> str:
     return f"--{name.replace('_', '-')}"
+
+
+def _name_option(fault: Fault, options: Container[str]) -> Fault:
+    """The fault of an argument of the library, under the option that gave it."""
+    name, *rest = fault.key or ("",)
+    return replace(fault, key=(_flag_of(name), *rest)) if name in options and not fault.file else fault
 
 
 def _build_parameter(of: Field[Any]) -> click.Parameter:

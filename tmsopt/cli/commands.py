@@ -11,8 +11,7 @@ from typing import Any
 import click
 
 from tmsopt import __version__
-from tmsopt.cli import WORDS
-from tmsopt.cli.colours import colour_options
+from tmsopt.cli.context import WORDS, colour_options
 from tmsopt.cli.ending import BAD_INPUT, STATUSES, report_end
 from tmsopt.errors import InputError
 
@@ -36,7 +35,7 @@ _COMMANDS = {
     "describe": ("guide", "Show what a model or a file is made of."),
     "schema": ("guide", "Write the JSON Schema of problem files, for editors."),
 }
-"""Command → its module, which has a class of that name, and its line in `tmsopt --help`."""
+"""Command → its module, which has a class of that name with `Command`, and its line in `tmsopt --help`."""
 
 _FRONT = 'tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE'
 _HINTS = {
@@ -74,7 +73,7 @@ class _Commands(Mapping[str, click.Command]):
 def _load_command(module: str, name: str) -> click.Command:
     from tmsopt.cli.command import build_command
 
-    return build_command(getattr(import_module(f"tmsopt.cli.{module}"), name.capitalize()), name)
+    return build_command(getattr(import_module(f"tmsopt.cli.{module}"), f"{name.capitalize()}Command"), name)
 
 
 class _Group(click.Group):

@@ -6,12 +6,12 @@ from pathlib import Path
 import click
 
 import tmsopt
-from tmsopt.cli.command import FileCommand, Search, option
+from tmsopt.cli.command import OnFile, WithSearch, option
 from tmsopt.cli.ending import hold_signals
 from tmsopt.cli.outputs import PAGES, check_output, saving
 
 
-class Explore(Search, FileCommand):
+class ExploreCommand(WithSearch, OnFile):
     """Write a page for a browser: sliders, chart, roots, growth rates, the bicycle in motion.
 
     Examples:

@@ -8,13 +8,13 @@ import click
 import tmsopt
 from tmsopt import guide
 from tmsopt.cli.answers import answer
-from tmsopt.cli.command import Command, FileCommand, argument, option
-from tmsopt.cli.outputs import check_output, saving, write_new, write_with_companions
+from tmsopt.cli.command import Command, OnFile, argument, option
+from tmsopt.cli.outputs import check_output, print_or_write, write_file, write_new
 from tmsopt.errors import refusal
 from tmsopt.files import write_text
 
 
-class New(FileCommand):
+class NewCommand(OnFile):
     """Write FILE, a commented problem to start from, and tmsopt.schema.json for editors.
 
     Examples:
@@ -29,18 +29,18 @@ class New(FileCommand):
 
     def run(self) -> None:
         check_output("FILE", self.file, ("toml",))
-        write_with_companions("FILE", self.file, guide.new_problem(self.model))
+        write_new("FILE", self.file, guide.new_problem(self.model))
 
 
 def _complete_names(_context: Any, _argument: Any, incomplete: str) -> list[str]:
     return [name for name in guide.examples() if name.startswith(incomplete)]
 
 
-class Toml(Command):
+class WithToml(Command):
     output: Path | None = option("A new file (toml).", None, "-o", endings=("toml",))
 
 
-class Example(Toml):
+class ExampleCommand(WithToml):
     """Write the example NAME here, with the files it refers to; without a name, list all.
 
     Examples:
@@ -57,7 +57,7 @@ class Example(Toml):
     def run(self) -> None:
         if self.name is not None:
             path = self.output or Path(f"{self.name.removesuffix('.toml')}.toml")
-            write_with_companions("--output" if self.output else "NAME", path, guide.example(self.name))
+            write_new("--output" if self.output else "NAME", path, guide.example(self.name))
         elif self.output is not None:
             raise refusal("found no NAME; tmsopt example lists all", "NAME")
         else:
@@ -67,7 +67,7 @@ class Example(Toml):
             answer(self.json, lines, lambda: titles)
 
 
-class Describe(Command):
+class DescribeCommand(Command):
     """Show symbols, units, signs and meanings of a model, or of the problem or study in FILE.
 
     Examples:
@@ -86,7 +86,7 @@ class Describe(Command):
         answer(self.json, found, found.to_json)
 
 
-class Schema(Command):
+class SchemaCommand(Command):
     """Write the JSON Schema of problem and study files: editors complete and check by it.
 
     Examples:
@@ -99,13 +99,10 @@ class Schema(Command):
     output: Path | None = option("A new file (json).  [default: stdout]", None, "-o", endings=("json",))
 
     def run(self) -> None:
-        if self.output:
-            write_new("--output", self.output, guide.schema_text())
-        else:
-            click.echo(guide.schema_text(), nl=False)
+        print_or_write(guide.schema_text(), self.output)
 
 
-class Convert(Toml, FileCommand):
+class ConvertCommand(WithToml, OnFile):
     """Make a problem of Whipple's bicycle from the point masses of FILE (tms).
 
     Examples:
@@ -123,13 +120,10 @@ class Convert(Toml, FileCommand):
 
     def run(self) -> None:
         text = guide.converted_file(self.file, self.to, self.inertia, self.body, self.front)
-        if self.output:
-            write_with_companions("--output", self.output, text)
-        else:
-            click.echo(text, nl=False)
+        print_or_write(text, self.output)
 
 
-class Import(Toml, FileCommand):
+class ImportCommand(WithToml, OnFile):
     """Make a problem file of a bicycle that BicycleParameters has measured.
 
     Examples:
@@ -145,8 +139,6 @@ class Import(Toml, FileCommand):
         from tmsopt.models import problem_text, read_bicycle
 
         text = problem_text(read_bicycle(self.file), self.speed)
-        if self.output:
-            with saving("--output", self.output):
-                write_text(self.output, text)
-        else:
+        if self.output is None:
             click.echo(text, nl=False)
+        write_file("--output", self.output, lambda path: write_text(path, text))

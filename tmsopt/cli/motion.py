@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Outcome
-from tmsopt.cli.command import Csv, FileCommand, Page, Picture, option
+from tmsopt.cli.answers import Reply
+from tmsopt.cli.command import OnFile, WithCsv, WithPage, WithPlot, option
 from tmsopt.cli.problems import note_scenarios
 from tmsopt.cli.terminal import progress_listener
 
@@ -21,7 +21,7 @@ def _parse_range(text: str) -> tuple[float, float]:
     return low, high
 
 
-class Speeds(Picture, FileCommand):
+class SpeedsCommand(WithPlot, OnFile):
     """Find every weave and capsize speed of FILE, and every speed at which roots meet, exactly.
 
     Examples:
@@ -35,13 +35,13 @@ class Speeds(Picture, FileCommand):
     parameter: str | None = option("Parameter that varies.  [default: the speed]", metavar="NAME")
     between: Any = option("Range to look through.  [default: all]", parse=_parse_range, metavar="LOW,HIGH")
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         problem = tmsopt.load(self.file)
         note_scenarios(problem.posed, [self.parameter] if self.parameter else ("v", "Fr"))
-        return Outcome(tmsopt.speeds(problem, self.parameter, between=self.between, progress=progress_listener()))
+        return Reply(tmsopt.speeds(problem, self.parameter, between=self.between, progress=progress_listener()))
 
 
-class Simulate(Csv, Page, Picture, FileCommand):
+class SimulateCommand(WithCsv, WithPage, WithPlot, OnFile):
     """Show what the design of FILE does after a lean, a push, or in noise.
 
     Examples:
@@ -67,7 +67,7 @@ class Simulate(Csv, Page, Picture, FileCommand):
     points: int = option("Times in the table.", 1001, min=2, max=1_000_000)
     path: bool = option("With --csv: torques and the wheels' path too.")
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         self.refuse_useless((not self.csv, "path", "says what --csv writes; add --csv FILE"))
         problem = tmsopt.load(self.file)
         note_scenarios(problem.posed, self.at)
@@ -75,4 +75,4 @@ class Simulate(Csv, Page, Picture, FileCommand):
         states: Any = {"start": self.start or None, "at": self.at or None}
         motion = tmsopt.simulate(problem, **states, **given, progress=progress_listener())
         draw = partial(tmsopt.plots.motion_figure, motion)
-        return Outcome(motion, draw=draw, write_csv=partial(motion.write_csv, whole=self.path))
+        return Reply(motion, draw=draw, write_csv=partial(motion.write_csv, whole=self.path))

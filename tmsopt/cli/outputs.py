@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from tmsopt.cli import WORDS
+from tmsopt.cli.context import WORDS
 from tmsopt.cli.ending import BAD_INPUT
 from tmsopt.cli.terminal import progress_listener, show_step
 from tmsopt.errors import refusal
@@ -75,26 +75,25 @@ def write_report(result: Any, path: Path, *files: Path, **options: Any) -> None:
 
 
 def write_new(option: str, path: Path, text: str) -> None:
-    """Write a file that does not exist yet."""
-    from tmsopt.files import write_text
-
-    with saving(option, path):
-        write_text(path, text, new=True)
-
-
-def write_with_companions(option: str, path: Path, text: str) -> None:
-    """Write a new file, and the files that it refers to unless they exist."""
+    """Write a new file, and the files that a problem refers to unless they exist."""
     from tmsopt.files import write_text
     from tmsopt.guide import companions
 
-    write_new(option, path, text)
-    others = {path.parent / name: other for name, other in companions(text).items()}
-    for file, content in others.items():
-        if file.parent == path.parent and not file.exists():
-            write_new(option, file, content)
-    for folder in {file.parent for file in others} - {path.parent}:
-        with saving(option, folder):
-            folder.mkdir(exist_ok=True)
-            for file, content in others.items():
-                if file.parent == folder and not file.exists():
-                    write_text(file, content, new=True)
+    others = companions(text) if path.suffix == ".toml" else {}
+    places: dict[Path, list[tuple[Path, str]]] = {path: [(path, text)]}  # folders beside it are named as a whole
+    for file, content in ((path.parent / name, other) for name, other in others.items()):
+        if not file.exists():
+            places.setdefault(file if file.parent == path.parent else file.parent, []).append((file, content))
+    for place, files in places.items():
+        with saving(option, place):
+            for file, content in files:
+                file.parent.mkdir(exist_ok=True)
+                write_text(file, content, new=True)
+
+
+def print_or_write(text: str, path: Path | None) -> None:
+    """Print a text, or write it into the new file of --output."""
+    if path is None:
+        click.echo(text, nl=False)
+    else:
+        write_new("--output", path, text)

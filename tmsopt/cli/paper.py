@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Outcome, answer
-from tmsopt.cli.command import Command, Picture, argument, option
+from tmsopt.cli.answers import Reply, answer
+from tmsopt.cli.command import Command, WithPlot, argument, option
 from tmsopt.cli.outputs import FIGURES, check_output, saving, write_file
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.errors import refusal
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tmsopt.plots.paper import Item
 
 
-class Figure(Command):
+class FigureCommand(Command):
     """Draw the figure NAME of the paper, or all of them.
 
     NAME is one that --list shows, its label in the paper such as fig3, or 'all'.
@@ -87,7 +87,7 @@ def _draw_items(items: "Sequence[Item]", files: Sequence[Path]) -> None:
                 steps(done, len(items), items[k].name)
 
 
-class Verify(Picture):
+class VerifyCommand(WithPlot):
     """Recompute every number and statement of the source paper, with a verdict on each.
 
     Examples:
@@ -101,9 +101,9 @@ class Verify(Picture):
     markdown: Path | None = option("Write the ledger as a page (md).", endings=("md",))
     only: tuple[str, ...] = option("Compute these entries; * and ? are wildcards.", metavar="KEY")
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         from tmsopt.documents import ledger_page
 
         ledger = tmsopt.verify(progress_listener(), self.only)
         write_file("--markdown", self.markdown, lambda path: write_text(path, ledger_page(ledger)))
-        return Outcome(ledger)
+        return Reply(ledger)

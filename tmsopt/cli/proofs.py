@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Outcome
-from tmsopt.cli.command import FileCommand, IpoptSearch, Page, Picture, Search, option
+from tmsopt.cli.answers import Reply
+from tmsopt.cli.command import OnFile, WithIpopt, WithPage, WithPlot, WithSearch, option
 from tmsopt.cli.ending import INFEASIBLE, NOT_CONVERGED, STATUSES
 from tmsopt.cli.problems import take_nominal
 from tmsopt.cli.terminal import progress_listener
 
 
-class Prove(Search, Page, Picture, FileCommand):
+class ProveCommand(WithSearch, WithPage, WithPlot, OnFile):
     """Prove that the solution of FILE exists, and whether it is stable and heavily damped.
 
     Examples:
@@ -26,7 +26,7 @@ class Prove(Search, Page, Picture, FileCommand):
     digits: int = option("Digits of every number.", 30, min=1, max=1000)
     exact: Mapping[str, str] = option("Exact value of a parameter.", metavar="NAME=VALUE", example="zeta_B=-1/3")
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         from tmsopt.problem import as_solvable
 
         problem = as_solvable(self.file)
@@ -34,10 +34,10 @@ class Prove(Search, Page, Picture, FileCommand):
         proof = tmsopt.prove(solution, self.digits, exact=self.exact, progress=progress_listener())
         status = 0 if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE
         data = problem.heading | {"status": solution.status} | proof.to_json()
-        return Outcome(proof, status, data, page={"design": solution})
+        return Reply(proof, status, data, page={"design": solution})
 
 
-class Diagnose(Search, Picture, FileCommand):
+class DiagnoseCommand(WithSearch, WithPlot, OnFile):
     """Show how each multiple root of the solution of FILE splits, and how fast.
 
     Examples:
@@ -47,7 +47,7 @@ class Diagnose(Search, Picture, FileCommand):
     Exit status: 0 done, 2 bad input, 3 infeasible, 4 not converged.
     """
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         from tmsopt.problem import as_solvable
 
         problem = as_solvable(self.file)
@@ -58,10 +58,10 @@ class Diagnose(Search, Picture, FileCommand):
             click.echo("--plot: nothing to draw, no root is multiple", err=True)
         shown = found or "no root of this solution is multiple, so none splits"
         without = "" if found else "plot"
-        return Outcome(found and found[0], 0, problem.heading | data, "full", shown=shown, without=without)
+        return Reply(found and found[0], 0, problem.heading | data, "full", shown=shown, without=without)
 
 
-class Compare(IpoptSearch, Picture, FileCommand):
+class CompareCommand(WithIpopt, WithPlot, OnFile):
     """Compare the optimum of FILE with the closed-form laws, and two formulations.
 
     Examples:
@@ -71,8 +71,8 @@ class Compare(IpoptSearch, Picture, FileCommand):
     Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged.
     """
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         from tmsopt.problem import as_solvable
 
         comparison = tmsopt.compare(take_nominal(as_solvable(self.file)), **self.search)
-        return Outcome(comparison, STATUSES[comparison.design.status])
+        return Reply(comparison, STATUSES[comparison.design.status])

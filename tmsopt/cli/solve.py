@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Outcome, make_document
-from tmsopt.cli.command import Csv, FileCommand, IpoptSearch, Page, Picture, option
+from tmsopt.cli.answers import Reply, make_document
+from tmsopt.cli.command import OnFile, WithCsv, WithIpopt, WithPage, WithPlot, option
 from tmsopt.cli.ending import INFEASIBLE, INTERRUPTED, STATUSES
 from tmsopt.cli.problems import parse_number
 from tmsopt.cli.terminal import progress_listener
@@ -40,7 +40,7 @@ def _parse_seconds(text: str) -> float:
     raise click.BadParameter(f"found {text!r}; accepted: {accepted}")
 
 
-class Solve(IpoptSearch, Csv, Page, Picture, FileCommand):
+class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
     """Find the best design that FILE asks for, or the front of the best ones.
 
     Examples:
@@ -64,7 +64,7 @@ class Solve(IpoptSearch, Csv, Page, Picture, FileCommand):
     rear_mass: str | None = option("Show SI for this rear mass m_B, e.g. 9kg.")
     starts: int | None = option("Most starts.  [default: 64, of a front 2]", min=1, max=MOST_STARTS)
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         from tmsopt.problem import as_solvable
 
         scale = _parse_scale("--wheelbase", self.wheelbase, "m"), _parse_scale("--rear-mass", self.rear_mass, "kg")
@@ -86,7 +86,7 @@ class Solve(IpoptSearch, Csv, Page, Picture, FileCommand):
         if self.all:
             designs = tmsopt.solve_all(problem, **self.search, **self.select("seconds"))
             data = problem.heading | designs.to_json()
-            return Outcome(designs, 0 if designs.solutions else INFEASIBLE, data)
+            return Reply(designs, 0 if designs.solutions else INFEASIBLE, data)
         if not problem.pareto:
             solution = tmsopt.solve(problem, throw=False, **self.search)
             if self.certify and not solution.interrupted:
@@ -98,13 +98,13 @@ class Solve(IpoptSearch, Csv, Page, Picture, FileCommand):
             return replace(self._show(error.solution, *scale), without="csv plot")
         figure = partial(tmsopt.plots.front_figure, front)
         status = INTERRUPTED if front.interrupted else 0
-        return Outcome(front, status, None, self._level, figure, page={"full": self.full})
+        return Reply(front, status, None, self._level, figure, page={"full": self.full})
 
     @property
     def _level(self) -> str:
         return "full" if self.full else "brief"
 
-    def _show(self, solution: tmsopt.Solution, w: float, m_B: float) -> Outcome:
+    def _show(self, solution: tmsopt.Solution, w: float, m_B: float) -> Reply:
         from tmsopt.documents import si_parameters
 
         si = si_parameters(solution, w, m_B)
@@ -124,7 +124,7 @@ class Solve(IpoptSearch, Csv, Page, Picture, FileCommand):
             click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         status = INTERRUPTED if solution.interrupted else STATUSES[solution.status]
         page = {"full": self.full}
-        return Outcome(solution, status, shown, draw=draw, page=page, without=without, shown=shown)
+        return Reply(solution, status, shown, draw=draw, page=page, without=without, shown=shown)
 
     def _make_json(self, solution: tmsopt.Solution) -> dict[str, Any]:
         """The keys of the contract; with --full all of them, and what the analysis finds."""

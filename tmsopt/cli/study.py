@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Outcome, answer, answer_rows, write_files
-from tmsopt.cli.command import FileCommand, Page, Picture, option
+from tmsopt.cli.answers import Reply, answer, answer_rows, write_files
+from tmsopt.cli.command import OnFile, WithPage, WithPlot, option
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, hold_signals
 from tmsopt.cli.outputs import check_output, saving
 from tmsopt.cli.terminal import progress_listener, show_step
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tmsopt.studies import Results
 
 
-class Study(Page, Picture, FileCommand):
+class StudyCommand(WithPage, WithPlot, OnFile):
     """Solve the problem of the study FILE for every row of what varies in it.
 
     Examples:
@@ -71,7 +71,7 @@ class Study(Page, Picture, FileCommand):
         for target in self.export if len(results.rows) else ():
             with saving("--export", target):
                 results.export(target, progress_listener())
-        write_files(self, Outcome(results), *self._list_files())
+        write_files(self, Reply(results), *self._list_files())
         if is_stopped:
             click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         return INTERRUPTED if is_stopped else 0

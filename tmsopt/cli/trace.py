@@ -5,14 +5,14 @@ from functools import partial
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Outcome
-from tmsopt.cli.command import Csv, FileCommand, Page, Picture, Search, option
+from tmsopt.cli.answers import Reply
+from tmsopt.cli.command import OnFile, WithCsv, WithPage, WithPlot, WithSearch, option
 from tmsopt.cli.ending import INFEASIBLE
 from tmsopt.cli.problems import choose_plane, take_nominal
 from tmsopt.errors import MOST_STARTS
 
 
-class Trace(Search, Csv, Page, Picture, FileCommand):
+class TraceCommand(WithSearch, WithCsv, WithPage, WithPlot, OnFile):
     """Trace a root pattern of FILE through parameter space: every branch, with its events.
 
     Examples:
@@ -28,7 +28,7 @@ class Trace(Search, Csv, Page, Picture, FileCommand):
     step: float = option("Longest step, in widths of the box.", 0.005, min=1e-6, max=0.1)
     starts: int = option("Fruitless starts in a row, to stop.", 48, min=1, max=MOST_STARTS)
 
-    def run(self) -> Outcome:
+    def run(self) -> Reply:
         self.refuse_useless((not self.plot, "axes", "says what --plot draws; add --plot FILE"))
         problem = take_nominal(tmsopt.load(self.file).posed)
         if self.axes is not None:
@@ -36,6 +36,6 @@ class Trace(Search, Csv, Page, Picture, FileCommand):
         found = tmsopt.trace(problem, self.pattern, step=self.step, **self.search)
         if not found.branches:
             click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
-            return Outcome(found, INFEASIBLE, without="csv plot")
+            return Reply(found, INFEASIBLE, without="csv plot")
         axes = choose_plane(problem, self.axes or ",".join(found.varying[:2])) if self.plot else ()
-        return Outcome(found, draw=partial(tmsopt.plots.trace_figure, found, *axes))
+        return Reply(found, draw=partial(tmsopt.plots.trace_figure, found, *axes))

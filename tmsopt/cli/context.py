@@ -1,11 +1,12 @@
-"""Whether text has colours: --color on every command, NO_COLOR, and the terminal."""
+"""What click's context keeps for all commands: the words of the command line, and whether text has colours."""
 
 import os
 import sys
 
 import click
 
-from tmsopt.cli import COLOUR
+COLOUR, WORDS = "tmsopt.colour", "tmsopt.words"
+"""Keys of what --color says, and of the words of the command line."""
 
 
 def colour_options() -> list[click.Parameter]:
