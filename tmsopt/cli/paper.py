@@ -102,8 +102,8 @@ class VerifyCommand(WithPlot):
     only: tuple[str, ...] = option("Compute these entries; * and ? are wildcards.", metavar="KEY")
 
     def run(self) -> Reply:
-        from tmsopt.documents import ledger_page
+        from tmsopt.documents import write_ledger_page
 
         ledger = tmsopt.verify(progress_listener(), self.only)
-        write_file("--markdown", self.markdown, lambda path: write_text(path, ledger_page(ledger)))
+        write_file("--markdown", self.markdown, lambda path: write_text(path, write_ledger_page(ledger)))
         return Reply(ledger)

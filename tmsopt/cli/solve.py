@@ -105,9 +105,9 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
         return "full" if self.full else "brief"
 
     def _show(self, solution: tmsopt.Solution, w: float, m_B: float) -> Reply:
-        from tmsopt.documents import si_parameters
+        from tmsopt.documents import convert_to_si
 
-        si = si_parameters(solution, w, m_B)
+        si = convert_to_si(solution, w, m_B)
         options = {"si": si} if self.wheelbase or self.rear_mass else {}
         try:
             shown = self._make_json(solution) if self.json else make_document(solution, self._level, **options)

@@ -139,14 +139,14 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         answer(False, shown, dict)
 
     def _answer_row(self, study: tmsopt.Study, number: int) -> None:
-        from tmsopt.documents import row_sentence
+        from tmsopt.documents import describe_row
         from tmsopt.studies import solve_row
 
         show_step("solving the row")
         row, solution = (solved := solve_row(study, number)).row, solved.solution
         found = {"solution": solution} if solution is not None else {}
         data = {"schema": 1, **row.to_json(), **{name: one.to_json() for name, one in found.items()}}
-        answer(self.json, [row_sentence(study, row), *found.values()], lambda: data)
+        answer(self.json, [describe_row(study, row), *found.values()], lambda: data)
 
 
 def _plan_rows(stated: tmsopt.Study | tmsopt.Sampling) -> tmsopt.Study:
