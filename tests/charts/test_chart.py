@@ -358,7 +358,10 @@ def test_chart_json_is_finite(run):
         (["trace", "nothing.toml"], "nothing.toml"),
         (["chart", "problems/realistic.toml"], "are free"),
         (["chart", "problems/chart.toml", "--axes", "Fr,Fr"], "accepted: Fr and lambda_s"),
-        (["chart", "problems/chart.toml", "--points", "1"], "--points: found (1, 1); accepted: two whole numbers, each from 2"),
+        (
+            ["chart", "problems/chart.toml", "--points", "1"],
+            "--points: found (1, 1); accepted: two whole numbers, each from 2",
+        ),
         (["chart", "problems/chart.toml", "--points", "40by30"], "accepted: a number from 2"),
         (["chart", "problems/chart.toml", "--output", "problems/x.csv"], "ending in npz"),
         (["chart", "problems/chart.toml", "--layer", "colour"], "--layer"),
