@@ -18,7 +18,7 @@ BLOCK = 2**14
 """Elements of a block: 128 kB an array."""
 
 
-def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
+def evaluate_on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
     """The outputs for numbers and arrays, each of the shape that it depends on; nan and inf without a warning.
 
     With bounds of errors, where a column has them.
@@ -33,7 +33,7 @@ def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
             return fold(formula, columns, FLOATS)
         strides = {n: np.broadcast_to(x, shape).strides for n, x in columns.items()}  # 0 along axes of no influence
         axes = [k for k, n in enumerate(shape) if n != 1]
-        large = set.intersection(*(formula.depending([n for n in columns if strides[n][k]]) for k in axes))
+        large = set.intersection(*(formula.dependent_steps([n for n in columns if strides[n][k]]) for k in axes))
         names, small, rest = formula.split(large)
         known = columns | dict(zip(names, fold(small, columns, FLOATS), strict=True))
         found = [known[str(o)] if str(o) in known else np.empty(shape) for o in formula.outputs]

@@ -112,7 +112,7 @@ def lower(ball: Any) -> float:
 
 
 @dataclass(frozen=True)
-class Tilt:
+class AngleByTangent:
     """An angle by its tangent, which is all that coefficients ask of it."""
 
     tangent: Any
@@ -124,7 +124,9 @@ class Tilt:
 
 def is_ball(x: Any) -> bool:
     """Whether x is a number of ball arithmetic, exact fractions and polynomials among them."""
-    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | flint.fmpq_poly | flint.arb_poly | Bounded | Tilt)
+    return isinstance(
+        x, flint.fmpq | flint.arb | flint.arb_series | flint.fmpq_poly | flint.arb_poly | Bounded | AngleByTangent
+    )
 
 
 def exact(x: Any) -> Any:

@@ -24,7 +24,7 @@ _WHOLE = 64  # exponent up to which a power of fractions is multiplied out
 _BITS = 2**12  # of such a power
 
 
-class NotAccepted(ValueError):
+class UnsupportedOperation(ValueError):
     """An operation that a kind of numbers lacks; the message is its name."""
 
 
@@ -87,7 +87,7 @@ class Formula:
         sources = sorted(k for k in taken if k not in late)
         return tuple(map(str, sources)), self.part(sources), self.part(self.outputs, sources)
 
-    def depending(self, names: Collection[str]) -> set[int]:
+    def dependent_steps(self, names: Collection[str]) -> set[int]:
         """The steps that depend on some of the inputs."""
         found: set[int] = set()
         for k, step in enumerate(self.steps):
@@ -156,7 +156,7 @@ def fold(
         elif op == CONSTANT:
             result = kind.constant(value)
         elif (operation := operations.get(op)) is None:
-            raise NotAccepted(op)
+            raise UnsupportedOperation(op)
         else:
             if len(operands) == 2:  # by far the most
                 result = operation(found[operands[0]], found[operands[1]])
@@ -175,7 +175,7 @@ _TOTAL = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "square", "abs", "min", "
 
 def _operators(op: str) -> tuple[Callable[["Node", Any], "Node"], Callable[["Node", Any], "Node"]]:
     """An operation as a method of its first operand, and of its second one."""
-    return lambda self, other: made(op, self, other), lambda self, other: made(op, other, self)
+    return lambda self, other: make_node(op, self, other), lambda self, other: make_node(op, other, self)
 
 
 class Node:
@@ -213,16 +213,16 @@ class Node:
     __eq__ = _operators("equal")[0]  # type: ignore[assignment]
 
     def __ne__(self, other: object) -> "Node":  # type: ignore[override]
-        return ~made("equal", self, other)
+        return ~make_node("equal", self, other)
 
     def __neg__(self) -> "Node":
-        return made("neg", self)
+        return make_node("neg", self)
 
     def __abs__(self) -> "Node":
-        return made("abs", self)
+        return make_node("abs", self)
 
     def __invert__(self) -> "Node":
-        return made("not", self)
+        return make_node("not", self)
 
     __hash__ = object.__hash__
 
@@ -237,7 +237,7 @@ class Node:
 
 def depends_on(x: Any, names: Collection[str]) -> bool:
     """Whether a node has some of the inputs in it."""
-    return bool(formula([x]).depending(names))
+    return bool(formula([x]).dependent_steps(names))
 
 
 def symbol(name: str) -> Node:
@@ -257,7 +257,7 @@ def constant(x: Any) -> Node:
     return Node(CONSTANT, (), Fraction(x) if isinstance(x, int | Fraction) else Fraction(int(x.p), int(x.q)))
 
 
-def made(op: str, *given: Any) -> Node:
+def make_node(op: str, *given: Any) -> Node:
     """An operation on nodes and numbers, in its simplest form."""
     operands, fractions, truths = tuple[Node, ...](), list[Fraction | None](), _LOGICAL.get(op, 0)
     for k, x in enumerate(given):
@@ -284,7 +284,7 @@ def _as_truth(x: Node) -> Node:
 
 def _as_number(x: Node) -> Node:
     """1 for what is true, 0 for what is false: slopes by CasADi reckon with them."""
-    return made("choose", x, 1, 0) if x.op in _TRUTHS else x
+    return make_node("choose", x, 1, 0) if x.op in _TRUTHS else x
 
 
 def _power(a: Fraction, b: Fraction) -> Fraction | None:
@@ -329,7 +329,7 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
         case ("mul", _, _) if first is last:
             return Node("square", (first,))
         case ("pow", _, 2):
-            return made("square", first)
+            return make_node("square", first)
         case ("pow", _, Fraction(numerator=1, denominator=2)):
             return Node("sqrt", (first,))
         case ("neg", _) if first.op == "neg":
@@ -338,7 +338,7 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
             return first.operands[0]
         case ("sin" | "cos", _) if first.op == "atan":
             t = first.operands[0]
-            return (t if op == "sin" else 1) / made("sqrt", 1 + t * t)
+            return (t if op == "sin" else 1) / make_node("sqrt", 1 + t * t)
     return None
 
 
@@ -384,10 +384,10 @@ def from_casadi(function: ca.Function, names: Sequence[str] = ()) -> Formula:
         names: of the inputs; by default their numbers.
     """
     names = names or tuple(map(str, range(function.nnz_in())))
-    return formula(nodes_of_casadi(function, names), names)
+    return formula(nodes_from_casadi(function, names), names)
 
 
-def nodes_of_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
+def nodes_from_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
     """The entries of its outputs as nodes."""
     firsts = list(accumulate(map(function.nnz_in, range(function.n_in())), initial=0))
     ends = list(accumulate(map(function.nnz_out, range(function.n_out())), initial=0))
@@ -415,7 +415,7 @@ def _translated(operation: int, operands: Sequence[Node]) -> Node:
 
 
 def _renamed(name: str, *operands: Any) -> Node:
-    return made(_RENAMED.get(name, name), *operands)
+    return make_node(_RENAMED.get(name, name), *operands)
 
 
 _WRITTEN: Mapping[int, Callable[[Node, Node], Node]] = {
@@ -423,8 +423,8 @@ _WRITTEN: Mapping[int, Callable[[Node, Node], Node]] = {
     ca.OP_TWICE: lambda a, b: 2 * a,
     ca.OP_INV: lambda a, b: 1 / a,
     ca.OP_NE: lambda a, b: a != b,
-    ca.OP_SIGN: lambda a, b: made("sub", a > 0, a < 0),
-    ca.OP_IF_ELSE_ZERO: lambda a, b: made("choose", a, b, 0),
+    ca.OP_SIGN: lambda a, b: make_node("sub", a > 0, a < 0),
+    ca.OP_IF_ELSE_ZERO: lambda a, b: make_node("choose", a, b, 0),
 }
 """In other operations."""
 

@@ -21,11 +21,11 @@ from tmsopt.algebra.formula import (
     Formula,
     Kind,
     Node,
-    NotAccepted,
+    UnsupportedOperation,
     constant,
     fold,
     formula as formula_of,
-    made as made_of,
+    make_node as made_of,
     symbol,
 )
 from tmsopt.algebra.kinds import ARITHMETIC, NODES
@@ -97,13 +97,13 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
 
 def _times(a: Any, b: Any) -> Any:
     if len(a) * len(b) > _MOST:
-        raise NotAccepted(f"a formula of more than {_MOST} products")
+        raise UnsupportedOperation(f"a formula of more than {_MOST} products")
     return a * b
 
 
 def _power(a: Any, n: int) -> Any:
     if len(a) > 1 and math.comb(len(a) + n - 1, n) > math.isqrt(_MOST) * 10:
-        raise NotAccepted(f"a formula of more than {_MOST} products")
+        raise UnsupportedOperation(f"a formula of more than {_MOST} products")
     return a**n
 
 
@@ -172,16 +172,16 @@ class Field:
 
     def _applied(self, operation: str, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
         """An unknown for what a function makes of its operands, the same for the same."""
-        for known, given, made in self._known:
+        for known, given, make_node in self._known:
             if known == operation and all(a == b for a, b in zip(given, operands, strict=True)):
-                return made
+                return make_node
         at, self._used = self._used, self._used + 1
-        made = self._free(at)
+        make_node = self._free(at)
         self._nodes.append(made_of(operation, *map(self.node, operands)))
-        self._known.append((operation, operands, made))
+        self._known.append((operation, operands, make_node))
         if square is not None:
             self._squares.append((at, square()))
-        return made
+        return make_node
 
     def _sine(self, a: Quotient) -> Quotient:
         cosine = self._applied("cos", a)
@@ -198,7 +198,7 @@ class Field:
         return Quotient(self._context.gens()[at])
 
 
-def multiplied_out(asked: Formula) -> Formula:
+def multiply_out(asked: Formula) -> Formula:
     """A formula of quotients of polynomials, in which sums cancel, in inputs and what is not rational in them.
 
     Raises:

@@ -29,7 +29,7 @@ def interval(x: Any) -> Interval:
     return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
 
 
-def outwards(lower: float, upper: float) -> Interval:
+def round_outwards(lower: float, upper: float) -> Interval:
     """Doubles that enclose an interval whose ends are decimals; a number alone is itself."""
     return (lower, upper) if lower == upper else (math.nextafter(lower, -math.inf), math.nextafter(upper, math.inf))
 
@@ -44,7 +44,7 @@ def ranges(formula: Formula, box: Sequence[Interval]) -> list[Interval]:
     return [interval(x) for x in fold(formula, over, INTERVALS)]
 
 
-def root_bound(coefficients: Sequence[Interval]) -> float:
+def bound_roots(coefficients: Sequence[Interval]) -> float:
     """No root of any polynomial with such coefficients, descending, is larger; inf where the leading one may be 0.
 
     Fujiwara's 2 max |a_k/a0|^(1/k), the last one halved under the root.

@@ -23,7 +23,18 @@ import numpy as np
 
 from tmsopt.algebra import rounding
 from tmsopt.algebra.balls import DIGITS, as_ball, exact, is_ball
-from tmsopt.algebra.formula import PI, Constant, Formula, Kind, Node, constant, fold, formula, made, nodes_of_casadi
+from tmsopt.algebra.formula import (
+    PI,
+    Constant,
+    Formula,
+    Kind,
+    Node,
+    constant,
+    fold,
+    formula,
+    make_node,
+    nodes_from_casadi,
+)
 from tmsopt.algebra.rounding import Bounded
 
 _WHOLE = 1023  # exponent up to which a power is a product
@@ -343,7 +354,7 @@ def _as_node(value: Constant) -> Node:
     return found
 
 
-NODES = Kind({name: partial(made, name) for name in (*FLOATS.operations, "pi")}, _as_node, constant)
+NODES = Kind({name: partial(make_node, name) for name in (*FLOATS.operations, "pi")}, _as_node, constant)
 
 
 def kind_of(*numbers: Any) -> Kind:
@@ -400,5 +411,5 @@ def gradients(outputs: Sequence[Any], inputs: Sequence[Node]) -> list[list[Node]
     own = ca.vertcat(*(symbols[x.value] for x in inputs))
     slopes = ca.jacobian(ca.vertcat(*fold(asked, symbols, CASADI)), own)
     function = ca.Function("slopes", [ca.vertcat(*symbols.values())], [ca.densify(slopes.T)])
-    found = iter(nodes_of_casadi(function, list(symbols)))
+    found = iter(nodes_from_casadi(function, list(symbols)))
     return [[next(found) for _ in inputs] for _ in outputs]

@@ -24,7 +24,7 @@ _TENTHS = 80  # powers of ten down which a box is looked for
 _FINER = 4  # boxes tried between a power of ten and the next
 
 
-class Refused(ArithmeticError):
+class ProofFailed(ArithmeticError):
     """A proof that does not succeed, with the reason and what to do."""
 
 
@@ -41,14 +41,14 @@ class Enclosure:
     uniqueness: float
 
 
-def slopes(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any:
+def jacobian(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any:
     """Jacobian of a system with respect to some of its names: by series of first order, a column each."""
     columns = [system({**at, n: flint.arb_series([at[n], 1], prec=2)}) for n in names]
     rows = zip(*columns, strict=True)
     return flint.arb_mat([[v[1] if isinstance(v, flint.arb_series) else flint.arb(0) for v in row] for row in rows])
 
 
-def refined(
+def refine_solution(
     system: System, start: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> dict[str, Any]:
     """The solution near a start as exact middles, by Newton's method at the working precision.
@@ -57,12 +57,12 @@ def refined(
         units: of unknowns that are not of the size of 1.
 
     Raises:
-        Refused: where it is not found.
+        ProofFailed: where it is not found.
     """
     at = dict(start)
     small = flint.arb(10) ** -digits
     for _ in range(_STEPS):
-        move = _solved(slopes(system, at, names), flint.arb_mat([[r.mid()] for r in system(at)]))
+        move = _solved(jacobian(system, at, names), flint.arb_mat([[r.mid()] for r in system(at)]))
         size = [(abs(move[k, 0]).mid() / (units.get(n, 1) + abs(at[n]))).mid() for k, n in enumerate(names)]
         for k, n in enumerate(names):
             at[n] = (at[n] - move[k, 0]).mid()
@@ -70,7 +70,7 @@ def refined(
             break
         if all(s < small for s in size):
             return at
-    raise Refused(
+    raise ProofFailed(
         "Newton's method finds no solution beside the design: the equations are singular there, or it is none"
     )
 
@@ -79,30 +79,30 @@ def _solved(jacobian: Any, right: Any) -> Any:
     try:
         return jacobian.mid().solve(right).mid()
     except ZeroDivisionError:
-        raise Refused("the Jacobian of the equations is singular there: the solution is not isolated") from None
+        raise ProofFailed("the Jacobian of the equations is singular there: the solution is not isolated") from None
 
 
-def enclosed(
+def enclose_solution(
     system: System, middle: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> Enclosure:
     """The solution beside a middle that is right to `digits`, in the smallest and the largest box that prove it.
 
     Args:
-        units: see `refined`.
+        units: see `refine_solution`.
 
     Raises:
-        Refused: where no box does.
+        ProofFailed: where no box does.
     """
     count = len(names)
     unit = flint.arb_mat(count, count, 1)
-    inverse = _solved(slopes(system, middle, names), unit)
+    inverse = _solved(jacobian(system, middle, names), unit)
     step = inverse * flint.arb_mat([[r] for r in system(middle)])
 
     def mapped(radii: Sequence[Any]) -> dict[str, Any] | None:
         """K(X) for the box of these radii, if it is in its interior."""
         around = [flint.arb(0, r.upper()) for r in radii]
         box = {n: middle[n] + a for n, a in zip(names, around, strict=True)}  # or wider, by rounding
-        contraction = unit - inverse * slopes(system, {**middle, **box}, names)
+        contraction = unit - inverse * jacobian(system, {**middle, **box}, names)
         moves = (contraction * flint.arb_mat([[a] for a in around]) - step).entries()
         if not all(a.contains_interior(move) for a, move in zip(around, moves, strict=True)):
             return None
@@ -111,7 +111,7 @@ def enclosed(
     sizes = [flint.arb(units.get(n, 1)) for n in names]
     inner = mapped([flint.arb(10) ** -digits * (u + abs(middle[n])) for n, u in zip(names, sizes, strict=True)])
     if inner is None:
-        raise Refused(
+        raise ProofFailed(
             "the Krawczyk test fails: the Jacobian of the equations is singular at the solution, or nearly so"
         )
     shares = ((1 - flint.arb(k) / _FINER) / 10**tenth for tenth in range(_TENTHS) for k in range(_FINER))
@@ -119,5 +119,5 @@ def enclosed(
     off = {n: inner[n].rad() + abs(inner[n] - middle[n]).upper() for n in names}
     smallest = max(off[n] / u for n, u in zip(names, sizes, strict=True))
     if not radius > smallest:
-        raise Refused("the Krawczyk test fails in every box but the smallest: the solution is hardly isolated")
+        raise ProofFailed("the Krawczyk test fails in every box but the smallest: the solution is hardly isolated")
     return Enclosure(inner, lower(radius))

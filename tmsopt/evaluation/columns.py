@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.algebra.rounding import Bounded, as_bounded
 from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.evaluation.law_rows import speed_laws
@@ -79,7 +79,7 @@ def verdicts(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str
     try:
         with np.errstate(all="ignore"):
             return _judged(problem, columns, reports)
-    except NotAccepted:  # of a formula that does not take bounds of errors
+    except UnsupportedOperation:  # of a formula that does not take bounds of errors
         return None
 
 

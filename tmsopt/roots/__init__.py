@@ -4,10 +4,10 @@ In: coefficients, highest power first. Out: roots, verdicts on stability, counts
 first; `patterns` says which roots meet, `quartics` takes millions at once.
 """
 
+from tmsopt.roots.batch import classify, find_motion
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
-from tmsopt.roots.many import classify, find_motion
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
 from tmsopt.roots.patterns.pattern import Pattern

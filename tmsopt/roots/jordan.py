@@ -74,7 +74,7 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
     """
     d, n = len(matrices) - 1, len(matrices[0])
     unit = max(float(abs(s).mid()), least) or 1.0
-    size, scale = equilibrated([_numbers(P) for P in matrices], unit)
+    size, scale = equilibrate([_numbers(P) for P in matrices], unit)
     blocks = [scale * unit**i * _numbers(_derivative(matrices, s, i)) for i in range(min(d, multiplicity - 1) + 1)]
     values = np.linalg.svd(blocks[0], compute_uv=False)[::-1] / np.linalg.norm(size * scale, 2)
     geometric = _nullity(values, 1, multiplicity, threshold)
@@ -206,7 +206,7 @@ def _nullity_modulo(rows: Sequence[Sequence[Any]], factor: Any) -> int:
     return len(left)
 
 
-def equilibrated(matrices: Sequence[Any], unit: float) -> tuple[Array, Array]:
+def equilibrate(matrices: Sequence[Any], unit: float) -> tuple[Array, Array]:
     """Sizes of the terms of L at eigenvalues of a size, and powers of two that bring its rows and columns near 1."""
     d = len(matrices) - 1
     size = np.asarray(sum(np.abs(P) * (unit ** (d - k)) for k, P in enumerate(matrices)), dtype=float)

@@ -12,7 +12,7 @@ import flint
 
 from tmsopt.algebra.balls import rational
 from tmsopt.algebra.identity import Quotient
-from tmsopt.algebra.krawczyk import enclosed, refined
+from tmsopt.algebra.krawczyk import enclose_solution, refine_solution
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import determinant, product
 from tmsopt.roots.stability import lienard_chipart
@@ -142,8 +142,8 @@ def match_factors(
     def system(unknowns: Mapping[str, Any]) -> list[Any]:
         return [side({**known, **unknowns}) for side in sides]
 
-    middle = refined(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
-    return dict(enclosed(system, middle, names, _RADIUS).balls)
+    middle = refine_solution(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
+    return dict(enclose_solution(system, middle, names, _RADIUS).balls)
 
 
 def tangent(p: Coefficients, parts: Sequence[Coefficients], names: str, point: Mapping[str, Any]) -> list[Ball]:

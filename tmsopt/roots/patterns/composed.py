@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.roots.meetings import meeting, weave_test
 from tmsopt.roots.numeric import rebuilt
-from tmsopt.roots.patterns.parts import AXIS, ENDS, Part, parts_of
+from tmsopt.roots.patterns.components import AXIS, ENDS, Component, parse_components
 from tmsopt.roots.patterns.pattern import QUARTIC, Pattern, Roots
 from tmsopt.roots.polynomial import evaluate, product as multiplied
+from tmsopt.roots.sign_tests import double_root_test, weave_test
 
 _GUESSES = 24  # unknowns to start from, the nearest of all ways to choose the roots
 _LOOKED_AT = 512  # ways to choose the roots at most
@@ -56,12 +56,12 @@ def composition(name: str) -> list[tuple[str, int, int]]:
 
     More: docs/explanation/exceptional_points.md
     """
-    return [(g.kind, g.order, g.count) for g in parts_of("".join(name.split()))]
+    return [(g.kind, g.order, g.count) for g in parse_components("".join(name.split()))]
 
 
 @cache
 def _pattern(name: str, degree: int) -> Pattern:
-    groups = parts_of(name)
+    groups = parse_components(name)
     others = degree - sum(g.roots for g in groups)
     if others < 0:
         raise ValueError(f"'{name}' takes {degree - others} roots, and the polynomial has {degree}")
@@ -96,11 +96,11 @@ def _pattern(name: str, degree: int) -> Pattern:
 _ABSCISSAE: Mapping[tuple[str, int], Any] = {("EP", 1): lambda u: u[0], ("CEP", 1): lambda u: -u[0] / 2}
 """Largest real part of the roots where parts of one kind, so many, make up all of them."""
 
-_TESTS: Mapping[str, Any] = {"capsize": lambda a: a[-1], "weave": weave_test, "EP2": meeting}
+_TESTS: Mapping[str, Any] = {"capsize": lambda a: a[-1], "weave": weave_test, "EP2": double_root_test}
 """For patterns of codimension 1: a function of the coefficients that changes sign across the set."""
 
 
-def _marks(placed: Sequence[tuple[Part, slice]], others: int) -> dict[str, Any]:
+def _marks(placed: Sequence[tuple[Component, slice]], others: int) -> dict[str, Any]:
     """More special patterns that a curve may pass."""
     marks: dict[str, Any] = {}
     roots = [(g, s.start) for g, s in placed if g.unknowns == ("r",)]
@@ -122,16 +122,16 @@ def _marks(placed: Sequence[tuple[Part, slice]], others: int) -> dict[str, Any]:
         marks["double zero"] = lambda u: u[-1]
     if others > 1 and alone.kind not in ("weave", "resonance"):
         name = "EP2" if alone.kind == "capsize" else _joined(alone.name, "EP2")
-        marks[name] = lambda u: meeting([1, *u[end:]])
+        marks[name] = lambda u: double_root_test([1, *u[end:]])
     return marks
 
 
 def _joined(*names: str) -> str:
     """The name of several patterns together."""
-    return "+".join(g.name for g in parts_of("+".join(names)))
+    return "+".join(g.name for g in parse_components("+".join(names)))
 
 
-def _guesses(groups: tuple[Part, ...], others: int, z: Roots) -> list[list[float]]:
+def _guesses(groups: tuple[Component, ...], others: int, z: Roots) -> list[list[float]]:
     """Unknowns of the tied factors from roots chosen among z, and the rest by least squares; the nearest first."""
     target = rebuilt(z)
     far = np.abs(z).max()

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from tmsopt.roots.patterns.parts import NUMBERS, several, times
+from tmsopt.roots.patterns.components import NUMBERS, several, times
 
 STRUCTURES = {
     "EP4": "four roots meet in one (EP4)",
@@ -18,7 +18,7 @@ STRUCTURES = {
 _PART = re.compile(r"(?P<count>\d*)(?P<kind>C?EP)(?P<order>\d+)|(?P<pairs>\w+) pairs|(?P<simple>pair|real)")
 
 
-def in_words(structure: str, degree: int = 4) -> str:
+def describe_structure(structure: str, degree: int = 4) -> str:
     """A structure in words, for a polynomial of a degree; one that is unknown as it is."""
     if structure in STRUCTURES and (degree == 4 or structure not in ("EP4", f"EP{degree}")):
         return STRUCTURES[structure]

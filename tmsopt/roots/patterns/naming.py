@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from tmsopt.roots.patterns.components import several
 from tmsopt.roots.patterns.composed import composition
-from tmsopt.roots.patterns.parts import several
 from tmsopt.roots.patterns.pattern import Pattern
 from tmsopt.roots.patterns.shape import Group, Shape, with_simple
 from tmsopt.roots.polynomial import Root, product
@@ -33,7 +33,7 @@ def shown(roots: Sequence[Root], everywhere: bool = True, ties: bool = True) -> 
     return shape, shape.start([complex(r.re, r.im) for r, _ in grouped], rest)
 
 
-def shown_patterns(roots: Sequence[Root]) -> list[Pattern]:
+def find_patterns(roots: Sequence[Root]) -> list[Pattern]:
     """The patterns that roots show, what says most first: all multiple roots and ties of the rightmost line, those on
     this line alone, all multiple roots alone.
 
@@ -58,7 +58,7 @@ def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     )
 
 
-def implies(roots: Sequence[Root], name: str) -> bool:
+def has_pattern(roots: Sequence[Root], name: str) -> bool:
     """Whether roots with these multiplicities have the multiple roots of a pattern, where those may coincide.
 
     A 4-fold real root is a double complex pair that meets on the axis, too.

@@ -83,7 +83,7 @@ class Pattern:
         units = ([int(k == j) for j in range(len(self.unknowns))] for k in range(len(self.unknowns)))
         return tuple(next(k for k, (c, d) in enumerate(zip(self.monic(u), base, strict=True)) if c != d) for u in units)
 
-    def reduced(self, unknowns: Sequence[Any]) -> list[Any]:
+    def scaled_unknowns(self, unknowns: Sequence[Any]) -> list[Any]:
         """Unknowns of arrays in units of the size of the roots, so that nothing depends on the unit of time."""
         size = mean_size(self.monic(unknowns)) + 1e-300
         return [u / size**power for u, power in zip(unknowns, self.powers, strict=True)]
@@ -92,13 +92,13 @@ class Pattern:
         """Coefficients of the product of the factors, descending from 1."""
         return product(*self.factors(unknowns))
 
-    def counted(self, unknowns: Sequence[Any]) -> list[tuple[list[Any], int]]:
+    def distinct_factors(self, unknowns: Sequence[Any]) -> list[tuple[list[Any], int]]:
         """The different factors for given unknowns, each with how often it occurs."""
         signs = [tuple(f) for f in self.factors(_UNRELATED[: len(self.unknowns)])]
         factors = self.factors(unknowns)
         return [(factors[signs.index(s)], signs.count(s)) for s in dict.fromkeys(signs)]
 
-    def remaining(self, unknowns: Sequence[Any]) -> list[list[Any]]:
+    def remaining_factors(self, unknowns: Sequence[Any]) -> list[list[Any]]:
         """The factors whose roots must lie left of the imaginary axis for the pattern to bound or keep stability."""
         return (self.rest or self.factors)(unknowns)
 

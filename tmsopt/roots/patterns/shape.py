@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from tmsopt.roots.patterns.parts import NUMBERS
+from tmsopt.roots.patterns.components import NUMBERS
 from tmsopt.roots.polynomial import product
 
 

@@ -144,7 +144,7 @@ def pattern_distance(
     return next(inside, float("inf"))
 
 
-def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[list[float]]:
+def fit_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[list[float]]:
     """Unknowns of the polynomials of a pattern nearest to a given one, one for each guess, the nearest first."""
     return [u for _, u in _fits(pattern, coefficients, None, 0.0)[0]]
 

@@ -13,7 +13,7 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.balls import as_ball, rational
-from tmsopt.algebra.krawczyk import slopes
+from tmsopt.algebra.krawczyk import jacobian
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.naming import shown
 from tmsopt.roots.patterns.shape import Shape
@@ -26,7 +26,7 @@ _HALF = 2  # of the digits that are carried, the share that a converged fit is t
 
 
 @dataclass(frozen=True)
-class Enclosed:
+class EnclosedRoot:
     """A root within balls, with its multiplicity; the imaginary part of a real root is exactly 0."""
 
     re: Any
@@ -44,7 +44,7 @@ class Enclosed:
         return abs(self.re) if self.im == 0 else (self.re * self.re + self.im * self.im).sqrt()
 
 
-def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
+def enclosed_roots(coefficients: Sequence[Any]) -> tuple[EnclosedRoot, ...] | None:
     """Every root of a real polynomial, coefficients descending as balls or exact fractions; None where not decided.
 
     The roots z of the polynomial p₀ in the middle are isolated first; a disc of radius n |p(z)/p′(z)| about z then
@@ -60,7 +60,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
         zeros += 1
     while terms and terms[0] == 0:
         terms.pop(0)
-    found = [Enclosed(flint.arb(0), flint.arb(0), zeros)] if zeros else []
+    found = [EnclosedRoot(flint.arb(0), flint.arb(0), zeros)] if zeros else []
     degree = len(terms) - 1
     if degree > 0:
         slope = [(degree - k) * c for k, c in enumerate(terms[:-1])]
@@ -68,19 +68,19 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
             if multiplicity > 1:
                 if not all(t.is_exact() for t in terms):
                     return None
-                found.append(Enclosed(z.real, z.imag, multiplicity))
+                found.append(EnclosedRoot(z.real, z.imag, multiplicity))
                 continue
             middle = z.real.mid() if z.imag == 0 else flint.acb(z.real.mid(), z.imag.mid())
             distance = (degree * abs(evaluate(terms, middle) / evaluate(slope, middle))).upper()
             ball = flint.arb(0, distance)
-            found.append(Enclosed(z.real.mid() + ball, flint.arb(0) if z.imag == 0 else z.imag.mid() + ball))
+            found.append(EnclosedRoot(z.real.mid() + ball, flint.arb(0) if z.imag == 0 else z.imag.mid() + ball))
     balls = [flint.acb(root.re, root.im) for root in found]
     if not all(a.is_finite() for a in balls) or any(a.overlaps(b) for a, b in combinations(balls, 2)):
         return None
     return rightmost_first(found)
 
 
-def factor_roots(factor: Sequence[Any]) -> Sequence[Enclosed] | None:
+def factor_roots(factor: Sequence[Any]) -> Sequence[EnclosedRoot] | None:
     """Roots of a factor; None where the balls cannot tell. A pair on the imaginary axis has the real part 0 exactly."""
     if len(factor) != 3:
         return enclosed_roots(factor)
@@ -89,12 +89,12 @@ def factor_roots(factor: Sequence[Any]) -> Sequence[Enclosed] | None:
     if discriminant > 0:
         width = discriminant.sqrt()
         far = (-b - width) / 2 if b > 0 else (width - b) / 2
-        return [Enclosed(far, nothing), Enclosed(-b - far if far.contains(0) else c / far, nothing)]
+        return [EnclosedRoot(far, nothing), EnclosedRoot(-b - far if far.contains(0) else c / far, nothing)]
     height = (-discriminant).sqrt() / 2
-    return [Enclosed(-b / 2, height), Enclosed(-b / 2, -height)] if discriminant < 0 else None
+    return [EnclosedRoot(-b / 2, height), EnclosedRoot(-b / 2, -height)] if discriminant < 0 else None
 
 
-def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
+def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[EnclosedRoot, ...] | None:
     """Roots of the polynomial nearest to a given one among those of a structure; None where the fit does not converge.
 
     Nearest is: least in the sum over k = 1 … n of (Δₖ/wₖ)², where Δₖ is the change of the k-th coefficient of the
@@ -115,10 +115,10 @@ def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[E
     start = [flint.arb(x) for x in places]
     target = [(c / unit**k).mid() for k, c in enumerate(monic)]
     found = _converged(shape, start, target)
-    return None if found is None else tuple(Enclosed(z.re * unit, z.im * unit, z.multiplicity) for z in found)
+    return None if found is None else tuple(EnclosedRoot(z.re * unit, z.im * unit, z.multiplicity) for z in found)
 
 
-def _converged(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[Enclosed, ...] | None:
+def _converged(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[EnclosedRoot, ...] | None:
     """Roots of the nearest polynomial of a shape, from a start."""
     small = flint.arb(2) ** (_LOST * (len(target) - 1) - flint.ctx.prec)
     sure = flint.arb(2) ** (-flint.ctx.prec // _HALF)
@@ -170,9 +170,9 @@ def _double(x: flint.fmpq) -> float:
         return float("inf") if x > 0 else float("-inf")
 
 
-def _roots_of(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:
+def _roots_of(shape: Shape, u: Sequence[Any]) -> list[EnclosedRoot] | None:
     """Roots of each group, and those of the rest; None where these are not decided."""
-    found: list[Enclosed] = []
+    found: list[EnclosedRoot] = []
     rest = shape.rest_factor(u)
     for factor, count in [*zip(shape.group_factors(u), (g.multiplicity for g in shape.groups), strict=True), (rest, 1)]:
         own = factor_roots(factor)
@@ -189,7 +189,7 @@ def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | 
         return None
     weights = _weights(found)
     offs = flint.arb_mat([[(b - a) / w] for a, b, w in zip(shape.monic(u), target, weights, strict=True)])
-    moved = slopes(lambda at: shape.monic([*at.values()]), dict(zip(shape.unknowns, u, strict=True)), shape.unknowns)
+    moved = jacobian(lambda at: shape.monic([*at.values()]), dict(zip(shape.unknowns, u, strict=True)), shape.unknowns)
     rows = flint.arb_mat([[slope / w for slope in row] for row, w in zip(moved.tolist(), weights, strict=True)])
     try:
         return list((rows.transpose() * rows).solve(rows.transpose() * offs))
@@ -197,7 +197,7 @@ def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | 
         return None
 
 
-def _weights(roots: Sequence[Enclosed]) -> list[Any]:
+def _weights(roots: Sequence[EnclosedRoot]) -> list[Any]:
     """Coefficients of ∏ (s + |zᵢ|), sizes of the terms that each coefficient is summed from."""
     sizes = sorted((r.modulus.mid() for r in roots for _ in range(r.multiplicity)), key=float)
     n = len(sizes)

@@ -8,9 +8,9 @@ import re
 from dataclasses import replace
 from functools import cache
 
+from tmsopt.roots.patterns.components import parse_components, several, times
 from tmsopt.roots.patterns.composed import pattern
 from tmsopt.roots.patterns.descriptions import all_or, listed
-from tmsopt.roots.patterns.parts import parts_of, several, times
 from tmsopt.roots.patterns.pattern import Pattern
 
 _MEANING = {"weave": "a real eigenfrequency", "resonance": "a real double eigenfrequency"}
@@ -33,16 +33,16 @@ def complex_pattern(name: str, size: int) -> Pattern:
         ValueError: for a name that is none, or a pattern of more eigenvalues than there are.
     """
     written = "".join(name.split())
-    for part in parts_of(written):
+    for part in parse_components(written):
         if part.kind == "CEP":
             raise ValueError(f"'{name}' {_REAL}; of a complex H write EP{part.order}")
         if part.kind == "capsize":
             raise ValueError(f"'{name}' {_REAL}; of a complex H write weave, a real eigenfrequency")
-    taken = sum(part.roots for part in parts_of(written) if part.kind == "EP")
+    taken = sum(part.roots for part in parse_components(written) if part.kind == "EP")
     if taken > size:
         raise ValueError(f"'{name}' takes {taken} eigenfrequencies, and H has {size}")
     made = pattern(written.replace("EP", "CEP"), 2 * size)
-    words = (_meaning(part.kind, part.order, part.count) for part in parts_of(written))
+    words = (_meaning(part.kind, part.order, part.count) for part in parse_components(written))
     return replace(made, name=complex_name(made.name), meaning=" and ".join(words), marks={}, doubles=made.name)
 
 
@@ -55,7 +55,7 @@ def complex_name(name: str) -> str:
     return re.sub(r"\bpair", "single", name.replace("CEP", "EP"))
 
 
-def complex_shown(shown: Pattern) -> Pattern:
+def as_complex_pattern(shown: Pattern) -> Pattern:
     """A pattern that the roots of a double show, as one of H."""
     words = shown.meaning.replace(" on one vertical line", " with one decay rate")
     words = words.replace("complex double", "double complex")
@@ -63,12 +63,12 @@ def complex_shown(shown: Pattern) -> Pattern:
     return replace(shown, name=complex_name(shown.name), meaning=words, marks={}, doubles=shown.form)
 
 
-def doubled_name(name: str) -> str:
+def real_form_name(name: str) -> str:
     """The same the other way round."""
     return re.sub(r"\bsingle", "pair", name.replace("EP", "CEP"))
 
 
-def complex_in_words(structure: str, size: int, gain: bool = False) -> str:
+def describe_complex_structure(structure: str, size: int, gain: bool = False) -> str:
     """A structure of the least damped eigenfrequencies, or of most gain, in words; one that is unknown as it is."""
     if structure == "undecided":
         return "double precision cannot tell which eigenfrequencies meet (undecided)"

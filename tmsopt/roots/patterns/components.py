@@ -41,7 +41,7 @@ def times(order: int) -> str:
 
 
 @dataclass(frozen=True)
-class Part:
+class Component:
     """Multiple roots of one kind and order, or a pattern of the imaginary axis.
 
     Attributes:
@@ -130,7 +130,7 @@ class Part:
         return [quadratic(np.array([r, t], dtype=complex)) for r, t in combinations(real, 2)] + pairs
 
 
-def parts_of(name: str) -> tuple[Part, ...]:
+def parse_components(name: str) -> tuple[Component, ...]:
     """The parts of a name, each kind and order once, real roots first and the highest multiplicity first."""
     counted: Counter[tuple[str, int]] = Counter()
     axis = []
@@ -145,7 +145,7 @@ def parts_of(name: str) -> tuple[Part, ...]:
     if len(axis) > len(set(axis)):
         raise ValueError(f"'{name}' names {axis[0]} twice")
     ordered = sorted(counted.items(), key=lambda item: (item[0][0] != "EP", -item[0][1]))
-    return (*(Part(kind, order, count) for (kind, order), count in ordered), *(Part(a, 1, 1) for a in axis))
+    return (*(Component(kind, order, count) for (kind, order), count in ordered), *(Component(a, 1, 1) for a in axis))
 
 
 def _real_means(z: Roots, order: int) -> list[float]:

@@ -20,7 +20,7 @@ CLOSED = 4
 """Degree up to which closed forms are used."""
 
 
-def meeting(coefficients: Coefficients) -> Any:
+def double_root_test(coefficients: Coefficients) -> Any:
     """A function that changes sign where two real roots meet, and is 0 where any two do; of arrays, degree 2 or more.
 
     Up to degree 4 it is the discriminant.
@@ -30,7 +30,7 @@ def meeting(coefficients: Coefficients) -> Any:
     return _least(coefficients, sums=False)[0]
 
 
-def balance(coefficients: Coefficients) -> Any:
+def opposite_roots_test(coefficients: Coefficients) -> Any:
     """A function that changes sign where two roots add up to 0, imaginary or opposite; of arrays, degree 2 or more.
 
     Up to degree 4 it is the Hurwitz determinant Δₙ₋₁, and has no meaning where all of a0, a1, a3 … vanish.
@@ -52,7 +52,7 @@ def weave_test(coefficients: Coefficients) -> Any:
     return np.where(coefficients[-1] * minors[n - 2] * below > 0, minors[n - 1], np.nan)
 
 
-def nearest_two(coefficients: Coefficients) -> Array:
+def nearest_pair_mean(coefficients: Coefficients) -> Array:
     """Mean of the real parts of the two roots nearest to each other: of a double root as exact as its coefficients."""
     if len(coefficients) == 3:
         return np.asarray(-coefficients[1] / 2 / coefficients[0], dtype=float)
