@@ -139,7 +139,7 @@ def test_intervals_scip_and_fractions_hold_the_ball(name, of, count):
     exact, met = balls(own, columns, count), dict.fromkeys(("intervals", "scip", "fractions"), 0)
     pytest.importorskip("pyscipopt")
     for k in range(len(own.outputs)):
-        part, built = own.part([own.outputs[k]]), translation.Translation(NOTHING)
+        part, built = own.extract([own.outputs[k]]), translation.Translation(NOTHING)
         for j in range(count):
             point = {n: float(x[j]) for n, x in columns.items()}
             for kind in met if exact[j][k].is_finite() else ():
@@ -184,7 +184,7 @@ def test_intervals_of_branch_and_prune_hold_the_ball(name, of, count):
     own, columns, needed = asked(name, of, tangents=True), drawn(name, of, count), coefficients_of(name, of)
     exact, points = balls(own, columns, count), np.array([columns[n] for n in own.names])
     for k, output in enumerate(own.outputs):
-        part = own.part([output])
+        part = own.extract([output])
         try:
             part = pruning.prepared(part)
         except UnsupportedOperation:

@@ -21,7 +21,7 @@ import flint
 import numpy as np
 from flint.utils.flint_exceptions import DomainError
 
-from tmsopt.algebra.balls import AngleByTangent, as_ball, exact
+from tmsopt.algebra.balls import Tilt, as_ball, exact
 from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, fold, make_node, trace
 from tmsopt.algebra.intervals import ball
 from tmsopt.algebra.kinds import BALLS, quotient, values
@@ -271,7 +271,7 @@ def _exact_rows(problem: Posed) -> list[list[Any]] | None:
         for n, ends in problem.ordered({**{n: (v, v) for n, v in problem.fixed.items()}, **problem.free}).items():
             lower, upper = (exact(math.tan(e)) if of[n].tangent else exact(e) for e in ends)
             at = lower + (upper - lower) * flint.fmpq(int(rng.integers(_FINENESS)), _FINENESS)
-            drawn[n] = AngleByTangent(at) if of[n].tangent else at
+            drawn[n] = Tilt(at) if of[n].tangent else at
         row = problem.model.coefficients(drawn, of)
         if not all(isinstance(c, flint.fmpq) for c in row):
             return None

@@ -95,7 +95,7 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
     def settled(number: Any) -> Array:
         nonlocal certain
         spread = _spread(number, m)
-        certain = certain & (spread.holds(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
+        certain = certain & (spread.is_known_within(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
         return np.asarray(spread.value)
 
     wide |= {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}

@@ -95,7 +95,7 @@ def answer(question: Question, clock: Clock, share: float, confirm: Confirm) -> 
         confirm: what to make of a design that was found; ``undecided`` if it is none, but for the solver's tolerance.
 
     Raises:
-        NotAccepted: for an operation that the solver cannot take.
+        UnsupportedOperation: for an operation that the solver cannot take.
     """
     end = clock.used + share * clock.left
     for sign in question.signs():

@@ -212,7 +212,7 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     """Equations and limits as plain data, and the box of all unknowns.
 
     Raises:
-        NotAccepted: for equations that branch and prune cannot take.
+        UnsupportedOperation: for equations that branch and prune cannot take.
     """
     box = tuple((ends(lo)[0], ends(hi)[1]) for lo, hi in _ends(sheet))
     names = {n: symbol(n) for n in sheet.names}

@@ -137,7 +137,7 @@ def rotating_frame(problem: Posed) -> RotatingFrame | None:
     """The frame of a complex H, by Gershgorin's discs over the box; None where these have no bound, or without H.
 
     Raises:
-        NotAccepted: for an operation that has no interval arithmetic.
+        UnsupportedOperation: for an operation that has no interval arithmetic.
     """
     if problem.model.double is None:
         return None

@@ -318,7 +318,7 @@ def prepared(asked: Formula) -> Formula:
     """A formula in operations that branch and prune has.
 
     Raises:
-        NotAccepted: for another one, with its name.
+        UnsupportedOperation: for another one, with its name.
     """
     known = {name: NODES.operations[name] for name in _OPERATIONS} | {"pow": _power}
     own = {name: symbol(name) for name in asked.names}

@@ -39,7 +39,7 @@ class SolverPool:
         """Decisions on tasks, run all at once, until one is shown to have no feasible point.
 
         Raises:
-            NotAccepted: for operations or numbers that the solver cannot take, if no task can.
+            UnsupportedOperation: for operations or numbers that the solver cannot take, if no task can.
             Failed: if the solver raised, and decided nothing.
             KeyboardInterrupt: when the user stops it; no process is left behind.
         """

@@ -76,7 +76,7 @@ class Translation:
         """Translate an NLP.
 
         Raises:
-            NotAccepted: for an operation that cannot be written for SCIP.
+            UnsupportedOperation: for an operation that cannot be written for SCIP.
         """
         import pyscipopt
 

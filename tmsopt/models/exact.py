@@ -10,7 +10,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.balls import DIGITS, AngleByTangent, rational
+from tmsopt.algebra.balls import DIGITS, Tilt, rational
 from tmsopt.algebra.formula import PI, Node, constant as node_of, fold, formula
 from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
@@ -166,7 +166,7 @@ class Written:
             value = rational(number.fraction)
             if of[name].tangent and name not in self.tangents and value != 0:
                 return None
-            found[name] = AngleByTangent(value) if of[name].tangent else value
+            found[name] = Tilt(value) if of[name].tangent else value
         return found
 
     def coefficients(self, model: Model, of: ParameterSet) -> list[Any] | None:

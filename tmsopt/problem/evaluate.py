@@ -82,7 +82,7 @@ def coefficients_of(problem: Posed, columns: Mapping[str, Any]) -> list[Any]:
 def coefficient_formula(model: Model, set_name: str) -> Formula:
     """The coefficients of a model in the parameters of a set."""
     whole = model.formulas[set_name]
-    return whole.part(whole.outputs[len(model.sets[0].names) :])
+    return whole.extract(whole.outputs[len(model.sets[0].names) :])
 
 
 def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> dict[str, Any]:

@@ -324,7 +324,7 @@ class Builder:
         """Ranges of expressions over the variables so far, by interval arithmetic.
 
         Raises:
-            NotAccepted: for an operation that has none.
+            UnsupportedOperation: for an operation that has none.
         """
         over = {name_of(k): ball(ends) for k, ends in enumerate(self.bounds)}
         numbers = {n: INTERVALS.constant(decimal(x)) for n, x in self.numbers.items()}

@@ -304,7 +304,7 @@ def _vanish(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], leadi
     field = Field(asked)
     try:
         row = fold(asked, field.inputs, field.kind)
-        return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
+        return next((k for k, c in enumerate(row) if not field.is_zero(c)), leading)
     except (ZeroDivisionError, UnsupportedOperation):  # or too large to tell
         return 0
 

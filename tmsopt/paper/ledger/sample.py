@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from tmsopt import laws
-from tmsopt.algebra.balls import AngleByTangent, rational
+from tmsopt.algebra.balls import Tilt, rational
 from tmsopt.models import copo
 from tmsopt.paper.ledger.algebra import is_stable
 
@@ -28,7 +28,7 @@ def describe_design(*design: Any) -> dict[str, Any]:
     """
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(rational, design)
     skew = zeta_B * chi_H - zeta_H * chi_B
-    square = _LAWS.flus(mu, chi_B, chi_H, zeta_B, zeta_H, AngleByTangent(T)) if skew != 0 else None
+    square = _LAWS.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T)) if skew != 0 else None
     lines = [chi_H > 1 + zeta_H * T, chi_H < 1 - zeta_B / mu * T, chi_H < chi_B, zeta_H > zeta_B]
     lines.append(square is not None and square > 0 and Fr > 0 and Fr * Fr > square)
     return {

@@ -7,7 +7,7 @@ from typing import Any
 import flint
 
 from tmsopt import laws
-from tmsopt.algebra.balls import AngleByTangent
+from tmsopt.algebra.balls import Tilt
 from tmsopt.models import copo, matrices, tms
 from tmsopt.paper.ledger import algebra
 from tmsopt.paper.ledger.entry import judge_decimal
@@ -16,7 +16,7 @@ from tmsopt.roots.polynomial import evaluate, product, quadratic_pencil, shift
 
 _FUNCTIONS = (
     *(abs, all, any, dict, int, len, list, max, min, range, sum),
-    *(copo, matrices, quadratic_pencil, AngleByTangent, product, shift, evaluate, describe_design, draw_sample),
+    *(copo, matrices, quadratic_pencil, Tilt, product, shift, evaluate, describe_design, draw_sample),
 )
 
 VOCABULARY: Mapping[str, Any] = {
