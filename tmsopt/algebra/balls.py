@@ -126,9 +126,7 @@ class Tilt:
 
 def is_ball(x: Any) -> bool:
     """Whether x is a number of ball arithmetic, including exact fractions and polynomials."""
-    return isinstance(
-        x, flint.fmpq | flint.arb | flint.arb_series | flint.fmpq_poly | flint.arb_poly | Bounded | Tilt
-    )
+    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | flint.fmpq_poly | flint.arb_poly | Bounded | Tilt)
 
 
 def exact(x: Any) -> Any:
