@@ -1,4 +1,4 @@
-"""Numbers with bounds of their errors: the bounds hold, by ball arithmetic at 300 bits, and are not far too wide."""
+"""Error bounds hold, by ball arithmetic at 300 bits, and are not much too wide."""
 
 from importlib import import_module
 

@@ -1,4 +1,4 @@
-"""What the operations of formulas are for each kind of numbers, against Python's own functions; each one is met."""
+"""Operations of formulas in each kind of number, compared with Python's functions; every operation is tested."""
 
 import math
 from fractions import Fraction
@@ -63,7 +63,7 @@ BOTH = {
 
 
 def asked():
-    """Every operation as a formula in x and y, and what it is."""
+    """Every operation as a formula in x and y, with its expected value."""
     x, y = symbol("x"), symbol("y")
     found = {op: (make_node(op, x, y), f) for op, f in ALIKE.items()}
     chosen = {op: make_node("choose", make_node(op, x, y), x, 3) for op in TRUTHS}
@@ -82,7 +82,7 @@ def asked():
 
 @pytest.mark.parametrize("op", asked())
 def test_operations_are_those_of_python(op):
-    """Each function of the libraries is right to a few units of its last digit; balls hold the value."""
+    """Library functions are right to a few units in the last place, and balls contain the value."""
     node, truth = asked()[op]
     own = formula([node], ("x", "y"))
     points = [p for p in POINTS if op != "pow" or p[1] > -1]
@@ -138,7 +138,7 @@ def test_where_a_ball_cannot_tell_both_choices_are_held():
 
 
 def test_constants_are_exact():
-    """A number is what its digits say; doubles are the nearest to it, whatever it is made of."""
+    """A constant has the value of its digits, and its double is the nearest one."""
     own = parse_value("0.1*x + 2*pi/3 - sqrt(1/3)", ["x"]).formula
     (found,) = fold(own, {"x": flint.fmpq(1)}, BALLS)
     with flint.ctx.workdps(60):
@@ -183,7 +183,7 @@ def test_a_formula_does_not_ask_for_its_numbers():
 
 
 def test_a_truth_among_numbers_is_1_or_0_of_every_kind():
-    """As in slopes by CasADi: of max(x, y) half of both where x = y. And a number is true where it is not 0."""
+    """Conditions count as 1 and 0, as in CasADi's derivative of max(x, y) at x = y; a number is true if it is not 0."""
     x, y = symbol("x"), symbol("y")
     kinks = gradients([make_node("max", x, y), make_node("min", x, y), abs(x - y)], [x, y])
     others = [
@@ -218,7 +218,7 @@ def test_functions_of_casadi_are_formulas():
 
 
 def test_an_exponent_stays_a_number_where_a_formula_is_split():
-    """As a parameter of a solver it would have a slope, the logarithm of a negative base among it."""
+    """As a parameter of a solver it would have a derivative, with the logarithm of a negative base."""
     whole = trace(lambda v: [v["x"] ** 3 + 5 * v["c"]], ["x", "c"])
     names, early, late = whole.split(whole.dependent_steps(["x"]))
     assert fold(early, {"c": 2.0}, FLOATS) == [10.0]
