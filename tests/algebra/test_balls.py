@@ -37,7 +37,7 @@ def series(x):
 
 @pytest.mark.parametrize("of", tms.sets, ids=lambda s: s.name)
 def test_every_quantity_of_balls_encloses_what_doubles_give(of):
-    """To the conditioning of doubles; where doubles give nan, the balls do, and exact fractions serve like balls."""
+    """Balls and exact fractions agree with doubles to the conditioning of doubles, and are nan where doubles are nan."""
     seen = 0
     for native in designs(60):
         p = to_si(native, w=1.7, m_B=11.0) if of.name == "SI" else native
@@ -58,7 +58,7 @@ def test_every_quantity_of_balls_encloses_what_doubles_give(of):
 
 
 def test_a_weave_speed_of_0_is_exactly_0():
-    """ζ_B = ζ_H and χ_H = 1 in SI: fractions know x_H/w − 1 = 0 and z_B/w − z_H/w = 0, doubles and balls may not."""
+    """ζ_B = ζ_H and χ_H = 1 in SI: x_H/w − 1 and z_B/w − z_H/w are exactly 0 in fractions, perhaps not in doubles."""
     p = {
         "w": 0.7,
         "v": 3.0,
@@ -125,14 +125,14 @@ def test_expressions_without_a_value_are_nan(text):
 
 
 def test_a_comparison_over_balls_is_left_minus_right():
-    """A number is what its digits say, however many, and a quotient of numbers is a fraction."""
+    """A number has the value of all its digits, and a quotient of numbers is a fraction."""
     for text in ("0.1", "1/10", "0.1000", "1e-1", "0.30000000000000004444 - 0.20000000000000004444"):
         got = parse_comparison(f"x >= {text}", ["x"]).of({"x": exact(0.5)}, BALLS)
         assert middle(got) == Fraction(1, 2) - Fraction(1, 10)
 
 
 def test_choices_and_magnitudes_of_balls():
-    """Certain ones are exact; of a ball about 0 nothing is lost; floats and arrays stay what they were."""
+    """Decided choices are exact, undecided ones enclose both cases, and floats and arrays keep their type."""
     wide = flint.arb(0, 0.5)
     assert greater(exact(2), exact(1)) == 2
     assert lesser(exact(2), flint.arb(3)) == 2

@@ -11,8 +11,10 @@ from tmsopt.algebra import NODES, fold
 from tmsopt.global_search import Puzzle, prune
 
 pruning = import_module("tmsopt.global_search.pruning")
-formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))
-multiplied_out = import_module("tmsopt.algebra.identity").multiplied_out
+formula, make_node, symbol = (
+    getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "make_node", "symbol")
+)
+multiply_out = import_module("tmsopt.algebra.identity").multiply_out
 
 NAMES = ("x", "y", "z")
 nothing = ()
@@ -66,7 +68,7 @@ def test_no_box_loses_a_zero():
             equations.append(left - function(at))
         reach = [(float(rng.choice([0, 1, 2.5])), float(rng.choice([0, 0.5, 3]))) for _ in NAMES]
         box = tuple((float(c) - lo, float(c) + hi) for c, (lo, hi) in zip(at, reach, strict=True))
-        assert holds(pruned(multiplied_out(formula(equations, NAMES)), box, turns=12), at)
+        assert holds(pruned(multiply_out(formula(equations, NAMES)), box, turns=12), at)
 
 
 FUNCTIONS = {
@@ -85,13 +87,13 @@ def test_no_operation_loses_a_point_or_a_slope(name):
     x, y = symbol("x"), symbol("y")
     if name in ("div", "sub"):
         asked, function = (
-            formula([made(name, x, y)], ("x", "y")),
+            formula([make_node(name, x, y)], ("x", "y")),
             {"div": float.__truediv__, "sub": float.__sub__}[name],
         )
     elif name in POWERS:
         asked, function = formula([x**name], ("x", "y")), lambda a, _: a**name
     else:
-        asked, function = formula([made(name, x)], ("x", "y")), lambda a, _: FUNCTIONS[name](a)
+        asked, function = formula([make_node(name, x)], ("x", "y")), lambda a, _: FUNCTIONS[name](a)
     ends = np.sort(rng.choice([-2.0, -0.7, 0.0, 0.3, 0.9, 2.5], (2, 2, 400)), axis=0)
     asked = pruning.prepared(asked)
     with np.errstate(all="ignore"):
@@ -130,9 +132,9 @@ def test_zeros_without_limits_and_where_functions_end():
     x, y = symbol("x"), symbol("y")
     left = pruned(formula([x - y * y, y - 3], ("x", "y")), ((-np.inf, np.inf), (-10.0, 10.0)))
     assert np.allclose(left[..., 0].T, [[9, 9], [3, 3]], atol=1e-6)
-    (ends,) = pruned(formula([made("sqrt", x - 1) - 1], ("x",)), ((-5.0, 5.0),)).T[0]
+    (ends,) = pruned(formula([make_node("sqrt", x - 1) - 1], ("x",)), ((-5.0, 5.0),)).T[0]
     assert ends == pytest.approx([2, 2], abs=1e-6)
-    boxes = pruned(formula([made("abs", x) - 2], ("x",)), ((-5.0, 5.0),), limits=[-x])
+    boxes = pruned(formula([make_node("abs", x) - 2], ("x",)), ((-5.0, 5.0),), limits=[-x])
     assert holds(boxes, [-2])
     assert not holds(boxes, [2])
 
@@ -145,9 +147,9 @@ def test_a_pole_has_no_slope(power):
 
 def test_identities_of_angles():
     t = symbol("x")
-    angle = made("atan", t)
-    assert made("tan", angle) is t
-    sine, cosine = made("sin", angle), made("cos", angle)
-    assert multiplied_out(formula([sine - t * cosine])).constants == [0]
-    assert multiplied_out(formula([Fraction(1, 2) + t - t])).constants == [Fraction(1, 2)]
-    assert multiplied_out(formula([(t / 4) ** 3 * 64 - t * t * t])).constants == [0]
+    angle = make_node("atan", t)
+    assert make_node("tan", angle) is t
+    sine, cosine = make_node("sin", angle), make_node("cos", angle)
+    assert multiply_out(formula([sine - t * cosine])).constants == [0]
+    assert multiply_out(formula([Fraction(1, 2) + t - t])).constants == [Fraction(1, 2)]
+    assert multiply_out(formula([(t / 4) ** 3 * 64 - t * t * t])).constants == [0]

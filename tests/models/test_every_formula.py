@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 from helpers.javascript import run
 
-from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, Bounded, NotAccepted, fold
+from tmsopt.algebra import BALLS, CASADI, FLOATS, INTERVALS, NODES, Bounded, UnsupportedOperation, fold
 from tmsopt.models import Values, controlled, from_coefficients, from_hamiltonian, from_matrices, tms, whipple
 from tmsopt.program import NLP
 
-formula, made, symbol = (getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "made", "symbol"))
-multiplied_out = import_module("tmsopt.algebra.identity").multiplied_out
+formula, make_node, symbol = (
+    getattr(import_module("tmsopt.algebra.formula"), n) for n in ("formula", "make_node", "symbol")
+)
+multiply_out = import_module("tmsopt.algebra.identity").multiply_out
 function = import_module("tmsopt.explorer.javascript").function
 pruning, translation = (import_module(f"tmsopt.global_search.{n}") for n in ("pruning", "translation"))
 
@@ -50,7 +52,9 @@ def asked(name, of, tangents=False):
     """Native parameters, coefficients, quantities and matrices of a model in one formula, of angles or their tangents."""
     model = MODELS[name]
     own = model.sets[of]
-    given = {p.name: made("atan", symbol(p.name)) if tangents and p.tangent else symbol(p.name) for p in own.parameters}
+    given = {
+        p.name: make_node("atan", symbol(p.name)) if tangents and p.tangent else symbol(p.name) for p in own.parameters
+    }
     values = Values(model, own, given).with_known({root: symbol(root) for root in OF_ROOTS})
     listed = [values[n] for n in model.quantity_names(own)]
     matrices = [] if model.pencil is None else model.pencil(own.native(given))
@@ -135,13 +139,13 @@ def test_intervals_scip_and_fractions_hold_the_ball(name, of, count):
     exact, met = balls(own, columns, count), dict.fromkeys(("intervals", "scip", "fractions"), 0)
     pytest.importorskip("pyscipopt")
     for k in range(len(own.outputs)):
-        part, built = own.part([own.outputs[k]]), translation.Translation(NOTHING)
+        part, built = own.extract([own.outputs[k]]), translation.Translation(NOTHING)
         for j in range(count):
             point = {n: float(x[j]) for n, x in columns.items()}
             for kind in met if exact[j][k].is_finite() else ():
                 try:
                     over = HOLDS[kind](built, part, point)
-                except (NotAccepted, ZeroDivisionError):
+                except (UnsupportedOperation, ZeroDivisionError):
                     assert kind == "fractions" or (kind == "scip" and k not in needed), (kind, k)
                     continue
                 met[kind] += 1
@@ -161,13 +165,13 @@ def _by_scip(built, part, point):
 
 def _by_fractions(built, part, point):
     if len(part.steps) > SHORT or any(math.isnan(x) for x in part.constants if isinstance(x, float)):
-        raise NotAccepted("what takes long to multiply out, and what is no number")
+        raise UnsupportedOperation("what takes long to multiply out, and what is no number")
     with flint.ctx.workprec(212):
         exact = {n: flint.fmpq(*x.as_integer_ratio()) for n, x in point.items()}
         return flint.arb(fold(_multiplied_out(part), exact, BALLS)[0])
 
 
-_multiplied_out = lru_cache(maxsize=1)(multiplied_out)
+_multiplied_out = lru_cache(maxsize=1)(multiply_out)
 
 
 HOLDS = {"intervals": _by_intervals, "scip": _by_scip, "fractions": _by_fractions}
@@ -180,10 +184,10 @@ def test_intervals_of_branch_and_prune_hold_the_ball(name, of, count):
     own, columns, needed = asked(name, of, tangents=True), drawn(name, of, count), coefficients_of(name, of)
     exact, points = balls(own, columns, count), np.array([columns[n] for n in own.names])
     for k, output in enumerate(own.outputs):
-        part = own.part([output])
+        part = own.extract([output])
         try:
             part = pruning.prepared(part)
-        except NotAccepted:
+        except UnsupportedOperation:
             assert k not in needed
             continue
         with np.errstate(all="ignore"):

@@ -248,7 +248,7 @@ def unclaimed(design, names):
 
 def test_a_bound_on_the_roots_that_is_too_small(slowest, monkeypatch):
     """A tenth, for frequencies of some 1: x1 is the square of one."""
-    monkeypatch.setattr(lines, "root_bound", lambda coefficients: 0.1)
+    monkeypatch.setattr(lines, "bound_roots", lambda coefficients: 0.1)
     assert unclaimed(certify(slowest, seconds=SECONDS), "x1.0")
 
 

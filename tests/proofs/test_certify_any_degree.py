@@ -18,7 +18,7 @@ from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, Question, task
 from tmsopt.models import from_coefficients, from_matrices
 from tmsopt.proofs import prove_design
 from tmsopt.roots import Root, product, roots
-from tmsopt.roots.patterns import implies, shown_patterns
+from tmsopt.roots.patterns import find_patterns, has_pattern
 
 factored = import_module("tmsopt.proofs.factored")
 
@@ -371,7 +371,7 @@ def roots_of(*places):
 )
 def test_patterns_that_roots_show(places, names):
     """Each starts from unknowns that rebuild the polynomial."""
-    found = shown_patterns(roots_of(*places))
+    found = find_patterns(roots_of(*places))
     assert [p.name for p in found] == names
     z = np.array([complex(r.re, r.im) for r in roots_of(*places) for _ in range(r.multiplicity)])
     for p in found:
@@ -394,4 +394,4 @@ def test_patterns_that_roots_show(places, names):
     ],
 )
 def test_patterns_that_others_imply(places, name, told):
-    assert implies(roots_of(*places), name) is told
+    assert has_pattern(roots_of(*places), name) is told

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from tmsopt import Problem, certify, solve
-from tmsopt.algebra import INTERVALS, NotAccepted, ball, interval
+from tmsopt.algebra import INTERVALS, UnsupportedOperation, ball, interval
 from tmsopt.global_search import INFEASIBLE, SCIP, Decision, Question, SolverPool, interlace, squares_of, task
 from tmsopt.models import tms
 
@@ -66,7 +66,7 @@ def test_a_comparison_linear_in_places_is_no_line(constraint):
 )
 def test_what_cannot_be_kept_in_numbers_is_refused(constraint):
     free = {"mu": (0.0, 12.0), "Fr": (1.0, 2.0)}
-    with pytest.raises(NotAccepted):
+    with pytest.raises(UnsupportedOperation):
         verdicts(question(free, constraint))
 
 

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from mpmath import mp
 
 import tmsopt
-from tmsopt.algebra import Number, Refused, enclosed, number, refined
+from tmsopt.algebra import Number, ProofFailed, enclose_solution, number, refine_solution
 from tmsopt.cli import every as main
 from tmsopt.documents import list_numbers
 from tmsopt.models import decimal
@@ -564,20 +564,20 @@ def test_krawczyk_on_a_square():
     """x² = 2 has ±√2; its test fails at 0, and where there is no root, and for a double one."""
     with flint.ctx.workdps(50):
         system = quadratic("-2")
-        middle = refined(system, {"x": flint.arb(1)}, ["x"], 45)
-        found = enclosed(system, middle, ["x"], 45)
+        middle = refine_solution(system, {"x": flint.arb(1)}, ["x"], 45)
+        found = enclose_solution(system, middle, ["x"], 45)
         assert found.balls["x"].contains(flint.arb(2).sqrt()) or found.balls["x"].overlaps(flint.arb(2).sqrt())
         assert 0.1 < found.uniqueness < 2 * SQRT2
         for constant in ("1", "0"):
-            with pytest.raises(Refused):
+            with pytest.raises(ProofFailed):
                 refined_and_enclosed(quadratic(constant))
         close = quadratic("-1e-40")  # two roots 2e-20 apart
         at = {"x": flint.arb("1e-20").mid()}
-        assert enclosed(close, refined(close, at, ["x"], 45), ["x"], 45).uniqueness < 2e-20
+        assert enclose_solution(close, refine_solution(close, at, ["x"], 45), ["x"], 45).uniqueness < 2e-20
 
 
 def refined_and_enclosed(system):
-    return enclosed(system, refined(system, {"x": flint.arb("0.3")}, ["x"], 45), ["x"], 45)
+    return enclose_solution(system, refine_solution(system, {"x": flint.arb("0.3")}, ["x"], 45), ["x"], 45)
 
 
 def test_decimals_hold_their_balls():

@@ -31,7 +31,7 @@ def counted(coefficients):
 
 
 def exact(coefficients):
-    """By Sturm in Fractions on the very doubles."""
+    """By Sturm's chain in fractions, for the coefficients as stored."""
     negative, _, positive = curves.sturm([Fraction(float(c)) for c in coefficients])
     return negative, positive
 
@@ -66,7 +66,7 @@ def test_random_coefficients_of_every_degree(degree):
 @pytest.mark.parametrize("order", [2, 3, 4, 6])
 @pytest.mark.parametrize("size", [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-5, 1e-3])
 def test_beside_an_exceptional_point(order, size):
-    """(s + 1)^n with its coefficients moved by `size`: doubles decide exactly, whatever the roots do."""
+    """(s + 1)^n with coefficients changed by `size`; the count is exact for the coefficients as stored."""
     rng = np.random.default_rng(order)
     c = np.array([comb(order, k) for k in range(order + 1)], dtype=float) * np.ones((25, 1))
     c[:, 1:] *= 1 + size * rng.choice([-1.0, 0.0, 1.0, 0.37], c[:, 1:].shape)
@@ -104,7 +104,7 @@ def test_special_sequences(factors, expected):
 
 @pytest.mark.parametrize("scale", [1e-60, 1e-8, 1e8, 1e60])
 def test_scales_of_root_and_leading_coefficient_do_not_matter(scale):
-    """(s + 1)(s + 2)(s − 3)(s² + 1) in s/scale, times anything; far from overflow."""
+    """(s + 1)(s + 2)(s − 3)(s² + 1) in s/scale, times any factor, far from overflow."""
     c = np.array(expand([[1, 1], [1, 2], [1, -3], [1, 0, 1]]), dtype=float)
     assert counted(c * scale) == (2, 1)
     assert counted(c * scale ** np.arange(6)) == (2, 1)

@@ -1,4 +1,4 @@
-"""Discs about numeric roots: the true roots, isolated in ball arithmetic, lie in them, beside multiple roots too."""
+"""Discs around numeric roots contain the true roots, isolated in ball arithmetic, also near multiple roots."""
 
 from importlib import import_module
 
@@ -13,7 +13,7 @@ enclose_motions = import_module("tmsopt.roots.discs").enclose_motions
 
 
 def polynomials(degree):
-    """Some at random, some near a root of the multiplicity of the degree, some with roots of very different size."""
+    """Random polynomials, some near an n-fold root, some with roots of very different size."""
     rng = np.random.default_rng(degree)
     near = np.stack([np.poly(-1 - e * rng.uniform(-1, 1, degree)) for e in np.geomspace(1e-3, 1, 60)])
     wide = np.stack([np.poly(-(10.0 ** rng.uniform(-4, 4, degree))) for _ in range(60)])
@@ -44,7 +44,7 @@ def test_a_multiple_root_is_never_certain():
 
 @pytest.mark.parametrize("apart", [1e-13, -1e-13])
 def test_a_second_root_on_the_rightmost_line_is_never_certain(apart):
-    """Which of a pair and a real root is rightmost, rounding decides."""
+    """Rounding decides whether a pair or a real root is rightmost."""
     a = np.poly([-1 + apart, -1 + 2j, -1 - 2j, -3]).real
     assert not enclose_motions([Bounded(np.full(1, c), np.zeros(1)) for c in a], 1e-12).simple.any()
     clear = np.poly([-1.1, -1 + 2j, -1 - 2j, -3]).real

@@ -26,7 +26,7 @@ from tmsopt.roots import (
 )
 
 JOINTLY_RIGHT = Fraction(1, 10**13)
-"""The accuracy promised of rebuilt coefficients."""
+"""The promised accuracy of rebuilt coefficients."""
 
 s = sympy.Symbol("s")
 repeatable = settings(max_examples=40, deadline=None, derandomize=True)
@@ -175,7 +175,7 @@ def test_roots_sixteen_decades_apart(degree):
 
 @pytest.mark.parametrize("degree", [3, 4, 6, 8])
 def test_newton_brings_roots_of_twelve_decades_to_a_few_roundings(degree):
-    """Eigenvalues alone leave errors up to 1e-13 here, at which roots are isolated exactly instead."""
+    """Eigenvalues alone leave errors up to 1e-13 here, the limit above which roots are isolated exactly."""
     rng = np.random.default_rng(degree)
     c = np.array([np.poly(-(10 ** rng.uniform(-6, 6, degree))) for _ in range(300)])
     assert backward_error(c, roots(c)).max() < 1e-14
@@ -297,7 +297,7 @@ def test_roots_refuse_what_has_none(bad):
 
 
 def random_exact(degree):
-    """Rational polynomials, a0 of both signs: products of factors with Re s about 0, some changed a little."""
+    """Rational polynomials with a0 of both signs: products of factors with Re s near 0, some slightly changed."""
     rng = np.random.default_rng(degree)
     chosen = []
     for k in range(60):

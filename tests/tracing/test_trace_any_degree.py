@@ -19,7 +19,7 @@ from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.plots import trace_figure
 from tmsopt.problem import Problem, load
 from tmsopt.roots import product, shift
-from tmsopt.roots.patterns import in_words
+from tmsopt.roots.patterns import describe_structure
 from tmsopt.search import solve
 from tmsopt.tracing import domain, swallowtail, trace
 
@@ -373,13 +373,13 @@ def test_a_swallowtail_takes_degree_4():
 
 
 def test_structures_in_words():
-    assert in_words("EP4") == "four roots meet in one (EP4)"
-    assert in_words("EP2", 2) == "both roots meet in one (EP2)"
-    assert in_words("EP6", 6) == "all six roots meet in one (EP6)"
-    assert in_words("EP4", 6) == "the four rightmost roots meet in one (EP4)"
-    assert in_words("CEP3", 6) == "three complex pairs meet in one (CEP3)"
+    assert describe_structure("EP4") == "four roots meet in one (EP4)"
+    assert describe_structure("EP2", 2) == "both roots meet in one (EP2)"
+    assert describe_structure("EP6", 6) == "all six roots meet in one (EP6)"
+    assert describe_structure("EP4", 6) == "the four rightmost roots meet in one (EP4)"
+    assert describe_structure("CEP3", 6) == "three complex pairs meet in one (CEP3)"
     words = "a double complex pair, two complex pairs and a real root have one decay rate"
-    assert in_words("CEP2+two pairs+real", 9) == f"{words} (CEP2+two pairs+real)"
+    assert describe_structure("CEP2+two pairs+real", 9) == f"{words} (CEP2+two pairs+real)"
 
 
 def test_columns_of_unknowns_are_told_from_parameters_of_the_same_name():

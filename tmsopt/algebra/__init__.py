@@ -1,8 +1,7 @@
 """One formula for floats, arrays, CasADi expressions, fractions and balls.
 
 In: formulas written once as plain arithmetic, and numbers of any of these kinds. Out: values of the same kind,
-enclosures, and solutions proved by interval Newton. Open `kinds` first: the table of what each arithmetic can
-do.
+enclosures, and solutions proved by interval Newton. Open `kinds` first: it lists what each kind of number can do.
 """
 
 import lazy_loader

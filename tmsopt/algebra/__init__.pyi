@@ -1,14 +1,16 @@
-from .arrays import on_arrays as on_arrays
+from .arrays import evaluate_on_arrays as evaluate_on_arrays
 from .balls import Number as Number, exact as exact, number as number, rational as rational
 from .formula import (
-    Formula as Formula, Kind as Kind, NotAccepted as NotAccepted, fold as fold, from_casadi as from_casadi,
-    trace as trace,
+    Formula as Formula, Kind as Kind, UnsupportedOperation as UnsupportedOperation, fold as fold,
+    from_casadi as from_casadi, trace as trace,
 )
 from .intervals import (
-    EVERYTHING as EVERYTHING, ball as ball, interval as interval, ranges as ranges, root_bound as root_bound,
+    EVERYTHING as EVERYTHING, ball as ball, bound_roots as bound_roots, interval as interval, ranges as ranges,
 )
 from .kinds import (
     BALLS as BALLS, CASADI as CASADI, FLOATS as FLOATS, INTERVALS as INTERVALS, NODES as NODES, values as values,
 )
-from .krawczyk import Refused as Refused, enclosed as enclosed, refined as refined
+from .krawczyk import (
+    ProofFailed as ProofFailed, enclose_solution as enclose_solution, refine_solution as refine_solution,
+)
 from .rounding import Bounded as Bounded, as_bounded as as_bounded

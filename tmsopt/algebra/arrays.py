@@ -1,7 +1,7 @@
-"""A formula on large arrays: what has the shape of the whole grid is computed a block at a time, in the cache.
+"""Evaluates a formula on large arrays, a block at a time, so that the work stays in the cache.
 
-Shapes are those of NumPy's broadcasting. A step that depends on one axis of a grid alone is computed along that axis,
-in shape (1, n) or (m, 1); what depends on no axis is one number.
+Shapes follow NumPy's broadcasting. A step that depends on a single axis is computed along it, in shape (1, n) or
+(m, 1); a step that depends on no axis is one number.
 """
 
 import math
@@ -15,13 +15,13 @@ from tmsopt.algebra.kinds import BALLS, FLOATS
 from tmsopt.algebra.rounding import Bounded, as_bounded
 
 BLOCK = 2**14
-"""Elements of a block: 128 kB an array."""
+"""Elements of a block: 128 kB for each array."""
 
 
-def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
-    """The outputs for numbers and arrays, each of the shape that it depends on; nan and inf without a warning.
+def evaluate_on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
+    """Outputs for numbers and arrays, each in the shape of its inputs; nan and inf come without a warning.
 
-    With bounds of errors, where a column has them.
+    If an input carries error bounds, so do the outputs.
     """
     if Bounded in map(type, given.values()):
         with np.errstate(all="ignore"):
@@ -31,33 +31,33 @@ def on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
     with np.errstate(all="ignore"):
         if math.prod(shape) <= BLOCK:
             return fold(formula, columns, FLOATS)
-        strides = {n: np.broadcast_to(x, shape).strides for n, x in columns.items()}  # 0 along axes of no influence
+        strides = {n: np.broadcast_to(x, shape).strides for n, x in columns.items()}  # 0 along axes without influence
         axes = [k for k, n in enumerate(shape) if n != 1]
-        large = set.intersection(*(formula.depending([n for n in columns if strides[n][k]]) for k in axes))
+        large = set.intersection(*(formula.dependent_steps([n for n in columns if strides[n][k]]) for k in axes))
         names, small, rest = formula.split(large)
-        known = columns | dict(zip(names, fold(small, columns, FLOATS), strict=True))
-        found = [known[str(o)] if str(o) in known else np.empty(shape) for o in formula.outputs]
-        filled = [k for k, o in enumerate(formula.outputs) if o in large]
-        rest = rest.part([rest.outputs[k] for k in filled])
-        for rows, along in _blocks(shape) if filled else ():
-            near = {name: _cut(known[name], rows, along) for name in rest.inputs}
-            for k, value in zip(filled, fold(rest, near, FLOATS), strict=True):
-                _cut(found[k], rows, along)[...] = value
-    return found
+        inputs = columns | dict(zip(names, fold(small, columns, FLOATS), strict=True))
+        results = [inputs[str(o)] if str(o) in inputs else np.empty(shape) for o in formula.outputs]
+        large_outputs = [k for k, o in enumerate(formula.outputs) if o in large]
+        rest = rest.extract([rest.outputs[k] for k in large_outputs])
+        for block in _split_grid(shape) if large_outputs else ():
+            block_inputs = {name: _slice_block(inputs[name], *block) for name in rest.inputs}
+            for k, value in zip(large_outputs, fold(rest, block_inputs, FLOATS), strict=True):
+                _slice_block(results[k], *block)[...] = value
+    return results
 
 
-def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
-    """Rows and columns of a grid, about so many elements at a time."""
+def _split_grid(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
+    """Rows and columns of blocks of about `BLOCK` elements."""
     rows, columns = (1, *shape)[-2:]
-    wide = max(1, min(columns, BLOCK))
-    high = max(1, BLOCK // wide)
-    for i in range(0, rows, high):
-        for j in range(0, columns, wide):
-            yield slice(i, i + high), slice(j, j + wide)
+    width = max(1, min(columns, BLOCK))
+    height = max(1, BLOCK // width)
+    for i in range(0, rows, height):
+        for j in range(0, columns, width):
+            yield slice(i, i + height), slice(j, j + width)
 
 
-def _cut(value: Any, rows: slice, columns: slice) -> Any:
-    """What of a value belongs to a block."""
+def _slice_block(value: Any, rows: slice, columns: slice) -> Any:
+    """The elements of a block, for a value that may be constant along some axes."""
     shape = np.shape(value)
     if shape and shape[-1] != 1:
         value = value[..., columns]

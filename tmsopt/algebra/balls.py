@@ -1,8 +1,8 @@
-"""Fractions and balls, what they are made of, and as data that lasts: decimals with a radius, and roots of them.
+"""Exact fractions and balls, and their storage as decimals with a radius.
 
-A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), a power series of
-these (`flint.arb_series`), a polynomial, or an array of numbers with bounds of their errors
-(`rounding.Bounded`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
+A ball is an exact fraction (`flint.fmpq`), an interval with a midpoint and a radius (`flint.arb`), a power series of
+these (`flint.arb_series`), a polynomial, or an array of numbers with error bounds (`rounding.Bounded`). The ball nan
+stands for a value that does not exist or that the balls are too wide to decide.
 """
 
 from collections.abc import Sequence
@@ -17,15 +17,17 @@ import flint
 from tmsopt.algebra.rounding import Bounded
 
 DIGITS = 60
-_FARTHEST = 2**20  # exponent of two of a fraction made of a ball
+"""Decimal digits of the usual working precision."""
+
+_LARGEST_EXPONENT = 2**20  # of two, in a fraction made from a ball
 
 GUARD = 5
-"""Decimal digits written beyond those asked for."""
+"""Decimal digits written in addition to the requested ones."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A real number known to lie within a radius of a decimal.
+    """A real number that lies within a radius of a decimal.
 
     Attributes:
         value: the decimal.
@@ -39,13 +41,13 @@ class Number:
         return float(self.value)
 
     def contains(self, x: Any) -> bool:
-        """Whether an exact number (a decimal in text, a Fraction) is within the radius."""
+        """Whether an exact number (decimal text or a Fraction) lies within the radius."""
         return abs(Fraction(x) - Fraction(self.value)) <= Fraction(self.radius)
 
 
 @dataclass(frozen=True)
 class ProvedRoot:
-    """A root with its exact multiplicity; a complex pair is two of these. A real root has the imaginary part 0."""
+    """A root with its exact multiplicity; a complex pair is two of these. The imaginary part of a real root is 0."""
 
     re: Number
     im: Number
@@ -53,7 +55,7 @@ class ProvedRoot:
 
 
 def number(ball: Any, digits: int) -> Number:
-    """A ball as a decimal with `digits` digits and a few more, or fewer where its radius says so."""
+    """A ball as a decimal of `digits` + `GUARD` digits, or fewer if its radius is large."""
     if not ball.is_finite():
         return Number("nan", "inf")
     if ball == 0:
@@ -61,31 +63,31 @@ def number(ball: Any, digits: int) -> Number:
     middle, radius, exponent = (int(x) for x in ball.mid_rad_10exp(digits + 2 * GUARD))
     drop = max(len(str(abs(middle))) - digits - GUARD, len(str(radius)) - 2, 0)
     unit = 10**drop
-    kept = (middle + unit // 2) // unit
-    radius += abs(middle - kept * unit)
-    return Number(_decimal(kept, exponent + drop), _rounded_up(radius, exponent))
+    shortened = (middle + unit // 2) // unit
+    radius += abs(middle - shortened * unit)
+    return Number(_format_decimal(shortened, exponent + drop), _format_radius(radius, exponent))
 
 
 def fraction(value: Fraction, digits: int) -> Number:
-    """An exact fraction as a decimal; one that ends is exact."""
-    under = value.denominator
-    if pow(10, under.bit_length(), under) == 0:
-        places = next(n for n in count() if 10**n % under == 0)
-        return Number(_decimal(int(value * 10**places), -places), "0")
+    """An exact fraction as a decimal, with radius 0 if the decimal terminates."""
+    denominator = value.denominator
+    if pow(10, denominator.bit_length(), denominator) == 0:
+        places = next(n for n in count() if 10**n % denominator == 0)
+        return Number(_format_decimal(int(value * 10**places), -places), "0")
     return number(flint.arb(rational(value)), digits)
 
 
-def _decimal(middle: int, exponent: int) -> str:
-    """middle · 10^exponent in plain digits, or with an exponent where these would be many."""
-    exact, figures = Decimal(f"{middle}e{exponent}"), str(abs(middle))
-    leading = exact.adjusted()
+def _format_decimal(middle: int, exponent: int) -> str:
+    """middle · 10^exponent in plain digits, or with an exponent if these would be many."""
+    decimal, digits = Decimal(f"{middle}e{exponent}"), str(abs(middle))
+    leading = decimal.adjusted()
     if leading >= -6 and (exponent <= 0 or leading < 20):
-        return f"{exact:f}"
-    return f"{'-' * (middle < 0)}{figures[0]}.{figures[1:] or '0'}e{leading}"
+        return f"{decimal:f}"
+    return f"{'-' * (middle < 0)}{digits[0]}.{digits[1:] or '0'}e{leading}"
 
 
-def _rounded_up(radius: int, exponent: int) -> str:
-    """radius · 10^exponent to two digits."""
+def _format_radius(radius: int, exponent: int) -> str:
+    """radius · 10^exponent, rounded up to two digits."""
     if radius == 0:
         return "0"
     upper = Context(prec=2, rounding=ROUND_UP).create_decimal(radius)
@@ -98,14 +100,14 @@ def largest_radius(balls: Sequence[Any]) -> float:
 
 
 def upper(ball: Any) -> float:
-    """A double that is not below a ball of a size that doubles have."""
+    """A double that no number of the ball exceeds; the ball must be within the range of doubles."""
     top = ball.upper()
     value = float(top)
     return value if flint.arb(value) >= top else value * (1 + 2**-51) + 5e-324
 
 
 def lower(ball: Any) -> float:
-    """A double that is not above a positive ball."""
+    """A double that no number of the positive ball falls below."""
     bottom = ball.lower()
     value = float(bottom)
     return value if flint.arb(value) <= bottom else value * (1 - 2**-51)
@@ -113,7 +115,7 @@ def lower(ball: Any) -> float:
 
 @dataclass(frozen=True)
 class Tilt:
-    """An angle by its tangent, which is all that coefficients ask of it."""
+    """An angle given by its tangent, the only function of it that coefficients use."""
 
     tangent: Any
 
@@ -123,12 +125,12 @@ class Tilt:
 
 
 def is_ball(x: Any) -> bool:
-    """Whether x is a number of ball arithmetic, exact fractions and polynomials among them."""
+    """Whether x is a number of ball arithmetic, including exact fractions and polynomials."""
     return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | flint.fmpq_poly | flint.arb_poly | Bounded | Tilt)
 
 
 def exact(x: Any) -> Any:
-    """A number as an exact fraction, a double as the binary number that it is; balls unchanged."""
+    """A number as an exact fraction (a double by its binary value); balls unchanged."""
     return flint.fmpq(*x.as_integer_ratio()) if hasattr(x, "as_integer_ratio") else x
 
 
@@ -137,17 +139,18 @@ def as_ball(x: Any) -> Any:
     return flint.arb(x) if isinstance(x, flint.fmpq) else x
 
 
-def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
-    """A number as an exact fraction: floats and fractions unchanged, balls by their middle at `digits`.
+def rational(x: Any) -> flint.fmpq:
+    """A number as an exact fraction: floats and fractions by their value, balls by their midpoint.
 
-    A middle that would have millions of bits, as exp(1e300) and its inverse, is a power of two far beyond doubles.
+    A midpoint that would need millions of bits, such as exp(1e300) or its inverse, becomes a power of two far outside
+    the range of doubles.
     """
     if isinstance(x, flint.fmpq):
         return x
     if isinstance(x, flint.arb):
-        figures, exponent = map(int, x.mid().man_exp())
-        if abs(exponent) <= _FARTHEST:
+        mantissa, exponent = map(int, x.mid().man_exp())
+        if abs(exponent) <= _LARGEST_EXPONENT:
             return x.mid().fmpq()
-        far = flint.fmpq(2) ** (_FARTHEST if exponent > 0 else -_FARTHEST)
-        return far if figures > 0 else -far
+        size = flint.fmpq(2) ** (_LARGEST_EXPONENT if exponent > 0 else -_LARGEST_EXPONENT)
+        return size if mantissa > 0 else -size
     return flint.fmpq(*Fraction(x).as_integer_ratio())

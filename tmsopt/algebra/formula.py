@@ -1,7 +1,7 @@
-"""Formulas as graphs with exact constants, stated once as plain arithmetic, and one fold of them into any numbers.
+"""Formulas as graphs with exact constants, and one fold that evaluates them in numbers of any kind.
 
-A formula is made of a Python function on nodes (`trace`), of a text (`tmsopt.models.expression`), or of a function of
-CasADi (`from_casadi`). What its operations mean is said by a kind of numbers; see `kinds`.
+A formula comes from a Python function on nodes (`trace`), from text (`tmsopt.models.expression`) or from a CasADi
+function (`from_casadi`). A kind of number defines the operations; see `kinds`.
 """
 
 import math
@@ -18,14 +18,14 @@ import casadi as ca
 INPUT, CONSTANT = "input", "constant"
 
 Constant = Union[Fraction, float, "Formula"]
-"""A fraction; a formula without names where the number is none, as √2 or π; nan and infinities alone as a float."""
+"""A fraction; a formula without inputs for an irrational number, as √2 or π; a float for nan and infinities only."""
 
-_WHOLE = 64  # exponent up to which a power of fractions is multiplied out
-_BITS = 2**12  # of such a power
+_LARGEST_POWER = 64  # exponent up to which a power of fractions is multiplied out
+_LARGEST_BITS = 2**12  # bits that such a power may have
 
 
-class NotAccepted(ValueError):
-    """An operation that a kind of numbers lacks; the message is its name."""
+class UnsupportedOperation(ValueError):
+    """A kind of number lacks an operation; the message names the operation."""
 
 
 class Step(NamedTuple):
@@ -33,8 +33,8 @@ class Step(NamedTuple):
 
     Attributes:
         op: ``input``, ``constant``, or the name of an operation such as ``add``.
-        operands: numbers of the steps whose results it takes.
-        value: name of an input, or the constant.
+        operands: indices of the steps whose results it takes.
+        value: the name of an input, or the constant.
     """
 
     op: str
@@ -44,12 +44,12 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, eq=True)
 class Formula:
-    """Numbers that depend on others, for numbers of any kind.
+    """Outputs as functions of inputs, for numbers of any kind.
 
     Attributes:
-        names: of the inputs, those that no step takes among them.
-        steps: in an order in which they can be computed, each once.
-        outputs: numbers of steps.
+        names: of all inputs, used or not.
+        steps: each once, in an order in which they can be computed.
+        outputs: indices of steps.
     """
 
     names: tuple[str, ...]
@@ -63,73 +63,77 @@ class Formula:
     def _hash(self) -> int:
         return hash((self.names, self.steps, self.outputs))
 
-    def part(self, outputs: Sequence[int], known: Collection[int] = ()) -> "Formula":
-        """The formula of some steps, in what is known of others, as inputs that have their numbers for names."""
-        needed = set(outputs)
+    def extract(self, outputs: Sequence[int], inputs: Collection[int] = ()) -> "Formula":
+        """The formula of some steps, in which the steps `inputs` become inputs named by their indices."""
+        used = set(outputs)
         for k in range(len(self.steps) - 1, -1, -1):
-            if k in needed and k not in known:
-                needed.update(self.steps[k].operands)
-        place = {k: number for number, k in enumerate(sorted(needed))}
+            if k in used and k not in inputs:
+                used.update(self.steps[k].operands)
+        position = {k: number for number, k in enumerate(sorted(used))}
         steps = [
             Step(INPUT, (), str(k))
-            if k in known
-            else self.steps[k]._replace(operands=tuple(map(place.__getitem__, self.steps[k].operands)))
-            for k in place
+            if k in inputs
+            else self.steps[k]._replace(operands=tuple(map(position.__getitem__, self.steps[k].operands)))
+            for k in position
         ]
-        return Formula(self.names, tuple(steps), tuple(map(place.__getitem__, outputs)))
+        return Formula(self.names, tuple(steps), tuple(map(position.__getitem__, outputs)))
 
     def split(self, late: Collection[int]) -> tuple[tuple[str, ...], "Formula", "Formula"]:
-        """The formula in two: what late steps and outputs take of the others, by name; these; and the rest in them.
+        """Split the formula into early and late steps.
 
-        Constants that late steps take stay with them: an exponent is to be a number, which has no slope.
+        Constants stay with the late steps that use them, so that an exponent remains a number, without a derivative.
+
+        Returns:
+            Names of the early results that late steps and outputs use, the formula of these results, and the formula of
+            the outputs in terms of them.
         """
-        taken = {o for k in late for o in self.steps[k].operands if self.steps[o].op != CONSTANT} | set(self.outputs)
-        sources = sorted(k for k in taken if k not in late)
-        return tuple(map(str, sources)), self.part(sources), self.part(self.outputs, sources)
+        used = {o for k in late for o in self.steps[k].operands if self.steps[o].op != CONSTANT} | set(self.outputs)
+        sources = sorted(k for k in used if k not in late)
+        return tuple(map(str, sources)), self.extract(sources), self.extract(self.outputs, sources)
 
-    def depending(self, names: Collection[str]) -> set[int]:
-        """The steps that depend on some of the inputs."""
-        found: set[int] = set()
+    def dependent_steps(self, names: Collection[str]) -> set[int]:
+        """Indices of the steps that depend on any of the named inputs."""
+        dependent: set[int] = set()
         for k, step in enumerate(self.steps):
-            if step.value in names if step.op == INPUT else not found.isdisjoint(step.operands):
-                found.add(k)
-        return found
+            if step.value in names if step.op == INPUT else not dependent.isdisjoint(step.operands):
+                dependent.add(k)
+        return dependent
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs that it depends on."""
+        """Names of the inputs that the steps use."""
         return tuple([step.value for step in self.steps if step.op == INPUT])
 
     @property
     def constants(self) -> list[Constant]:
-        """Its constants, each once."""
+        """The constants, each once."""
         return [step.value for step in self.steps if step.op == CONSTANT]
 
     @cached_property
     def dead(self) -> tuple[tuple[int, ...], ...]:
-        """For each step the operands that nothing needs after it."""
+        """For each step, the operands that no later step uses."""
         last = {o: k for k, step in enumerate(self.steps) for o in step.operands}
-        found: list[list[int]] = [[] for _ in self.steps]
+        dead: list[list[int]] = [[] for _ in self.steps]
         for o, k in last.items():
             if o not in self.outputs:
-                found[k].append(o)
-        return tuple(map(tuple, found))
+                dead[k].append(o)
+        return tuple(map(tuple, dead))
 
     @cached_property
     def uses(self) -> tuple[int, ...]:
-        """How often the result of each step is taken by others."""
-        counted = Counter(chain.from_iterable([step.operands for step in self.steps]))
-        return tuple(map(counted.__getitem__, range(len(self.steps))))
+        """How often other steps use the result of each step."""
+        counts = Counter(chain.from_iterable([step.operands for step in self.steps]))
+        return tuple(map(counts.__getitem__, range(len(self.steps))))
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Numbers of one kind.
+    """A kind of number.
 
     Attributes:
-        operations: name → what it makes of its operands.
-        constant: what a constant is.
-        number: what an input is taken for.
+        operations: name of an operation → function of its operands.
+        constant: converts a constant.
+        number: converts an input.
     """
 
     operations: Mapping[str, Callable[..., Any]]
@@ -140,53 +144,53 @@ class Kind:
 def fold(
     formula: Formula, values: Mapping[str, Any], kind: Kind, shared: Callable[[Any], Any] | None = None
 ) -> list[Any]:
-    """The outputs of a formula for numbers of a kind.
+    """Evaluate a formula in numbers of a kind.
 
     Args:
         values: name of an input → number.
         shared: applied to every result that is used more than once.
 
     Raises:
-        NotAccepted: for an operation that the kind does not have.
+        UnsupportedOperation: for an operation that the kind does not have.
     """
-    operations, found = kind.operations, list[Any]()
+    operations, results = kind.operations, list[Any]()
     for (op, operands, value), dead, uses in zip(formula.steps, formula.dead, formula.uses, strict=True):
         if op == INPUT:
             result = kind.number(values[value])
         elif op == CONSTANT:
             result = kind.constant(value)
         elif (operation := operations.get(op)) is None:
-            raise NotAccepted(op)
+            raise UnsupportedOperation(op)
         else:
-            if len(operands) == 2:  # by far the most
-                result = operation(found[operands[0]], found[operands[1]])
+            if len(operands) == 2:  # by far the most frequent, and faster this way
+                result = operation(results[operands[0]], results[operands[1]])
             else:
-                result = operation(*map(found.__getitem__, operands))
+                result = operation(*map(results.__getitem__, operands))
             if shared and uses > 1:
                 result = shared(result)
-        found.append(result)
+        results.append(result)
         for o in dead:
-            found[o] = None  # so that few arrays are alive, and these in the cache
-    return [found[o] for o in formula.outputs]
+            results[o] = None  # frees arrays early, so that the others stay in the cache
+    return [results[o] for o in formula.outputs]
 
 
 _TOTAL = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "square", "abs", "min", "max", "sin", "cos", "atan", "exp"}
 
 
 def _operators(op: str) -> tuple[Callable[["Node", Any], "Node"], Callable[["Node", Any], "Node"]]:
-    """An operation as a method of its first operand, and of its second one."""
-    return lambda self, other: made(op, self, other), lambda self, other: made(op, other, self)
+    """An operation as a method of its first operand, and as a method of its second operand."""
+    return lambda self, other: make_node(op, self, other), lambda self, other: make_node(op, other, self)
 
 
 class Node:
-    """A number that is not known yet: an input, a constant, or an operation on others; made by arithmetic.
+    """An input, a constant, or an operation on other nodes, built by ordinary arithmetic.
 
-    What is certain for every number is left out: 0 + x is x, fractions are computed, and 0 x is 0 where x always has a
-    value. A 0.0 stays, which makes of infinity what is no number.
+    Simplifications that hold for every number are applied: 0 + x is x, fractions are computed, and 0 x is 0 if x always
+    has a value. A factor 0.0 stays, since 0.0 times infinity is nan.
 
     Attributes:
-        fixed: whether no input is in it.
-        total: whether it has a value wherever its inputs have.
+        fixed: whether it depends on no input.
+        total: whether it has a value wherever its inputs have one.
     """
 
     __slots__ = ("fixed", "op", "operands", "total", "value")
@@ -199,7 +203,7 @@ class Node:
             self.fixed, self.total = self.fixed and o.fixed, self.total and o.total
 
     def __bool__(self) -> bool:
-        raise TypeError("a formula does not ask what its numbers are; write choose(condition, a, b)")
+        raise TypeError("a formula cannot branch on the value of a number; write choose(condition, a, b)")
 
     __add__, __radd__ = _operators("add")
     __sub__, __rsub__ = _operators("sub")
@@ -213,31 +217,31 @@ class Node:
     __eq__ = _operators("equal")[0]  # type: ignore[assignment]
 
     def __ne__(self, other: object) -> "Node":  # type: ignore[override]
-        return ~made("equal", self, other)
+        return ~make_node("equal", self, other)
 
     def __neg__(self) -> "Node":
-        return made("neg", self)
+        return make_node("neg", self)
 
     def __abs__(self) -> "Node":
-        return made("abs", self)
+        return make_node("abs", self)
 
     def __invert__(self) -> "Node":
-        return made("not", self)
+        return make_node("not", self)
 
     __hash__ = object.__hash__
 
-    def __array_ufunc__(self, function: Any, method: str, *given: Any) -> "Node":
-        return _renamed(function.__name__, *given)
+    def __array_ufunc__(self, function: Any, method: str, *operands: Any) -> "Node":
+        return _make_by_alias(function.__name__, *operands)
 
     @property
     def fraction(self) -> Fraction | None:
-        """The number that it is, where that is a fraction."""
+        """The value of a constant fraction, else None."""
         return self.value if self.op == CONSTANT and isinstance(self.value, Fraction) else None
 
 
 def depends_on(x: Any, names: Collection[str]) -> bool:
-    """Whether a node has some of the inputs in it."""
-    return bool(formula([x]).depending(names))
+    """Whether a node depends on any of the named inputs."""
+    return bool(formula([x]).dependent_steps(names))
 
 
 def symbol(name: str) -> Node:
@@ -249,7 +253,7 @@ PI = Node("pi")
 
 
 def constant(x: Any) -> Node:
-    """A number as it is written: a float stands for the decimal that prints it."""
+    """A number as a node. A float stands for the decimal that prints it."""
     if isinstance(x, Node):
         return x
     if isinstance(x, float):
@@ -257,40 +261,40 @@ def constant(x: Any) -> Node:
     return Node(CONSTANT, (), Fraction(x) if isinstance(x, int | Fraction) else Fraction(int(x.p), int(x.q)))
 
 
-def made(op: str, *given: Any) -> Node:
+def make_node(op: str, *arguments: Any) -> Node:
     """An operation on nodes and numbers, in its simplest form."""
-    operands, fractions, truths = tuple[Node, ...](), list[Fraction | None](), _LOGICAL.get(op, 0)
-    for k, x in enumerate(given):
+    operands, fractions, conditions = tuple[Node, ...](), list[Fraction | None](), _CONDITION_OPERANDS.get(op, 0)
+    for k, x in enumerate(arguments):
         o = x if isinstance(x, Node) else constant(x)
-        if truths or o.op in _TRUTHS:
-            o = _as_truth(o) if k < truths else _as_number(o)
-        known = o.op == CONSTANT and isinstance(o.value, Fraction) and not (isinstance(x, float) and x == 0)
+        if conditions or o.op in _CONDITIONS:
+            o = _as_condition(o) if k < conditions else _as_number(o)
+        is_fraction = o.op == CONSTANT and isinstance(o.value, Fraction) and not (isinstance(x, float) and x == 0)
         operands += (o,)
-        fractions.append(o.value if known else None)
+        fractions.append(o.value if is_fraction else None)
     if op in _EXACT and None not in fractions and (number := _EXACT[op](*fractions)) is not None:
         return Node(CONSTANT, (), number)
-    simplest = _simplest(op, operands, fractions) if op in _SIMPLEST else None
-    return Node(op, operands) if simplest is None else simplest
+    simplified = _simplify(op, operands, fractions) if op in _SIMPLIFIABLE else None
+    return Node(op, operands) if simplified is None else simplified
 
 
-_TRUTHS = {"less", "at_most", "equal", "negligible", "both", "either", "not"}
-_LOGICAL = {"choose": 1, "both": 2, "either": 2, "not": 1}
-"""How many of its operands, from the first on, an operation takes for true or false; all others are numbers."""
+_CONDITIONS = {"less", "at_most", "equal", "negligible", "both", "either", "not"}
+_CONDITION_OPERANDS = {"choose": 1, "both": 2, "either": 2, "not": 1}
+"""How many of the first operands of an operation are conditions; all others are numbers."""
 
 
-def _as_truth(x: Node) -> Node:
-    return x if x.op in _TRUTHS else ~(x == 0)
+def _as_condition(x: Node) -> Node:
+    return x if x.op in _CONDITIONS else ~(x == 0)
 
 
 def _as_number(x: Node) -> Node:
-    """1 for what is true, 0 for what is false: slopes by CasADi reckon with them."""
-    return made("choose", x, 1, 0) if x.op in _TRUTHS else x
+    """1 for a true condition, 0 for a false one, as CasADi's derivatives expect."""
+    return make_node("choose", x, 1, 0) if x.op in _CONDITIONS else x
 
 
 def _power(a: Fraction, b: Fraction) -> Fraction | None:
-    whole = b.denominator == 1 and abs(b) <= _WHOLE and (a != 0 or b > 0)
-    size = max(a.numerator.bit_length(), a.denominator.bit_length())
-    return a ** int(b) if whole and size * abs(b) <= _BITS else None
+    exact = b.denominator == 1 and abs(b) <= _LARGEST_POWER and (a != 0 or b > 0)
+    bits = max(a.numerator.bit_length(), a.denominator.bit_length())
+    return a ** int(b) if exact and bits * abs(b) <= _LARGEST_BITS else None
 
 
 _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
@@ -303,13 +307,13 @@ _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
     "abs": abs,
     "pow": _power,
 }
-"""What fractions make a fraction of; None where they do not."""
+"""Operations that give a fraction for fractions; None where they do not."""
 
-_SIMPLEST = {"add", "sub", "mul", "div", "pow", "neg", "exp", "sin", "cos", "tan", "asin", "atan"}
+_SIMPLIFIABLE = {"add", "sub", "mul", "div", "pow", "neg", "exp", "sin", "cos", "tan", "asin", "atan"}
 
 
-def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911, PLR0912
-    """What an operation comes to, whatever the number is; None where that is no simpler."""
+def _simplify(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911, PLR0912
+    """A simpler node that is equal for all numbers; None if there is none."""
     first, last = operands[0], operands[-1]
     match op, *fractions:
         case ("add", 0, _) | ("mul", 1, _):
@@ -329,7 +333,7 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
         case ("mul", _, _) if first is last:
             return Node("square", (first,))
         case ("pow", _, 2):
-            return made("square", first)
+            return make_node("square", first)
         case ("pow", _, Fraction(numerator=1, denominator=2)):
             return Node("sqrt", (first,))
         case ("neg", _) if first.op == "neg":
@@ -338,99 +342,100 @@ def _simplest(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
             return first.operands[0]
         case ("sin" | "cos", _) if first.op == "atan":
             t = first.operands[0]
-            return (t if op == "sin" else 1) / made("sqrt", 1 + t * t)
+            return (t if op == "sin" else 1) / make_node("sqrt", 1 + t * t)
     return None
 
 
 def formula(outputs: Iterable[Any], names: Iterable[str] = ()) -> Formula:
-    """The formula of nodes and numbers, in inputs of these names and those that appear."""
-    return _listed([_as_number(constant(x)) for x in outputs], names)
+    """The formula of nodes and numbers; `names` come first among its inputs, then the others in order of use."""
+    return _list_steps([_as_number(constant(x)) for x in outputs], names)
 
 
-def _listed(outputs: Sequence[Node], names: Iterable[str] = (), nested: bool = True) -> Formula:
-    """The steps of nodes, equal ones once.
+def _list_steps(outputs: Sequence[Node], names: Iterable[str] = (), nested: bool = True) -> Formula:
+    """The formula of nodes, with equal steps merged.
 
     Args:
-        nested: whether a node without inputs is a constant that is a formula of its own.
+        nested: whether a node without inputs becomes one constant, a formula of its own.
     """
-    places: dict[Step, int] = {}
-    known: dict[int, int] = {}  # id of a node, which is kept alive by the outputs
+    indices: dict[Step, int] = {}
+    done: dict[int, int] = {}  # id of a node → index; the outputs keep the nodes alive
     waiting = list(outputs[::-1])
     while waiting:
         node = waiting.pop()
-        if id(node) in known:
+        if id(node) in done:
             continue
         if nested and node.fixed and node.op != CONSTANT:
-            step = Step(CONSTANT, (), _listed([node], nested=False))
-        elif known.keys() >= set(map(id, node.operands)):
-            step = Step(node.op, tuple(map(known.__getitem__, map(id, node.operands))), node.value)
+            step = Step(CONSTANT, (), _list_steps([node], nested=False))
+        elif done.keys() >= set(map(id, node.operands)):
+            step = Step(node.op, tuple(map(done.__getitem__, map(id, node.operands))), node.value)
         else:
             waiting += [node, *node.operands[::-1]]
             continue
-        known[id(node)] = places.setdefault(step, len(places))
-    met = [step.value for step in places if step.op == INPUT]
-    return Formula(tuple(dict.fromkeys((*names, *met))), tuple(places), tuple(map(known.__getitem__, map(id, outputs))))
+        done[id(node)] = indices.setdefault(step, len(indices))
+    inputs = [step.value for step in indices if step.op == INPUT]
+    places = tuple(map(done.__getitem__, map(id, outputs)))
+    return Formula(tuple(dict.fromkeys((*names, *inputs))), tuple(indices), places)
 
 
 def trace(function: Callable[[Mapping[str, Node]], Iterable[Any]], names: Sequence[str]) -> Formula:
-    """What a function of named numbers computes."""
+    """The formula that a Python function of named numbers computes."""
     return formula(function({name: symbol(name) for name in names}), names)
 
 
 def from_casadi(function: ca.Function, names: Sequence[str] = ()) -> Formula:
-    """The formula of a function of CasADi, the entries of all its inputs in a row, and of its outputs.
+    """The formula of a CasADi function; the entries of all its inputs, and of all its outputs, form one list.
 
     Args:
-        names: of the inputs; by default their numbers.
+        names: of the inputs; by default their indices.
     """
     names = names or tuple(map(str, range(function.nnz_in())))
-    return formula(nodes_of_casadi(function, names), names)
+    return formula(nodes_from_casadi(function, names), names)
 
 
-def nodes_of_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
-    """The entries of its outputs as nodes."""
-    firsts = list(accumulate(map(function.nnz_in, range(function.n_in())), initial=0))
-    ends = list(accumulate(map(function.nnz_out, range(function.n_out())), initial=0))
-    inputs, held, outputs = [symbol(n) for n in names], dict[int, Node](), [constant(0)] * ends[-1]
+def nodes_from_casadi(function: ca.Function, names: Sequence[str]) -> list[Node]:
+    """The entries of the outputs of a CasADi function, as nodes."""
+    first_input = list(accumulate(map(function.nnz_in, range(function.n_in())), initial=0))
+    first_output = list(accumulate(map(function.nnz_out, range(function.n_out())), initial=0))
+    inputs, registers, outputs = [symbol(n) for n in names], dict[int, Node](), [constant(0)] * first_output[-1]
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
-        given, into = function.instruction_input(k), function.instruction_output(k)
+        source, target = function.instruction_input(k), function.instruction_output(k)
         match operation:
             case ca.OP_INPUT:
-                held[into[0]] = inputs[firsts[given[0]] + given[1]]
+                registers[target[0]] = inputs[first_input[source[0]] + source[1]]
             case ca.OP_OUTPUT:
-                outputs[ends[into[0]] + into[1]] = held[given[0]]
+                outputs[first_output[target[0]] + target[1]] = registers[source[0]]
             case ca.OP_CONST:
-                held[into[0]] = constant(function.instruction_constant(k))
+                registers[target[0]] = constant(function.instruction_constant(k))
             case _:
-                held[into[0]] = _translated(operation, [held[r] for r in given])
+                registers[target[0]] = _convert_operation(operation, [registers[r] for r in source])
     return outputs
 
 
-def _translated(operation: int, operands: Sequence[Node]) -> Node:
-    """An operation of CasADi; what there is not here keeps its name, and no kind of numbers takes it."""
-    if operation in _WRITTEN:
-        return _WRITTEN[operation](operands[0], operands[-1])
-    return _renamed(_NAMES.get(operation, f"operation {operation}"), *operands)
+def _convert_operation(operation: int, operands: Sequence[Node]) -> Node:
+    """A CasADi operation as a node. An unknown operation keeps its name, and no kind of number supports it."""
+    if operation in _REWRITES:
+        return _REWRITES[operation](operands[0], operands[-1])
+    return _make_by_alias(_NAMES.get(operation, f"operation {operation}"), *operands)
 
 
-def _renamed(name: str, *operands: Any) -> Node:
-    return made(_RENAMED.get(name, name), *operands)
+def _make_by_alias(name: str, *operands: Any) -> Node:
+    return make_node(_ALIASES.get(name, name), *operands)
 
 
-_WRITTEN: Mapping[int, Callable[[Node, Node], Node]] = {
+_REWRITES: Mapping[int, Callable[[Node, Node], Node]] = {
     ca.OP_ASSIGN: lambda a, b: a,
     ca.OP_TWICE: lambda a, b: 2 * a,
     ca.OP_INV: lambda a, b: 1 / a,
     ca.OP_NE: lambda a, b: a != b,
-    ca.OP_SIGN: lambda a, b: made("sub", a > 0, a < 0),
-    ca.OP_IF_ELSE_ZERO: lambda a, b: made("choose", a, b, 0),
+    ca.OP_SIGN: lambda a, b: make_node("sub", a > 0, a < 0),
+    ca.OP_IF_ELSE_ZERO: lambda a, b: make_node("choose", a, b, 0),
 }
-"""In other operations."""
+"""CasADi operations written with other operations."""
 
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
 
-_RENAMED = {
+_ALIASES = {
     "subtract": "sub",
     "multiply": "mul",
     "divide": "div",
@@ -449,4 +454,4 @@ _RENAMED = {
     "and": "both",
     "or": "either",
 }
-"""Functions of NumPy and CasADi whose names are not those of operations."""
+"""Names in NumPy and CasADi → name of the operation."""

@@ -1,7 +1,7 @@
-"""Whether expressions are 0 for all values of their symbols: by normal forms of rational functions, not by trying.
+"""Decides whether an expression is 0 for all values of its symbols, by normal forms of rational functions.
 
-A function that is not rational is an unknown of its own, one for each argument, with what binds it: sin² + cos² = 1,
-tan = sin/cos, √x² = x and |x|² = x². What vanishes for another reason is not seen to.
+Each function that is not rational, with each of its arguments, is an unknown of its own. Its relations are used:
+sin² + cos² = 1, tan = sin/cos, √x² = x and |x|² = x². An expression that is 0 for another reason is not recognised.
 """
 
 import math
@@ -21,145 +21,146 @@ from tmsopt.algebra.formula import (
     Formula,
     Kind,
     Node,
-    NotAccepted,
+    UnsupportedOperation,
     constant,
     fold,
     formula as formula_of,
-    made as made_of,
+    make_node,
     symbol,
 )
 from tmsopt.algebra.kinds import ARITHMETIC, NODES
 
-_WHOLE = 64  # exponent up to which a power is a product
-_MOST = 10**7  # products of two terms in one multiplication; more take minutes, and more memory than there is
+_LARGEST_POWER = 64  # exponent up to which a power is multiplied out
+_MOST_PRODUCTS = 10**7  # of two terms, in one multiplication; more would take minutes and exhaust the memory
 
 
 @dataclass(frozen=True, eq=False)
 class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap hash
-    """A quotient of two polynomials; equal to another if the cross products are."""
+    """A quotient of two polynomials, equal to another one if the cross products are equal."""
 
-    over: Any
-    under: Any = None  # the polynomial 1, where it is left out
+    numerator: Any
+    denominator: Any = None  # by default the polynomial 1
 
     def __post_init__(self) -> None:
-        if self.under is None:
-            object.__setattr__(self, "under", self.over**0)
+        if self.denominator is None:
+            object.__setattr__(self, "denominator", self.numerator**0)
             return
-        common = self.over.gcd(self.under)
+        common = self.numerator.gcd(self.denominator)
         if not common.is_constant():
-            object.__setattr__(self, "over", self.over // common)
-            object.__setattr__(self, "under", self.under // common)
+            object.__setattr__(self, "numerator", self.numerator // common)
+            object.__setattr__(self, "denominator", self.denominator // common)
 
     def __add__(self, other: Any) -> "Quotient":
-        o = self._other(other)
-        return Quotient(_times(self.over, o.under) + _times(o.over, self.under), _times(self.under, o.under))
+        o = self._convert(other)
+        crossed = _multiply(self.numerator, o.denominator) + _multiply(o.numerator, self.denominator)
+        return Quotient(crossed, _multiply(self.denominator, o.denominator))
 
     def __mul__(self, other: Any) -> "Quotient":
-        o = self._other(other)
-        return Quotient(_times(self.over, o.over), _times(self.under, o.under))
+        o = self._convert(other)
+        return Quotient(_multiply(self.numerator, o.numerator), _multiply(self.denominator, o.denominator))
 
     def __truediv__(self, other: Any) -> "Quotient":
-        o = self._other(other)
-        if o.over == 0:
+        o = self._convert(other)
+        if o.numerator == 0:
             raise ZeroDivisionError("division by the zero quotient")
-        return Quotient(_times(self.over, o.under), _times(self.under, o.over))
+        return Quotient(_multiply(self.numerator, o.denominator), _multiply(self.denominator, o.numerator))
 
     def __neg__(self) -> "Quotient":
-        return Quotient(-self.over, self.under)
+        return Quotient(-self.numerator, self.denominator)
 
     def __sub__(self, other: Any) -> "Quotient":
-        return self + (-self._other(other))
+        return self + (-self._convert(other))
 
     def __rsub__(self, other: Any) -> "Quotient":
-        return self._other(other) - self
+        return self._convert(other) - self
 
     def __rtruediv__(self, other: Any) -> "Quotient":
-        return self._other(other) / self
+        return self._convert(other) / self
 
     def __pow__(self, n: int) -> "Quotient":
-        over, under = (_power(x, abs(n)) for x in (self.over, self.under))
-        return Quotient(over, under) if n >= 0 else 1 / Quotient(over, under)
+        quotient = Quotient(_power(self.numerator, abs(n)), _power(self.denominator, abs(n)))
+        return quotient if n >= 0 else 1 / quotient
 
     def sqrt(self) -> "Quotient":
         """The square root of a square, with positive leading coefficients."""
-        return Quotient(self.over.sqrt(), self.under.sqrt())
+        return Quotient(self.numerator.sqrt(), self.denominator.sqrt())
 
     __radd__ = __add__
     __rmul__ = __mul__
 
     def __eq__(self, other: object) -> bool:
-        o = self._other(other)
-        return bool(_times(self.over, o.under) == _times(o.over, self.under))
+        o = self._convert(other)
+        return bool(_multiply(self.numerator, o.denominator) == _multiply(o.numerator, self.denominator))
 
-    def _other(self, other: Any) -> "Quotient":
-        return other if isinstance(other, Quotient) else Quotient(self.under * 0 + other)
+    def _convert(self, other: Any) -> "Quotient":
+        return other if isinstance(other, Quotient) else Quotient(self.denominator * 0 + other)
 
 
-def _times(a: Any, b: Any) -> Any:
-    if len(a) * len(b) > _MOST:
-        raise NotAccepted(f"a formula of more than {_MOST} products")
+def _multiply(a: Any, b: Any) -> Any:
+    if len(a) * len(b) > _MOST_PRODUCTS:
+        raise UnsupportedOperation(f"a formula of more than {_MOST_PRODUCTS} products")
     return a * b
 
 
 def _power(a: Any, n: int) -> Any:
-    if len(a) > 1 and math.comb(len(a) + n - 1, n) > math.isqrt(_MOST) * 10:
-        raise NotAccepted(f"a formula of more than {_MOST} products")
+    if len(a) > 1 and math.comb(len(a) + n - 1, n) > math.isqrt(_MOST_PRODUCTS) * 10:
+        raise UnsupportedOperation(f"a formula of more than {_MOST_PRODUCTS} products")
     return a**n
 
 
 class Field:
-    """Rational functions of the inputs of a formula, and of what else it makes of them; one for each formula."""
+    """The rational functions of the inputs of one formula and of its functions that are not rational."""
 
     def __init__(self, formula: Formula) -> None:
-        each = [formula, *(step.value for step in formula.steps if isinstance(step.value, Formula))]
-        others = sum(step.op not in (INPUT, CONSTANT) for one in each for step in one.steps)
+        formulas = [formula, *(step.value for step in formula.steps if isinstance(step.value, Formula))]
+        others = sum(step.op not in (INPUT, CONSTANT) for each in formulas for step in each.steps)
         count = len(formula.names)
         context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(count + 2 * others + 1)), "lex")
         self._context = context
-        self.inputs = {name: self._free(k) for k, name in enumerate(formula.names)}
-        self._used = count
-        self._nodes = [symbol(name) for name in formula.names]  # what each unknown is
-        self._known: list[tuple[str, tuple[Quotient, ...], Quotient]] = []
-        self._squares: list[tuple[int, Quotient]] = []
+        self.inputs = {name: self._generator(k) for k, name in enumerate(formula.names)}
+        self._nodes = [symbol(name) for name in formula.names]  # the meaning of each unknown
+        self._functions: list[tuple[str, tuple[Quotient, ...], Quotient]] = []  # name, operands, unknown
+        self._squares: list[tuple[int, Quotient]] = []  # index of an unknown, and its square
         self.kind = Kind(
             {
-                **{op: partial(self._applied, op) for op in NODES.operations},
+                **{op: partial(self._apply, op) for op in NODES.operations},
                 **ARITHMETIC,
                 "pow": self._power,
-                "sqrt": lambda a: self._applied("sqrt", a, square=lambda: a),
-                "abs": lambda a: self._applied("abs", a, square=lambda: a * a),
+                "sqrt": lambda a: self._apply("sqrt", a, square=lambda: a),
+                "abs": lambda a: self._apply("abs", a, square=lambda: a * a),
                 "sin": self._sine,
-                "tan": lambda a: self._sine(a) / self._applied("cos", a),
+                "tan": lambda a: self._sine(a) / self._apply("cos", a),
             },
             self.number,
         )
 
     def number(self, x: Constant) -> Quotient:
-        """A constant; one that is no fraction by what is known of its functions."""
+        """A constant of a formula, irrational ones by unknowns for their functions."""
         if isinstance(x, Formula):
             return fold(x, {}, self.kind)[0]  # type: ignore[no-any-return]
         return Quotient(self._context.constant(rational(x)))
 
-    def vanishes(self, x: Any) -> bool:
-        """Whether an element is 0 for all values; what is true is certain."""
+    def is_zero(self, x: Any) -> bool:
+        """Whether an element is 0 for all values. True is certain; False is not."""
         if not isinstance(x, Quotient):
             return bool(x == 0)
-        for at, square in reversed(self._squares):
-            powers, rest = [self.number(Fraction(1))], self.number(Fraction(0))
-            for exponents, coefficient in x.over.to_dict().items():
-                while len(powers) <= exponents[at] // 2:
+        for index, square in reversed(self._squares):
+            powers, total = [self.number(Fraction(1))], self.number(Fraction(0))
+            for exponents, coefficient in x.numerator.to_dict().items():
+                while len(powers) <= exponents[index] // 2:
                     powers.append(powers[-1] * square)
-                kept = (*exponents[:at], exponents[at] % 2, *exponents[at + 1 :])
-                rest += powers[exponents[at] // 2] * Quotient(self._context.from_dict({kept: coefficient}))
-            x = rest
-        return not x.over
+                reduced = (*exponents[:index], exponents[index] % 2, *exponents[index + 1 :])
+                total += powers[exponents[index] // 2] * Quotient(self._context.from_dict({reduced: coefficient}))
+            x = total
+        return not x.numerator
 
     def node(self, x: Quotient) -> Node:
-        """An element in inputs, multiplied out, each unknown taken out of as many terms as hold it (Horner's rule)."""
-        lead = x.under.leading_coefficient()
-        return self._taken_out((x.over / lead).to_dict()) / self._taken_out((x.under / lead).to_dict())
+        """An element as a node, multiplied out and written by Horner's rule."""
+        lead = x.denominator.leading_coefficient()
+        return self._factor_out((x.numerator / lead).to_dict()) / self._factor_out((x.denominator / lead).to_dict())
 
-    def _taken_out(self, terms: Mapping[tuple[int, ...], Any]) -> Node:
+    def _factor_out(self, terms: Mapping[tuple[int, ...], Any]) -> Node:
+        """A sum of terms with the most frequent unknown factored out, recursively."""
         count = [sum(exponent > 0 for exponent in each) for each in zip(*terms, strict=True)]
         if not any(count):
             return constant(terms[next(iter(terms))] if terms else 0)
@@ -167,50 +168,51 @@ class Field:
         power = min(monomial[k] for monomial in terms if monomial[k])
         inner = {(*m[:k], m[k] - power, *m[k + 1 :]): c for m, c in terms.items() if m[k]}
         rest = {m: c for m, c in terms.items() if not m[k]}
-        product = self._taken_out(inner) * self._nodes[k] ** int(power)
-        return product + self._taken_out(rest) if rest else product
+        product = self._factor_out(inner) * self._nodes[k] ** int(power)
+        return product + self._factor_out(rest) if rest else product
 
-    def _applied(self, operation: str, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
-        """An unknown for what a function makes of its operands, the same for the same."""
-        for known, given, made in self._known:
-            if known == operation and all(a == b for a, b in zip(given, operands, strict=True)):
-                return made
-        at, self._used = self._used, self._used + 1
-        made = self._free(at)
-        self._nodes.append(made_of(operation, *map(self.node, operands)))
-        self._known.append((operation, operands, made))
+    def _apply(self, operation: str, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
+        """The unknown for a function of operands, the same one for equal operands."""
+        for other, others, unknown in self._functions:
+            if other == operation and all(a == b for a, b in zip(others, operands, strict=True)):
+                return unknown
+        index = len(self._nodes)
+        unknown = self._generator(index)
+        self._nodes.append(make_node(operation, *map(self.node, operands)))
+        self._functions.append((operation, operands, unknown))
         if square is not None:
-            self._squares.append((at, square()))
-        return made
+            self._squares.append((index, square()))
+        return unknown
 
     def _sine(self, a: Quotient) -> Quotient:
-        cosine = self._applied("cos", a)
-        return self._applied("sin", a, square=lambda: 1 - cosine * cosine)
+        cosine = self._apply("cos", a)
+        return self._apply("sin", a, square=lambda: 1 - cosine * cosine)
 
     def _power(self, a: Quotient, b: Quotient) -> Quotient:
-        exponent = b.over.leading_coefficient() / b.under.leading_coefficient() if b.over else flint.fmpq(0)
-        whole = b.over.is_constant() and b.under.is_constant() and exponent.q == 1
-        if not whole or abs(exponent) > _WHOLE:
-            return self._applied("pow", a, b)
+        top, bottom = b.numerator, b.denominator
+        exponent = top.leading_coefficient() / bottom.leading_coefficient() if top else flint.fmpq(0)
+        is_integer = top.is_constant() and bottom.is_constant() and exponent.q == 1
+        if not is_integer or abs(exponent) > _LARGEST_POWER:
+            return self._apply("pow", a, b)
         return a ** int(exponent.p)
 
-    def _free(self, at: int) -> Quotient:
-        return Quotient(self._context.gens()[at])
+    def _generator(self, index: int) -> Quotient:
+        return Quotient(self._context.gens()[index])
 
 
-def multiplied_out(asked: Formula) -> Formula:
-    """A formula of quotients of polynomials, in which sums cancel, in inputs and what is not rational in them.
+def multiply_out(formula: Formula) -> Formula:
+    """The formula as quotients of polynomials in lowest terms, in its inputs and its functions that are not rational.
 
     Raises:
-        NotAccepted: where there would be too many terms.
+        UnsupportedOperation: if there would be too many terms.
     """
-    field = Field(asked)
-    return formula_of(map(field.node, fold(asked, field.inputs, field.kind)), asked.names)
+    field = Field(formula)
+    return formula_of(map(field.node, fold(formula, field.inputs, field.kind)), formula.names)
 
 
-def is_linear(asked: Formula) -> bool:
-    """Whether a formula of one output is linear in its inputs, as far as that is known."""
-    field = Field(asked)
-    (found,) = fold(asked, field.inputs, field.kind)
-    plain = (sum(exponents) == sum(exponents[: len(asked.names)]) <= 1 for exponents in found.over.to_dict())
-    return bool(found.under.is_constant()) and all(plain)
+def is_linear(formula: Formula) -> bool:
+    """Whether a formula of one output is linear in its inputs. True is certain; False is not."""
+    field = Field(formula)
+    (output,) = fold(formula, field.inputs, field.kind)
+    plain = (sum(exponents) == sum(exponents[: len(formula.names)]) <= 1 for exponents in output.numerator.to_dict())
+    return bool(output.denominator.is_constant()) and all(plain)

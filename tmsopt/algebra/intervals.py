@@ -12,42 +12,42 @@ from tmsopt.algebra.kinds import INTERVALS
 Interval = tuple[float, float]
 
 EVERYTHING = (-math.inf, math.inf)
-_PRECISION = 64  # bits; a few more than a double
+_PRECISION = 64  # bits, 11 more than a double
 
 
 def ball(ends: Interval) -> Any:
-    """An interval as a ball that holds it; without bounds where an end is infinite."""
+    """A ball that encloses an interval; unbounded if an end is infinite, nan if an end is nan."""
     if not all(map(math.isfinite, ends)):
         return flint.arb("nan") if math.isnan(ends[0] + ends[1]) else flint.arb(0, math.inf)
     return flint.arb(ends[0]).union(flint.arb(ends[1]))
 
 
 def interval(x: Any) -> Interval:
-    """Doubles at or beyond the ends of a ball."""
+    """Doubles that enclose a ball."""
     if not x.is_finite():
         return EVERYTHING
     return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
 
 
-def outwards(lower: float, upper: float) -> Interval:
-    """Doubles that enclose an interval whose ends are decimals; a number alone is itself."""
+def round_outwards(lower: float, upper: float) -> Interval:
+    """Doubles that enclose an interval whose ends are decimals; equal ends stay as they are."""
     return (lower, upper) if lower == upper else (math.nextafter(lower, -math.inf), math.nextafter(upper, math.inf))
 
 
 def ranges(formula: Formula, box: Sequence[Interval]) -> list[Interval]:
-    """Ranges of the outputs of a formula over a box; without bounds where it may not exist.
+    """Ranges of the outputs of a formula over a box; unbounded if an output may not exist.
 
     Raises:
-        NotAccepted: for an operation that has no interval arithmetic here.
+        UnsupportedOperation: for an operation that intervals lack.
     """
-    over = {name: ball(ends) for name, ends in zip(formula.names, box, strict=True)}
-    return [interval(x) for x in fold(formula, over, INTERVALS)]
+    balls = {name: ball(ends) for name, ends in zip(formula.names, box, strict=True)}
+    return [interval(x) for x in fold(formula, balls, INTERVALS)]
 
 
-def root_bound(coefficients: Sequence[Interval]) -> float:
-    """No root of any polynomial with such coefficients, descending, is larger; inf where the leading one may be 0.
+def bound_roots(coefficients: Sequence[Interval]) -> float:
+    """Upper bound of |s| over the roots of all polynomials with such coefficients, descending.
 
-    Fujiwara's 2 max |a_k/a0|^(1/k), the last one halved under the root.
+    Fujiwara's 2 max |a_k/a0|^(1/k), with half of |aₙ/a0| in the last term; inf if a0 may be 0.
     """
     with flint.ctx.workprec(_PRECISION):
         a = [ball(ends) for ends in coefficients]

@@ -1,13 +1,12 @@
-"""Kinds of numbers: what the operations of a formula are for floats and arrays, CasADi, balls, intervals and nodes.
+"""Kinds of number: the operations of a formula for floats and arrays, CasADi, balls, intervals and nodes.
 
-A condition on balls is True, False, or None where that is not certain, of series nan. The operations beside those of
-arithmetic:
+A condition on balls is True, False or None (undecided); on series, undecided is nan. Operations besides the usual ones:
 
     quotient      a / b, nan where b is 0: a quantity that does not exist, not an infinite one
-    ratio         the same, and 0 where a is 0, whatever b is
+    ratio         the same, but 0 where a is 0, for every b
     choose        b where the condition a holds, else c
     positive_part a where it is positive, else 0
-    negligible    whether a is 0, or nothing but the rounding of a sum whose terms have the size b
+    negligible    whether a is 0, or only the rounding error of a sum of terms of size b
 """
 
 import math
@@ -23,14 +22,25 @@ import numpy as np
 
 from tmsopt.algebra import rounding
 from tmsopt.algebra.balls import DIGITS, as_ball, exact, is_ball
-from tmsopt.algebra.formula import PI, Constant, Formula, Kind, Node, constant, fold, formula, made, nodes_of_casadi
+from tmsopt.algebra.formula import (
+    PI,
+    Constant,
+    Formula,
+    Kind,
+    Node,
+    constant,
+    fold,
+    formula,
+    make_node,
+    nodes_from_casadi,
+)
 from tmsopt.algebra.rounding import Bounded
 
-_WHOLE = 1023  # exponent up to which a power is a product
-_BITS = 2**22  # of a fraction that is a power
-_TINY = 1e-300  # keeps 0/0 away for an optimiser, and changes nothing else
+_LARGEST_POWER = 1023  # exponent up to which a power of balls is a product
+_LARGEST_BITS = 2**22  # of a power of a fraction
+_TINY = 1e-300  # avoids 0/0 in an optimiser and changes nothing else
 ROUNDING = 4 * float(np.finfo(float).eps)
-"""Of a sum of a few terms, relative to their size."""
+"""Rounding error of a sum of a few terms, relative to their size."""
 
 Operations = Mapping[str, Callable[..., Any]]
 
@@ -44,8 +54,8 @@ ARITHMETIC: Operations = {
 }
 
 
-def _alike(absolute: Callable[[Any], Any]) -> Operations:
-    """Operations that NumPy and CasADi write as Python does, but for |x|, which CasADi's symbols have by name alone."""
+def _python_operations(absolute: Callable[[Any], Any]) -> Operations:
+    """Operations that NumPy and CasADi share with Python; |x| is passed in, since CasADi has no `abs`."""
     return {
         **ARITHMETIC,
         "abs": absolute,
@@ -61,7 +71,7 @@ def _alike(absolute: Callable[[Any], Any]) -> Operations:
 
 
 def as_double(value: Constant) -> Any:
-    """The double nearest to a constant, as NumPy has it: it gives nan and inf where Python raises."""
+    """The NumPy double nearest to a constant. Its operations give nan and inf where Python's raise."""
     return np.float64(value) if isinstance(value, float) else _double(value)
 
 
@@ -81,7 +91,7 @@ def _double(value: Fraction | Formula) -> Any:
 
 
 def _power(base: Any, exponent: Any) -> Any:
-    """A small power as products and roots, exactly rounded each."""
+    """A power; common exponents as products and roots, each rounded correctly."""
     small = _POWERS.get(float(exponent)) if np.ndim(exponent) == 0 else None
     return np.power(base, exponent) if small is None else small(base)
 
@@ -106,7 +116,7 @@ def _quotient(a: Any, b: Any) -> Any:
 
 FLOATS = Kind(
     {
-        **_alike(abs),
+        **_python_operations(abs),
         "pow": _power,
         **{name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sign")},
         **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan")},
@@ -122,19 +132,19 @@ FLOATS = Kind(
     as_double,
     np.float64,
 )
-"""Scalars and arrays that broadcast; to be folded without NumPy's warnings."""
+"""Scalars and arrays that broadcast; switch NumPy's warnings off before you fold with it."""
 
 
 # Expressions of CasADi.
 
 
 def _tangent(x: Any) -> Any:
-    """Of an arctangent, its argument, so that formulas in tan stay polynomial."""
+    """The tangent; tan(atan(x)) is x, so that formulas in tan stay polynomial."""
     return x.dep(0) if not isinstance(x, ca.DM) and x.is_op(ca.OP_ATAN) else ca.tan(x)
 
 
 def _symbolic_ratio(a: Any, b: Any) -> Any:
-    """Smooth where b may be 0."""
+    """a / b, smooth where b may be 0."""
     if isinstance(b, ca.DM):
         return a / b if b != 0 else 0 * a
     return a * b / (b * b + _TINY)
@@ -142,7 +152,7 @@ def _symbolic_ratio(a: Any, b: Any) -> Any:
 
 CASADI = Kind(
     {
-        **_alike(ca.fabs),
+        **_python_operations(ca.fabs),
         "pow": operator.pow,
         **{name: getattr(ca, name) for name in ("sqrt", "exp", "log", "sin", "cos", "asin", "acos", "atan", "sign")},
         "tan": _tangent,
@@ -164,7 +174,7 @@ CASADI = Kind(
 
 
 def as_exact(value: Constant) -> Any:
-    """A constant as a fraction, or as a ball of the working precision."""
+    """A constant as a fraction, or else as a ball of the working precision."""
     if isinstance(value, Fraction):
         return exact(value)
     return flint.arb(value) if isinstance(value, float) else fold(value, {}, BALLS)[0]
@@ -186,14 +196,14 @@ def _ball_root(x: Any) -> Any:
 def _ball_quotient(a: Any, b: Any) -> Any:
     try:
         return a * (1 / b) if isinstance(a, flint.arb_poly) else a / b
-    except (ZeroDivisionError, ValueError):  # of fractions, of series
+    except (ZeroDivisionError, ValueError):  # the first from fractions, the second from series
         return flint.arb("nan")
 
 
 def _ball_power(a: Any, b: Any) -> Any:
-    """nan for a negative a and a b that is not whole. A fraction of many bits is a ball."""
-    whole = isinstance(b, flint.fmpq) and b.q == 1 and abs(b.p) <= _WHOLE
-    if whole and not (isinstance(a, flint.fmpq) and a.height_bits() * abs(int(b.p)) > _BITS):
+    """a to the power b, nan for a negative a and a fractional b. A fraction of too many bits becomes a ball."""
+    is_product = isinstance(b, flint.fmpq) and b.q == 1 and abs(b.p) <= _LARGEST_POWER
+    if is_product and not (isinstance(a, flint.fmpq) and a.height_bits() * abs(int(b.p)) > _LARGEST_BITS):
         try:
             return a ** int(b.p)
         except (ZeroDivisionError, ValueError):
@@ -202,7 +212,7 @@ def _ball_power(a: Any, b: Any) -> Any:
 
 
 def magnitude(x: Any) -> Any:
-    """|x| of a ball; where the sign of a series is not certain, its slopes may have either."""
+    """|x| of a ball; if the sign of a series is undecided, its derivatives may have either sign."""
     if not isinstance(x, flint.arb_series):
         return abs(x)
     first = x[0]
@@ -215,7 +225,7 @@ def magnitude(x: Any) -> Any:
 
 
 def greater(a: Any, b: Any) -> Any:
-    """The greater of two balls: (a + b + |a − b|)/2, and exactly one of the two where it is certain which."""
+    """The greater of two balls: one of the two if that is decided, else (a + b + |a − b|)/2."""
     if isinstance(a, Bounded) or isinstance(b, Bounded):
         return rounding.greater(a, b)
     difference = a - b
@@ -235,7 +245,7 @@ def lesser(a: Any, b: Any) -> Any:
 
 
 def _compare(holds: Callable[..., Any], fails: Callable[..., Any], a: Any, b: Any) -> Any:
-    """What a comparison and its opposite say of two numbers: of arrays as floats, nan where that is not certain."""
+    """Compare two balls by a comparison and its opposite; for arrays the answer is 1.0, 0.0 or nan (undecided)."""
     difference = a - b
     if isinstance(difference, Bounded):
         low, high = difference.value - difference.error, difference.value + difference.error
@@ -246,25 +256,25 @@ def _compare(holds: Callable[..., Any], fails: Callable[..., Any], a: Any, b: An
 
 
 def _ball_choice(condition: Any, a: Any, b: Any) -> Any:
-    """One of two; where it is not certain which, a ball around both."""
-    if isinstance(condition, float | flint.arb):  # nan, of series: a jump has no slope
+    """a if the condition holds, else b; a ball around both if it is undecided."""
+    if isinstance(condition, float | flint.arb):  # nan, from series: a jump has no derivative
         return flint.arb("nan")
     if isinstance(condition, np.ndarray):
         one, other = rounding.as_bounded(a), rounding.as_bounded(b)
         return one.where(condition == 1, other).where(~np.isnan(condition), Bounded(np.nan, np.inf))
     if condition is None:
         one, other = as_ball(a), as_ball(b)
-        known = all(isinstance(x, flint.arb) and x.is_finite() for x in (one, other))
-        return one.union(other) if known else flint.arb("nan")
+        finite = all(isinstance(x, flint.arb) and x.is_finite() for x in (one, other))
+        return one.union(other) if finite else flint.arb("nan")
     return a if condition else b
 
 
 def _ball_ratio(a: Any, b: Any) -> Any:
     if isinstance(a, Bounded):
-        nothing = (a.value == 0) & (a.error == 0)
-        return Bounded(np.zeros_like(a.value)).where(nothing, a / rounding.as_bounded(b))
-    vanishes = all(a[k] == 0 for k in range(a.prec)) if hasattr(a, "prec") else bool(a == 0)
-    return 0 * b if vanishes else _ball_quotient(a, b)
+        zero = (a.value == 0) & (a.error == 0)
+        return Bounded(np.zeros_like(a.value)).where(zero, a / rounding.as_bounded(b))
+    is_zero = all(a[k] == 0 for k in range(a.prec)) if hasattr(a, "prec") else bool(a == 0)
+    return 0 * b if is_zero else _ball_quotient(a, b)
 
 
 def _both(a: Any, b: Any) -> Any:
@@ -280,7 +290,7 @@ def _not(a: Any) -> Any:
 _equals = partial(_compare, operator.eq, operator.ne)
 
 
-def _function(name: str) -> Callable[[Any], Any]:
+def _ball_function(name: str) -> Callable[[Any], Any]:
     return lambda x: getattr(as_ball(x), name)()
 
 
@@ -296,7 +306,7 @@ BALLS = Kind(
         "abs": magnitude,
         "min": lesser,
         "max": greater,
-        **{name: _function(name) for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")},
+        **{name: _ball_function(name) for name in ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan")},
         "less": partial(_compare, operator.lt, operator.ge),
         "at_most": partial(_compare, operator.le, operator.gt),
         "equal": _equals,
@@ -310,17 +320,17 @@ BALLS = Kind(
     as_exact,
     _ball_number,
 )
-"""Constants are exact; fractions stay fractions as long as they can."""
+"""Constants are exact, and fractions stay fractions where possible."""
 
 
 def square(x: Any) -> Any:
-    """x² of an interval, not negative."""
-    # abs(x) of a ball around 0 reaches below 0, by as much as the ball has on its lesser side
+    """x² of an interval, never negative."""
+    # abs(x) of a ball around 0 would reach below 0
     return (x.abs_lower() ** 2).union(x.abs_upper() ** 2) if x.is_finite() else flint.arb(0, math.inf)
 
 
 def _interval_power(x: Any, y: Any) -> Any:
-    """x to the power y; whole powers of any x."""
+    """x to the power y; for an integer y, x may be negative."""
     if not y.is_integer():
         return x**y
     exponent = int(abs(float(y)))
@@ -332,37 +342,37 @@ INTERVALS = Kind(
     {**BALLS.operations, "square": square, "pow": _interval_power},
     lambda value: flint.arb(as_exact(value)),
 )
-"""Balls as wide as a box, where an even power must not reach below 0."""
+"""Balls as wide as a box; an even power never reaches below 0."""
 
 
-# Nodes: a formula of formulas.
+# Nodes: formulas of formulas.
 
 
 def _as_node(value: Constant) -> Node:
-    found: Node = fold(value, {}, NODES)[0] if isinstance(value, Formula) else constant(value)
-    return found
+    node: Node = fold(value, {}, NODES)[0] if isinstance(value, Formula) else constant(value)
+    return node
 
 
-NODES = Kind({name: partial(made, name) for name in (*FLOATS.operations, "pi")}, _as_node, constant)
+NODES = Kind({name: partial(make_node, name) for name in (*FLOATS.operations, "pi")}, _as_node, constant)
 
 
 def kind_of(*numbers: Any) -> Kind:
-    """The kind that numbers are of; floats among others are taken for those."""
-    found = FLOATS
+    """The common kind of numbers; floats convert to every other kind."""
+    kind = FLOATS
     for x in numbers:
-        if isinstance(x, float):  # by far the most
+        if isinstance(x, float):  # by far the most frequent
             continue
         if isinstance(x, Node):
             return NODES
         if isinstance(x, ca.SX | ca.MX):
-            found = CASADI
-        elif found is FLOATS and is_ball(x):
-            found = BALLS
-    return found
+            kind = CASADI
+        elif kind is FLOATS and is_ball(x):
+            kind = BALLS
+    return kind
 
 
 def values(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
-    """The outputs of a formula for numbers of whatever kind; nan and inf of floats come without a warning."""
+    """Outputs of a formula for numbers of any kind; nan and inf of floats come without a warning."""
     with np.errstate(all="ignore"):
         return fold(formula, given, kind_of(*[given[name] for name in formula.names if name in given]))
 
@@ -370,23 +380,23 @@ def values(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
 # Operations of formulas, on numbers of any kind.
 
 
-def _applied(op: str) -> Callable[..., Any]:
-    def operation(*operands: Any) -> Any:
+def _make_function(op: str) -> Callable[..., Any]:
+    def evaluate(*operands: Any) -> Any:
         kind = kind_of(*operands)
         with np.errstate(all="ignore"):
             return kind.operations[op](*map(kind.number, operands))
 
-    return operation
+    return evaluate
 
 
 sqrt, tan, atan, absolute, least, less, both, choose, quotient, ratio, positive_part, negligible = map(
-    _applied,
+    _make_function,
     ["sqrt", "tan", "atan", "abs", "min", "less", "both", "choose", "quotient", "ratio", "positive_part", "negligible"],
 )
 
 
 def pi(like: Any) -> Any:
-    """π, as a number of the kind of another."""
+    """π, in the kind of another number."""
     return kind_of(like).constant(_PI)
 
 
@@ -394,11 +404,11 @@ _PI = formula([PI])
 
 
 def gradients(outputs: Sequence[Any], inputs: Sequence[Node]) -> list[list[Node]]:
-    """The slopes of each output with respect to some inputs, as nodes; CasADi takes them."""
-    asked = formula(outputs)
-    symbols = {name: ca.SX.sym(name) for name in dict.fromkeys((*asked.inputs, *(x.value for x in inputs)))}
-    own = ca.vertcat(*(symbols[x.value] for x in inputs))
-    slopes = ca.jacobian(ca.vertcat(*fold(asked, symbols, CASADI)), own)
-    function = ca.Function("slopes", [ca.vertcat(*symbols.values())], [ca.densify(slopes.T)])
-    found = iter(nodes_of_casadi(function, list(symbols)))
-    return [[next(found) for _ in inputs] for _ in outputs]
+    """Derivatives of each output with respect to each input, as nodes, by CasADi."""
+    traced = formula(outputs)
+    symbols = {name: ca.SX.sym(name) for name in dict.fromkeys((*traced.inputs, *(x.value for x in inputs)))}
+    variables = ca.vertcat(*(symbols[x.value] for x in inputs))
+    jacobian = ca.jacobian(ca.vertcat(*fold(traced, symbols, CASADI)), variables)
+    function = ca.Function("gradients", [ca.vertcat(*symbols.values())], [ca.densify(jacobian.T)])
+    nodes = iter(nodes_from_casadi(function, list(symbols)))
+    return [[next(nodes) for _ in inputs] for _ in outputs]

@@ -22,7 +22,7 @@ import numpy as np
 from flint.utils.flint_exceptions import DomainError
 
 from tmsopt.algebra.balls import Tilt, as_ball, exact
-from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, fold, made, trace
+from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, fold, make_node, trace
 from tmsopt.algebra.intervals import ball
 from tmsopt.algebra.kinds import BALLS, quotient, values
 from tmsopt.models import Model, ParameterSet
@@ -228,7 +228,8 @@ def is_rational(model: Model, of: ParameterSet) -> bool:
     """Whether the coefficients are rational functions of the parameters of a set, or of the tangents of angles."""
     tangents = {p.name for p in of.parameters if p.tangent}
     coefficients = trace(
-        lambda x: model.coefficients({n: made("atan", s) if n in tangents else s for n, s in x.items()}, of), of.names
+        lambda x: model.coefficients({n: make_node("atan", s) if n in tangents else s for n, s in x.items()}, of),
+        of.names,
     )
     wholes = {k for k, s in enumerate(coefficients.steps) if isinstance(s.value, Fraction) and s.value.denominator == 1}
     powers = [s for s in coefficients.steps if s.op == "pow" and s.operands[1] in wholes]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.algebra.rounding import Bounded, as_bounded
 from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.evaluation.law_rows import speed_laws
@@ -79,7 +79,7 @@ def verdicts(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str
     try:
         with np.errstate(all="ignore"):
             return _judged(problem, columns, reports)
-    except NotAccepted:  # of a formula that does not take bounds of errors
+    except UnsupportedOperation:  # of a formula that does not take bounds of errors
         return None
 
 
@@ -95,7 +95,7 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
     def settled(number: Any) -> Array:
         nonlocal certain
         spread = _spread(number, m)
-        certain = certain & (spread.holds(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
+        certain = certain & (spread.is_known_within(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
         return np.asarray(spread.value)
 
     wide |= {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}

@@ -24,13 +24,19 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIM
 from tmsopt.problem.units import Reading, frequencies, readings
 from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
+from tmsopt.roots.patterns.root_enclosures import (
+    EnclosedRoot,
+    enclosed_roots,
+    nearest_decimal,
+    nearest_double,
+    nearest_roots,
+)
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
 
 _Key = tuple[str, str]  # a field of `Certified`, and in a table a name
-_Several = tuple[Enclosed, ...]
+_Several = tuple[EnclosedRoot, ...]
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,7 @@ def _nearest(ball: Any, digits: int) -> Any:
     if isinstance(ball, tuple):
         each = tuple(_nearest(one, digits) for one in ball)
         return None if None in each else each
-    if isinstance(ball, Enclosed):
+    if isinstance(ball, EnclosedRoot):
         place = _nearest((ball.re, ball.im), digits)
         return place and Root(place[0], place[1], ball.multiplicity)
     return nearest_decimal(ball, digits) if digits else nearest_double(ball)
@@ -168,7 +174,7 @@ class _Design:
                 found = nearest_roots(coefficients, structure.roots)
             if (found is None or stored is None) and not last:
                 return None
-            as_found = (Enclosed(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in structure.roots)
+            as_found = (EnclosedRoot(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in structure.roots)
             ideal[case] = tuple(as_found) if found is None else found
         return stored or (), ideal
 
@@ -186,7 +192,7 @@ def _rightmost(roots: _Several) -> Any:
     return reduce(greater, (root.re for root in roots))
 
 
-def _ratio(root: Enclosed) -> Any:
+def _ratio(root: EnclosedRoot) -> Any:
     """−Re s/|s|; 0 for a root at 0."""
     return flint.arb(0) if root.re == 0 and root.im == 0 else -root.re / root.modulus
 

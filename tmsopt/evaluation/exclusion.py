@@ -2,7 +2,7 @@
 
 import math
 
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.problem.limit import limit_of, limit_side
@@ -49,7 +49,7 @@ def _excluded(problem: Posed) -> bool:
         return False
     try:
         found = build.over([row[1] for row in build.rows])
-    except NotAccepted:
+    except UnsupportedOperation:
         return False
     return any(
         least > high + _BEYOND * max(1.0, abs(high)) or most < low - _BEYOND * max(1.0, abs(low))

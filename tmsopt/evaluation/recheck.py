@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import Formula, NotAccepted, formula, symbol
+from tmsopt.algebra.formula import Formula, UnsupportedOperation, formula, symbol
 from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.kinds import gradients
 from tmsopt.boundaries.nearest import Robustness, robustness_at
@@ -156,7 +156,7 @@ def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
     try:
         function = _sloped(problem.model, of.name, condition, names)
         centre, around = (ranges(function, list(zip(at - r, at + r, strict=True))) for r in (0 * reach, reach))
-    except NotAccepted:
+    except UnsupportedOperation:
         return False
     with np.errstate(invalid="ignore"):  # a slope may be without bound
         slack = float(np.abs(around[1:]).max(axis=1) @ reach)

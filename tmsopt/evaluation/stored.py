@@ -32,7 +32,7 @@ from tmsopt.problem.unit_system import amounts_text, unit_at
 from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure, product
 from tmsopt.roots.exact import isolated_roots
-from tmsopt.roots.patterns.enclosed import nearest_roots
+from tmsopt.roots.patterns.root_enclosures import nearest_roots
 
 _DIGITS = 150  # slopes are differences over 2⁻¹⁰⁰ of a parameter
 _SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from what a structure tolerates up to 5e-7

@@ -10,7 +10,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.algebra.intervals import Interval, ball, outwards
+from tmsopt.algebra.intervals import Interval, ball, round_outwards
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.models.expression import Expression
 from tmsopt.problem.cases import Band, Case, Cover
@@ -165,11 +165,11 @@ def cover(problem: Posed, parameters: Numbers, worst: float, boxes: int | None =
         boxes = max(BOXES >> max(problem.model.degree - 4, 0), _FEWEST)
     limit, done = worst + SLACK * (1 + abs(worst)), 0
     choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.scenarios.values()]
-    offset: _Box = {(True, n): outwards(-t, t) for n, t in problem.tolerances.items()}
+    offset: _Box = {(True, n): round_outwards(-t, t) for n, t in problem.tolerances.items()}
     waiting = deque[_Box]()
     for each in product(*choices):  # bands and tolerances whole
         at = zip(problem.scenarios, each, strict=True)
-        waiting.append({(False, n): outwards(*ends) for n, ends in at} | offset)
+        waiting.append({(False, n): round_outwards(*ends) for n, ends in at} | offset)
     with flint.ctx.workdps(_DIGITS):
         while waiting and done < boxes:
             box = waiting.popleft()

@@ -9,7 +9,7 @@ from functools import partial
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
-from tmsopt.algebra.formula import made, trace
+from tmsopt.algebra.formula import make_node, trace
 from tmsopt.explorer.javascript import function
 from tmsopt.roots import lienard_chipart
 from tmsopt.roots.numeric import GOOD
@@ -47,7 +47,7 @@ def kernel_script(degree: int) -> str:
     return "\n".join(parts) + "\n"
 
 
-_where = partial(made, "choose")
+_where = partial(make_node, "choose")
 _KNOWN: dict[str, Any] = {**vars(factors), **vars(signs)}
 for _name, _each in [*_KNOWN.items()]:
     if isinstance(_each, FunctionType):

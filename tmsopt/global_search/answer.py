@@ -8,7 +8,7 @@ from itertools import count
 
 import numpy as np
 
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.algebra.intervals import ranges
 from tmsopt.global_search.question import Question
 from tmsopt.global_search.race import SolverPool
@@ -95,7 +95,7 @@ def answer(question: Question, clock: Clock, share: float, confirm: Confirm) -> 
         confirm: what to make of a design that was found; ``undecided`` if it is none, but for the solver's tolerance.
 
     Raises:
-        NotAccepted: for an operation that the solver cannot take.
+        UnsupportedOperation: for an operation that the solver cannot take.
     """
     end = clock.used + share * clock.left
     for sign in question.signs():
@@ -120,7 +120,7 @@ def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Con
         ways = [replace(question, unit=question.unit * u, compact=c) for u, c in _WAYS[turn % len(_WAYS)]]
         try:
             decisions = clock.race([task(way.program(sign, max(least, 0.0)), seconds) for way in ways])
-        except NotAccepted:
+        except UnsupportedOperation:
             if turn == 0:
                 raise
             continue  # numbers are too large or too small in these units alone

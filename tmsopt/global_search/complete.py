@@ -12,11 +12,11 @@ import flint
 import numpy as np
 
 from tmsopt.algebra.balls import Number, number
-from tmsopt.algebra.formula import NotAccepted, fold, formula, symbol
-from tmsopt.algebra.identity import multiplied_out
+from tmsopt.algebra.formula import UnsupportedOperation, fold, formula, symbol
+from tmsopt.algebra.identity import multiply_out
 from tmsopt.algebra.intervals import interval
 from tmsopt.algebra.kinds import BALLS, NODES
-from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
+from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
 from tmsopt.global_search.conditions import Ends, Sheet, rotating_frame, sheet, sheets
 from tmsopt.global_search.pruning import Box, Puzzle, ends, prepared, prune
 from tmsopt.problem.problem import Posed
@@ -96,7 +96,7 @@ def completeness(problem: Posed, seconds: float = SECONDS, progress: Counts | No
     with flint.ctx.workdps(_CARRIED):
         try:
             posed = [(sheet, *_puzzle(sheet)) for sheet in _sheets(problem)]
-        except (NotAccepted, TypeError, ZeroDivisionError) as error:
+        except (UnsupportedOperation, TypeError, ZeroDivisionError) as error:
             return Completeness(False, f"branch and prune cannot take {error}")
         run = _Run(began + seconds, seconds, progress)
         for sheet, puzzle, box in posed:
@@ -212,16 +212,16 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     """Equations and limits as plain data, and the box of all unknowns.
 
     Raises:
-        NotAccepted: for equations that branch and prune cannot take.
+        UnsupportedOperation: for equations that branch and prune cannot take.
     """
     box = tuple((ends(lo)[0], ends(hi)[1]) for lo, hi in _ends(sheet))
     names = {n: symbol(n) for n in sheet.names}
     limits = [*fold(sheet.nonnegative, names, NODES), *fold(sheet.ascending, names, NODES)]
     for name, limit in sheet.limits.items():
-        with suppress(NotAccepted):  # it takes no part, and is asked of every design that is found
+        with suppress(UnsupportedOperation):  # it takes no part, and is asked of every design that is found
             limits.append(-sheet.problem.conditions[name].sign * fold(prepared(limit), names, NODES)[0])
     equations, more, limited = (
-        prepared(multiplied_out(asked)) for asked in (sheet.equations, sheet.shared, formula(limits, sheet.names))
+        prepared(multiply_out(asked)) for asked in (sheet.equations, sheet.shared, formula(limits, sheet.names))
     )
     widths = tuple(hi - lo if math.isfinite(hi - lo) else 1.0 for lo, hi in box)
     return Puzzle(equations, limited, widths, more), box
@@ -244,9 +244,9 @@ def _zero(sheet: Sheet, box: Box) -> _Zero | None:
     units = reaches_of(sheet.problem)
     try:
         system = partial(fold, sheet.equations, kind=BALLS)
-        middle = refined(system, start, sheet.names, _DIGITS, units)
-        found = enclosed(system, middle, sheet.names, _DIGITS, units)
-    except (Refused, ZeroDivisionError, ValueError):
+        middle = refine_solution(system, start, sheet.names, _DIGITS, units)
+        found = enclose_solution(system, middle, sheet.names, _DIGITS, units)
+    except (ProofFailed, ZeroDivisionError, ValueError):
         return None
     around = {n: found.uniqueness * units.get(n, 1.0) for n in sheet.names}
     near = [(middle[n] - r, middle[n] + r) for n, r in around.items()]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.algebra.formula import Formula, formula, symbol
-from tmsopt.algebra.intervals import outwards, ranges
+from tmsopt.algebra.intervals import ranges, round_outwards
 from tmsopt.algebra.kinds import atan, quotient
 from tmsopt.models import Quantity, Values
 from tmsopt.models.expression import Expression
@@ -22,7 +22,7 @@ from tmsopt.models.stated.pairs import Pair
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.roots import product as multiplied
-from tmsopt.roots.patterns.parts import Part, parts_of
+from tmsopt.roots.patterns.components import Component, parse_components
 from tmsopt.roots.polynomial import characteristic_polynomial
 
 Ends = tuple[float, float]
@@ -100,14 +100,14 @@ def sheets(name: str, of_h: bool) -> Iterator[tuple[Piece, ...]]:
     Args:
         of_h: whether the unknowns are eigenvalues of a complex H, the pattern named as that of its double: all small.
     """
-    for choice in product(*(list(_ways(part, of_h)) for part in parts_of(name))):
+    for choice in product(*(list(_ways(part, of_h)) for part in parse_components(name))):
         pieces: list[Piece] = []
         for kind, order, outer in (piece for way in choice for piece in way):
             pieces.append(Piece(kind, order, outer, sum(len(p.ranges) for p in pieces)))
         yield tuple(pieces)
 
 
-def _ways(part: Part, of_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
+def _ways(part: Component, of_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
     """Kind, power and place of the factors of a part."""
     if of_h:
         yield [("point", part.order, False) if part.kind == "CEP" else ("line", part.roots // 2, False)] * part.count
@@ -137,14 +137,14 @@ def rotating_frame(problem: Posed) -> RotatingFrame | None:
     """The frame of a complex H, by Gershgorin's discs over the box; None where these have no bound, or without H.
 
     Raises:
-        NotAccepted: for an operation that has no interval arithmetic.
+        UnsupportedOperation: for an operation that has no interval arithmetic.
     """
     if problem.model.double is None:
         return None
     names = tuple(problem.free)
     rows = _complex_matrix(problem, {**problem.as_nodes(problem.fixed), **{n: symbol(n) for n in names}})
     asked = formula((part for row in rows for x in row for part in (x.re, x.im)), names)
-    found = np.array(ranges(asked, [outwards(*ends) for ends in problem.free.values()]))
+    found = np.array(ranges(asked, [round_outwards(*ends) for ends in problem.free.values()]))
     if not np.isfinite(found).all():
         return None
     n = len(rows)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.algebra.formula import constant, formula
-from tmsopt.algebra.intervals import Interval, root_bound
+from tmsopt.algebra.intervals import Interval, bound_roots
 from tmsopt.global_search.interlacing import interlace, squares_of
 from tmsopt.models import Model, Values
 from tmsopt.program.formulate import Builder
@@ -60,7 +60,7 @@ class Frame:
         """Bound on the roots for coefficients in ranges, of the first case or of another."""
         (lower, upper), *others = ranges
         least = self.least * self.lead if first else -math.inf
-        return root_bound([(max(lower, least), max(upper, least)), *others])
+        return bound_roots([(max(lower, least), max(upper, least)), *others])
 
 
 def compact(model: Model, values: Values) -> list[Any]:
@@ -138,7 +138,7 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
     """Ranges for the unknown factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
     count = len(pattern.unknowns)
-    largest = root_bound(build.over(compact(frame.model, build.values[0]))) / build.unit
+    largest = bound_roots(build.over(compact(frame.model, build.values[0]))) / build.unit
     symbols = build.x[-count:]
     for factor in pattern.factors(symbols):
         for k, c in enumerate(factor[1:], start=1):

@@ -19,11 +19,11 @@ from tmsopt.algebra.formula import (
     Formula,
     Kind,
     Node,
-    NotAccepted,
+    UnsupportedOperation,
     constant,
     fold,
     formula,
-    made,
+    make_node,
     symbol,
 )
 from tmsopt.algebra.intervals import ball, interval
@@ -318,7 +318,7 @@ def prepared(asked: Formula) -> Formula:
     """A formula in operations that branch and prune has.
 
     Raises:
-        NotAccepted: for another one, with its name.
+        UnsupportedOperation: for another one, with its name.
     """
     known = {name: NODES.operations[name] for name in _OPERATIONS} | {"pow": _power}
     own = {name: symbol(name) for name in asked.names}
@@ -329,12 +329,12 @@ def _power(a: Node, b: Node) -> Node:
     """A power by squares and products."""
     n = b.fraction
     if n is None or n.denominator > 1:
-        raise NotAccepted("pow")
+        raise UnsupportedOperation("pow")
     if n < 0:
         return 1 / _power(a, -b)
     if n == 0:
         return constant(1)
-    half = made("square", _power(a, constant(n // 2))) if n > 1 else constant(1)
+    half = make_node("square", _power(a, constant(n // 2))) if n > 1 else constant(1)
     return half * a if n % 2 else half
 
 

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from tmsopt.algebra.formula import NotAccepted, formula, symbol
+from tmsopt.algebra.formula import UnsupportedOperation, formula, symbol
 from tmsopt.algebra.identity import is_linear
 from tmsopt.global_search.half_planes import Frame, bound_unknowns, compact, half_planes, sectors
 from tmsopt.models.expression import Expression
@@ -71,7 +71,7 @@ class Question:
         """The question as data, for one sign of a0, which is not below `least` in size."""
         problem, signs = self.problem, self.signs()[sign]
         if problem.asks(ANGULAR_FREQUENCY):
-            raise NotAccepted(ANGULAR_FREQUENCY)
+            raise UnsupportedOperation(ANGULAR_FREQUENCY)
         frame = Frame(problem.model, signs, self.unit, rewards_change_of(problem, "abscissa"), self.compact, least)
         carried = {"abscissa": partial(half_planes, frame), "damping_ratio": partial(sectors, frame)}
         lifts: Mapping[str, Lifting] = carried

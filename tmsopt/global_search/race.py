@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.global_search.tasks import INFEASIBLE, UNDECIDED, Decision, Failed, GlobalSolver, Task
 from tmsopt.killable import Killable, ProcessEnded
 
@@ -39,7 +39,7 @@ class SolverPool:
         """Decisions on tasks, run all at once, until one is shown to have no feasible point.
 
         Raises:
-            NotAccepted: for operations or numbers that the solver cannot take, if no task can.
+            UnsupportedOperation: for operations or numbers that the solver cannot take, if no task can.
             Failed: if the solver raised, and decided nothing.
             KeyboardInterrupt: when the user stops it; no process is left behind.
         """
@@ -72,14 +72,14 @@ class SolverPool:
 
 def _decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
     """Decisions in the order of the tasks; undecided where a process was ended or crashed."""
-    decisions, refused, failed = list[Decision](), list[NotAccepted](), list[BaseException]()
+    decisions, refused, failed = list[Decision](), list[UnsupportedOperation](), list[BaseException]()
     for answer in answers:
         match answer.exception() if answer.done() else ProcessEnded():
             case None:
                 decisions.append(answer.result())
             case ProcessEnded():
                 decisions.append(Decision(UNDECIDED))
-            case NotAccepted() as error:
+            case UnsupportedOperation() as error:
                 refused.append(error)
             case error:
                 failed.append(error)

@@ -21,7 +21,7 @@ def decide(asked: Task) -> Decision:
     """Branch and bound.
 
     Raises:
-        NotAccepted: for an operation that cannot be written for SCIP.
+        UnsupportedOperation: for an operation that cannot be written for SCIP.
     """
     began = time.perf_counter()
     translated = Translation(asked.nlp)

@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from tmsopt.algebra.formula import NotAccepted, formula, symbol
+from tmsopt.algebra.formula import UnsupportedOperation, formula, symbol
 from tmsopt.algebra.intervals import ranges
 from tmsopt.problem.problem import Posed
 from tmsopt.roots import hurwitz_minors
@@ -33,7 +33,7 @@ def none_stable(problem: Posed) -> bool:
         box = left.popleft()
         try:
             ends = np.array(ranges(tests, box))
-        except NotAccepted:
+        except UnsupportedOperation:
             return False
         if (ends[:, 0] > 0).any() and (ends[:, 1] < 0).any():
             continue

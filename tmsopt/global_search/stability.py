@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.evaluation.recheck import Evaluation, recheck
 from tmsopt.global_search.answer import Answer, Clock, answer, contradicted, doubt
 from tmsopt.global_search.question import Question, unit_of
@@ -79,7 +79,7 @@ def any_stable(
                 proved = _admits(at_axis, best, known, clock)
             if told.verdict == FOUND and _judged(asked, told.other).design is None:  # it is on the axis
                 told = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _ANY)
-        except NotAccepted:
+        except UnsupportedOperation:
             return Stability()
         except Failed as error:
             return Stability(failed=f"{SOLVER.name} failed: {error}")

@@ -62,7 +62,7 @@ class GlobalSolver:
         missing: what to say where that is not there.
         tolerance: by which it may be off in a row; 0 for exact arithmetic.
         prepare: called once in its process, before the first task.
-        decide: raises NotAccepted for an operation that it cannot take.
+        decide: raises UnsupportedOperation for an operation that it cannot take.
     """
 
     name: str

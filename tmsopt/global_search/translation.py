@@ -12,7 +12,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.formula import Kind, NotAccepted
+from tmsopt.algebra.formula import Kind, UnsupportedOperation
 from tmsopt.algebra.intervals import Interval, ball, interval
 from tmsopt.algebra.kinds import INTERVALS, as_double
 from tmsopt.program.nlp import NLP
@@ -76,7 +76,7 @@ class Translation:
         """Translate an NLP.
 
         Raises:
-            NotAccepted: for an operation that cannot be written for SCIP.
+            UnsupportedOperation: for an operation that cannot be written for SCIP.
         """
         import pyscipopt
 
@@ -197,7 +197,7 @@ class Translation:
     def ratio(self, a: Term, b: Term) -> Term:
         """The same, which leaves 0/0 open; where b is 0 throughout, a/b is 0 or does not exist."""
         if b.degree == 0 and not b.expression:
-            raise NotAccepted("a ratio to 0")
+            raise UnsupportedOperation("a ratio to 0")
         return self.quotient(a, b)
 
     def root(self, a: Term) -> Term:
@@ -211,13 +211,13 @@ class Translation:
     def power(self, a: Term, b: Term) -> Term:
         if b.degree > 0:  # a^b = exp(b log a), where a cannot be 0, nor negative with a b that is whole
             if not a.ends[0] > 0:
-                raise NotAccepted("a power with a variable exponent of what may be 0 or negative")
+                raise UnsupportedOperation("a power with a variable exponent of what may be 0 or negative")
             return self.applied("exp", self.product(b, self.applied("log", a)))
         exponent = b.expression
         if exponent == 0.5:
             return self.root(a)
         if abs(exponent) > _WHOLE:
-            raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
+            raise UnsupportedOperation(f"a power with an exponent beyond {_WHOLE}")
         if exponent != int(exponent) and a.degree > 0 and a.ball.is_finite():
             _refuse_huge(_OVER["pow"](a.ball, b.ball), "a power")
         if exponent < 0:
@@ -311,13 +311,13 @@ class Translation:
 
 def _constant(value: float) -> Term:
     if math.isfinite(value) and abs(value) > _HUGE:
-        raise NotAccepted(f"numbers beyond {_HUGE:g}")
+        raise UnsupportedOperation(f"numbers beyond {_HUGE:g}")
     return Term(float(value), 0, flint.arb(value), abs(float(value)))
 
 
 def _refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
     if over.is_finite() and max(map(abs, interval(over))) > most:
-        raise NotAccepted(f"{name} of numbers beyond {most:g}")
+        raise UnsupportedOperation(f"{name} of numbers beyond {most:g}")
 
 
 def _scale_of(size: float) -> float:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tmsopt.algebra import kinds
-from tmsopt.algebra.formula import CONSTANT, PI, Formula, Kind, Node, constant, fold, formula, made, symbol
+from tmsopt.algebra.formula import CONSTANT, PI, Formula, Kind, Node, constant, fold, formula, make_node, symbol
 from tmsopt.errors import short, suggest
 from tmsopt.models.advice import advice, call_advice
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, OUTSIDE
@@ -270,7 +270,7 @@ class _Part(NamedTuple):
 
 
 def _joined(op: str, *parts: _Part) -> _Part:
-    return _Part(made(op, *(p.node for p in parts)), DEGREES.operations[op](*(p.degree for p in parts)))
+    return _Part(make_node(op, *(p.node for p in parts)), DEGREES.operations[op](*(p.degree for p in parts)))
 
 
 def _read(body: ast.expr, text: str) -> tuple[tuple[str, ...], Node]:

@@ -11,15 +11,15 @@ from typing import Any
 
 from tmsopt.models.model import Model, ParameterSet
 from tmsopt.roots import Pattern, Root, Structure, pattern
-from tmsopt.roots.patterns.composed import pattern_names
-from tmsopt.roots.patterns.descriptions import in_words
-from tmsopt.roots.patterns.doubled import (
-    complex_in_words,
+from tmsopt.roots.patterns.complex_patterns import (
     complex_name,
     complex_pattern,
     complex_pattern_names,
-    doubled_name,
+    describe_complex_structure,
+    real_form_name,
 )
+from tmsopt.roots.patterns.composed import pattern_names
+from tmsopt.roots.patterns.descriptions import describe_structure
 
 ON_AXIS = 1e-12
 """Of the largest root of the polynomial: so far right of the imaginary axis is on it, as far as rounding tells."""
@@ -87,14 +87,14 @@ def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Stru
     if model.carrier is None:
         return Structure(name, tuple(roots), 0.0)
     lower = [replace(r, im=r.im - model.carrier) for r in roots]
-    return Structure(doubled_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
+    return Structure(real_form_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
 
 
 def structure_in_words(model: Model, structure: str, gain: bool = False) -> str:
     """A structure, as it is told, in words; of a complex H by its gain where it has any."""
     if model.carrier is None:
-        return in_words(structure, model.degree)
-    return complex_in_words(structure, model.degree // 2, gain)
+        return describe_structure(structure, model.degree)
+    return describe_complex_structure(structure, model.degree // 2, gain)
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:

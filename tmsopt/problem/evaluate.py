@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.arrays import on_arrays
+from tmsopt.algebra.arrays import evaluate_on_arrays
 from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, Values
@@ -47,7 +47,7 @@ class ArrayFunction:
         """
         missing = {n for n in self.formula.inputs if n not in columns}
         known = roots_of(coefficients_of(self.problem, columns), missing) if missing else {}
-        return dict(zip(self.names, on_arrays(self.formula, {**columns, **known}), strict=True))
+        return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **known}), strict=True))
 
 
 def evaluate(problem: Posed, expressions: Iterable[str | Expression], columns: Mapping[str, Any]) -> list[Any]:
@@ -75,14 +75,14 @@ def _made(problem: Posed, expressions: tuple[str | Expression, ...]) -> ArrayFun
 
 def coefficients_of(problem: Posed, columns: Mapping[str, Any]) -> list[Any]:
     """Coefficients of designs, each of the shape that it depends on."""
-    return on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
+    return evaluate_on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
 
 
 @lru_cache(maxsize=64)
 def coefficient_formula(model: Model, set_name: str) -> Formula:
     """The coefficients of a model in the parameters of a set."""
     whole = model.formulas[set_name]
-    return whole.part(whole.outputs[len(model.sets[0].names) :])
+    return whole.extract(whole.outputs[len(model.sets[0].names) :])
 
 
 def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> dict[str, Any]:

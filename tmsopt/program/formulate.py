@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import constant, depends_on, fold, formula, made, symbol
+from tmsopt.algebra.formula import constant, depends_on, fold, formula, make_node, symbol
 from tmsopt.algebra.intervals import Interval, ball, interval
 from tmsopt.algebra.kinds import INTERVALS
 from tmsopt.models import Quantity, Values, decimal
@@ -217,7 +217,7 @@ class Builder:
     def parameter(self, name: str, lower: float, upper: float) -> Any:
         """A free parameter, as a variable or as the arctangent of one."""
         if self.problem.parameter_set[name].tangent:
-            return made("atan", self.variable(f"tan({name})", np.tan(lower), np.tan(upper)))
+            return make_node("atan", self.variable(f"tan({name})", np.tan(lower), np.tan(upper)))
         return self.variable(name, lower, upper)
 
     def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
@@ -324,7 +324,7 @@ class Builder:
         """Ranges of expressions over the variables so far, by interval arithmetic.
 
         Raises:
-            NotAccepted: for an operation that has none.
+            UnsupportedOperation: for an operation that has none.
         """
         over = {name_of(k): ball(ends) for k, ends in enumerate(self.bounds)}
         numbers = {n: INTERVALS.constant(decimal(x)) for n, x in self.numbers.items()}

@@ -16,7 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.algebra.formula import Kind, NotAccepted, depends_on, fold, formula, made, symbol
+from tmsopt.algebra.formula import Kind, UnsupportedOperation, depends_on, fold, formula, make_node, symbol
 from tmsopt.algebra.intervals import ball, interval
 from tmsopt.algebra.kinds import INTERVALS, NODES
 from tmsopt.models import Values
@@ -84,14 +84,14 @@ def _suspect(nlp: NLP) -> bool:
     def divided(op: str, *operands: Any) -> Any:
         lower, upper = interval(known["cos"](*operands) if op == "tan" else operands[-1])
         if lower <= 0 <= upper:
-            raise NotAccepted
+            raise UnsupportedOperation
         return known[op](*operands)
 
     smooth = {op: f for op, f in known.items() if op not in _PIECES} | {op: partial(divided, op) for op in _POLES}
     box = [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
     try:
         nlp.fold(box, Kind(smooth, INTERVALS.constant))
-    except NotAccepted:
+    except UnsupportedOperation:
         return True
     return False
 
@@ -115,7 +115,7 @@ class _Unfolding:
         """A kink that depends on variables, as a new one."""
         every = set(map(name_of, range(self.count)))
         if not any(depends_on(e, every) for e in operands):
-            return made(op, *operands)
+            return make_node(op, *operands)
         t = self.variable(pieces := _PIECES[op](*operands), quotient=False)
         self.rows += [t - piece for piece in pieces]
         return -t if op == "min" else t
@@ -130,15 +130,15 @@ class _Unfolding:
     def divided(self, op: str, *operands: Any) -> Any:
         """A quotient or tangent; as a new variable where the denominator may be 0 in the box."""
         numerator, denominator = _POLES[op](*operands)
-        own, plain = formula([denominator]), made(op, *operands)
-        if not own.depending(self.nlp.inputs) or own.depending(
+        own, plain = formula([denominator]), make_node(op, *operands)
+        if not own.dependent_steps(self.nlp.inputs) or own.dependent_steps(
             set(map(name_of, range(len(self.nlp.inputs), self.count)))
         ):
             return plain
         box = [ball(ends) for ends in zip(self.nlp.lower, self.nlp.upper, strict=True)]
         try:
             (over,) = replace(self.nlp, formula=own).fold(box, INTERVALS)
-        except NotAccepted:
+        except UnsupportedOperation:
             return plain
         lower, upper = interval(over)
         if lower > 0 or upper < 0:
@@ -150,7 +150,7 @@ class _Unfolding:
 
 _POLES: Mapping[str, Callable[..., tuple[Any, Any]]] = {
     "div": lambda a, b: (a, b),
-    "tan": lambda e: (made("sin", e), made("cos", e)),
+    "tan": lambda e: (make_node("sin", e), make_node("cos", e)),
 }
 _PIECES: Mapping[str, Callable[..., Sequence[Any]]] = {
     "abs": lambda e: (e, -e),

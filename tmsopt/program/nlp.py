@@ -277,7 +277,7 @@ class Compiled:
 def compile_formula(formula: Formula, count: int) -> Compiled:
     """A formula of an NLP as functions of CasADi of so many variables."""
     variables = tuple(map(name_of, range(count)))
-    names, early, late = formula.split(formula.depending(variables))
+    names, early, late = formula.split(formula.dependent_steps(variables))
     x, p = ca.SX.sym("x", count), ca.SX.sym("p", len(names))
     given = dict(zip((*variables, *names), [*ca.vertsplit(x), *ca.vertsplit(p)], strict=True))
     f, *g = fold(late, given, CASADI)

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from functools import partial
 
-from tmsopt.algebra.formula import NotAccepted
+from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.errors import Fault, InputError
 from tmsopt.evaluation.bound import instant_bound
 from tmsopt.evaluation.recheck import recheck
@@ -76,7 +76,7 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
             replaced = True
             while replaced and not (problem.objective is None and feasible(found)):
                 found, replaced = (_bounded if feasible(found) else _excluded)(found, clock)
-        except NotAccepted as error:
+        except UnsupportedOperation as error:
             return _in_vain(found, f"branch and bound cannot take {error}, so there is no bound")
         except Failed as error:
             return _in_vain(found, f"{SOLVER.name} failed: {error}; so there is no bound")

@@ -7,14 +7,14 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.balls import GUARD, largest_radius, upper
-from tmsopt.algebra.krawczyk import Enclosure, Refused, enclosed, refined
+from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
 from tmsopt.models.exact import Written
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.proofs.factored import Factored, factored, has_pattern, of_pattern
 from tmsopt.proofs.system import ROUNDINGS, Chosen, Equations, choose, equations
 from tmsopt.roots import Pattern
-from tmsopt.roots.patterns.structure import nearest_unknowns
+from tmsopt.roots.patterns.structure import fit_unknowns
 
 EXACT = "exact factorisation"
 """The method for a design whose coefficients are fractions."""
@@ -76,7 +76,7 @@ def beside(problem: Posed, pattern: Pattern, design: Written, stored: Mapping[st
     """The design with a pattern that a stored one stands for, by Krawczyk's test.
 
     Raises:
-        Refused: with the reason in words.
+        ProofFailed: with the reason in words.
     """
     system, carried = equations(problem, pattern, stored), digits + _EXTRA
     for _ in range(_TIMES):
@@ -87,7 +87,7 @@ def beside(problem: Posed, pattern: Pattern, design: Written, stored: Mapping[st
             if all(b.rad() <= small * (system.units.get(n, 1) + abs(b)) for n, b in balls):
                 return found
         carried *= 2
-    raise Refused(f"the balls do not shrink to {digits} digits; ask for fewer")
+    raise ProofFailed(f"the balls do not shrink to {digits} digits; ask for fewer")
 
 
 def _beside(system: Equations, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
@@ -100,9 +100,9 @@ def _beside(system: Equations, design: Written, stored: Mapping[str, float], dig
             start = {**held, **unknowns}
             try:
                 return _proved(system, start, among, digits)
-            except Refused as refusal:
+            except ProofFailed as refusal:
                 reasons.append(str(refusal))
-    raise Refused(reasons[0] if reasons else f"no {pattern.name} is anywhere near the design")
+    raise ProofFailed(reasons[0] if reasons else f"no {pattern.name} is anywhere near the design")
 
 
 def _choices(problem: Posed, stored: Mapping[str, float], free: list[str], count: int) -> Iterator[list[str]]:
@@ -124,9 +124,9 @@ def _starts(system: Equations, held: Mapping[str, Any], problem: Posed) -> Itera
     scale = Scale(system.unit)
     coefficients = scale.scaled([float(c) for c in problem.model.coefficients(own, of)])
     try:
-        fits = nearest_unknowns(system.pattern, coefficients)
+        fits = fit_unknowns(system.pattern, coefficients)
     except ValueError:
-        raise Refused("a0 is 0, or a coefficient does not exist: a root is at infinity") from None
+        raise ProofFailed("a0 is 0, or a coefficient does not exist: a root is at infinity") from None
     for fit in fits[:2]:
         units = (system.units.get(n, 1.0) for n in system.of_pattern)
         yield lifted | {n: flint.arb(x * u) for n, x, u in zip(system.of_pattern, fit, units, strict=True)}
@@ -137,8 +137,8 @@ def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digit
     of = problem.parameter_set
     chosen = choose(system, start, among)
     names = [*chosen.moved, *system.unknowns]
-    middle = refined(system, start, names, digits, system.units)
-    enclosure = enclosed(system, middle, names, digits, system.units)
+    middle = refine_solution(system, start, names, digits, system.units)
+    enclosure = enclose_solution(system, middle, names, digits, system.units)
     at = {**middle, **enclosure.balls}
     distance, explained = _distance(chosen, start, enclosure, system.units)
     tangents = {n: at[n] for n in of.names if of[n].tangent}
@@ -167,7 +167,7 @@ def _distance(
     """The moved parameter that the stored design is off most, against what rounding explains.
 
     Raises:
-        Refused: if it is off by more, or if rounding takes it, or a root, out of the box in which the solution is
+        ProofFailed: if it is off by more, or if rounding takes it, or a root, out of the box in which the solution is
             unique: beside an EP4 are EP3s, of which the last bit of a stored number would choose one.
     """
     explained = chosen.explained
@@ -175,7 +175,7 @@ def _distance(
     unique = {n: enclosure.uniqueness * units.get(n, 1.0) for n in explained}
     loose = max(explained, key=lambda n: explained[n] / unique[n], default=None)
     if loose and not explained[loose] < unique[loose]:
-        raise Refused(
+        raise ProofFailed(
             f"nearly singular: rounding alone moves {loose} by {explained[loose]:.2g}, and the solution is the only "
             f"one within {unique[loose]:.2g} only; hold another parameter, or give exact numbers"
         )
@@ -183,7 +183,7 @@ def _distance(
     if worst is None:
         return 0.0, 0.0
     if off[worst] > explained[worst]:
-        raise Refused(
+        raise ProofFailed(
             f"not the design's: the nearest one is {off[worst]:.2g} from the stored {worst}, of which rounding of the "
             f"stored numbers explains {explained[worst]:.2g} ({ROUNDINGS} roundings of each); solve again, or give all "
             "digits"
@@ -195,20 +195,22 @@ def _checked(system: Equations, coefficients: Sequence[Any], at: Mapping[str, An
     """What the equations alone do not say.
 
     Raises:
-        Refused: for a0 = 0, a quantity of the wrong sign, or another kind of pattern.
+        ProofFailed: for a0 = 0, a quantity of the wrong sign, or another kind of pattern.
     """
     if coefficients[0].contains(0):
-        raise Refused("a0 cannot be told from 0: a root may be at infinity, and all equations hold where all a are 0")
+        raise ProofFailed(
+            "a0 cannot be told from 0: a root may be at infinity, and all equations hold where all a are 0"
+        )
     for quantity in system.lifted:
         r, x = quantity.range, at[quantity.name]
         if not (x >= r.lower and x <= r.upper):
-            raise Refused(f"the solution found has {quantity.name} = {float(x):.6g}, out of its range {r}")
+            raise ProofFailed(f"the solution found has {quantity.name} = {float(x):.6g}, out of its range {r}")
     pattern = system.pattern
     for value in pattern.nonnegative([at[n] for n in system.of_pattern]):
         if value < 0:
-            raise Refused(_other_kind(pattern))
+            raise ProofFailed(_other_kind(pattern))
         if not value > 0:
-            raise Refused(_undecided_kind(pattern))
+            raise ProofFailed(_undecided_kind(pattern))
 
 
 def _other_kind(pattern: Pattern) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import flint
 
 from tmsopt.roots import Pattern, composition, evaluate, lienard_chipart
-from tmsopt.roots.patterns.enclosed import Enclosed, factor_roots
+from tmsopt.roots.patterns.root_enclosures import EnclosedRoot, factor_roots
 from tmsopt.roots.polynomial import rightmost_first
 
 Factor = Sequence[Any]
@@ -23,9 +23,9 @@ class Factored:
     factors: tuple[tuple[Factor, int], ...]
 
     @cached_property
-    def roots(self) -> tuple[Enclosed, ...] | None:
+    def roots(self) -> tuple[EnclosedRoot, ...] | None:
         """All roots, rightmost first, with exact multiplicities; None where the balls cannot tell two apart."""
-        found: list[Enclosed] = []
+        found: list[EnclosedRoot] = []
         for factor, multiplicity in self.factors:
             own = factor_roots(factor)
             if own is None:
@@ -67,7 +67,7 @@ class Factored:
 
 def of_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factored:
     """The factors of a pattern, equal ones counted."""
-    return Factored(tuple(pattern.counted(unknowns)))
+    return Factored(tuple(pattern.distinct_factors(unknowns)))
 
 
 def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
@@ -108,7 +108,7 @@ def _extreme(which: Callable[[Any, Any], Any], balls: Sequence[Any]) -> Any:
     return reduce(which, balls) if balls and None not in balls else None
 
 
-def _ratio(root: Enclosed) -> Any:
+def _ratio(root: EnclosedRoot) -> Any:
     if root.real:
         return flint.arb(1) if root.re < 0 else flint.arb(-1) if root.re > 0 else None
     return -root.re / (root.re * root.re + root.im * root.im).sqrt()

@@ -14,7 +14,7 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.proofs.existence import EXACT, Existing
 from tmsopt.proofs.factored import Factored
 from tmsopt.roots import exact_nullity, has_one_eigenvector
-from tmsopt.roots.patterns.enclosed import factor_roots
+from tmsopt.roots.patterns.root_enclosures import factor_roots
 
 
 @dataclass(frozen=True)

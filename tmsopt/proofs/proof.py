@@ -9,7 +9,7 @@ from typing import Any, Unpack
 import flint
 
 from tmsopt.algebra.balls import Number, ProvedRoot, fraction, number
-from tmsopt.algebra.krawczyk import Refused
+from tmsopt.algebra.krawczyk import ProofFailed
 from tmsopt.errors import Fault, InputError, count_faults
 from tmsopt.models.exact import Written, written
 from tmsopt.models.names import number_text
@@ -27,8 +27,8 @@ from tmsopt.proofs.factored import multiple_roots
 from tmsopt.proofs.facts import NOTHING, Verdict, eigenvectors, heavy_damping, inside, limits, stability
 from tmsopt.records import Printable, Table, plain
 from tmsopt.roots import PATTERNS, Pattern, Root
-from tmsopt.roots.patterns.doubled import complex_shown
-from tmsopt.roots.patterns.naming import implies, shown_patterns
+from tmsopt.roots.patterns.complex_patterns import as_complex_pattern
+from tmsopt.roots.patterns.naming import find_patterns, has_pattern
 from tmsopt.search.solve import solve_any_status
 
 DIGITS = 30
@@ -234,7 +234,7 @@ def _proved(
     for pattern in patterns:
         try:
             found = beside(problem, pattern, design, varied, digits)
-        except Refused as refusal:
+        except ProofFailed as refusal:
             reasons.append(str(refusal))
         else:
             return _assembled(problem, design, pattern.name, pattern, found, digits)
@@ -252,12 +252,12 @@ def _patterns(problem: Posed, structure: str, roots: Sequence[Root]) -> list[Pat
     """Patterns to prove: that of the structure, if it has the one that is located, and then the latter."""
     located = problem.pattern
     quartic = PATTERNS if problem.model.degree == _QUARTIC else {}
-    shown = shown_patterns(roots) if roots else [quartic[structure]] if structure in quartic else []
-    if located and not (implies(roots, located.form) if roots else located.form == structure):
+    shown = find_patterns(roots) if roots else [quartic[structure]] if structure in quartic else []
+    if located and not (has_pattern(roots, located.form) if roots else located.form == structure):
         shown = []
     named = [quartic.get(p.name, p) for p in shown]
     if problem.model.carrier is not None:
-        named = [complex_shown(p) for p in named]
+        named = [as_complex_pattern(p) for p in named]
     return list({p.name: p for p in [*named, *([located] if located else [])]}.values())
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.krawczyk import Refused, slopes
+from tmsopt.algebra.krawczyk import ProofFailed, jacobian as jacobian_of
 from tmsopt.global_search.conditions import others, values_at
 from tmsopt.models import Quantity
 from tmsopt.models.expression import Expression
@@ -79,12 +79,14 @@ def equations(problem: Posed, pattern: Pattern, parameters: Mapping[str, float])
     """The equations of a pattern in a problem.
 
     Raises:
-        Refused: for an equality that cannot be evaluated in balls.
+        ProofFailed: for an equality that cannot be evaluated in balls.
     """
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
     beyond = [n for n in (RADIUS, "damping_ratio", ANGULAR_FREQUENCY) if any(n in c.names for c in equalities)]
     if beyond:
-        raise Refused(f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest")
+        raise ProofFailed(
+            f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest"
+        )
     lifted = lifted_quantities(problem.model, problem.parameter_set, parameters, equalities)
     own = Equations(problem, pattern, equalities, lifted, ordinary(scale_of(problem).unit))
     units = reaches_of(problem)
@@ -109,17 +111,17 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     """The best conditioned of the free parameters: QR with column pivoting, once the unknowns are projected out.
 
     Raises:
-        Refused: with too few parameters, or none that the equations depend on.
+        ProofFailed: with too few parameters, or none that the equations depend on.
     """
     count, of = system.conditions, system.problem.parameter_set
     if len(among) < count:
-        raise Refused(
+        raise ProofFailed(
             f"{_many(count, 'condition')} and {_many(len(among), 'free parameter')}: the pattern could not be proved "
             "for these numbers; they may be rounded, or irrational, and then an equation that vanishes cannot be told "
             f"from a small number; free {count - len(among)} more, or give fractions that have the pattern"
         )
     names = [*of.names, *system.unknowns]
-    jacobian = np.array([[float(e) for e in row] for row in slopes(system, at, names).tolist()])
+    jacobian = np.array([[float(e) for e in row] for row in jacobian_of(system, at, names).tolist()])
     values = np.array([abs(float(at[n])) for n in names])
     rounding = np.abs(jacobian) @ values + 1e-300
     widths = {n: _NEAR_ZERO * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
@@ -130,14 +132,14 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     size = np.abs(jacobian)[:, [*free, *outside]] @ scale[[*free, *outside]] + 1e-300
     scaled = jacobian / size[:, None] * scale
     if not np.all(np.isfinite(scaled)):
-        raise Refused("the equations have no finite derivatives at the design; move it off the edge of its range")
+        raise ProofFailed("the equations have no finite derivatives at the design; move it off the edge of its range")
     basis = np.linalg.qr(scaled[:, outside], mode="complete")[0][:, len(outside) :] if outside else np.eye(len(scaled))
     reduced = basis.T @ scaled[:, free]
     order, pivots = _pivoted(reduced, count)
     if count and not pivots[-1] > _DEPENDENT * max(pivots[0], 1e-3):
         idle = [n for n, k in zip(among, free, strict=True) if not np.any(jacobian[:, k])]
         why = f"; they do not depend on {', '.join(idle)}" if idle else ""
-        raise Refused(
+        raise ProofFailed(
             f"the equations are (nearly) singular in the free parameters {', '.join(among)}{why}; free another one"
         )
     moved = tuple(sorted((among[k] for k in order), key=of.names.index))

@@ -1,13 +1,13 @@
 """Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity.
 
-In: coefficients, highest power first. Out: roots, verdicts on stability, counts and structures. Open `polynomial`
-first; `patterns` says which roots meet, `quartics` takes millions at once.
+In: coefficients, highest power first. Out: roots, stability, counts of real roots, and structures. Open `polynomial`
+first; `patterns` finds out which roots coincide, `quartics` solves millions of quartics at once.
 """
 
+from tmsopt.roots.batch import classify, find_motion
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
-from tmsopt.roots.many import classify, find_motion
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
 from tmsopt.roots.patterns.pattern import Pattern

@@ -1,4 +1,4 @@
-"""Number of real roots from the coefficients alone, for arrays of polynomials: by discs about numeric roots."""
+"""Counts the real roots of arrays of polynomials, by discs around numeric roots."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -6,23 +6,23 @@ from numpy.typing import ArrayLike, NDArray
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots.discs import Discs
 from tmsopt.roots.exact import exact_roots
-from tmsopt.roots.numeric import regular, roots
+from tmsopt.roots.numeric import roots, validate_coefficients
 
 Counts = NDArray[np.int_]
 
-_ROOM = 1.002
-"""For the rounding of the radii themselves."""
+_MARGIN = 1.002
+"""Factor that covers the rounding of the radii."""
 
 
 def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Counts]:
-    """Numbers of negative and of positive real roots, each multiple root counted once.
+    """Count the negative and the positive real roots, each multiple root once.
 
-    Coefficients of shape (…, n + 1), descending, with a leading one other than 0; both answers have shape (…).
-    Rows in which discs about numeric roots touch, as next to an exceptional point, are decided in exact arithmetic
-    from the coefficients as stored.
+    Coefficients have shape (…, n + 1), descending, with a leading one other than 0; both results have shape (…).
+    Where the discs around numeric roots touch, as near an exceptional point, exact arithmetic decides from the
+    coefficients as stored.
 
     Args:
-        exact: else the numeric roots of those rows are counted, at a hundredth of the time.
+        exact: if False, the numeric roots are counted in those rows too, a hundred times faster.
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
@@ -34,7 +34,7 @@ def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Cou
 
     More: docs/how_to/charts.md
     """
-    c = regular(coefficients, "real_roots")
+    c = validate_coefficients(coefficients, "real_roots")
     rows = c.reshape(-1, c.shape[-1])
     z, doubtful = _enclose(rows)
     real = z.imag == 0
@@ -46,10 +46,10 @@ def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Cou
 
 
 def _enclose(c: Array) -> tuple[Complex, Truth]:
-    """Numeric roots of the rows, and where discs that hold the true ones touch one another, 0 or both sides."""
+    """Numeric roots of the rows, and the rows whose discs are too wide to count real roots."""
     z = roots(c)
     with np.errstate(all="ignore"):
         discs = Discs(c.T, np.zeros(c.T.shape), z.T)
-        radius = _ROOM * discs.radius
+        radius = _MARGIN * discs.radius
         decided = np.abs(np.where(z.imag == 0, z.real, z.imag)) > radius.T
-    return z, ~(np.all(decided, axis=1) & discs.disjoint(radius))
+    return z, ~(np.all(decided, axis=1) & discs.are_disjoint(radius))

@@ -1,4 +1,4 @@
-"""Roots of polynomials with rational coefficients, to any number of digits, multiplicities exact."""
+"""Roots of polynomials with rational coefficients to any number of digits, with exact multiplicities."""
 
 import math
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from tmsopt.roots.polynomial import Root, rightmost_first
 
 
 def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root, ...]:
-    """Isolated roots of a polynomial with rational coefficients (descending), rightmost first.
+    """Roots of a polynomial with rational coefficients (descending), rightmost first.
 
-    The square-free factorisation decides multiplicities, ball arithmetic isolates the roots to `digits`; the
-    values returned are those rounded to double precision.
+    The square-free factorisation gives the multiplicities, and ball arithmetic isolates the roots to `digits`; the
+    results are rounded to double precision.
 
     Example:
         >>> [(s.re, s.im, s.multiplicity) for s in tmsopt.roots.exact_roots([1, 2, 2, 2, 1])]  # (s + 1)² (s² + 1)
@@ -27,7 +27,7 @@ def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root
 
 
 def isolated_roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
-    """The distinct ones as balls of the working precision, each with its multiplicity."""
+    """The distinct roots as balls of the working precision, each with its multiplicity."""
     terms = [rational(c) for c in coefficients]
     common = math.lcm(*(int(term.q) for term in terms))
     polynomial: Any = flint.fmpz_poly([int(t * common) for t in reversed(terms)])
@@ -35,7 +35,7 @@ def isolated_roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
 
 
 def exact_abscissa(coefficients: Sequence[Any]) -> float:
-    """Largest real part of the roots, correct to double precision even beside an exceptional point.
+    """Largest real part of the roots, correct to double precision even near an exceptional point.
 
     Example:
         >>> tmsopt.roots.exact_abscissa([1, 12, 66, 220, 495, 792, 924, 792, 495, 220, 66, 12, 1])  # (s + 1)¹²

@@ -12,9 +12,9 @@ from tmsopt.records import Array, Complex
 
 Matrix = Sequence[Sequence[Any]]
 
-_ELSEWHERE = ((0.31, 0.17), (-0.43, 0.71), (1.13, -0.59))
+_OFFSETS = ((0.31, 0.17), (-0.43, 0.71), (1.13, -0.59))  # of arbitrary test points, relative to |s|
 _ROUNDING = 1e-16
-_SWEEPS = 8  # of equilibration: each halves the spread of the logarithms
+_SWEEPS = 8  # of the equilibration; each halves the spread of the logarithms
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,10 @@ class Jordan:
 
     Attributes:
         geometric: number of independent eigenvectors.
-        partial: lengths of the Jordan chains, longest first; none where the ranks contradict the multiplicity.
-        zero: largest singular value of the equilibrated matrix at the eigenvalue that counts as 0, relative.
-        nonzero: the smallest that does not; inf without one.
-        threshold: what may count as 0; the widest gap below it decides.
+        partial: lengths of the Jordan chains, longest first; empty if the ranks contradict the multiplicity.
+        zero: the largest relative singular value of the equilibrated matrix that counts as 0.
+        nonzero: the smallest one that does not; inf if there is none.
+        threshold: upper limit of the singular values that may count as 0.
     """
 
     geometric: int
@@ -37,7 +37,7 @@ class Jordan:
 
 
 def is_regular(matrices: Sequence[Matrix], s: Any, threshold: float) -> bool:
-    """Whether det L(s) is not 0 for all s, judged at places about s that are no roots but by accident.
+    """Whether det L is not identically 0, judged at three arbitrary points near s.
 
     Example:
         >>> import flint
@@ -48,20 +48,20 @@ def is_regular(matrices: Sequence[Matrix], s: Any, threshold: float) -> bool:
     More: docs/explanation/exceptional_points.md
     """
     unit = abs(s) if abs(s) > 0 else flint.arb(1)
-    return any(jordan(matrices, s + unit * flint.acb(a, b), 1, threshold).zero > threshold for a, b in _ELSEWHERE)
+    return any(jordan(matrices, s + unit * flint.acb(a, b), 1, threshold).zero > threshold for a, b in _OFFSETS)
 
 
 def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: float, least: float = 0.0) -> Jordan:
     """Jordan structure at an eigenvalue s of L(s) = Σ Pₖ s^(d−k), of known algebraic multiplicity.
 
-    The nullity of L(s) is the geometric multiplicity, and the nullities of the block Toeplitz matrices of L(s), L′(s),
-    L″(s)/2 … count the chains that are at least so long. Rows and columns are scaled to the size of the terms of L(s),
-    so that units do not matter. At least one singular value counts as 0, at most those up to `threshold`, and between
-    these the widest gap decides.
+    The nullity of L(s) is the geometric multiplicity. The nullities of the block Toeplitz matrices of L(s), L′(s),
+    L″(s)/2 … give the number of chains of each length. Rows and columns are scaled to the size of the terms of L(s), so
+    that units do not matter. At least one singular value counts as 0, and none above `threshold`; within these limits
+    the widest gap decides.
 
     Args:
-        matrices: Pₖ in descending powers, balls; s is a ball too, so that no digit is lost where terms cancel.
-        least: unit of the eigenvalues at least, where s is small beside others.
+        matrices: Pₖ in descending powers, as balls; s is a ball too, so that no digit is lost where terms cancel.
+        least: lower limit of the unit of eigenvalues, for an s that is small compared with others.
 
     Example:
         >>> import flint
@@ -74,38 +74,38 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
     """
     d, n = len(matrices) - 1, len(matrices[0])
     unit = max(float(abs(s).mid()), least) or 1.0
-    size, scale = equilibrated([_numbers(P) for P in matrices], unit)
-    blocks = [scale * unit**i * _numbers(_derivative(matrices, s, i)) for i in range(min(d, multiplicity - 1) + 1)]
+    size, scale = equilibrate([_as_complex(P) for P in matrices], unit)
+    blocks = [scale * unit**i * _as_complex(_derivative(matrices, s, i)) for i in range(min(d, multiplicity - 1) + 1)]
     values = np.linalg.svd(blocks[0], compute_uv=False)[::-1] / np.linalg.norm(size * scale, 2)
     geometric = _nullity(values, 1, multiplicity, threshold)
-    partial = _partial(blocks, multiplicity, geometric, threshold)
+    partial = _chain_lengths(blocks, multiplicity, geometric, threshold)
     nonzero = float(values[geometric]) if geometric < n else float("inf")
     return Jordan(geometric, partial, float(values[geometric - 1]), nonzero, threshold)
 
 
 def _nullity(values: Array, least: int, most: int, threshold: float) -> int:
-    """How many singular values, in ascending order, count as 0."""
+    """Number of singular values, in ascending order, that count as 0."""
     most = min(most, len(values), max(least, int(np.sum(values <= threshold))))
-    above = np.log(np.maximum(np.append(values, 1.0), _ROUNDING))
-    return least + int(np.argmax(above[least : most + 1] - above[least - 1 : most]))
+    logarithms = np.log(np.maximum(np.append(values, 1.0), _ROUNDING))
+    return least + int(np.argmax(logarithms[least : most + 1] - logarithms[least - 1 : most]))
 
 
-def _partial(blocks: Sequence[Complex], multiplicity: int, geometric: int, threshold: float) -> tuple[int, ...]:
-    """Lengths of the chains, from how many are at least 1, 2 … long."""
+def _chain_lengths(blocks: Sequence[Complex], multiplicity: int, geometric: int, threshold: float) -> tuple[int, ...]:
+    """Lengths of the Jordan chains, from the numbers of chains of length at least 1, 2 …"""
     if geometric == 1:
         return (multiplicity,)
     largest = max(float(np.linalg.norm(block, 2)) for block in blocks)
-    longer = [geometric]
+    counts = [geometric]  # of chains of length at least 1, 2 …
     nullity = geometric
-    while nullity < multiplicity and longer[-1]:
-        size = len(longer) + 1
-        known = [*blocks, *[np.zeros_like(blocks[0])] * size]  # those beyond the degree, and above the diagonal, are 0
-        toeplitz = np.block([[known[i - j] if i >= j else known[-1] for j in range(size)] for i in range(size)])
+    while nullity < multiplicity and counts[-1]:
+        size = len(counts) + 1
+        padded = [*blocks, *[np.zeros_like(blocks[0])] * size]  # derivatives beyond the degree are 0
+        toeplitz = np.block([[padded[i - j] if i >= j else padded[-1] for j in range(size)] for i in range(size)])
         values = np.linalg.svd(toeplitz, compute_uv=False)
-        found = _nullity(values[::-1] / largest, nullity, nullity + longer[-1], threshold)
-        longer.append(found - nullity)
-        nullity = found
-    lengths = tuple(sum(count > k for count in longer) for k in range(geometric))
+        larger = _nullity(values[::-1] / largest, nullity, nullity + counts[-1], threshold)
+        counts.append(larger - nullity)
+        nullity = larger
+    lengths = tuple(sum(count > k for count in counts) for k in range(geometric))
     return lengths if sum(lengths) == multiplicity else ()
 
 
@@ -118,7 +118,7 @@ def _derivative(matrices: Sequence[Matrix], s: Any, order: int) -> list[list[Any
 
 
 def has_one_eigenvector(matrices: Sequence[Matrix], s: Any) -> bool:
-    """Whether L(s) surely has rank n − 1 at least: in balls, a minor of that order is not 0.
+    """Whether the rank of L(s) is proved to be at least n − 1, by a minor of that order that is not 0 in balls.
 
     Example:
         >>> import flint
@@ -138,10 +138,10 @@ def has_one_eigenvector(matrices: Sequence[Matrix], s: Any) -> bool:
 
 
 def exact_nullity(matrices: Sequence[Matrix], factor: Any) -> int:
-    """Number of independent eigenvectors at each root of an irreducible factor of det L, in fractions.
+    """Number of independent eigenvectors at each root of an irreducible factor of det L, in exact fractions.
 
     Args:
-        matrices: of fractions.
+        matrices: with entries ``fmpq``.
         factor: ``fmpq_poly``.
 
     Example:
@@ -156,10 +156,10 @@ def exact_nullity(matrices: Sequence[Matrix], factor: Any) -> int:
 
 
 def exact_longest(matrices: Sequence[Matrix], factor: Any, multiplicity: int) -> int:
-    """Length of the longest Jordan chain at each root of an irreducible factor of det L, in fractions.
+    """Length of the longest Jordan chain at each root of an irreducible factor of det L, in exact fractions.
 
     Args:
-        matrices: of fractions.
+        matrices: with entries ``fmpq``.
         factor: ``fmpq_poly``.
         multiplicity: how often the factor occurs in det L.
 
@@ -188,37 +188,37 @@ def exact_longest(matrices: Sequence[Matrix], factor: Any, multiplicity: int) ->
 
 
 def _polynomials(matrices: Sequence[Matrix]) -> list[list[Any]]:
-    """L(s) with polynomials for entries."""
+    """L(s) as a matrix of polynomials."""
     size = range(len(matrices[0]))
     return [[flint.fmpq_poly([P[i][j] for P in reversed(matrices)]) for j in size] for i in size]
 
 
 def _nullity_modulo(rows: Sequence[Sequence[Any]], factor: Any) -> int:
     """Nullity of a square matrix of polynomials at each root of an irreducible factor."""
-    left = [[x % factor for x in row] for row in rows]
+    remaining = [[x % factor for x in row] for row in rows]
     for j in range(len(rows)):
-        pivot = next((row for row in left if row[j] != 0), None)
+        pivot = next((row for row in remaining if row[j] != 0), None)
         if pivot is None:
             continue
         inverse = pivot[j].xgcd(factor)[1]
-        others = (row for row in left if row is not pivot)
-        left = [[(x - row[j] * inverse * y) % factor for x, y in zip(row, pivot, strict=True)] for row in others]
-    return len(left)
+        others = (row for row in remaining if row is not pivot)
+        remaining = [[(x - row[j] * inverse * y) % factor for x, y in zip(row, pivot, strict=True)] for row in others]
+    return len(remaining)
 
 
-def equilibrated(matrices: Sequence[Any], unit: float) -> tuple[Array, Array]:
-    """Sizes of the terms of L at eigenvalues of a size, and powers of two that bring its rows and columns near 1."""
+def equilibrate(matrices: Sequence[Any], unit: float) -> tuple[Array, Array]:
+    """Sizes of the entries of L at eigenvalues of size `unit`, and powers of two that bring rows and columns near 1."""
     d = len(matrices) - 1
     size = np.asarray(sum(np.abs(P) * (unit ** (d - k)) for k, P in enumerate(matrices)), dtype=float)
     rows, columns = np.ones((2, len(size)))
     for _ in range(_SWEEPS):
         scaled = np.outer(rows, columns) * size
-        high, wide = scaled.max(axis=1), scaled.max(axis=0)
-        rows = rows / np.sqrt(np.where(high > 0, high, 1.0))
-        columns = columns / np.sqrt(np.where(wide > 0, wide, 1.0))
+        row_max, column_max = scaled.max(axis=1), scaled.max(axis=0)
+        rows = rows / np.sqrt(np.where(row_max > 0, row_max, 1.0))
+        columns = columns / np.sqrt(np.where(column_max > 0, column_max, 1.0))
     return size, np.outer(*(np.exp2(np.round(np.log2(factors))) for factors in (rows, columns)))
 
 
-def _numbers(matrix: Matrix) -> Complex:
-    """Middles of balls as complex doubles."""
+def _as_complex(matrix: Matrix) -> Complex:
+    """Midpoints of balls as complex doubles."""
     return np.array([[complex(flint.acb(x)) for x in row] for row in matrix])

@@ -1,7 +1,7 @@
-"""Numeric roots that are jointly right: their elementary symmetric functions give back the coefficients.
+"""Numeric roots that reproduce the coefficients of their polynomial to rounding.
 
-Next to a k-fold root each single root is uncertain by the k-th root of the rounding unit, so roots are judged
-together, by the coefficients that they rebuild.
+Near a k-fold root each single root is uncertain by the k-th root of the rounding unit. Roots are therefore judged
+together, by the coefficients rebuilt from them.
 """
 
 from collections.abc import Callable
@@ -16,19 +16,19 @@ from tmsopt.roots.quartics.factors import root_pair
 Rows = Callable[[Array, NDArray[np.intp]], Array]
 
 GOOD = 4e-15
-"""Backward error below which a Newton step is not worth its time."""
+"""Backward error below which no Newton step is taken."""
 
-_LEAST = 1e-300  # of the largest coefficient, for a leading one: the quotient of the two must be a double
-_STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more
-_JOINT = 1e-13  # backward error above which the roots are isolated exactly; seen for roots of very different size
+_LEAST_LEAD = 1e-300  # of the largest coefficient: their quotient must be a double
+_STEPS = 6  # Newton's method doubles the digits at each step; companion eigenvalues start with 4 or more
+_ACCEPTED = 1e-13  # backward error above which the roots are isolated exactly, as for roots of very different size
 
 
 def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     """All roots of real polynomials: coefficients of shape (…, n + 1), descending; roots of shape (…, n).
 
-    Companion eigenvalues, then Newton's method on the quadratic factors (and one linear factor for odd n) with
-    the step kept only where it lowers the backward error. Where that does not suffice, as it may not for many roots
-    of very different size, they are isolated in exact arithmetic. Conjugate pairs are exact and adjacent.
+    Companion eigenvalues, refined by Newton's method on the quadratic factors (and a linear factor for odd n); a step
+    counts only if it lowers the backward error. If that does not suffice, as for many roots of very different size,
+    exact arithmetic isolates the roots. Conjugate pairs are exact and adjacent.
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
@@ -39,11 +39,11 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
 
     More: docs/explanation/factors.md
     """
-    c = regular(coefficients, "roots")
+    c = validate_coefficients(coefficients, "roots")
     n = c.shape[-1] - 1
-    least = np.abs(c).max(axis=-1) * _LEAST  # a root that is beyond doubles is brought to their end
+    least = np.abs(c).max(axis=-1) * _LEAST_LEAD  # keeps roots within the range of doubles
     lead = np.copysign(np.maximum(np.abs(c[..., 0]), least), c[..., 0])
-    with np.errstate(over="ignore", invalid="ignore"):  # roots 300 orders apart: what overflows is not an improvement
+    with np.errstate(over="ignore", invalid="ignore"):  # a step that overflows is no improvement
         monic = (c / lead[..., None]).reshape(c[..., 0].size, n + 1)
         monic[:, 0] = 1
         scale = _scale(monic)
@@ -56,26 +56,29 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
         polish(
             factors,
             error,
-            lambda some, rows: some + _newton_step(some, scaled[rows]),
-            lambda some, rows: backward_error(scaled[rows], _factor_roots(some)[:, :n]),
+            lambda trial, rows: trial + _newton_step(trial, scaled[rows]),
+            lambda trial, rows: backward_error(scaled[rows], _factor_roots(trial)[:, :n]),
             _STEPS,
         )
         found = _factor_roots(factors)[:, :n] * scale[:, None]
     clamped = (np.abs(c[..., 0]) < least).reshape(-1)
-    for row in np.flatnonzero(clamped | ~(error <= _JOINT)):
-        found[row] = _isolated(c.reshape(-1, n + 1)[row], found[row])
+    for row in np.flatnonzero(clamped | ~(error <= _ACCEPTED)):
+        found[row] = _isolate_roots(c.reshape(-1, n + 1)[row], found[row])
     return found.reshape(*c.shape[:-1], n)
 
 
-def regular(coefficients: ArrayLike, asked: str) -> Array:
-    """Coefficients of shape (…, n + 1) that a function can take, n ≥ 1.
+def validate_coefficients(coefficients: ArrayLike, caller: str) -> Array:
+    """Coefficients as an array of shape (…, n + 1), n ≥ 1.
+
+    Args:
+        caller: name of the function for messages.
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
     """
     c = np.asarray(coefficients, dtype=float)
     if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
-        raise ValueError(f"{asked} takes finite coefficients, two or more, with a leading one other than 0")
+        raise ValueError(f"{caller} needs two or more finite coefficients with a leading one other than 0")
     return c
 
 
@@ -111,8 +114,8 @@ def rebuilt(values: NDArray[np.complex128] | Array) -> Array:
 def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> Array:
     """Largest relative error of the coefficients rebuilt from the roots, shape (…).
 
-    Each coefficient's error is measured against the same symmetric function of |roots|, which is the size of
-    the terms it is summed from: a coefficient that cancels to nearly 0 has no relative accuracy of its own.
+    The error of each coefficient is relative to the same symmetric function of |roots|, the size of its terms, because
+    a coefficient that cancels to nearly 0 has no relative accuracy of its own.
 
     Example:
         >>> p = [1, 4, 6, 4, 1]
@@ -128,15 +131,15 @@ def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> A
 
 
 def _scale(monic: Array) -> Array:
-    """Geometric mean of |roots| where no root is 0, else the largest term of the Fujiwara bound; 1 where that is 0."""
+    """Geometric mean of |roots| if no root is 0, else the largest term of the Fujiwara bound; 1 if that is 0."""
     n = monic.shape[-1] - 1
     powers = np.abs(monic[:, 1:]) ** (1 / np.arange(1, n + 1))
     scale = np.where(powers[:, -1] > 0, powers[:, -1], powers.max(axis=-1))
-    return np.where(scale**n > 0, scale, 1.0)  # whose power may be, as well
+    return np.where(scale**n > 0, scale, 1.0)  # the power may underflow
 
 
 def _factors(values: NDArray[np.complex128]) -> Array:
-    """Coefficients (p, q) of s² + p s + q per pair, shape (rows, ⌈n/2⌉, 2); a lone real root r has p = −r, q = 0."""
+    """Coefficients (p, q) of s² + p s + q, shape (rows, ⌈n/2⌉, 2); a single real root r has p = −r, q = 0."""
     order = np.lexsort((values.imag, np.abs(values.imag), values.real, values.imag == 0), axis=-1)
     values = np.take_along_axis(values, order, axis=-1)
     if values.shape[-1] % 2:
@@ -145,49 +148,49 @@ def _factors(values: NDArray[np.complex128]) -> Array:
     return np.stack([-(first + second).real, (first * second).real], axis=-1)
 
 
-def _isolated(coefficients: Array, found: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """The roots of one polynomial, correctly rounded; those found already where they do not fit into doubles."""
-    isolated = isolated_roots(coefficients.tolist())
-    each = [complex(z) for z, m in isolated for _ in range(m)]
+def _isolate_roots(coefficients: Array, numeric: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """The roots of one polynomial, correctly rounded, or the numeric ones if the roots exceed doubles."""
+    each = [complex(z) for z, m in isolated_roots(coefficients.tolist()) for _ in range(m)]
     exact = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
-    return exact if exact.shape == found.shape and np.all(np.isfinite(exact)) else found
+    return exact if exact.shape == numeric.shape and np.all(np.isfinite(exact)) else numeric
 
 
-def polish(found: Array, error: Array, step: Rows, judge: Rows, steps: int) -> None:
-    """Newton steps along the first axis, in place, where the backward error is not good and as long as it falls.
+def polish(values: Array, error: Array, step: Rows, measure: Rows, steps: int) -> None:
+    """Newton steps on the rows of an array, in place, until the backward error is good or does not fall.
 
     Args:
-        step, judge: what a step makes of some rows, by their numbers, and its backward errors.
+        step: function of some rows and their indices that takes a step.
+        measure: function of the same arguments that gives the backward errors.
     """
     rows = np.flatnonzero(error > GOOD)
     for _ in range(steps):
         if not rows.size:
             break
-        trial = step(found[rows], rows)
-        left = judge(trial, rows)
-        better = left < error[rows]
-        rows, left = rows[better], left[better]
-        found[rows], error[rows] = trial[better], left
-        rows = rows[left > GOOD]
+        trial = step(values[rows], rows)
+        trial_error = measure(trial, rows)
+        better = trial_error < error[rows]
+        rows, trial_error = rows[better], trial_error[better]
+        values[rows], error[rows] = trial[better], trial_error
+        rows = rows[trial_error > GOOD]
 
 
 @np.errstate(all="ignore")
 def quadratic_roots(p: Array, q: Array) -> NDArray[np.complex128]:
-    """Roots of quadratic factors s² + p s + q of shape (…, m), those of a factor side by side; conjugates are exact."""
+    """Roots of quadratic factors s² + p s + q of shape (…, m); the two of a factor are adjacent, conjugates exact."""
     re, im, other_re, other_im = root_pair(p, q)
     pairs = np.stack([re + 1j * im, other_re + 1j * other_im], axis=-1)
     return np.asarray(pairs.reshape(*p.shape[:-1], 2 * p.shape[-1]))
 
 
 def _newton_step(factors: Array, monic: Array) -> Array:
-    """Least-squares Newton step: at coinciding factors the Jacobian is singular and the shortest step is taken."""
+    """Newton step; where factors coincide and the Jacobian is singular, the shortest least-squares step."""
     rows, half, _ = factors.shape
     n = monic.shape[-1] - 1
     others = [_multiply(np.delete(factors, k, axis=1)) for k in range(half)]
     residual = monic[:, 1:] - _multiply(factors)[:, 1 : n + 1]
     jacobian = np.zeros((rows, n, 2 * half))
     for k, other in enumerate(others):
-        for column in (0, 1):  # d/dp multiplies by s, d/dq by 1
+        for column in (0, 1):  # d/dp gives a factor s, d/dq a factor 1
             width = min(n - column, other.shape[-1])
             jacobian[:, column : column + width, 2 * k + column] = other[:, :width]
     radius = np.abs(_factor_roots(factors))
@@ -195,7 +198,7 @@ def _newton_step(factors: Array, monic: Array) -> Array:
     unit = radius.reshape(rows, half, 2).max(axis=-1) + 1e-300
     columns = np.stack([unit, unit**2], axis=-1).reshape(rows, 2 * half)
     if n % 2:
-        jacobian[:, :, -1] = 0  # the lone root's q stays 0
+        jacobian[:, :, -1] = 0  # q of the single real root stays 0
     with np.errstate(all="ignore"):
         balanced = jacobian * columns[:, None, :] / size[:, :, None]
         target = residual / size
@@ -217,5 +220,5 @@ def _multiply(factors: Array) -> Array:
 
 
 def _factor_roots(factors: Array) -> NDArray[np.complex128]:
-    """Both roots of each quadratic, without cancellation; the padding root 0 of an odd degree comes last."""
+    """Both roots of each factor, without cancellation; for an odd degree, the padding root 0 comes last."""
     return quadratic_roots(factors[..., 0], factors[..., 1])

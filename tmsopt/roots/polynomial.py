@@ -1,6 +1,6 @@
-"""Real polynomials as lists of coefficients in descending powers, over any numbers.
+"""Polynomials as lists of coefficients in descending powers, for numbers of any kind.
 
-Only ``+ - *`` are used, so one formula serves CasADi expressions, NumPy arrays, exact fractions and balls.
+Only ``+ - *`` are used, so that one formula serves CasADi expressions, NumPy arrays, exact fractions and balls.
 """
 
 import math
@@ -17,7 +17,7 @@ Coefficients = Sequence[Any]
 
 
 def product(*factors: Coefficients) -> list[Any]:
-    """Coefficients of the product of polynomials given by their coefficients.
+    """Coefficients of the product of polynomials.
 
     Example:
         >>> tmsopt.roots.product([1, 1], [1, 2], [1, 3])  # (s + 1)(s + 2)(s + 3)
@@ -26,7 +26,7 @@ def product(*factors: Coefficients) -> list[Any]:
     More: docs/reference/python.md
     """
     result: list[Any] = list(factors[0]) if factors else [1]
-    with np.errstate(over="ignore", invalid="ignore"):  # users know inf and nan; one of its own for each thread
+    with np.errstate(over="ignore", invalid="ignore"):
         for factor in factors[1:]:
             terms: list[Any] = [0] * (len(result) + len(factor) - 1)
             for i, a in enumerate(result):
@@ -110,7 +110,7 @@ def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
 
 
 def characteristic_polynomial(A: Sequence[Sequence[Any]]) -> list[Any]:
-    """Coefficients of det(s I − A), descending from 1, without division (Samuelson and Berkowitz; n⁴/4 products)."""
+    """Coefficients of det(s I − A), descending from 1, by the algorithm of Samuelson and Berkowitz (n⁴/4 products)."""
     monic: list[Any] = [1]
     for n in range(len(A)):
         row, column = A[n][:n], [A[i][n] for i in range(n)]
@@ -123,7 +123,7 @@ def characteristic_polynomial(A: Sequence[Sequence[Any]]) -> list[Any]:
 
 
 def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
-    """Sum of the products of as many terms as both have."""
+    """Sum of products, up to the end of the shorter sequence."""
     return reduce(operator.add, map(operator.mul, a, b), 0)
 
 
@@ -149,5 +149,5 @@ class Root:
 
 
 def rightmost_first(roots: Iterable[Any]) -> tuple[Any, ...]:
-    """Roots with parts re and im, doubles or balls, in the order of their middles; the upper one of a pair first."""
+    """Sort roots with attributes re and im, doubles or balls, rightmost first; of a pair the upper one first."""
     return tuple(sorted(roots, key=lambda r: (-float(r.re), -float(r.im))))

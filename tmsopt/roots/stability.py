@@ -1,4 +1,4 @@
-"""Stability and discriminant from the coefficients alone, with no root computed."""
+"""Stability and discriminant from the coefficients, without computing a root."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,12 +11,12 @@ from tmsopt.algebra.rounding import Bounded
 from tmsopt.records import Array
 from tmsopt.roots.polynomial import Coefficients, determinant
 
-_SMALL = 4
-"""Up to this degree the Liénard–Chipart conditions have few terms; above, Routh's scheme takes fewer operations."""
+_LARGEST_CLOSED = 4
+"""Highest degree for the Liénard–Chipart conditions; above it, Routh's scheme takes fewer operations."""
 
 
 def hurwitz_minors(coefficients: Coefficients) -> list[Any]:
-    """Leading principal minors Δ1 … Δn of the Hurwitz matrix of a polynomial of degree n, any numbers.
+    """Leading principal minors Δ1 … Δn of the Hurwitz matrix of a polynomial of degree n, for numbers of any kind.
 
     Example:
         >>> tmsopt.roots.hurwitz_minors([1, 2, 3, 4])  # a1, a1 a2 - a0 a3, a3 times that
@@ -34,7 +34,7 @@ def _hurwitz_minor(coefficients: Coefficients, m: int) -> Any:
             return a1
         case 2, [a0, a1, a2, *more]:
             return a1 * a2 - more[0] * a0 if more else a1 * a2
-        case 3, [a0, a1, a2, a3, *more]:  # many are asked for, and each product counts
+        case 3, [a0, a1, a2, a3, *more]:  # often computed, so with few products
             minor = a1 * (a2 * a3 - more[0] * a1 if more else a2 * a3) - a3 * (a0 * a3)
             return minor + more[1] * (a0 * a1) if more[1:] else minor
 
@@ -46,10 +46,9 @@ def _hurwitz_minor(coefficients: Coefficients, m: int) -> Any:
 
 
 def lienard_chipart(coefficients: Coefficients) -> list[Any]:
-    """The n quantities that are all positive exactly when every root has Re s < 0, given a0 > 0.
+    """The n quantities that are all positive if and only if every root has Re s < 0, given a0 > 0.
 
-    aₙ, aₙ₋₂, … and the Hurwitz minors Δₙ₋₁, Δₙ₋₃, … (Liénard–Chipart). Multiply the polynomial by the sign
-    of a0 first.
+    They are aₙ, aₙ₋₂, … and the Hurwitz minors Δₙ₋₁, Δₙ₋₃, … (Liénard–Chipart). If a0 < 0, negate the polynomial first.
 
     Example:
         >>> tmsopt.roots.lienard_chipart([1, 4, 6, 4, 1]), tmsopt.roots.lienard_chipart([1, 4, 6, 4, -1])
@@ -62,10 +61,10 @@ def lienard_chipart(coefficients: Coefficients) -> list[Any]:
 
 
 def routh(coefficients: Coefficients) -> list[Any]:
-    """First column of Routh's scheme after a0: all positive exactly when every root has Re s < 0, given a0 > 0.
+    """First column of Routh's scheme after a0: all positive if and only if every root has Re s < 0, given a0 > 0.
 
-    Numbers that can be divided: floats, arrays, fractions, balls. In fewer operations than `lienard_chipart`, which
-    does without division; what follows an entry that is 0 means nothing.
+    The numbers must allow division: floats, arrays, fractions or balls. Routh's scheme takes fewer operations than
+    `lienard_chipart`, which needs no division. Entries after a 0 have no meaning.
 
     Example:
         >>> tmsopt.roots.routh([1.0, 2.0, 3.0, 4.0])
@@ -73,11 +72,11 @@ def routh(coefficients: Coefficients) -> list[Any]:
 
     More: docs/explanation/factors.md
     """
-    return list(_column(coefficients))
+    return list(_iterate_routh(coefficients))
 
 
-def _column(coefficients: Coefficients) -> Iterator[Any]:
-    """The same, each entry before anything is divided by it."""
+def _iterate_routh(coefficients: Coefficients) -> Iterator[Any]:
+    """Yield the entries of `routh` one by one, each before it becomes a divisor."""
     above, row = list(coefficients[0::2]), list(coefficients[1::2])
     while row:
         yield row[0]
@@ -87,13 +86,13 @@ def _column(coefficients: Coefficients) -> Iterator[Any]:
 
 
 def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
-    """Whether all roots have Re s < 0: coefficients of shape (…, n + 1), descending; the answer has shape (…).
+    """Whether all roots have Re s < 0: coefficients of shape (…, n + 1), descending; the result has shape (…).
 
-    A polynomial with a leading coefficient 0 is not: a root is at infinity.
+    A polynomial with a leading coefficient 0 has a root at infinity and counts as unstable.
 
     Args:
-        exact: above degree 4, let exact arithmetic answer, from the coefficients as stored, where rounding could change
-            a sign: some 0.1 ms each. Up to degree 4 the signs of the few rounded conditions count.
+        exact: above degree 4, whether exact arithmetic decides, from the coefficients as stored, where rounding could
+            change a sign; about 0.1 ms each. Up to degree 4 the signs of the rounded conditions decide.
 
     Raises:
         ValueError: for fewer than two coefficients.
@@ -106,10 +105,10 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     """
     c = np.asarray(coefficients, dtype=float)
     if c.ndim == 0 or c.shape[-1] < 2:
-        raise ValueError("is_stable takes two coefficients or more, descending")
+        raise ValueError(f"is_stable needs two or more coefficients, descending; found shape {c.shape}")
     sign = np.sign(c[..., 0])
-    if c.shape[-1] - 1 > _SMALL:
-        return _by_routh(sign[..., None] * c, exact)
+    if c.shape[-1] - 1 > _LARGEST_CLOSED:
+        return _is_stable_by_routh(sign[..., None] * c, exact)
     normalised = [sign * c[..., k] for k in range(c.shape[-1])]
     stable = sign != 0
     for quantity in lienard_chipart(normalised):
@@ -117,31 +116,31 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     return np.asarray(stable)
 
 
-def _by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
+def _is_stable_by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
     flat = c.reshape(-1, c.shape[-1])
     stable = np.all(np.isfinite(flat) & (flat > 0), axis=1)
     rows = np.flatnonzero(stable)
     with np.errstate(all="ignore"):
         column = routh([Bounded(x, np.zeros(len(rows))) for x in flat[rows].T])
-        value, error = (np.stack([getattr(x, part) for x in column], axis=1) for part in ("value", "error"))
+        value, error = (np.stack([getattr(x, field) for x in column], axis=1) for field in ("value", "error"))
     if not exact:
         error = np.zeros_like(value)
-    # An entry after one that is not positive decides nothing, so the first that is not tells.
-    first = np.argmin(value > error, axis=1)[:, None]  # or any, where all are
-    least, off = (np.take_along_axis(x, first, axis=1)[:, 0] for x in (value, error))
-    stable[rows] = least > off
-    for k in rows[~(np.abs(least) > off)] if exact else ():
-        stable[k] = all(x > 0 for x in _column([flint.fmpq(*a.as_integer_ratio()) for a in flat[k].tolist()]))
+    # The first entry that is not surely positive decides; entries after it have no meaning.
+    first = np.argmin(value > error, axis=1)[:, None]
+    decisive, bound = (np.take_along_axis(x, first, axis=1)[:, 0] for x in (value, error))
+    stable[rows] = decisive > bound
+    for k in rows[~(np.abs(decisive) > bound)] if exact else ():
+        stable[k] = all(x > 0 for x in _iterate_routh([flint.fmpq(*a.as_integer_ratio()) for a in flat[k].tolist()]))
     return np.asarray(stable.reshape(c.shape[:-1]))
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def discriminant(coefficients: Coefficients) -> Any:
-    """Discriminant of a polynomial of degree 2 or more, any numbers: zero exactly where two roots coincide.
+    """Discriminant of a polynomial of degree 2 or more, zero if and only if two roots coincide; numbers of any kind.
 
-    Of a quartic by its invariants I and J, Δ = (4 I³ − J²)/27; it keeps its sign across the sets 2EP2 and CEP2, where
-    a squared factor vanishes. From degree 5 on by the Bézout determinant of p′ and n p − s p′, divided by n^(n−2): no
-    division but that, and n 2ⁿ products.
+    For a quartic it is (4 I³ − J²)/27 with the invariants I and J, and keeps its sign across the sets 2EP2 and CEP2,
+    where a squared factor is 0. From degree 5 it is the Bézout determinant of p′ and n p − s p′, divided by n^(n−2);
+    this takes n 2ⁿ products and no other division.
 
     Raises:
         ValueError: for degree 0 or 1.
@@ -162,13 +161,13 @@ def discriminant(coefficients: Coefficients) -> Any:
             j = 72 * a * c * e + 9 * b * c * d - 27 * a * d * d - 27 * e * b * b - 2 * c * c * c
             return (4 * i * i * i - j * j) / 27
     if len(coefficients) < 3:
-        raise ValueError(f"discriminant takes a polynomial of degree 2 or more, not {len(coefficients) - 1}")
+        raise ValueError(f"discriminant needs a polynomial of degree 2 or more; found degree {len(coefficients) - 1}")
     return _bezout_discriminant(coefficients)
 
 
 def _bezout_discriminant(c: Coefficients) -> Any:
     n = len(c) - 1
-    slope = [(n - k) * c[k] for k in range(n)][::-1]  # ascending, as Bézout's matrix has it
+    slope = [(n - k) * c[k] for k in range(n)][::-1]  # ascending, as in Bézout's matrix
     other = [(k + 1) * c[k + 1] for k in range(n)][::-1]
 
     def entry(i: int, j: int) -> list[Any]:

@@ -16,7 +16,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
-from tmsopt.roots.meetings import nearest_two
+from tmsopt.roots.sign_tests import nearest_pair_mean
 from tmsopt.tracing.branch import Branch, table_at
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
 from tmsopt.tracing.equations import coefficients
@@ -171,7 +171,7 @@ def _bounds(branch: Branch, problem: Posed) -> Truth:
 
     Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
     """
-    rest = pattern_of(problem.model, branch.pattern).remaining(list(branch.unknowns.values()))
+    rest = pattern_of(problem.model, branch.pattern).remaining_factors(list(branch.unknowns.values()))
     z = roots_along(rest, len(branch))
     tied = np.where(on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)  # of the fastest, squared
     if np.all(tied < 0):
@@ -206,7 +206,7 @@ def _once(branch: Branch) -> Truth:
     """Where a curve of two double roots is met by the larger of them: the other draws the same curve again."""
     if not np.any(branch.kinds == "2EP2"):
         return np.ones(len(branch), dtype=bool)
-    r, other = branch.unknowns["r"], nearest_two(_rest(branch))
+    r, other = branch.unknowns["r"], nearest_pair_mean(_rest(branch))
     return np.asarray((branch.kinds != "2EP2") | (r - other >= -1e-12 * np.abs(other)))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from tmsopt.errors import Fault, InputError, is_number, list_faults, refusal, short, suggest, text_faults
 from tmsopt.records import Array, Truth
-from tmsopt.roots.meetings import nearest_two
+from tmsopt.roots.sign_tests import nearest_pair_mean
 from tmsopt.tracing.continuation import Curve, Walk, between
 from tmsopt.tracing.equations import Traced
 from tmsopt.tracing.points import NOTHING, Points, margins
@@ -136,14 +136,14 @@ def events_of(points: Points) -> Iterator[Event]:
     problem, pattern = points.ready.problem, points.ready.pattern
 
     def margin(number: int, k: int, points: Points) -> Any:
-        return margins(pattern.remaining(points.unknowns)[number])[k]
+        return margins(pattern.remaining_factors(points.unknowns)[number])[k]
 
     for name in pattern.marks:
         yield Event(name, partial(Points.mark, name=name))
     if pattern.form == "EP2" and "2EP2" in points.special:
         # q(r) has a double zero where r is the double root of q
-        yield Event("EP4", lambda p: p.unknowns[0] - nearest_two(pattern.factors(p.unknowns)[-1]))
-    for number, factor in enumerate(pattern.remaining(points.unknowns)):
+        yield Event("EP4", lambda p: p.unknowns[0] - nearest_pair_mean(pattern.factors(p.unknowns)[-1]))
+    for number, factor in enumerate(pattern.remaining_factors(points.unknowns)):
         for k in range(len(margins(factor))):  # the first quantity is the constant term
             yield Event("weave" if k else "capsize", partial(margin, number, k), detail=CHANGES)
     for k, parameter in enumerate(problem.free):

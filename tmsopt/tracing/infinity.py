@@ -19,7 +19,7 @@ from tmsopt.program.nlp import scale_of
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
-from tmsopt.roots.meetings import meeting
+from tmsopt.roots.sign_tests import double_root_test
 from tmsopt.tracing.continuation import Curve, Walk, curve
 from tmsopt.tracing.equations import design_at, limits_of
 from tmsopt.tracing.events import Event, Found, insert, locate_zeros
@@ -87,7 +87,7 @@ def _judged(problem: Posed, on: Curve, walked: Walk, rest: ca.Function) -> Infin
         v = values(y)
         c = list(v[:, : -2 if vanishing else -1].T)
         found = [("weave" if k else "capsize", value) for k, value in enumerate(margins(c))]
-        found += [("EP2", meeting(c))] if len(c) > 2 else []
+        found += [("EP2", double_root_test(c))] if len(c) > 2 else []
         return [("infinity", c[0]), *found, *([("capsize", v[:, -1])] if vanishing else [])]
 
     size = np.abs(values(walked.y)[:, :-1])

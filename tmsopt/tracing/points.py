@@ -10,8 +10,8 @@ from tmsopt.models import Values
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import lienard_chipart, roots
-from tmsopt.roots.meetings import CLOSED, balance
 from tmsopt.roots.patterns.pattern import mean_size
+from tmsopt.roots.sign_tests import CLOSED, opposite_roots_test
 from tmsopt.tracing.branch import name_unknowns
 from tmsopt.tracing.equations import Traced, design_at
 
@@ -120,7 +120,7 @@ class Points:
     def mark(self, name: str) -> Array:
         """What vanishes at a special case of the pattern."""
         pattern = self.ready.pattern
-        return self.column(pattern.marks[name](pattern.reduced(self.unknowns)))
+        return self.column(pattern.marks[name](pattern.scaled_unknowns(self.unknowns)))
 
     def column(self, value: Any) -> Array:
         """A value at each point."""
@@ -129,7 +129,7 @@ class Points:
     @cached_property
     def _others(self) -> Complex:
         """The roots that the pattern does not tie."""
-        return roots_along(self.ready.pattern.remaining(self.unknowns), len(self))
+        return roots_along(self.ready.pattern.remaining_factors(self.unknowns), len(self))
 
 
 def _within(v: Array, low: float, high: float) -> Array:
@@ -156,4 +156,4 @@ def on_axis(z: Complex) -> Truth:
 
 def margins(factor: list[Any]) -> list[Any]:
     """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
-    return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], balance(factor)]
+    return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], opposite_roots_test(factor)]

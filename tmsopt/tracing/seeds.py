@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.problem.problem import Posed
 from tmsopt.program.starts import spread
 from tmsopt.records import Array, Truth
-from tmsopt.roots.meetings import CLOSED
+from tmsopt.roots.sign_tests import CLOSED
 from tmsopt.tracing.continuation import INFINITE, Curve, Walk, both_ways, contains
 from tmsopt.tracing.equations import Traced, coefficients, design_at
 from tmsopt.tracing.solving import projected

@@ -19,7 +19,7 @@ from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, plain
 from tmsopt.roots import is_stable, real_roots
-from tmsopt.roots.meetings import meeting
+from tmsopt.roots.sign_tests import double_root_test
 from tmsopt.tracing.branch import EventPoint, Trace
 from tmsopt.tracing.equations import coefficients, design_at, limits_of
 from tmsopt.tracing.events import has_turned
@@ -188,7 +188,7 @@ def _cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
         x = np.stack(_on_surface(parts, r))
         least = np.min(np.minimum(x - low, high - x) / (high - low), axis=0)
         rest = _divided(_divided(parts[0][:, None] + np.tensordot(np.stack(parts[1:]), x, (0, 0)), r), r)
-        return [np.where(np.isfinite(least), least, -1.0), np.polyval(rest, r), meeting(list(rest))]
+        return [np.where(np.isfinite(least), least, -1.0), np.polyval(rest, r), double_root_test(list(rest))]
 
     cuts: list[Cut] = []
     values = tests(scan)

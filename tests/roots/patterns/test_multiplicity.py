@@ -44,7 +44,7 @@ def doubles(coefficients, unit=1.0):
 
 
 def named(items):
-    """What stands on the rightmost line: higher multiplicity first, then pairs, then a simple real root."""
+    """Roots on the rightmost line: higher multiplicities first, then pairs, then a simple real root."""
     right = max(re for re, _, _ in items)
     line = [(m, im == 0) for re, im, m in items if re == right]
     parts = [("EP" if real else "CEP") + str(m) for m, real in sorted(line, reverse=True) if m > 1]

@@ -1,4 +1,4 @@
-"""Patterns of more than four roots: their names, signs and marks, of polynomials that are made to have them."""
+"""Names, signs and marks of patterns beyond degree 4, for polynomials built with these patterns."""
 
 import pytest
 
@@ -54,7 +54,7 @@ def test_pairs_and_two_real_roots_are_told_apart_by_a_sign(name, quadratic, belo
     ],
 )
 def test_marks_vanish_where_more_roots_meet(name, degree, mark, tied, rest, beside):
-    """And not where they do not: with other tied roots, or with the rest (s + 4)(s + 6)(s + 8) … instead."""
+    """The functions are not 0 for other tied roots, or for the rest (s + 4)(s + 6)(s + 8) …"""
     form = pattern(name, degree)
     others = product(*rest)[1:]
     assert form.marks[mark]([*tied, *others]) == 0

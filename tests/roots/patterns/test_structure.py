@@ -51,7 +51,7 @@ EVERY = [(name, factors) for name, examples in EXAMPLES.items() for factors in e
 
 
 def named_by(roots):
-    """The name that exact roots with multiplicities deserve: those on the rightmost line, or two double ones."""
+    """The expected name for exact roots with multiplicities: roots on the rightmost line, or two double roots."""
     doubles = [z for z, m in roots if m == 2]
     if len(doubles) == 2:
         return "CEP2" if doubles[0].imag else "2EP2"
@@ -89,7 +89,7 @@ def test_every_kind_is_named_in_any_unit_of_time(name, factors):
 
 @pytest.mark.parametrize("power", [-78, -66, -58, -52, 90])
 def test_an_ep2_of_degree_8_is_one_in_units_whose_powers_leave_doubles(power):
-    """A power of 2 rounds nothing; the product of the roots is 16,800 times 2 to eight times it, down to 1e-184."""
+    """A power of 2 does not round; the product of the roots is 16,800 times its eighth power, down to 1e-184."""
     c = product([1, 1], [1, 1], [1, 6, 20], [1, 3], [1, 4], [1, 5], [1, 7])
     found = structure(scaled(c, 2.0**power, 1.0))
     assert found.name == "EP2"
@@ -196,7 +196,7 @@ def test_zero_tolerance_is_decided_away_from_every_pattern():
 
 
 def test_undecided_only_where_rounding_decides():
-    """With the tolerance at the very distance, either answer would be a guess; a percent beside it, none is."""
+    """A tolerance equal to the distance is undecided; one percent more or less decides."""
     c = product([1, 1], [1, 1], [1, 3], [1, 4])
     c[-1] += 1e-9
     distance = pattern_distance(PATTERNS["EP2"], c)
@@ -207,7 +207,7 @@ def test_undecided_only_where_rounding_decides():
 
 
 def test_a_structure_near_the_origin_of_its_own_scale():
-    """A root of 1e-7 beside an EP3 at −1 is not part of it, and rightmost."""
+    """A root of size 1e-7 is not part of an EP3 at −1, and is rightmost."""
     assert structure(product([1, 1], [1, 1], [1, 1], [1, 1e-7])).name == "real"
     assert structure(product([1, 1], [1, 1], [1, 1], [1, 1e7])).name == "EP3"
 
@@ -279,7 +279,7 @@ factor = st.lists(rationals, min_size=2, max_size=3).filter(lambda f: f[0] != 0)
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.lists(factor, min_size=1, max_size=2), st.sampled_from([1, 2, 3]))
 def test_exact_roots_agree_with_60_digits(factors, power):
-    """The roots of the factors by mpmath, which knows nothing of square-free parts; 1e-15 is one rounding."""
+    """The roots of the factors by mpmath, without square-free parts; 1e-15 is one rounding error."""
     p = product(*factors, *[factors[0]] * (power - 1))
     found = exact_roots(p)
     assert [root.re for root in found] == sorted((root.re for root in found), reverse=True)
@@ -295,7 +295,7 @@ def test_exact_roots_agree_with_60_digits(factors, power):
 
 
 def test_exact_abscissa_beside_an_exceptional_point():
-    """Doubles nearest to (s + r)⁴: their true roots scatter by ε^(1/4), and the exact route sees exactly that."""
+    """Doubles nearest to (s + r)⁴ have roots that scatter by ε^(1/4), and exact arithmetic finds these."""
     for r in (0.3, 1.8803015465431967, 7.1):
         c = [1.0, 4 * r, 6 * r**2, 4 * r**3, r**4]
         assert exact_abscissa(c) == pytest.approx(float(abscissa_60(c)), rel=1e-15)

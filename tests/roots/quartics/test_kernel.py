@@ -1,4 +1,4 @@
-"""Roots and classes of many quartics: jointly right on every kind of polynomial.
+"""Roots and classes of many quartics, accurate for every kind of polynomial.
 
 Roots are judged by the coefficients that they rebuild, in the longest doubles of the machine; classes against
 `is_stable` and `real_roots`, which have tests of their own, and against exact arithmetic.
@@ -27,11 +27,11 @@ from tmsopt.roots import (
 )
 
 JOINTLY_RIGHT = 1e-13
-"""The accuracy promised of rebuilt coefficients."""
+"""The promised accuracy of rebuilt coefficients."""
 
 COUNT = 3000
 DOUBT = [1.0, 0.3927315003875155, 5.90069031723172, -3.420867305216691e-159, 3.61127e-319]
-"""Coefficients that are not normal numbers have few digits, and so has what any roots give back."""
+"""Subnormal coefficients have few digits, and so have coefficients rebuilt from any roots."""
 
 Maker = Callable[[np.random.Generator, int], np.ndarray]
 
@@ -118,7 +118,7 @@ def triple(rng, n):
 
 
 def tiny(number):
-    """Of four roots, some of 1e-300 … 1e-8 times the others: all that doubles can hold."""
+    """Four roots, some 1e-300 … 1e-8 times the others, the whole range of doubles."""
 
     def make(rng, n):
         z = drawn(rng, n, log(rng, -0.5, 0.5))
@@ -332,7 +332,7 @@ def on_a_boundary(rng, n):
 
 
 def test_classes_are_those_of_the_definitions():
-    """On 1e5 designs, and where rounding decides or exact arithmetic must: near boundaries and exceptional points."""
+    """On 1e5 designs, and near boundaries and exceptional points, where rounding or exact arithmetic decides."""
     rng = np.random.default_rng(3)
     few = [made(f, 20) for f in FAMILIES]  # exact arithmetic takes a tenth of a second for 200 of them
     designs = np.stack(tms.coefficients(wide_designs(7, 100_000)), axis=-1)
@@ -360,7 +360,7 @@ def test_classes_are_those_of_exact_arithmetic():
 
 
 def test_real_roots_beside_a_double_one_are_counted_exactly():
-    """A double root, real or of a pair of pairs, whose coefficients are an ulp or so off: rounding cannot tell."""
+    """A double real root or double pair whose coefficients are off by about an ulp, too little for doubles to decide."""
     rng = np.random.default_rng(8)
     r, b, c = rng.uniform(0.2, 2.0, (3, 200))
     double = np.array([np.polymul([1, 2 * x, x * x], [1, y, z]) for x, y, z in zip(r, b, c, strict=True)])

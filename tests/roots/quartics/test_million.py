@@ -21,7 +21,7 @@ def _chunks():
 
 @pytest.mark.slow
 def test_both_verdicts_agree_on_a_million_designs():
-    """|abscissa| has a density of order 1 at 0, so of a million about 1e-3 fall below 1e-9: next to none is left out."""
+    """|abscissa| has a density of order 1 at 0, so almost no design of a million falls below 1e-9."""
     count = 0
     for coefficients in _chunks():
         found = roots(coefficients)
@@ -34,7 +34,7 @@ def test_both_verdicts_agree_on_a_million_designs():
 
 
 def test_the_verdict_is_that_of_an_exact_routh_table():
-    """Exact arithmetic on the very doubles; as many stable designs as unstable ones."""
+    """Exact arithmetic on the coefficients as stored; as many stable designs as unstable ones."""
     coefficients = next(_chunks())
     verdict = is_stable(coefficients)
     chosen = [*np.flatnonzero(verdict)[:500], *np.flatnonzero(~verdict)[:500]]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import Kind, constant, made
+from tmsopt.algebra.formula import Kind, constant, make_node
 from tmsopt.algebra.kinds import NODES
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, DegreeTooHigh
@@ -102,14 +102,14 @@ def _real(name: str) -> Callable[..., Pair]:
     def applied(*operands: Pair) -> Pair:
         if not all(map(is_real, operands)):
             raise DegreeTooHigh(f"takes {name} of a complex number; accepted: + - * / ** and exp of these")
-        return Pair(made(name, *(x.re for x in operands)))
+        return Pair(make_node(name, *(x.re for x in operands)))
 
     return applied
 
 
 def _exp(x: Pair) -> Pair:
-    size = made("exp", x.re)
-    return Pair(size) if is_real(x) else Pair(size * made("cos", x.im), size * made("sin", x.im))
+    size = make_node("exp", x.re)
+    return Pair(size) if is_real(x) else Pair(size * make_node("cos", x.im), size * make_node("sin", x.im))
 
 
 PAIRS = Kind(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import Formula, Node, NotAccepted, formula
+from tmsopt.algebra.formula import Formula, Node, UnsupportedOperation, formula
 from tmsopt.algebra.intervals import Interval, ranges
 from tmsopt.algebra.kinds import values
 from tmsopt.models.model import Matrix, Model
@@ -144,7 +144,7 @@ def _ranges(asked: Formula, box: Sequence[Interval]) -> list[Interval]:
         found = ranges(asked, box)
         if all(math.isfinite(x) for ends in found for x in ends):
             return found
-    except NotAccepted:
+    except UnsupportedOperation:
         pass
     own = _sampled(asked, box, _shares(len(box)))
     own = np.where(np.isfinite(own), own, 0.0)

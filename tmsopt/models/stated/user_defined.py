@@ -12,7 +12,16 @@ import flint
 import numpy as np
 
 from tmsopt.algebra.balls import DIGITS
-from tmsopt.algebra.formula import Formula, Node, NotAccepted, constant, fold, formula, nodes_of_casadi, symbol
+from tmsopt.algebra.formula import (
+    Formula,
+    Node,
+    UnsupportedOperation,
+    constant,
+    fold,
+    formula,
+    nodes_from_casadi,
+    symbol,
+)
 from tmsopt.algebra.identity import Field
 from tmsopt.algebra.kinds import BALLS, NODES, values
 from tmsopt.errors import short
@@ -295,8 +304,8 @@ def _vanish(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], leadi
     field = Field(asked)
     try:
         row = fold(asked, field.inputs, field.kind)
-        return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
-    except (ZeroDivisionError, NotAccepted):  # or too large to tell
+        return next((k for k, c in enumerate(row) if not field.is_zero(c)), leading)
+    except (ZeroDivisionError, UnsupportedOperation):  # or too large to tell
         return 0
 
 
@@ -361,7 +370,7 @@ def _node(key: str, where: Any, value: Any) -> Any:
             raise Unfit(key, f"{where}: is a matrix; accepted: scalar expressions")
         inputs = ca.symvar(entry := ca.densify(ca.SX(value)))
         names = [x.name() for x in inputs]
-        return nodes_of_casadi(ca.Function("entry", [ca.vertcat(ca.SX(0, 1), *inputs)], [entry]), names)[0]
+        return nodes_from_casadi(ca.Function("entry", [ca.vertcat(ca.SX(0, 1), *inputs)], [entry]), names)[0]
     if not isinstance(value, Real) or isinstance(value, bool):
         raise Unfit(key, f"{where}: found {short(value)}; {_ACCEPTED}")
     try:

@@ -12,7 +12,7 @@ import flint
 
 from tmsopt.algebra.balls import rational
 from tmsopt.algebra.identity import Quotient
-from tmsopt.algebra.krawczyk import enclosed, refined
+from tmsopt.algebra.krawczyk import enclose_solution, refine_solution
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import determinant, product
 from tmsopt.roots.stability import lienard_chipart
@@ -38,8 +38,8 @@ def make_ring(names: str) -> dict[str, Quotient]:
 
 def differentiate(x: Quotient, variable: Quotient) -> Quotient:
     """Derivative with respect to a variable."""
-    over, under = (part.derivative(str(variable.over)) for part in (x.over, x.under))
-    return Quotient(over * x.under - x.over * under, x.under**2)
+    over, under = (part.derivative(str(variable.numerator)) for part in (x.numerator, x.denominator))
+    return Quotient(over * x.denominator - x.numerator * under, x.denominator**2)
 
 
 def depends_on(x: Quotient, variable: Quotient) -> bool:
@@ -49,49 +49,51 @@ def depends_on(x: Quotient, variable: Quotient) -> bool:
 
 def evaluate_at(x: Quotient, values: Mapping[str, Any]) -> Any:
     """A quotient at balls, fractions or quotients for all of its variables."""
-    return _evaluation(x.over)(values) / _evaluation(x.under)(values)
+    return _evaluation(x.numerator)(values) / _evaluation(x.denominator)(values)
 
 
 def substitute(x: Quotient, /, **values: Any) -> Any:
     """A quotient with values for some of its variables; a fraction where no variable is left."""
-    found = evaluate_at(x, make_ring(" ".join(x.over.context().names())) | values)
-    constant = isinstance(found, Quotient) and found.over.is_constant() and found.under.is_constant()
-    return sum(found.over.coeffs()) / found.under.leading_coefficient() if constant else found
+    found = evaluate_at(x, make_ring(" ".join(x.numerator.context().names())) | values)
+    constant = isinstance(found, Quotient) and found.numerator.is_constant() and found.denominator.is_constant()
+    return sum(found.numerator.coeffs()) / found.denominator.leading_coefficient() if constant else found
 
 
 def is_positive(x: Quotient) -> bool:
     """Whether numerator and denominator have coefficients of one sign, so that x > 0 where all variables are."""
-    return any(all(sign * c > 0 for c in [*x.over.coeffs(), *x.under.coeffs()]) and x != 0 for sign in (1, -1))
+    return any(
+        all(sign * c > 0 for c in [*x.numerator.coeffs(), *x.denominator.coeffs()]) and x != 0 for sign in (1, -1)
+    )
 
 
 def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:
     """Whether a quotient is 0 where a polynomial is: its numerator is a multiple, its denominator is not."""
-    return bool(divmod(x.over, modulus.over)[1] == 0 and divmod(x.under, modulus.over)[1] != 0)
+    return bool(divmod(x.numerator, modulus.numerator)[1] == 0 and divmod(x.denominator, modulus.numerator)[1] != 0)
 
 
 def list_coefficients(x: Quotient, variable: Quotient) -> Coefficients:
     """Coefficients of a numerator in one variable alone, descending."""
-    terms = {powers[_index_of(x, variable)]: c for powers, c in x.over.to_dict().items()}
+    terms = {powers[_index_of(x, variable)]: c for powers, c in x.numerator.to_dict().items()}
     return [terms.get(k, flint.fmpq(0)) for k in range(max(terms), -1, -1)]
 
 
 def degree_in(x: Quotient, variable: Quotient) -> int:
     """Degree of the numerator in a variable."""
-    return int(x.over.degrees()[_index_of(x, variable)])
+    return int(x.numerator.degrees()[_index_of(x, variable)])
 
 
 def _index_of(x: Quotient, variable: Quotient) -> int:
-    return int(x.over.context().variable_to_index(str(variable.over)))
+    return int(x.numerator.context().variable_to_index(str(variable.numerator)))
 
 
 def factorise(x: Quotient) -> list[Quotient]:
     """The irreducible factors of the numerator, once each."""
-    return [Quotient(factor) for factor, _ in x.over.factor()[1]]
+    return [Quotient(factor) for factor, _ in x.numerator.factor()[1]]
 
 
 def resultant(x: Quotient, y: Quotient, variable: Quotient) -> Quotient:
     """Resultant of two numerators: it vanishes where both do for one value of the variable."""
-    return Quotient(x.over.resultant(y.over, str(variable.over)))
+    return Quotient(x.numerator.resultant(y.numerator, str(variable.numerator)))
 
 
 # Polynomials in s
@@ -137,18 +139,18 @@ def match_factors(
         ArithmeticError: where no unique solution is proved.
     """
     names = list(guess)
-    sides = [_evaluation(equation.over) for equation in _differences(p, parts)]
+    sides = [_evaluation(equation.numerator) for equation in _differences(p, parts)]
 
     def system(unknowns: Mapping[str, Any]) -> list[Any]:
         return [side({**known, **unknowns}) for side in sides]
 
-    middle = refined(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
-    return dict(enclosed(system, middle, names, _RADIUS).balls)
+    middle = refine_solution(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
+    return dict(enclose_solution(system, middle, names, _RADIUS).balls)
 
 
 def tangent(p: Coefficients, parts: Sequence[Coefficients], names: str, point: Mapping[str, Any]) -> list[Ball]:
     """The direction of the curve of one unknown more on which a polynomial has monic factors, at a point of it."""
-    rows = [equation.over for equation in _differences(p, parts)]
+    rows = [equation.numerator for equation in _differences(p, parts)]
     return kernel([[_evaluation(row.derivative(name))(point) for name in names.split()] for row in rows])
 
 

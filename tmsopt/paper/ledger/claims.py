@@ -71,7 +71,7 @@ class _Shown:
         match self.value:
             case list(parts):
                 return ", ".join(format(_Shown(part), form) for part in parts)
-            case Quotient(over=numerator):
+            case Quotient(numerator=numerator):
                 return str(numerator)
             case number if form.isdigit():
                 return str(flint.arb(number).str(int(form), radius=False))

@@ -11,8 +11,8 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot
 from tmsopt.records import Array, Complex
 from tmsopt.roots import Pattern, Root, jordan
-from tmsopt.roots.jordan import equilibrated
-from tmsopt.roots.patterns.structure import nearest_unknowns
+from tmsopt.roots.jordan import equilibrate
+from tmsopt.roots.patterns.structure import fit_unknowns
 
 _RANK = 1e-10  # relative singular value that counts as 0
 _CLOSE = 1e-3  # singular values that may vanish beside the design: those of a double root are off by √1e-10 and less
@@ -51,12 +51,12 @@ def _located(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) 
     """The multiple roots of the nearest polynomial of a pattern."""
     values = problem.values(parameters)
     try:
-        (unknowns, *_) = nearest_unknowns(pattern, np.array([float(c) for c in values.coefficients]))
+        (unknowns, *_) = fit_unknowns(pattern, np.array([float(c) for c in values.coefficients]))
     except ValueError:
         return []
     return [
         Root(float(z.real), float(z.imag) if abs(z.imag) > 0 else 0.0, count)
-        for factor, count in pattern.counted(unknowns)
+        for factor, count in pattern.distinct_factors(unknowns)
         if not ("resonance" in pattern.form and len(factor) > 2 and factor[1] == 0)
         for z in np.roots(np.array(factor, dtype=float))
         if count > 1
@@ -122,7 +122,7 @@ def _crossed(
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
     widths = np.array([problem.free[n][1] - problem.free[n][0] for n in free])
-    size, scale = equilibrated(_matrices(problem, parameters), unit)
+    size, scale = equilibrate(_matrices(problem, parameters), unit)
     scale = scale / np.linalg.norm(size * scale, 2)  # held, lest it jumps as entries change
 
     def moved(x: Array) -> dict[str, float]:

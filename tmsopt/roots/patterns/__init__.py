@@ -1,7 +1,7 @@
-"""Which roots meet: patterns by name, the structure of given roots, the nearest polynomial that has one.
+"""Patterns of multiple roots by name, the structure of a polynomial, and the nearest polynomial with a structure.
 
-In: names such as EP4 or EP2+CEP2, and coefficients of polynomials. Out: factored forms to match, names and
-multiplicities. Open `pattern` first: what a pattern is; then `structure`: which one a polynomial has.
+In: names such as EP4 or EP2+CEP2, and coefficients of polynomials. Out: factored forms, names and multiplicities. Open
+`pattern` first: it defines patterns; then `structure`: it finds the structure of a polynomial.
 """
 
 import lazy_loader

@@ -1,7 +1,7 @@
-"""Patterns of polynomials of any degree by name: what is said of some roots, beside others of which nothing is.
+"""Patterns of polynomials of any degree by name, composed of multiple roots and a factor with free roots.
 
-``EP3+CEP2`` of degree 9 is (s − r)³ (s² + bs + c)² (s² + c₁s + c₂). The others make up one monic factor with unknown
-coefficients, so that the equations stay linear in them.
+``EP3+CEP2`` of degree 9 is (s − r)³ (s² + bs + c)² (s² + c₁s + c₂). The free roots form one monic factor with unknown
+coefficients, in which the equations are linear.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -13,29 +13,29 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.roots.meetings import meeting, weave_test
 from tmsopt.roots.numeric import rebuilt
-from tmsopt.roots.patterns.parts import AXIS, ENDS, Part, parts_of
+from tmsopt.roots.patterns.components import AXIS, ENDS, Component, parse_components
 from tmsopt.roots.patterns.pattern import QUARTIC, Pattern, Roots
-from tmsopt.roots.polynomial import evaluate, product as multiplied
+from tmsopt.roots.polynomial import evaluate, product as multiply_polynomials
+from tmsopt.roots.sign_tests import double_root_test, weave_test
 
-_GUESSES = 24  # unknowns to start from, the nearest of all ways to choose the roots
-_LOOKED_AT = 512  # ways to choose the roots at most
+_MOST_GUESSES = 24
+_MOST_CHOICES = 512  # of roots, from which the nearest guesses are taken
 
 
 def pattern_names(degree: int) -> tuple[str, ...]:
-    """Names of the patterns of a degree that are not made up of others."""
+    """Names of the patterns of a degree that are not composed of others."""
     real = [f"EP{k}" for k in range(degree, 1, -1)]
-    several = [f"2EP{k}" for k in range(degree // 2, 1, -1)]
+    two_real = [f"2EP{k}" for k in range(degree // 2, 1, -1)]
     pairs = [f"CEP{k}" for k in range(degree // 2, 1, -1)]
-    return (*real, *several, *pairs, *(a for a, taken in AXIS.items() if taken <= degree))
+    return (*real, *two_real, *pairs, *(name for name, roots in AXIS.items() if roots <= degree))
 
 
 def pattern(name: str, degree: int) -> Pattern:
-    """The pattern of a name, such as ``EP3``, ``2EP2``, ``EP2+CEP2``, ``weave``, for polynomials of a degree.
+    """The pattern with a name such as ``EP3``, ``2EP2``, ``EP2+CEP2`` or ``weave``, for polynomials of a degree.
 
     Raises:
-        ValueError: for a name that is none, or a pattern of more roots than the degree.
+        ValueError: for an unknown name, or a pattern with more roots than the degree.
 
     Example:
         >>> triple = tmsopt.roots.pattern("EP3", 5)
@@ -44,11 +44,11 @@ def pattern(name: str, degree: int) -> Pattern:
 
     More: docs/explanation/exceptional_points.md
     """
-    return _pattern("".join(name.split()), degree)
+    return _compose("".join(name.split()), degree)
 
 
 def composition(name: str) -> list[tuple[str, int, int]]:
-    """What a pattern is made of: (kind, multiplicity, count), of kind ``EP``, ``CEP`` or one of the imaginary axis.
+    """Components of a pattern: (kind, multiplicity, count), of kind ``EP``, ``CEP`` or one on the imaginary axis.
 
     Example:
         >>> tmsopt.roots.composition("2EP2+CEP2")
@@ -56,97 +56,96 @@ def composition(name: str) -> list[tuple[str, int, int]]:
 
     More: docs/explanation/exceptional_points.md
     """
-    return [(g.kind, g.order, g.count) for g in parts_of("".join(name.split()))]
+    return [(c.kind, c.order, c.count) for c in parse_components("".join(name.split()))]
 
 
 @cache
-def _pattern(name: str, degree: int) -> Pattern:
-    groups = parts_of(name)
-    others = degree - sum(g.roots for g in groups)
+def _compose(name: str, degree: int) -> Pattern:
+    components = parse_components(name)
+    others = degree - sum(c.roots for c in components)
     if others < 0:
         raise ValueError(f"'{name}' takes {degree - others} roots, and the polynomial has {degree}")
-    name = _joined(name)
-    tied = [u for g in groups for u in g.unknowns]
-    names = [f"{u}{tied[: k + 1].count(u)}" if tied.count(u) > 1 else u for k, u in enumerate(tied)]
-    rest = [f"{'d' if 'c' in tied else 'c'}{k}" for k in range(1, others + 1)]
-    starts = accumulate((len(g.unknowns) for g in groups), initial=0)
-    placed = [(g, slice(at, at + len(g.unknowns))) for g, at in zip(groups, starts, strict=False)]
+    name = _join_names(name)
+    letters = [u for c in components for u in c.unknowns]
+    names = [f"{u}{letters[: k + 1].count(u)}" if letters.count(u) > 1 else u for k, u in enumerate(letters)]
+    rest = [f"{'d' if 'c' in letters else 'c'}{k}" for k in range(1, others + 1)]
+    starts = accumulate((len(c.unknowns) for c in components), initial=0)
+    placed = [(c, slice(start, start + len(c.unknowns))) for c, start in zip(components, starts, strict=False)]
 
     def factors(u: Sequence[Any], without: Collection[str] = ()) -> list[list[Any]]:
-        remainder = [[1, *u[len(tied) :]]] if others else []
-        return [f for g, s in placed if g.kind not in without for f in g.factors(u[s])] + remainder
+        remainder = [[1, *u[len(letters) :]]] if others else []
+        return [f for c, s in placed if c.kind not in without for f in c.factors(u[s])] + remainder
 
-    made = Pattern(
+    composed = Pattern(
         name=name,
-        meaning=" and ".join(g.meaning for g in groups) + (" beside other roots" if others else ""),
+        meaning=" and ".join(c.meaning for c in components) + (" and other roots" if others else ""),
         unknowns=(*names, *rest),
         factors=factors,
-        guesses=partial(_guesses, groups, others),
-        nonnegative=lambda u: [x for g, s in placed for x in g.nonnegative(u[s])],
-        abscissa=None if others or len(groups) > 1 else _ABSCISSAE.get((groups[0].kind, groups[0].count)),
-        rest=partial(factors, without=AXIS) if any(g.kind in AXIS for g in groups) else None,
+        guesses=partial(_guess_unknowns, components, others),
+        nonnegative=lambda u: [x for c, s in placed for x in c.nonnegative(u[s])],
+        abscissa=None if others or len(components) > 1 else _ABSCISSAE.get((components[0].kind, components[0].count)),
+        rest=partial(factors, without=AXIS) if any(c.kind in AXIS for c in components) else None,
         test=_TESTS.get(name),
-        marks=_marks(placed, others),
-        ends={u: ENDS[g.kind] for g in groups for u in g.unknowns if u == "W"} if "W" in names else {},
+        marks=_find_marks(placed, others),
+        ends={u: ENDS[c.kind] for c in components for u in c.unknowns if u == "W"} if "W" in names else {},
         degree=degree,
     )
-    return replace(made, **(QUARTIC.get(name, {}) if degree == 4 else {}))
+    return replace(composed, **(QUARTIC.get(name, {}) if degree == 4 else {}))
 
 
 _ABSCISSAE: Mapping[tuple[str, int], Any] = {("EP", 1): lambda u: u[0], ("CEP", 1): lambda u: -u[0] / 2}
-"""Largest real part of the roots where parts of one kind, so many, make up all of them."""
+"""(Kind, count) of the only component → largest real part of the roots."""
 
-_TESTS: Mapping[str, Any] = {"capsize": lambda a: a[-1], "weave": weave_test, "EP2": meeting}
+_TESTS: Mapping[str, Any] = {"capsize": lambda a: a[-1], "weave": weave_test, "EP2": double_root_test}
 """For patterns of codimension 1: a function of the coefficients that changes sign across the set."""
 
 
-def _marks(placed: Sequence[tuple[Part, slice]], others: int) -> dict[str, Any]:
-    """More special patterns that a curve may pass."""
+def _find_marks(placed: Sequence[tuple[Component, slice]], others: int) -> dict[str, Any]:
+    """More special patterns that a curve may pass, each with an expression of the unknowns that is 0 there."""
     marks: dict[str, Any] = {}
-    roots = [(g, s.start) for g, s in placed if g.unknowns == ("r",)]
+    roots = [(c, s.start) for c, s in placed if c.unknowns == ("r",)]
     for (one, j), (other, k) in combinations(roots, 2):
-        rest = [g.name for g, _ in placed if g not in (one, other)]
-        marks[_joined(f"EP{one.order + other.order}", *rest)] = lambda u, j=j, k=k: u[j] - u[k]
+        rest = [c.name for c, _ in placed if c not in (one, other)]
+        marks[_join_names(f"EP{one.order + other.order}", *rest)] = lambda u, j=j, k=k: u[j] - u[k]
     if len(placed) > 1:
         return marks
-    ((alone, own),) = placed
+    ((only, own),) = placed
     end = own.stop
-    if alone.in_quadratics and len(alone.unknowns) == 2:
-        marks[f"EP{2 * alone.order}"] = lambda u: u[0] * u[0] - 4 * u[1]
-    if others and alone.unknowns == ("r",):
-        marks[f"EP{alone.order + 1}"] = lambda u: evaluate([1, *u[end:]], u[0])
-        marks["double zero" if alone.order == 2 else f"{alone.order}-fold zero"] = lambda u: u[0]
-    if others and alone.kind in ("EP", "CEP"):
+    if only.is_quadratic and len(only.unknowns) == 2:
+        marks[f"EP{2 * only.order}"] = lambda u: u[0] * u[0] - 4 * u[1]
+    if others and only.unknowns == ("r",):
+        marks[f"EP{only.order + 1}"] = lambda u: evaluate([1, *u[end:]], u[0])
+        marks["double zero" if only.order == 2 else f"{only.order}-fold zero"] = lambda u: u[0]
+    if others and only.kind in ("EP", "CEP"):
         marks["capsize"] = lambda u: u[-1]
-    if others and alone.kind == "capsize":
+    if others and only.kind == "capsize":
         marks["double zero"] = lambda u: u[-1]
-    if others > 1 and alone.kind not in ("weave", "resonance"):
-        name = "EP2" if alone.kind == "capsize" else _joined(alone.name, "EP2")
-        marks[name] = lambda u: meeting([1, *u[end:]])
+    if others > 1 and only.kind not in ("weave", "resonance"):
+        name = "EP2" if only.kind == "capsize" else _join_names(only.name, "EP2")
+        marks[name] = lambda u: double_root_test([1, *u[end:]])
     return marks
 
 
-def _joined(*names: str) -> str:
-    """The name of several patterns together."""
-    return "+".join(g.name for g in parts_of("+".join(names)))
+def _join_names(*names: str) -> str:
+    """The name of several patterns together, in canonical order."""
+    return "+".join(c.name for c in parse_components("+".join(names)))
 
 
-def _guesses(groups: tuple[Part, ...], others: int, z: Roots) -> list[list[float]]:
-    """Unknowns of the tied factors from roots chosen among z, and the rest by least squares; the nearest first."""
+def _guess_unknowns(components: tuple[Component, ...], others: int, z: Roots) -> list[list[float]]:
+    """Unknowns of the components from choices of the roots z, the free factor by least squares; the nearest first."""
     target = rebuilt(z)
-    far = np.abs(z).max()
-    size = rebuilt(-np.abs(z) - 1e-3 * (far if far ** len(z) > 0 else 1.0))  # all may be 0
-    found: dict[tuple[float, ...], float] = {}
-    for choice in islice(product(*(g.guesses(z) for g in groups)), _LOOKED_AT):
-        tied = np.array(
-            multiplied(*(f for g, u in zip(groups, choice, strict=True) for f in g.factors(u))), dtype=float
-        )
-        columns = np.stack([np.convolve(tied, unit) for unit in np.eye(others + 1)], axis=1) / size[:, None]
+    largest = np.abs(z).max()
+    size = rebuilt(-np.abs(z) - 1e-3 * (largest if largest ** len(z) > 0 else 1.0))  # all may be 0
+    mismatches: dict[tuple[float, ...], float] = {}
+    for choice in islice(product(*(c.guesses(z) for c in components)), _MOST_CHOICES):
+        factors = (f for c, u in zip(components, choice, strict=True) for f in c.factors(u))
+        fixed = np.array(multiply_polynomials(*factors), dtype=float)
+        columns = np.stack([np.convolve(fixed, unit) for unit in np.eye(others + 1)], axis=1) / size[:, None]
         rest = np.linalg.lstsq(columns[:, 1:], target / size - columns[:, 0], rcond=None)[0]
         mismatch = float(np.linalg.norm(columns[:, 0] + columns[:, 1:] @ rest - target / size))
-        found[(*(x for u in choice for x in u), *rest.tolist())] = mismatch
-    return [list(u) for u in sorted(found, key=found.__getitem__)[:_GUESSES]]
+        mismatches[(*(x for u in choice for x in u), *rest.tolist())] = mismatch
+    return [list(u) for u in sorted(mismatches, key=mismatches.__getitem__)[:_MOST_GUESSES]]
 
 
 PATTERNS: Mapping[str, Pattern] = MappingProxyType({name: pattern(name, 4) for name in QUARTIC})
-"""Patterns of a quartic that are not made up of others, by name."""
+"""Patterns of a quartic that are not composed of others, by name."""

@@ -1,4 +1,4 @@
-"""The polynomial of a factored form that is nearest to a given one: least squares on relative coefficient changes."""
+"""Finds the polynomial of a factored form nearest to a given one, by least squares on relative coefficient changes."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -12,31 +12,33 @@ from tmsopt.roots.numeric import rebuilt
 Roots = NDArray[np.complex128]
 
 _STEPS = 20
-_RESOLVED = 1e6  # roundings; a solver leaves some hundreds in a coefficient that it makes vanish
-_ROUNDINGS = 16  # of every parameter: what a solver may leave of its equations
+_RESOLVED = 1e6  # rounding errors above which a coefficient is not 0 by a solver's work, which leaves some hundreds
+_ROUNDINGS = 16  # rounding errors of every parameter that a solver may leave in its equations
 
 
 class Form(Protocol):
-    """A set of monic polynomials given by factors with unknown coefficients: a pattern or a shape."""
+    """A set of monic polynomials with factors of unknown coefficients: a pattern or a shape."""
 
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the product of the factors, descending from 1."""
         ...
 
 
-def sizes(found: Roots, monic: Array | None = None, off: Array | None = None, tolerance: float = 0.0) -> Array:
-    """Size of the terms that each monic coefficient is summed from.
+def term_sizes(z: Roots, monic: Array | None = None, off: Array | None = None, tolerance: float = 0.0) -> Array:
+    """Sizes of the terms whose sums are the monic coefficients.
 
-    A root far smaller than the others counts as a thousandth of their median, so that a coefficient that a root
-    at 0 makes vanish is judged by the others' size and not by its own rounding; of the largest, if the median is 0.
+    A root below a thousandth of the median root (of the largest root, if the median is 0) counts as that size, so that
+    a coefficient that is 0 because of a root at 0 is judged by the size of the other roots and not by its rounding.
 
     Args:
-        monic, off: the coefficients, and how far rounding may put each off. One that stands far above that, as of a
-            stiff system, is not near 0 by chance, and is judged by the roots' own sizes.
-        tolerance: relative change that is to cover some roundings: a small difference of large numbers cannot be right
-            to its own size.
+        z: roots of the polynomial.
+        monic: the coefficients.
+        off: rounding errors of the coefficients. A coefficient far above its error, as in a stiff system, is small but
+            not 0, and is judged by the true sizes of the roots.
+        tolerance: relative change that must cover some rounding errors, because a small difference of large numbers is
+            not accurate relative to its own size.
     """
-    radius = np.abs(found)
+    radius = np.abs(z)
     floor = 1e-3 * float(np.median(radius) or radius.max())
     size = rebuilt(-np.maximum(radius, floor))
     if monic is not None and off is not None:
@@ -46,15 +48,16 @@ def sizes(found: Roots, monic: Array | None = None, off: Array | None = None, to
 
 
 def relative_distance(form: Form, unknowns: Sequence[float] | Array, monic: Array, size: Array) -> float:
-    """Root sum of squares of the relative coefficient changes from a monic polynomial to one of a form."""
+    """Relative change of the coefficients (root sum of squares) from a monic polynomial to one of the form."""
     return float(np.linalg.norm((np.array(form.monic(list(unknowns)), dtype=float) - monic) / size))
 
 
 def gauss_newton(form: Form, guess: Array, monic: Array, size: Array, patience: int = _STEPS) -> Array:
-    """Unknowns of least relative distance, from a guess; complex-step Jacobian, each column in its own size.
+    """Unknowns of least relative distance from a polynomial, by Gauss–Newton steps with a complex-step Jacobian.
 
     Args:
-        patience: steps that may fail to bring the distance down by a tenth before the nearest so far is returned.
+        guess: unknowns to start from.
+        patience: steps that may fail to lower the distance by a tenth before the best unknowns are returned.
     """
     u = best = guess
     if not guess.size:
@@ -62,12 +65,12 @@ def gauss_newton(form: Form, guess: Array, monic: Array, size: Array, patience: 
     least, left = np.inf, patience
     directions = 1e-100j * np.eye(len(u))
     for _ in range(_STEPS):
-        moved = np.stack(np.broadcast_arrays(*form.monic([x + d for x, d in zip(u, directions, strict=True)])))
-        jacobian = moved.imag / 1e-100 / size[:, None]
+        shifted = np.stack(np.broadcast_arrays(*form.monic([x + d for x, d in zip(u, directions, strict=True)])))
+        jacobian = shifted.imag / 1e-100 / size[:, None]
         residual = (np.array(form.monic(list(u)), dtype=float) - monic) / size
         if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(residual))):
             break
-        with np.errstate(over="ignore"):  # where it diverges
+        with np.errstate(over="ignore"):  # if it diverges
             distance = float(np.linalg.norm(residual))
         left = patience if distance < 0.9 * least else left - 1
         if distance < least:

@@ -1,31 +1,30 @@
-"""What roots show, with their multiplicities: a shape, and the pattern that it is."""
+"""Shapes and patterns of given roots with multiplicities."""
 
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from tmsopt.roots.patterns.components import count_in_words
 from tmsopt.roots.patterns.composed import composition
-from tmsopt.roots.patterns.parts import several
 from tmsopt.roots.patterns.pattern import Pattern
-from tmsopt.roots.patterns.shape import Group, Shape, with_simple
+from tmsopt.roots.patterns.shape import Group, Shape, join_group_names
 from tmsopt.roots.polynomial import Root, product
 
 
-def shown(roots: Sequence[Root], everywhere: bool = True, ties: bool = True) -> tuple[Shape, list[Any]]:
-    """The shape that roots show: multiple ones, and those on the rightmost line if several; with its unknowns.
+def find_shape(roots: Sequence[Root], everywhere: bool = True, ties: bool = True) -> tuple[Shape, list[Any]]:
+    """The shape of given roots and its unknowns: multiple roots, and two or more roots on the rightmost line.
 
     Args:
-        everywhere: whether multiple roots that are not on the rightmost line count too.
-        ties: whether it counts that roots are on one line.
+        everywhere: whether multiple roots left of the rightmost line belong to the shape.
+        ties: whether roots on the rightmost line are tied to it.
     """
     upper = [r for r in roots if r.im >= 0]
     right = max(r.re for r in upper)
-    several = ties and sum(r.re == right for r in upper) > 1
-    line = [several and r.re == right for r in upper]
+    has_ties = ties and sum(r.re == right for r in upper) > 1
     grouped = [
-        (r, Group(r.multiplicity, r.im == 0, tied))
-        for r, tied in zip(upper, line, strict=True)
-        if tied or (r.multiplicity > 1 and (everywhere or r.re == right))
+        (r, Group(r.multiplicity, r.im == 0, has_ties and r.re == right))
+        for r in upper
+        if (has_ties and r.re == right) or (r.multiplicity > 1 and (everywhere or r.re == right))
     ]
     free = [r for r in upper for _ in range(r.multiplicity) if r not in [q for q, _ in grouped]]
     rest = product(*([1, -r.re] if r.im == 0 else [1, -2 * r.re, r.re**2 + r.im**2] for r in free))
@@ -33,23 +32,26 @@ def shown(roots: Sequence[Root], everywhere: bool = True, ties: bool = True) -> 
     return shape, shape.start([complex(r.re, r.im) for r, _ in grouped], rest)
 
 
-def shown_patterns(roots: Sequence[Root]) -> list[Pattern]:
-    """The patterns that roots show, what says most first: all multiple roots and ties of the rightmost line, those on
-    this line alone, all multiple roots alone.
+def find_patterns(roots: Sequence[Root]) -> list[Pattern]:
+    """The patterns of given roots, the most specific first.
 
-    A name is that of the rightmost line, such as ``EP2+pair``, ``beside`` those of other multiple roots; of multiple
-    roots alone it is that of the pattern that they make, such as ``EP3+CEP2``. Each starts from the roots.
+    These are: all multiple roots with the ties of the rightmost line; the multiple roots and ties of this line only;
+    all multiple roots without ties; the multiple roots of the line without ties. The name of a line, such as
+    ``EP2+pair``, is joined by ``beside`` to the names of other multiple roots; without ties the name is an ordinary
+    one, such as ``EP3+CEP2``. The guess of each pattern is the given roots.
     """
-    every = [_pattern(*shown(roots, *which)) for which in ((True, True), (False, True), (True, False), (False, False))]
-    return list({p.name: p for p in every if p.name}.values())
+    options = ((True, True), (False, True), (True, False), (False, False))
+    patterns = [_make_pattern(*find_shape(roots, *option)) for option in options]
+    return list({p.name: p for p in patterns if p.name}.values())
 
 
-def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
+def _make_pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     tied, others = ([g for g in shape.groups if g.tied is on] for on in (True, False))
-    meanings = [_words(groups) + where for groups, where in ((tied, " on one vertical line"), (others, "")) if groups]
+    places = ((tied, " on one vertical line"), (others, ""))
+    meanings = [_describe_groups(groups) + place for groups, place in places if groups]
     return Pattern(
-        name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
-        meaning=", and ".join(meanings) + (" beside other roots" if shape.rest else ""),
+        name=" beside ".join(_name_groups(groups) for groups in (tied, others) if groups),
+        meaning=", and ".join(meanings) + (" and other roots" if shape.rest else ""),
         unknowns=shape.unknowns,
         factors=shape.factors,
         guesses=lambda z: [[float(x) for x in start]],
@@ -58,45 +60,45 @@ def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     )
 
 
-def implies(roots: Sequence[Root], name: str) -> bool:
-    """Whether roots with these multiplicities have the multiple roots of a pattern, where those may coincide.
+def has_pattern(roots: Sequence[Root], name: str) -> bool:
+    """Whether given roots contain the multiple roots of a pattern, or a limit of them.
 
-    A 4-fold real root is a double complex pair that meets on the axis, too.
+    For example, a 4-fold real root is the limit of a double complex pair that meets on the real axis.
     """
     real = [r.multiplicity for r in roots if r.im == 0]
     pairs = [r.multiplicity for r in roots if r.im > 0]
     for kind, order, count in composition(name):
         for _ in range(count):
             if kind == "CEP" and max(pairs, default=0) >= order:
-                _take(pairs, order)
+                _use_roots(pairs, order)
             elif kind in ("EP", "CEP") and max(real, default=0) >= order * (1 + (kind == "CEP")):
-                _take(real, order * (1 + (kind == "CEP")))
+                _use_roots(real, order * (1 + (kind == "CEP")))
             else:
                 return False
     return True
 
 
-def _take(left: list[int], order: int) -> None:
-    """Use up so many roots of the least multiple one that has them."""
-    k = left.index(min(m for m in left if m >= order))
-    left[k] -= order
+def _use_roots(multiplicities: list[int], order: int) -> None:
+    """Subtract an order from the smallest multiplicity that is large enough."""
+    k = multiplicities.index(min(m for m in multiplicities if m >= order))
+    multiplicities[k] -= order
 
 
-def _name(groups: Sequence[Group]) -> str:
-    """``EP3``, ``2EP2+CEP2``, ``EP2+two pairs+real``: real roots first, the highest multiplicity first."""
-    counted = Counter((not g.real, -g.multiplicity) for g in groups if g.multiplicity > 1)
+def _name_groups(groups: Sequence[Group]) -> str:
+    """``EP3``, ``2EP2+CEP2``, ``EP2+two pairs+real``: real roots and the highest multiplicity come first."""
+    counts = Counter((not g.real, -g.multiplicity) for g in groups if g.multiplicity > 1)
     names = [
         f"{count if count > 1 else ''}{'C' if pair else ''}EP{-order}"
-        for (pair, order), count in sorted(counted.items())
+        for (pair, order), count in sorted(counts.items())
     ]
-    return with_simple(names, groups)
+    return join_group_names(names, groups)
 
 
-def _words(groups: Sequence[Group]) -> str:
-    """In the order of the name: multiple real roots, multiple pairs, simple pairs, a simple real root."""
-    counted = Counter(groups)
+def _describe_groups(groups: Sequence[Group]) -> str:
+    """Groups in words: multiple real roots, multiple pairs, simple pairs, a simple real root."""
+    counts = Counter(groups)
     words = []
-    for group in sorted(counted, key=lambda g: (g.multiplicity == 1, g.real == (g.multiplicity == 1), -g.multiplicity)):
+    for group in sorted(counts, key=lambda g: (g.multiplicity == 1, g.real == (g.multiplicity == 1), -g.multiplicity)):
         fold = f"{group.multiplicity}-fold " if group.multiplicity > 1 else ""
-        words.append(several(counted[group], f"{fold}{'real root' if group.real else 'complex pair'}"))
+        words.append(count_in_words(counts[group], f"{fold}{'real root' if group.real else 'complex pair'}"))
     return " and ".join(words)

@@ -1,7 +1,7 @@
-"""Root patterns as products of monic factors with unknown coefficients, and what those of a quartic have of their own.
+"""Root patterns as products of monic factors with unknown coefficients, and the special forms for quartics.
 
-``p(s) = a0 · product(factors(unknowns))`` is a smooth system in the parameters and the unknowns, regular where
-the roots themselves are not.
+``p(s) = a0 · product(factors(unknowns))`` is a smooth system in the parameters and the unknowns. It is regular even
+where the roots are not.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ Roots = NDArray[np.complex128]
 _NAME = "<U32"
 
 _UNRELATED = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
-"""Unknowns with no relation, to see which factors are the same."""
+"""Values of the unknowns without rational relations, to recognise equal factors."""
 
 
 @dataclass(frozen=True)
@@ -33,17 +33,17 @@ class Pattern:
         name: as written in a problem file.
         meaning: one line.
         unknowns: names of the unknown factor coefficients.
-        factors: the monic factors for given unknowns, any numbers.
-        guesses: unknowns to start from, for numeric roots.
+        factors: the monic factors for given unknowns, for numbers of any kind.
+        guesses: function of numeric roots that gives starting values of the unknowns.
         nonnegative: expressions of the unknowns that must be ≥ 0.
-        abscissa: largest real part of the roots, where one smooth expression of the unknowns gives it.
-        rest: the factors whose roots the pattern does not tie to the imaginary axis; all of them by default.
-        test: function of the coefficients that changes sign across the set, where one condition makes it; nan where
-            it means nothing.
-        marks: name of a more special pattern → expression of the unknowns that is 0 where it is met.
-        ends: unknown → what happens where it reaches 0 and the pattern ends.
+        abscissa: largest real part of the roots, if it is a smooth expression of the unknowns.
+        rest: the factors with roots that may leave the imaginary axis; all factors by default.
+        test: for codimension 1, a function of the coefficients that changes sign across the set; nan where it has no
+            meaning.
+        marks: name of a more special pattern → expression of the unknowns that is 0 on it.
+        ends: unknown → event where it reaches 0 and the pattern ends.
         degree: of the polynomials.
-        doubles: of a pattern of a complex matrix, the name of the one of the real system of twice the size that it is.
+        doubles: for a pattern of a complex matrix, the name of the same pattern of the real system of twice the size.
 
     Example:
         >>> tmsopt.roots.pattern("EP3", 4).monic([-1, -2])  # (s + 1)³ (s + 2)
@@ -68,7 +68,7 @@ class Pattern:
 
     @property
     def form(self) -> str:
-        """The name that says which factors these are, in a real polynomial."""
+        """Name of the pattern of the real polynomial with these factors."""
         return self.doubles or self.name
 
     @property
@@ -78,13 +78,13 @@ class Pattern:
 
     @property
     def powers(self) -> tuple[int, ...]:
-        """Power of a rate that each unknown is: 1 of a root, 2 of W; the first coefficient that it stands in."""
+        """Dimension of each unknown as a power of a rate, such as 1 for a root or 2 for W."""
         base = self.monic([0] * len(self.unknowns))
         units = ([int(k == j) for j in range(len(self.unknowns))] for k in range(len(self.unknowns)))
         return tuple(next(k for k, (c, d) in enumerate(zip(self.monic(u), base, strict=True)) if c != d) for u in units)
 
-    def reduced(self, unknowns: Sequence[Any]) -> list[Any]:
-        """Unknowns of arrays in units of the size of the roots, so that nothing depends on the unit of time."""
+    def scaled_unknowns(self, unknowns: Sequence[Any]) -> list[Any]:
+        """Unknowns of arrays in units of the size of the roots, independent of the unit of time."""
         size = mean_size(self.monic(unknowns)) + 1e-300
         return [u / size**power for u, power in zip(unknowns, self.powers, strict=True)]
 
@@ -92,18 +92,18 @@ class Pattern:
         """Coefficients of the product of the factors, descending from 1."""
         return product(*self.factors(unknowns))
 
-    def counted(self, unknowns: Sequence[Any]) -> list[tuple[list[Any], int]]:
-        """The different factors for given unknowns, each with how often it occurs."""
-        signs = [tuple(f) for f in self.factors(_UNRELATED[: len(self.unknowns)])]
+    def distinct_factors(self, unknowns: Sequence[Any]) -> list[tuple[list[Any], int]]:
+        """The distinct factors for given unknowns, each with its multiplicity."""
+        samples = [tuple(f) for f in self.factors(_UNRELATED[: len(self.unknowns)])]
         factors = self.factors(unknowns)
-        return [(factors[signs.index(s)], signs.count(s)) for s in dict.fromkeys(signs)]
+        return [(factors[samples.index(s)], samples.count(s)) for s in dict.fromkeys(samples)]
 
-    def remaining(self, unknowns: Sequence[Any]) -> list[list[Any]]:
-        """The factors whose roots must lie left of the imaginary axis for the pattern to bound or keep stability."""
+    def remaining_factors(self, unknowns: Sequence[Any]) -> list[list[Any]]:
+        """The factors whose roots must lie left of the imaginary axis if the pattern is stable or bounds stability."""
         return (self.rest or self.factors)(unknowns)
 
     def kind(self, unknowns: Sequence[Any]) -> NDArray[np.str_]:
-        """Name of the pattern at each point: 2EP2 and CEP2 are one set, told apart by the sign of b² − 4c."""
+        """Name of the pattern at each point. 2EP2 and CEP2 form one set; the sign of b² − 4c distinguishes them."""
         plain = self.name.removeprefix("2").removeprefix("C")
         if self.doubles or self.name not in (f"2{plain}", f"C{plain}"):
             return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME)
@@ -112,27 +112,27 @@ class Pattern:
 
 
 def mean_size(monic: Sequence[Any]) -> NDArray[np.float64]:
-    """Mean size of the roots by the largest of Maclaurin's means of the coefficients; |r| for an n-fold root r."""
+    """Mean size of the roots, the largest of Maclaurin's means of the coefficients; |r| for an n-fold root r."""
     n = len(monic) - 1
     means = [(np.abs(monic[k]) / comb(n, k)) ** (1 / k) for k in range(1, n + 1)]
     return np.asarray(np.max(np.broadcast_arrays(*means), axis=0), dtype=float)
 
 
 def quadratic(pair: Roots) -> list[float]:
-    """p and q of s² + p s + q for its two roots."""
+    """p and q of s² + p s + q from its two roots."""
     return [float(-pair.sum().real), float(pair.prod().real)]
 
 
-def _two(roots: Roots) -> list[tuple[Roots, Roots]]:
-    """Every choice of two of the roots that is closed under conjugation, with the rest."""
-    every = range(len(roots))
-    chosen = [(roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, 2)]
+def _choose_two(roots: Roots) -> list[tuple[Roots, Roots]]:
+    """Every choice of two roots that is closed under conjugation, with the other roots."""
+    indices = range(len(roots))
+    choices = [(roots[list(c)], roots[[k for k in indices if k not in c]]) for c in combinations(indices, 2)]
     close = 1e-9 * (np.abs(roots).max() + 1e-300)
-    return [(a, b) for a, b in chosen if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()]
+    return [(a, b) for a, b in choices if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()]
 
 
 def _double_quadratic_guess(roots: Roots) -> list[list[float]]:
-    """(s² + bs + c)² from its first two coefficients."""
+    """b and c of (s² + bs + c)² from its first two coefficients."""
     mean = roots.mean().real
     square = (roots**2).sum().real
     b = -2 * mean
@@ -145,7 +145,7 @@ def _triple_guesses(roots: Roots) -> list[list[float]]:
 
 
 def _pair_test(a: Sequence[Any]) -> Any:
-    """The Hurwitz determinant Δ3, which is 0 where two roots add up to 0; they are imaginary where a3/a1 = W > 0."""
+    """The Hurwitz determinant Δ3, 0 where two roots add up to 0; nan where these are real, for W = a3/a1 ≤ 0."""
     return np.where(a[1] * a[3] > 0, hurwitz_minors(a)[2], np.nan)
 
 
@@ -164,7 +164,7 @@ QUARTIC: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "EP2": {
             "meaning": "a real double root: the discriminant surface",
             "unknowns": ("r", "b", "c"),
-            "guesses": lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
+            "guesses": lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _choose_two(z)],
             "marks": {
                 "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2],
                 "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
@@ -175,7 +175,7 @@ QUARTIC: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "weave": {
             "meaning": "a pair on the imaginary axis",
             "unknowns": ("W", "b", "c"),
-            "guesses": lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)],
+            "guesses": lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _choose_two(z)],
             "test": _pair_test,
         },
         "capsize": {
@@ -186,5 +186,5 @@ QUARTIC: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "resonance": {"guesses": lambda z: [[float(np.abs(z).mean()) ** 2]]},
     }
 )
-"""Patterns of a quartic that are not made up of others: what they have of their own, guesses without a choice of roots
-and shorter words and names, beside what their parts make them."""
+"""Patterns of a quartic that are not composed of others → fields that replace those of the general construction: direct
+guesses and shorter words and names."""

@@ -1,11 +1,11 @@
-"""Polynomials with certain multiple roots, certain roots on one vertical line, and others free, as factored forms."""
+"""Factored forms of polynomials with given multiple roots, given roots on one vertical line, and free roots."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from tmsopt.roots.patterns.parts import NUMBERS
+from tmsopt.roots.patterns.components import NUMBERS
 from tmsopt.roots.polynomial import product
 
 
@@ -14,7 +14,7 @@ class Group:
     """A real root or a complex pair with its multiplicity.
 
     Attributes:
-        tied: whether it stands on the vertical line that all tied ones share.
+        tied: whether it lies on the vertical line that all tied groups share.
     """
 
     multiplicity: int
@@ -27,12 +27,12 @@ class Group:
         return self.multiplicity * (1 if self.real else 2)
 
 
-def with_simple(names: Iterable[str], groups: Iterable[Group]) -> str:
-    """Names of multiple roots joined, with those of the simple pairs and the simple real roots among groups."""
+def join_group_names(names: Iterable[str], groups: Iterable[Group]) -> str:
+    """Join the names of multiple roots and the names of the simple pairs and real roots among the groups."""
     simple = [g.real for g in groups if g.multiplicity == 1]
-    pairs = simple.count(False)
-    several = ["pair"] if pairs == 1 else [f"{NUMBERS[pairs]} pairs"] if pairs else []
-    return "+".join([*names, *several, *["real"] * simple.count(True)])
+    count = simple.count(False)
+    pairs = ["pair"] if count == 1 else [f"{NUMBERS[count]} pairs"] if count else []
+    return "+".join([*names, *pairs, *["real"] * simple.count(True)])
 
 
 _KINDS = {(True, True): "", (True, False): "r", (False, True): "W", (False, False): "bc"}
@@ -41,10 +41,11 @@ _KINDS = {(True, True): "", (True, False): "r", (False, True): "W", (False, Fals
 
 @dataclass(frozen=True)
 class Shape:
-    """A set of polynomials: the given groups, and a monic factor of degree `rest` with free coefficients.
+    """A set of polynomials: given groups of roots, and a monic factor of degree `rest` with free coefficients.
 
-    The unknowns are, in order: the real part g of the line if a group is tied; for each group nothing (real, tied), r
-    of s − r (real), W of (s − g)² + W (a tied pair) or b, c of s² + b s + c (a pair); the coefficients of the rest.
+    The unknowns are, in order: the real part g of the line, if a group is tied; for each group r of s − r (real, free),
+    nothing (real, tied), b and c of s² + b s + c (pair, free) or W of (s − g)² + W (pair, tied); the coefficients of
+    the rest.
     """
 
     groups: tuple[Group, ...]
@@ -52,46 +53,46 @@ class Shape:
 
     @property
     def degree(self) -> int:
-        """Of the polynomials."""
+        """Degree of the polynomials."""
         return sum(g.degree for g in self.groups) + self.rest
 
     @cached_property
     def unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns as in other patterns, numbered in groups only where there are several of a kind."""
+        """Names of the unknowns, with the number of the group if several groups have an unknown of that name."""
         each = [(kind, k) for k, g in enumerate(self.groups) for kind in _KINDS[g.real, g.tied]]
         kinds = [kind for kind, _ in each]
         names = (kind if kinds.count(kind) == 1 else f"{kind}{k}" for kind, k in each)
-        return (*["g"] * self._tied, *names, *(f"d{k}" for k in range(1, self.rest + 1)))
+        return (*["g"] * self._has_line, *names, *(f"d{k}" for k in range(1, self.rest + 1)))
 
     @property
     def conditions(self) -> int:
-        """Codimension: coefficients less unknowns."""
+        """Codimension: number of coefficients minus number of unknowns."""
         return self.degree - len(self.unknowns)
 
     @property
-    def _tied(self) -> bool:
+    def _has_line(self) -> bool:
         return True in [g.tied for g in self.groups]
 
     def group_factors(self, unknowns: Sequence[Any]) -> list[list[Any]]:
         """One monic factor for each group."""
-        left = list(unknowns)
-        g: Any = left.pop(0) if self._tied else None
-        found: list[list[Any]] = []
+        values = iter(unknowns)
+        g: Any = next(values) if self._has_line else None
+        factors: list[list[Any]] = []
         for group in self.groups:
             if group.real:
-                found.append([1, -(g if group.tied else left.pop(0))])
+                factors.append([1, -(g if group.tied else next(values))])
             elif group.tied:
-                found.append([1, -2 * g, g * g + left.pop(0)])
+                factors.append([1, -2 * g, g * g + next(values)])
             else:
-                found.append([1, left.pop(0), left.pop(0)])
-        return found
+                factors.append([1, next(values), next(values)])
+        return factors
 
     def rest_factor(self, unknowns: Sequence[Any]) -> list[Any]:
         """The monic factor with free coefficients."""
         return [1, *list(unknowns)[len(unknowns) - self.rest :]]
 
     def factors(self, unknowns: Sequence[Any]) -> list[list[Any]]:
-        """All factors, each as often as its multiplicity says."""
+        """All factors, each repeated by its multiplicity."""
         each = zip(self.group_factors(unknowns), self.groups, strict=True)
         repeated = [f for f, g in each for _ in range(g.multiplicity)]
         return [*repeated, self.rest_factor(unknowns)] if self.rest else repeated
@@ -101,17 +102,17 @@ class Shape:
         return product(*self.factors(unknowns))
 
     def start(self, places: Sequence[complex], rest: Sequence[Any]) -> list[Any]:
-        """Unknowns for one root of each group, that of a pair in the upper half-plane, and the rest's coefficients."""
+        """Unknowns for one root of each group (of a pair the upper one) and the coefficients of the rest."""
         tied = [z.real for z, g in zip(places, self.groups, strict=True) if g.tied for _ in range(g.degree)]
-        found: list[Any] = [sum(tied) / len(tied)] if tied else []
+        unknowns: list[Any] = [sum(tied) / len(tied)] if tied else []
         for z, group in zip(places, self.groups, strict=True):
             if group.tied:
-                found += [] if group.real else [z.imag**2]
+                unknowns += [] if group.real else [z.imag**2]
             else:
-                found += [z.real] if group.real else [-2 * z.real, abs(z) ** 2]
-        return [*found, *list(rest)[1:]]
+                unknowns += [z.real] if group.real else [-2 * z.real, abs(z) ** 2]
+        return [*unknowns, *list(rest)[1:]]
 
     def gaps(self, unknowns: Sequence[Any]) -> list[Any]:
-        """The squared imaginary part of each pair: positive where the pair is complex."""
+        """The squared imaginary part of each pair, positive if the pair is complex."""
         factors = zip(self.group_factors(unknowns), self.groups, strict=True)
         return [f[2] - f[1] * f[1] / 4 for f, g in factors if not g.real]

@@ -1,4 +1,4 @@
-"""The multiplicity structure of a polynomial within a stated tolerance, decided on coefficients."""
+"""Decides the multiplicity structure of a polynomial within a given tolerance of its coefficients."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,33 +8,33 @@ from numpy.typing import ArrayLike
 
 from tmsopt.records import Array
 from tmsopt.roots.numeric import roots as numeric_roots
-from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
-from tmsopt.roots.patterns.multiplicity import Fit, decided
+from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, term_sizes
+from tmsopt.roots.patterns.multiplicity import Fit, find_multiple_roots
 from tmsopt.roots.patterns.pattern import Pattern, Roots
-from tmsopt.roots.patterns.shape import Group, with_simple
+from tmsopt.roots.patterns.shape import Group, join_group_names
 from tmsopt.roots.polynomial import Root, rightmost_first
 
 ROUNDING = 8 * np.finfo(float).eps
-"""Relative error that coefficients of a quartic computed in double precision carry anyway."""
+"""Relative rounding error of the coefficients of a quartic in double precision."""
 
 HIGHEST = 12
-"""Degree of a polynomial whose structure can be decided."""
+"""Highest degree of a polynomial whose structure can be decided."""
 
-_CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
-_GREATEST = 1023  # power of 2 that is a double
-_NOTHING = np.finfo(float).eps ** 2  # of the largest root: what fitting in doubles leaves of a real part that is 0
+_BOUNDARY = 1e-10  # of the squared root size: a pattern contains its boundary, as CEP2 and 2EP2 contain EP4
+_LARGEST_EXPONENT = 1023  # of 2 in a double
+_ZERO = np.finfo(float).eps ** 2  # of the largest root: real parts below it are rounding errors of a fit in doubles
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Which roots stand on the rightmost vertical line.
+    """The roots on the rightmost vertical line, with their multiplicities.
 
     Attributes:
         name: ``EPk`` for a k-fold real root, ``CEPk`` for a k-fold complex pair, ``real``, ``pair``, ``two pairs`` …
-            for simple ones, joined by ``+`` as in ``EP2+pair``, or ``undecided`` where double precision cannot tell.
-            Of a quartic with two real double roots ``2EP2``.
-        roots: all roots with multiplicities, of the nearest polynomial that has the structure.
-        distance: relative change of the coefficients (root sum of squares) that takes the polynomial there.
+            for simple ones, joined by ``+`` as in ``EP2+pair``; ``2EP2`` for a quartic with two real double roots;
+            ``undecided`` if double precision does not suffice.
+        roots: all roots of the nearest polynomial with the structure, with multiplicities.
+        distance: relative change of the coefficients (root sum of squares) to that polynomial.
 
     Example:
         >>> found = tmsopt.roots.structure([1, 3, 3, 1])
@@ -50,7 +50,7 @@ class Structure:
 
     @property
     def abscissa(self) -> float:
-        """Real part of the rightmost root of the structured polynomial."""
+        """Real part of the rightmost root of the polynomial with the structure."""
         return max((root.re for root in self.roots), default=float("nan"))
 
 
@@ -58,14 +58,15 @@ class Structure:
 def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike | None = None) -> Structure:
     """Structure of the roots of a real polynomial of degree 1 to 12, coefficients descending, shape (n + 1,).
 
-    A structure holds when a polynomial that has it exactly lies within `tolerance`: the root sum of squares of
-    the changes of the coefficients, each relative to the terms that make it up. The most degenerate structure that
-    holds is named. ``undecided`` says that the distance differs from the tolerance by less than rounding does, as
-    it must for tolerance 0 at an exceptional point.
+    A structure holds if a polynomial with exactly this structure lies within `tolerance`. The result is the most
+    degenerate structure that holds, or ``undecided`` if the distance differs from the tolerance by less than rounding
+    errors, as always for tolerance 0 at an exceptional point.
 
     Args:
-        off: how far rounding may put each coefficient off, if that is known, shape (n + 1,): those that are small
-            differences of large numbers cannot be right to their own size, and others are judged by the roots' own.
+        tolerance: root sum of squares of the changes of the coefficients, each relative to the size of its terms.
+        off: rounding errors of the coefficients, if known, shape (n + 1,). A small difference of large numbers is then
+            not judged relative to its own size, and a coefficient far above its error is judged by the true sizes of
+            the roots.
 
     Raises:
         ValueError: for another shape, coefficients that are not finite, or a leading 0.
@@ -76,20 +77,20 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
 
     More: docs/explanation/exceptional_points.md
     """
-    c = _checked(coefficients)
-    found = numeric_roots(c)
-    nonzero = np.abs(found[(found != 0) & np.isfinite(found)])
-    power = min(round(np.mean(np.log2(nonzero))), _GREATEST) if nonzero.size else 0
+    c = _validate(coefficients)
+    z = numeric_roots(c)
+    nonzero = np.abs(z[(z != 0) & np.isfinite(z)])
+    power = min(round(np.mean(np.log2(nonzero))), _LARGEST_EXPONENT) if nonzero.size else 0
     unit = 2.0**power
-    monic, size = _in_unit(c, found, power, off, tolerance)
+    monic, size = _scale(c, z, power, off, tolerance)
     rounding = ROUNDING * (len(c) - 1) / 4
-    fit = decided(monic, size, tolerance + rounding, rounding)
+    fit = find_multiple_roots(monic, size, tolerance + rounding, rounding)
     if fit.distance < tolerance - rounding or not fit.shape.groups:
-        return _named(fit, found, unit)
-    definite = _named(decided(monic, size, tolerance - rounding, rounding), found, unit)
+        return _make_structure(fit, z, unit)
+    definite = _make_structure(find_multiple_roots(monic, size, tolerance - rounding, rounding), z, unit)
     if definite.name not in ("pair", "real"):
         return definite
-    return Structure("undecided", _simple(found), fit.distance)
+    return Structure("undecided", _simple_roots(z), fit.distance)
 
 
 def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root, ...] | None:
@@ -102,28 +103,25 @@ def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root
 
     More: docs/explanation/exceptional_points.md
     """
-    found = structure(coefficients, tolerance).roots
-    multiple = all(root.im == 0 for root in found) and any(root.multiplicity > 1 for root in found)
-    return found if multiple else None
+    roots = structure(coefficients, tolerance).roots
+    has_multiple = all(root.im == 0 for root in roots) and any(root.multiplicity > 1 for root in roots)
+    return roots if has_multiple else None
 
 
-def _in_unit(c: Array, found: Roots, power: int, off: ArrayLike | None, tolerance: float) -> tuple[Array, Array]:
-    """Monic coefficients and their sizes where 2 to a power is the unit of roots; a double may not hold unit⁴."""
-    monic, unit = _scaled(c / c[0], power), 2.0**power
+def _scale(c: Array, z: Roots, power: int, off: ArrayLike | None, tolerance: float) -> tuple[Array, Array]:
+    """Monic coefficients and the sizes of their terms, with 2^power as the unit of roots; unit⁴ may exceed doubles."""
+    powers, unit = -power * np.arange(len(c)), 2.0**power
+    monic = np.asarray(np.ldexp(c / c[0], powers))
     if off is None:
-        return monic, sizes(found / unit)
-    known = np.abs(_scaled(np.asarray(off, dtype=float) / c[0], power))
-    return monic, sizes(found / unit, monic, np.where(np.isfinite(known), known, 0.0), tolerance)
-
-
-def _scaled(monic: Array, power: int) -> Array:
-    return np.asarray(np.ldexp(monic, -power * np.arange(len(monic))))
+        return monic, term_sizes(z / unit)
+    errors = np.abs(np.ldexp(np.asarray(off, dtype=float) / c[0], powers))
+    return monic, term_sizes(z / unit, monic, np.where(np.isfinite(errors), errors, 0.0), tolerance)
 
 
 def pattern_distance(
     pattern: Pattern, coefficients: ArrayLike, off: ArrayLike | None = None, tolerance: float = 0.0
 ) -> float:
-    """Relative change of the coefficients (root sum of squares) to reach a pattern of their degree; inf if none.
+    """Least relative change of the coefficients (root sum of squares) to a pattern; inf if no fit reaches it.
 
     Args:
         off, tolerance: see `structure`.
@@ -136,44 +134,44 @@ def pattern_distance(
     More: docs/explanation/factors.md
     """
     try:
-        fits, found = _fits(pattern, coefficients, off, tolerance)
+        fits, z = _fit_pattern(pattern, coefficients, off, tolerance)
     except ValueError:
         return float("inf")
-    least = -_CLOSED * np.abs(found).max() ** 2
+    least = -_BOUNDARY * np.abs(z).max() ** 2
     inside = (distance for distance, u in fits if all(value >= least for value in pattern.nonnegative(u)))
     return next(inside, float("inf"))
 
 
-def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[list[float]]:
-    """Unknowns of the polynomials of a pattern nearest to a given one, one for each guess, the nearest first."""
-    return [u for _, u in _fits(pattern, coefficients, None, 0.0)[0]]
+def fit_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[list[float]]:
+    """Unknowns of the nearest polynomials of a pattern, one list for each guess, the nearest first."""
+    return [u for _, u in _fit_pattern(pattern, coefficients, None, 0.0)[0]]
 
 
-def _fits(
+def _fit_pattern(
     pattern: Pattern, coefficients: ArrayLike, off: ArrayLike | None, tolerance: float
 ) -> tuple[list[tuple[float, list[float]]], Roots]:
-    """The distance and the unknowns that each guess leads to, the nearest first, and the roots.
+    """Distance and unknowns of the fit from each guess, the nearest first, and the numeric roots.
 
     Raises:
         ValueError: for coefficients of another degree than the pattern's.
     """
-    c = _checked(coefficients)
+    c = _validate(coefficients)
     if len(c) - 1 != pattern.degree:
-        raise ValueError(f"found coefficients of degree {len(c) - 1}; accepted: those of degree {pattern.degree}")
-    found = numeric_roots(c)
-    monic, size = _in_unit(c, found, 0, off, tolerance)
-    fits = [gauss_newton(pattern, np.array(guess, dtype=float), monic, size) for guess in pattern.guesses(found)]
-    each = ((relative_distance(pattern, u, monic, size), u.tolist()) for u in fits)
-    return sorted(each, key=lambda fit: fit[0]), found
+        raise ValueError(f"found coefficients of degree {len(c) - 1}; accepted: degree {pattern.degree}")
+    z = numeric_roots(c)
+    monic, size = _scale(c, z, 0, off, tolerance)
+    unknowns = [gauss_newton(pattern, np.array(guess, dtype=float), monic, size) for guess in pattern.guesses(z)]
+    fits = ((relative_distance(pattern, u, monic, size), u.tolist()) for u in unknowns)
+    return sorted(fits, key=lambda fit: fit[0]), z
 
 
-def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float:
-    """Relative distance of a polynomial with known roots from its best guess of a pattern, cheaply; inf without one."""
-    size, monic = sizes(found), coefficients / coefficients[0]
-    return min((relative_distance(pattern, g, monic, size) for g in pattern.guesses(found)), default=float("inf"))
+def guess_distance(pattern: Pattern, coefficients: Array, z: Roots) -> float:
+    """Relative distance of a polynomial with roots z from the best guess of a pattern, without a fit; inf if none."""
+    size, monic = term_sizes(z), coefficients / coefficients[0]
+    return min((relative_distance(pattern, g, monic, size) for g in pattern.guesses(z)), default=float("inf"))
 
 
-def _checked(coefficients: ArrayLike) -> Array:
+def _validate(coefficients: ArrayLike) -> Array:
     c = np.asarray(coefficients, dtype=float)
     if c.ndim != 1 or not 2 <= c.size <= HIGHEST + 1:
         raise ValueError(f"found coefficients of shape {c.shape}; accepted: 2 to {HIGHEST + 1} of them, descending")
@@ -184,29 +182,26 @@ def _checked(coefficients: ArrayLike) -> Array:
     return c
 
 
-def _named(fit: Fit, found: Roots, unit: float) -> Structure:
-    """The structure of a fit, in the unit of the polynomial."""
+def _make_structure(fit: Fit, numeric: Roots, unit: float) -> Structure:
+    """The structure of a fit, with its roots in the unit of the polynomial."""
     if not fit.shape.groups:
-        return Structure("pair" if found[np.argmax(found.real)].imag else "real", _simple(found), 0.0)
-    each = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
-    each += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
-    right = max(z.real for z, _ in each)
-    line = [Group(multiplicity, z.imag == 0) for z, multiplicity in each if z.real == right]
-    least = _NOTHING * max(abs(z) for z, _ in each)
-    pairs = ((w, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,)))
-    roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in pairs]
-    name = "2EP2" if [(root.im, root.multiplicity) for root in roots] == _TWO_DOUBLE else _line_name(line)
-    return Structure(name, rightmost_first(roots), fit.distance)
+        return Structure("pair" if numeric[np.argmax(numeric.real)].imag else "real", _simple_roots(numeric), 0.0)
+    upper = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
+    upper += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
+    right = max(z.real for z, _ in upper)
+    line = [Group(multiplicity, z.imag == 0) for z, multiplicity in upper if z.real == right]
+    least = _ZERO * max(abs(z) for z, _ in upper)
+    every = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
+    roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in every]
+    two_double = [(root.im, root.multiplicity) for root in roots] == [(0.0, 2), (0.0, 2)]
+    return Structure("2EP2" if two_double else _name_line(line), rightmost_first(roots), fit.distance)
 
 
-_TWO_DOUBLE = [(0.0, 2), (0.0, 2)]  # all roots of a quartic, which have a name of their own
-
-
-def _line_name(line: Sequence[Group]) -> str:
+def _name_line(line: Sequence[Group]) -> str:
     """Name of the roots and pairs on a vertical line."""
     multiple = sorted((g.multiplicity, g.real) for g in line if g.multiplicity > 1)
-    return with_simple((f"EP{m}" if real else f"CEP{m}" for m, real in reversed(multiple)), line)
+    return join_group_names((f"EP{m}" if real else f"CEP{m}" for m, real in reversed(multiple)), line)
 
 
-def _simple(found: Roots) -> tuple[Root, ...]:
-    return rightmost_first(Root(float(z.real), float(z.imag)) for z in found)
+def _simple_roots(numeric: Roots) -> tuple[Root, ...]:
+    return rightmost_first(Root(float(z.real), float(z.imag)) for z in numeric)

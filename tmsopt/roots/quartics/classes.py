@@ -1,4 +1,4 @@
-"""Classes of the motion of many quartics at once, from their coefficients alone."""
+"""Classes of the motion of many quartics at once, from their coefficients."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,11 @@ from tmsopt.deprecated import ignore_option
 from tmsopt.records import Array
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.quartics import signs
-from tmsopt.roots.quartics.quartic import columns, make_blocks
+from tmsopt.roots.quartics.quartic import flatten_columns, make_blocks
 from tmsopt.roots.stability import is_stable
 
 CLASSES = ("undefined", "capsize", "weave", "stable", "heavily damped")
-"""Names of the class codes 0 … 4, from worst to best; undefined is a leading 0 or a coefficient that is not finite."""
+"""Names of the class codes 0 … 4, from worst to best; undefined means a leading 0 or a coefficient not finite."""
 
 Codes = NDArray[np.int8]
 
@@ -23,10 +23,10 @@ class Classes:
     """Classes of polynomials.
 
     Attributes:
-        kind: codes of CLASSES: unstable with a real root ≥ 0 (capsize), unstable without one (weave), stable, stable
-            with real roots alone, all different (heavily damped).
-        real_roots: number of different real roots.
-        doubtful: number of quartics whose signs rounding left in doubt, and that `real_roots` decided.
+        kind: codes of CLASSES: unstable with a real root ≥ 0 (capsize), unstable without one (weave), stable, and
+            stable with only real, distinct roots (heavily damped).
+        real_roots: number of distinct real roots.
+        doubtful: number of quartics with signs that rounding could change, which exact arithmetic decided.
 
     Example:
         >>> found = tmsopt.roots.quartic_classes(1, 4, 6, 4, [1, -1])  # (s + 1)⁴, and a root right of 0
@@ -45,7 +45,7 @@ class Classes:
 def quartic_classes(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike) -> Classes:
     """Classes of the quartics a0 s⁴ + … + a4, coefficients of any shapes that broadcast.
 
-    Stability is that of `is_stable`, the count that of `real_roots`, exact on the coefficients as stored.
+    Stability agrees with `is_stable`, the count with `real_roots`, exact for the coefficients as stored.
 
     Raises:
         ValueError: for shapes that cannot be broadcast.
@@ -57,7 +57,7 @@ def quartic_classes(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, 
 
     More: docs/how_to/charts.md
     """
-    a, shape = columns(a0, a1, a2, a3, a4)
+    a, shape = flatten_columns(a0, a1, a2, a3, a4)
     kind, count = np.empty((2, a[0].size), np.int8)
     doubtful = np.empty(a[0].size, np.bool_)
     with np.errstate(all="ignore"):
@@ -71,7 +71,7 @@ def quartic_classes(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, 
 
 @ignore_option("compiled")
 def quartic_is_stable(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike) -> NDArray[np.bool_]:
-    """Whether all roots have Re s < 0, as `is_stable` has it; arguments and errors as of `quartic_classes`.
+    """Whether all roots have Re s < 0, as in `is_stable`; arguments and errors as for `quartic_classes`.
 
     Example:
         >>> tmsopt.roots.quartic_is_stable(1, 4, 6, 4, [1, -1])
@@ -79,16 +79,16 @@ def quartic_is_stable(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike
 
     More: docs/how_to/charts.md
     """
-    a, shape = columns(a0, a1, a2, a3, a4)
-    verdict = np.empty(a[0].size, np.bool_)
+    a, shape = flatten_columns(a0, a1, a2, a3, a4)
+    stable = np.empty(a[0].size, np.bool_)
     with np.errstate(all="ignore"):
-        for block in make_blocks(verdict.size):
-            verdict[block] = signs.stable(*(c[block] for c in a))
-    return verdict.reshape(shape)
+        for block in make_blocks(stable.size):
+            stable[block] = signs.stable(*(c[block] for c in a))
+    return stable.reshape(shape)
 
 
 def count_classes(c: Array) -> tuple[Codes, Codes]:
-    """Class codes and numbers of different real roots of polynomials of any degree, exact where rounding is in doubt.
+    """Class codes and numbers of distinct real roots of polynomials of any degree, exact where rounding could matter.
 
     Args:
         c: coefficients, shape (rows, degree + 1).
@@ -100,9 +100,9 @@ def count_classes(c: Array) -> tuple[Codes, Codes]:
         negative, positive = real_roots(c)
         zero = c[:, -1] == 0
         with np.errstate(all="ignore"):
-            held = is_stable(c)
+            stable = is_stable(c)
         damped = np.where(negative == c.shape[1] - 1, CLASSES.index("heavily damped"), CLASSES.index("stable"))
         unstable = np.where((positive > 0) | zero, CLASSES.index("capsize"), CLASSES.index("weave"))
-        kind[regular] = np.where(held, damped, unstable)
+        kind[regular] = np.where(stable, damped, unstable)
         count[regular] = negative + positive + zero
     return kind, count

@@ -1,7 +1,7 @@
 """The two real quadratic factors of a quartic (s² + p1 s + q1)(s² + p2 s + q2), as elementwise formulas.
 
-They use arithmetic, `where` and NumPy functions of numbers only, so that the explorer can write them as JavaScript.
-Divisions by 0 are meant: what is not finite has no error that is accepted.
+They use only arithmetic, `where` and NumPy functions of numbers, so that the explorer can translate them to JavaScript.
+Divisions by 0 are intended: a result that is not finite has no acceptable error.
 """
 
 from typing import Any
@@ -13,11 +13,11 @@ where: Any = np.where
 Real = Any
 """An array of numbers."""
 Four = tuple[Real, Real, Real, Real]
-"""Four of them: p1, q1, p2, q2 or b1, b2, b3, b4."""
+"""Four arrays: p1, q1, p2, q2 or b1, b2, b3, b4."""
 
 
 def monic(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> Four:
-    """Coefficients b1 … b4 over the leading one; one that is not finite leaves b4 not finite."""
+    """Coefficients b1 … b4 divided by the leading one; if any is not finite, b4 is not finite."""
     return a1 / a0, a2 / a0, a3 / a0, a4 / a0 + 0.0 * a0
 
 
@@ -25,9 +25,9 @@ def start(b1: Real, b2: Real, b3: Real, b4: Real) -> Four:
     """Factors of s⁴ + b1 s³ + b2 s² + b3 s + b4 in closed form.
 
     With t = s + b1/4 the quartic is t⁴ + B t² + C t + D = (t² + u t + v)(t² − u t + w), and U = u² is the largest
-    root of U³ + 2B U² + (B² − 4D) U − C², which is never negative. A root of that cubic with a small residual gives
-    factors with a small residual, also next to an exceptional point, where the root itself is uncertain. The shift by
-    b1/4 costs digits where one root is far larger than the others.
+    root of U³ + 2B U² + (B² − 4D) U − C², which is never negative. A root of this cubic with a small residual gives
+    factors with a small residual, even near an exceptional point, where the root itself is uncertain. The shift by b1/4
+    loses digits if one root is far larger than the others.
     """
     h = 0.25 * b1
     h2 = h * h
@@ -37,7 +37,7 @@ def start(b1: Real, b2: Real, b3: Real, b4: Real) -> Four:
     B2, D4, C2 = B * B, 4.0 * D, C * C
     E = B2 - D4
     U = largest_root((B2 + 3.0 * D4) * (1 / 9), B * (B2 - 9.0 * D4) * (1 / 27) + 0.5 * C2) - B * (2 / 3)
-    # Where U is small its equation is nearly quadratic, and the difference above has few digits left.
+    # For small U the difference above has few digits left, but the cubic is nearly quadratic.
     width = np.sqrt(np.maximum(E * E + 8.0 * B * C2, 0.0))
     small = where(E < 0.0, (width - E) / (4.0 * B), where(C2 > 0.0, 2.0 * C2 / (E + width), 0.0))
     U = where(U < 2e-4 * B, small, np.maximum(U, 0.0))
@@ -49,25 +49,25 @@ def start(b1: Real, b2: Real, b3: Real, b4: Real) -> Four:
         U, residual = where(better, trial, U), where(better, left, residual)
     u = np.sqrt(U)
     sum_, difference = B + U, where(u > 0.0, C / u, np.sqrt(np.maximum(E, 0.0)))
-    v, w = ordered(0.5 * (sum_ - difference), 0.5 * (sum_ + difference), D)
-    q1, q2 = ordered(h * (h + u) + v, h * (h - u) + w, b4)
+    v, w = correct_smaller(0.5 * (sum_ - difference), 0.5 * (sum_ + difference), D)
+    q1, q2 = correct_smaller(h * (h + u) + v, h * (h - u) + w, b4)
     return 2.0 * h + u, q1, 2.0 * h - u, q2
 
 
-def ordered(first: Real, second: Real, product: Real) -> tuple[Real, Real]:
-    """Two numbers of a known product, the smaller of them taken from the product and the larger."""
-    kept = np.abs(first) > np.abs(second)
-    large = where(kept, first, second)
+def correct_smaller(first: Real, second: Real, product: Real) -> tuple[Real, Real]:
+    """Two numbers with a known product; the smaller one is recomputed from the product and the larger one."""
+    first_is_larger = np.abs(first) > np.abs(second)
+    large = where(first_is_larger, first, second)
     small = where(large == 0.0, 0.0, product / large)
-    return where(kept, large, small), where(kept, small, large)
+    return where(first_is_larger, large, small), where(first_is_larger, small, large)
 
 
 def largest_root(Q: Real, R: Real) -> Real:
-    """Largest real root of x³ − 3 Q x − 2 R, to 7 digits of the spread of the roots.
+    """Largest real root of x³ − 3 Q x − 2 R, to 7 digits relative to the spread of the roots.
 
-    With three real roots, x = 2 √Q cos(arccos(w)/3) where w = R/Q^(3/2), and the cosine is an analytic function of
-    √(1 + w) that a polynomial gives to 1e-7 (interpolation in Chebyshev points); its ½ is exact, so that a double
-    root stays one.
+    For three real roots, x = 2 √Q cos(arccos(w)/3) with w = R/Q^(3/2). The cosine is an analytic function of √(1 + w),
+    here an interpolation polynomial in Chebyshev points with an error of 1e-7. Its constant ½ is exact, so that a
+    double root stays double.
     """
     Q3 = Q * Q * Q
     S = R * R - Q3
@@ -82,10 +82,9 @@ def largest_root(Q: Real, R: Real) -> Real:
 
 
 def error(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real, q2: Real) -> Real:
-    """Backward error of factors: that of `tmsopt.roots.backward_error`, or up to twice as much.
+    """Backward error of factors, between 1 and 2 times `tmsopt.roots.backward_error`; nan if they are not finite.
 
-    The sum of |roots| of a factor is taken as max(|p|, 2 √|q|), which is it or up to √2 too small. nan for factors that
-    are not finite.
+    max(|p|, 2 √|q|) replaces the sum of |roots| of a factor; it is exact or too small by a factor of at most √2.
     """
     Q1, Q2 = np.abs(q1), np.abs(q2)
     P1, P2 = np.maximum(np.abs(p1), 2.0 * np.sqrt(Q1)), np.maximum(np.abs(p2), 2.0 * np.sqrt(Q2))
@@ -99,10 +98,10 @@ def error(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real, 
 
 
 def newton(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real, q2: Real) -> Four:
-    """One step of Newton's method on both factors at once; not finite where they share both roots.
+    """One step of Newton's method on both factors; not finite if they share both roots.
 
-    The residual r is taken modulo each factor, and the changes solve δf1 f2 ≡ r mod f1 and δf2 f1 ≡ r mod f2: each
-    factor sees the residual in its own unit, so the roots of one may be far from those of the other.
+    The changes solve δf1 f2 ≡ r mod f1 and δf2 f1 ≡ r mod f2 with the residual r. Each factor has its own unit, so that
+    the roots of the two may be of very different size.
     """
     r1, r2, r3, r4 = b1 - (p1 + p2), b2 - (q1 + q2 + p1 * p2), b3 - (p1 * q2 + p2 * q1), b4 - q1 * q2
     u, v = p2 - p1, q2 - q1
@@ -121,19 +120,19 @@ def abscissa(p: Real, q: Real) -> Real:
     """Largest real part of the roots of s² + p s + q, without cancellation."""
     half = -0.5 * p
     square = half * half - q
-    width = where(q == 0.0, np.abs(half), np.sqrt(np.maximum(square, 0.0)))  # the square of a tiny half may be 0
+    width = where(q == 0.0, np.abs(half), np.sqrt(np.maximum(square, 0.0)))  # the square of a tiny half may underflow
     low = half - width
     return where(half > 0.0, half + width, where((width > 0.0) & (low < 0.0), q / low, half))
 
 
 def damping_ratio(p: Real, q: Real) -> Real:
-    """Least −Re s/|s| over the roots of s² + p s + q, where a root at 0 counts 0."""
+    """Least −Re s/|s| over the roots of s² + p s + q; a root at 0 counts as 0."""
     real = where((q < 0.0) | (p < 0.0), -1.0, where(q == 0.0, 0.0, 1.0))
     return where(0.25 * p * p < q, 0.5 * p / np.sqrt(np.abs(q)), real)
 
 
 def root_pair(p: Real, q: Real) -> Four:
-    """Real and imaginary parts of both roots of s² + p s + q, conjugates exact."""
+    """Real and imaginary parts of both roots of s² + p s + q, with exact conjugates."""
     half = -0.5 * p
     square = half * half - q
     width = np.sqrt(np.abs(square))

@@ -1,8 +1,8 @@
 """Roots of many real quartics at once, as their two real quadratic factors.
 
-Every quartic is factored in closed form and, where the factors do not give its coefficients back to 4e-15, by Newton's
-method on the factors. The few that this leaves beyond 5e-14 have roots far apart, tiny or huge, or several at 0: they
-take companion eigenvalues, in a unit near the largest root.
+Every quartic is factored in closed form. If the factors do not reproduce its coefficients to 4e-15, Newton's method
+refines them. The few quartics still beyond 5e-14 have roots of very different size, tiny or huge roots, or several at
+0; companion eigenvalues solve them, in a unit near the largest root.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,12 +17,12 @@ from tmsopt.records import Array
 from tmsopt.roots.numeric import GOOD, polish, quadratic_roots, roots
 from tmsopt.roots.quartics import factors
 
-_BLOCK = 2**14  # numbers of an array that stay in the cache between two operations
+_BLOCK = 2**14  # elements of an array that stay in the cache between two operations
 
 ACCEPTED = 5e-14
-"""Backward error above which companion eigenvalues are taken."""
+"""Backward error above which companion eigenvalues are used."""
 STEPS = 4
-"""Newton steps on the closed form, of which one nearly always does."""
+"""Most Newton steps after the closed form; one nearly always suffices."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Factors:
 
     @property
     def roots(self) -> NDArray[np.complex128]:
-        """All roots, shape (…, 4), those of a factor side by side; conjugates are exact."""
+        """All roots, shape (…, 4); the two of a factor are adjacent, conjugates exact."""
         return quadratic_roots(self.p, self.q)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Spectral abscissa max Re s and damping ratio min −Re s/|s| over the roots, a root at 0 counting 0.
+    """Spectral abscissa max Re s and damping ratio min −Re s/|s| over the roots; a root at 0 counts as 0.
 
     Attributes:
         abscissa, damping_ratio: shape (…); nan for coefficients that are not finite or a leading 0.
@@ -76,7 +76,7 @@ class Motion:
 def quartic_factors(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike) -> Factors:
     """Real quadratic factors of the quartics a0 s⁴ + … + a4, coefficients of any shapes that broadcast.
 
-    The coefficients that the factors give back have a `backward_error` of 1e-13 at most, beside exceptional points too.
+    The factors have a `backward_error` of at most 1e-13, even near exceptional points.
 
     Raises:
         ValueError: for shapes that cannot be broadcast.
@@ -88,7 +88,7 @@ def quartic_factors(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, 
 
     More: docs/explanation/factors.md
     """
-    a, shape = columns(a0, a1, a2, a3, a4)
+    a, shape = flatten_columns(a0, a1, a2, a3, a4)
     p, q = np.empty((2, a[0].size, 2))
     fallbacks = _fill((p, q), a, _split)
     return Factors(p.reshape(*shape, 2), q.reshape(*shape, 2), fallbacks)
@@ -96,7 +96,7 @@ def quartic_factors(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, 
 
 @ignore_option("compiled")
 def abscissa_and_damping(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike) -> Motion:
-    """Abscissa and damping ratio of the quartics a0 s⁴ + … + a4; arguments and errors as of `quartic_factors`.
+    """Abscissa and damping ratio of the quartics a0 s⁴ + … + a4; arguments and errors as for `quartic_factors`.
 
     Example:
         >>> motion = tmsopt.roots.abscissa_and_damping(1, 10, 35, 50, 24)  # roots -1, -2, -3, -4
@@ -105,14 +105,14 @@ def abscissa_and_damping(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayL
 
     More: docs/how_to/charts.md
     """
-    a, shape = columns(a0, a1, a2, a3, a4)
+    a, shape = flatten_columns(a0, a1, a2, a3, a4)
     alpha, ratio = np.empty((2, a[0].size))
     fallbacks = _fill((alpha, ratio), a, _measure)
     return Motion(alpha.reshape(shape), ratio.reshape(shape), fallbacks)
 
 
-def columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
-    """The coefficients as flat arrays of doubles of one size, and the shape that they broadcast to.
+def flatten_columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
+    """The coefficients as flat arrays of equal size, and the shape that they broadcast to.
 
     Raises:
         ValueError: for shapes that cannot be broadcast.
@@ -122,42 +122,49 @@ def columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
 
 
 def make_blocks(size: int) -> list[slice]:
-    """Parts of arrays that stay in the cache between two operations."""
+    """Slices of an array that stay in the cache between two operations."""
     return [slice(first, first + _BLOCK) for first in range(0, size, _BLOCK)]
 
 
 def _fill(results: Sequence[Array], a: Sequence[Array], finish: Callable[..., tuple[Array, Array]]) -> int:
-    """Fill arrays with what a function makes of factors and their unit; the number that took companion eigenvalues."""
-    left = [np.empty(0, dtype=int)]
-    with np.errstate(all="ignore"):  # a root of coefficients of very different sizes need not be a double
+    """Fill the results from the factors of quartics.
+
+    Args:
+        finish: function of the factors and their unit that gives the results.
+
+    Returns:
+        The number of quartics that needed companion eigenvalues.
+    """
+    unsolved = [np.empty(0, dtype=int)]
+    with np.errstate(all="ignore"):  # roots may exceed doubles
         for block in make_blocks(a[0].size):
             monic = factors.monic(*[c[block] for c in a])
-            found = factors.start(*monic)
-            error = factors.error(*monic, *found)
+            pq = factors.start(*monic)
+            error = factors.error(*monic, *pq)
             rows = np.flatnonzero(~(error <= GOOD))
-            some, some_error = np.stack([f[rows] for f in found]), error[rows]
-            _polish(np.stack([b[rows] for b in monic]), some, some_error)
-            for whole, part in zip(found, some, strict=True):
-                whole[rows] = part
-            for result, values in zip(results, finish(*found, 0), strict=True):
+            refined, refined_error = np.stack([x[rows] for x in pq]), error[rows]
+            _refine(np.stack([b[rows] for b in monic]), refined, refined_error)
+            for x, values in zip(pq, refined, strict=True):
+                x[rows] = values
+            for result, values in zip(results, finish(*pq, 0), strict=True):
                 result[block] = values
-            left.append(block.start + rows[~(some_error <= ACCEPTED)])
-        rows = np.concatenate(left)
+            unsolved.append(block.start + rows[~(refined_error <= ACCEPTED)])
+        rows = np.concatenate(unsolved)
         if not rows.size:
             return 0
-        last, unit, fallbacks = _factors_by_eigenvalues(np.stack([c[rows] for c in a]))
-        for result, values in zip(results, finish(*last, unit), strict=True):
+        by_eigenvalues, unit, fallbacks = _factors_by_eigenvalues(np.stack([c[rows] for c in a]))
+        for result, values in zip(results, finish(*by_eigenvalues, unit), strict=True):
             result[rows] = values
     return fallbacks
 
 
-def _polish(b: Array, found: Array, error: Array) -> None:
-    """Newton steps on the columns that need them, in place."""
+def _refine(b: Array, pq: Array, error: Array) -> None:
+    """Newton steps on the factors, in place."""
     polish(
-        found.T,
+        pq.T,
         error,
-        lambda some, rows: np.stack(factors.newton(*b[:, rows], *some.T), axis=1),
-        lambda some, rows: np.asarray(factors.error(*b[:, rows], *some.T)),
+        lambda trial, rows: np.stack(factors.newton(*b[:, rows], *trial.T), axis=1),
+        lambda trial, rows: np.asarray(factors.error(*b[:, rows], *trial.T)),
         STEPS,
     )
 
@@ -166,24 +173,24 @@ def _factors_by_eigenvalues(c: Array) -> tuple[Array, NDArray[np.int_], int]:
     """Factors p1, q1, p2, q2 of quartics with coefficients of shape (5, quartics), in units of 2^unit each.
 
     Returns:
-        The factors, nan for coefficients that are not finite or a leading 0; the units; how many have factors.
+        The factors, nan for coefficients that are not finite or a leading 0; the units; the number of other quartics.
     """
-    found, unit = np.full((4, c.shape[1]), np.nan), np.zeros(c.shape[1], dtype=int)
+    pq, unit = np.full((4, c.shape[1]), np.nan), np.zeros(c.shape[1], dtype=int)
     regular = np.flatnonzero(np.all(np.isfinite(c), axis=0) & (c[0] != 0))
     if regular.size:
-        monic, unit[regular] = _in_unit(c[:, regular])
+        monic, unit[regular] = _scale_roots(c[:, regular])
         z = roots(np.concatenate([np.ones_like(monic[:1]), monic]).T).reshape(-1, 2, 2)
         p, q = -z.sum(axis=2).real, z.prod(axis=2).real
-        found[:, regular] = p[:, 0], q[:, 0], p[:, 1], q[:, 1]
-    return found, unit, regular.size
+        pq[:, regular] = p[:, 0], q[:, 0], p[:, 1], q[:, 1]
+    return pq, unit, regular.size
 
 
-def _in_unit(c: Array) -> tuple[Array, NDArray[np.int_]]:
-    """Monic coefficients in a unit 2^m near the largest root (Fujiwara), without rounding but for the division."""
+def _scale_roots(c: Array) -> tuple[Array, NDArray[np.int_]]:
+    """Monic coefficients in a unit 2^m near the largest root (Fujiwara); only the division by the lead rounds."""
     _, exponent = np.frexp(c)
     power = np.arange(1, 5)[:, None]
-    above = np.where(c[1:] != 0, (exponent[1:] - exponent[0]) / power, -np.inf).max(axis=0)
-    unit = np.where(np.isfinite(above), np.ceil(above), 0).astype(int)
+    bound = np.where(c[1:] != 0, (exponent[1:] - exponent[0]) / power, -np.inf).max(axis=0)
+    unit = np.where(np.isfinite(bound), np.ceil(bound), 0).astype(int)
     lead = np.ldexp(c[0], -exponent[0])
     return np.ldexp(c[1:], -exponent[0] - unit * power) / lead, unit
 
@@ -194,7 +201,7 @@ def _split(p1: Array, q1: Array, p2: Array, q2: Array, unit: Any) -> tuple[Array
 
 
 def _measure(p1: Array, q1: Array, p2: Array, q2: Array, unit: Any) -> tuple[Array, Array]:
-    """Abscissa and damping ratio; nan where there are no factors."""
+    """Abscissa and damping ratio; nan if there are no factors."""
     alpha = np.maximum(factors.abscissa(p1, q1), factors.abscissa(p2, q2))
     ratio = np.minimum(factors.damping_ratio(p1, q1), factors.damping_ratio(p2, q2))
     return np.ldexp(alpha, unit), np.where(np.isnan(alpha), np.nan, ratio)

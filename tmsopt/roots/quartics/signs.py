@@ -1,4 +1,4 @@
-"""Signs that decide the class of a quartic, as elementwise formulas."""
+"""Elementwise formulas for the signs that decide the class of a quartic."""
 
 from typing import Any
 
@@ -7,9 +7,9 @@ import numpy as np
 from tmsopt.roots.quartics.factors import Real, where
 
 _BOUND = 1e-14
-"""Relative to the sum of |terms|: 45 roundings, where no term below passes through more than 32."""
+"""Rounding error relative to the sum of |terms|: 45 roundings; no term below has more than 32."""
 _LEAST, _MOST = 1e-20, 1e20
-"""Coefficients between them give no term that overflows or underflows: none is a product of more than 12."""
+"""Sizes of coefficients for which no term overflows or underflows; no term is a product of more than 12 of them."""
 
 
 def one(condition: Any) -> Any:
@@ -20,7 +20,7 @@ def one(condition: Any) -> Any:
 def stable(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> Any:
     """Whether all roots of a0 s⁴ + … + a4 have Re s < 0 (Liénard–Chipart).
 
-    In the order of operations of `is_stable`, so that both round alike; the last term keeps what overflows undecided.
+    The order of operations is that of `is_stable`, so that both round alike. Terms times 0.0 turn overflow into nan.
     """
     minor = a1 * (a2 * a3 - a4 * a1) - a3 * (a0 * a3 - a4 * 0.0) + 0.0 * (a0 * a1 - a2 * 0.0)
     up = (a0 > 0.0) & (a1 > 0.0) & (a2 > 0.0) & (a4 > 0.0) & (minor > 0.0)
@@ -29,7 +29,11 @@ def stable(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> Any:
 
 
 def chain(a: Real, b: Real, c: Real, d: Real, e: Real, minus: float) -> tuple[Real, Real, Real, Real, Real]:
-    """A, C, L, M and N of the chain of Sturm, see `classes`; of sizes and with plus for minus, the sums of |terms|."""
+    """A, C, L, M and N of Sturm's chain, see `classes`; for |coefficients| and minus = 1, the sums of |terms|.
+
+    Args:
+        minus: −1, or 1 for the sums of |terms|.
+    """
     A = 3.0 * (b * b) + minus * 8.0 * (a * c)
     B = 2.0 * (b * c) + minus * 12.0 * (a * d)
     C = b * d + minus * 16.0 * (a * e)
@@ -40,27 +44,27 @@ def chain(a: Real, b: Real, c: Real, d: Real, e: Real, minus: float) -> tuple[Re
 
 
 def classes(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> tuple[Any, Any, Any]:
-    """Class code, number of different real roots, and whether rounding leaves a sign in doubt.
+    """Class code, number of distinct real roots, and whether rounding could change a sign.
 
-    By the chain of Sturm without divisions: p, p' and, but for positive factors, −(p mod p') = A s² + B s + C,
-    L s + M and N. An error is bounded by that of the same expression in absolute values.
+    Sturm's chain without divisions is p, p′ and, up to positive factors, −(p mod p′) = A s² + B s + C, L s + M and N.
+    The same expressions in absolute values bound the errors.
     """
     sign = where(a0 < 0.0, -1.0, 1.0)
     a, b, c, d, e = sign * a0, sign * a1, sign * a2, sign * a3, sign * a4
     b_, c_, d_, e_ = np.abs(b), np.abs(c), np.abs(d), np.abs(e)
-    found = chain(a, b, c, d, e, -1.0)
-    A0, C0, L0, M0, N0, d0, e0 = (x > 0.0 for x in (*found, d, e))
+    entries = chain(a, b, c, d, e, -1.0)
+    A0, C0, L0, M0, N0, d0, e0 = (x > 0.0 for x in (*entries, d, e))
     certain = (a >= _LEAST) & (a <= _MOST) & (d_ >= _LEAST) & (d_ <= _MOST) & (e_ >= _LEAST) & (e_ <= _MOST)
     certain = certain & (b_ <= _MOST) & (c_ <= _MOST)
     certain = certain & ((b_ >= _LEAST) | (b_ == 0.0)) & ((c_ >= _LEAST) | (c_ == 0.0))
-    for x, terms in zip(found, chain(a, b_, c_, d_, e_, 1.0), strict=True):
+    for x, terms in zip(entries, chain(a, b_, c_, d_, e_, 1.0), strict=True):
         certain = certain & (np.abs(x) > _BOUND * terms)
     # Sign changes at −∞ of (+, −, A, −L, N), at 0 of (e, d, C, M, N), at ∞ of (+, +, A, L, N).
     left = 1 + one(A0) + one(A0 == L0) + one(L0 == N0)
     middle = one(e0 != d0) + one(d0 != C0) + one(C0 != M0) + one(M0 != N0)
     right = 1 - one(A0) + one(A0 != L0) + one(L0 != N0)
     negative, count = left - middle, left - right
-    held = stable(a0, a1, a2, a3, a4)
-    # with all real parts negative no real root is ≥ 0, so that the codes of stable ones need the count alone
-    kind = where(held, 3 + one(negative == 4), 2 - one(count > negative))
+    is_stable = stable(a0, a1, a2, a3, a4)
+    # A stable quartic has no real root ≥ 0, so its code needs the count only.
+    kind = where(is_stable, 3 + one(negative == 4), 2 - one(count > negative))
     return kind, count, ~certain

@@ -1,4 +1,4 @@
-"""Classes and motion of many polynomials of one degree: quartics by formulas, others by numeric roots in discs."""
+"""Classes and motion of many polynomials of one degree: quartics by closed formulas, others by numeric roots."""
 
 from collections.abc import Sequence
 
@@ -7,14 +7,14 @@ from numpy.typing import ArrayLike
 
 from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics.classes import Classes, count_classes, quartic_classes
-from tmsopt.roots.quartics.quartic import Motion, abscissa_and_damping, columns, make_blocks
+from tmsopt.roots.quartics.quartic import Motion, abscissa_and_damping, flatten_columns, make_blocks
 
 _QUARTIC = 5
-"""Coefficients of the degree that has formulas of its own."""
+"""Number of coefficients of a quartic."""
 
 
 def classify(coefficients: Sequence[ArrayLike]) -> Classes:
-    """Classes of polynomials whose coefficients, highest power first, have shapes that broadcast.
+    """Classes of polynomials; the coefficients, highest power first, have shapes that broadcast.
 
     Example:
         >>> tmsopt.roots.classify([1, [3, -3], 2]).real_roots  # (s ± 1)(s ± 2)
@@ -24,7 +24,7 @@ def classify(coefficients: Sequence[ArrayLike]) -> Classes:
     """
     if len(coefficients) == _QUARTIC:
         return quartic_classes(*coefficients)
-    a, shape = columns(*coefficients)
+    a, shape = flatten_columns(*coefficients)
     rows = np.stack(a, axis=1)
     kind, count = np.empty((2, len(rows)), np.int8)
     for block in make_blocks(len(rows)):
@@ -33,7 +33,7 @@ def classify(coefficients: Sequence[ArrayLike]) -> Classes:
 
 
 def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
-    """Spectral abscissae and damping ratios; arguments as of `classify`.
+    """Spectral abscissae and damping ratios; arguments as for `classify`.
 
     Example:
         >>> tmsopt.roots.find_motion([1, [2, 4], 5]).abscissa.round(9)  # -1 ± 2i, -2 ± i
@@ -43,12 +43,12 @@ def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
     """
     if len(coefficients) == _QUARTIC:
         return abscissa_and_damping(*coefficients)
-    a, shape = columns(*coefficients)
+    a, shape = flatten_columns(*coefficients)
     rows = np.stack(a, axis=1)
     alpha, ratio = np.full((2, len(rows)), np.nan)
     regular = np.flatnonzero(np.all(np.isfinite(rows), axis=1) & (rows[:, 0] != 0))
     for block in make_blocks(regular.size):
-        part = regular[block]
-        z = roots(rows[part])
-        alpha[part], ratio[part] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+        chosen = regular[block]
+        z = roots(rows[chosen])
+        alpha[chosen], ratio[chosen] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
     return Motion(alpha.reshape(shape), ratio.reshape(shape), regular.size)

@@ -1,4 +1,4 @@
-"""What a pattern is made of: multiple roots of one kind and order, or roots tied to the imaginary axis."""
+"""Components of patterns: multiple roots of one kind and order, or roots on the imaginary axis."""
 
 import re
 from collections import Counter
@@ -12,10 +12,10 @@ import numpy as np
 from tmsopt.roots.patterns.pattern import Roots, quadratic
 
 _PART = re.compile(r"(?P<count>[1-9]\d*)?(?P<kind>C?EP)(?P<order>[1-9]\d*)")
-_LARGEST = 12
+_LARGEST = 12  # multiplicity and count
 
 AXIS = {"weave": 2, "resonance": 4, "capsize": 1}
-"""Patterns of the imaginary axis → roots that they take."""
+"""Patterns on the imaginary axis → number of their roots."""
 
 _WORDS = {
     "weave": "a pair on the imaginary axis",
@@ -24,30 +24,30 @@ _WORDS = {
 }
 
 ENDS = {"weave": "the pair meets in a double root 0", "resonance": "both pairs meet in a 4-fold root 0"}
-"""What happens where W of s² + W reaches 0."""
+"""Pattern → event where W of s² + W reaches 0."""
 
 NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
-"""Numbers up to the highest degree, in words."""
+"""Numbers in words up to the highest degree."""
 
 
-def several(count: int, what: str) -> str:
-    """One or more things of a kind: a real root, two real roots."""
-    return f"a {what}" if count == 1 else f"{NUMBERS[count]} {what}s".replace("ys", "ies")
+def count_in_words(count: int, noun: str) -> str:
+    """A number of things in words: ``a real root``, ``two real roots``."""
+    return f"a {noun}" if count == 1 else f"{NUMBERS[count]} {noun}s".replace("ys", "ies")
 
 
-def times(order: int) -> str:
-    """A multiplicity in words."""
+def multiplicity_in_words(order: int) -> str:
+    """A multiplicity in words: ``double``, ``triple``, ``4-fold``."""
     return {2: "double", 3: "triple"}.get(order, f"{order}-fold")
 
 
 @dataclass(frozen=True)
-class Part:
-    """Multiple roots of one kind and order, or a pattern of the imaginary axis.
+class Component:
+    """Multiple roots of one kind and order, or a pattern on the imaginary axis.
 
     Attributes:
         kind: ``EP``, ``CEP``, ``weave``, ``resonance`` or ``capsize``.
         order: multiplicity of each root.
-        count: how many such roots, or pairs.
+        count: number of such roots or pairs.
     """
 
     kind: str
@@ -56,28 +56,28 @@ class Part:
 
     @property
     def name(self) -> str:
-        """As in the name of a pattern."""
+        """Name as in the name of a pattern."""
         if self.kind in AXIS:
             return self.kind
         return f"{self.count if self.count > 1 else ''}{self.kind}{self.order}"
 
     @property
     def meaning(self) -> str:
-        """In words."""
+        """Description in words."""
         if self.kind in _WORDS:
             return _WORDS[self.kind]
-        return several(self.count, f"{self.order}-fold {'real root' if self.kind == 'EP' else 'complex pair'}")
+        return count_in_words(self.count, f"{self.order}-fold {'real root' if self.kind == 'EP' else 'complex pair'}")
 
     @property
     def roots(self) -> int:
-        """How many it takes."""
+        """Number of roots."""
         if self.kind in AXIS:
             return AXIS[self.kind]
         return self.count * self.order * (2 if self.kind == "CEP" else 1)
 
     @property
-    def in_quadratics(self) -> bool:
-        """Whether s² + bs + c with a sign of b² − 4c states it: complex pairs, and two real roots that may meet."""
+    def is_quadratic(self) -> bool:
+        """Whether its factors are s² + bs + c with a sign condition on b² − 4c: complex pairs or two real roots."""
         return self.kind == "CEP" or (self.kind == "EP" and self.count == 2)
 
     @property
@@ -94,13 +94,13 @@ class Part:
                 return ("b", "c") if self.count == 2 else ("r",) * self.count
 
     def factors(self, u: Sequence[Any]) -> list[list[Any]]:
-        """Its monic factors, each as often as its multiplicity says."""
+        """Its monic factors, each repeated by its multiplicity."""
         match self.kind:
             case "capsize":
                 return [[1, 0]]
             case "weave" | "resonance":
                 return [[1, 0, u[0]]] * (AXIS[self.kind] // 2)
-        if self.in_quadratics:
+        if self.is_quadratic:
             return [[1, u[k], u[k + 1]] for k in range(0, len(u), 2)] * self.order
         return [[1, -r] for r in u] * self.order
 
@@ -108,13 +108,13 @@ class Part:
         """Expressions of the unknowns that must be ≥ 0."""
         if self.kind in ("weave", "resonance"):
             return [u[0]]
-        if not self.in_quadratics:
+        if not self.is_quadratic:
             return []
         sign = 1 if self.kind == "EP" else -1
         return [sign * (u[k] * u[k] - 4 * u[k + 1]) for k in range(0, len(u), 2)]
 
     def guesses(self, z: Roots) -> list[list[float]]:
-        """Unknowns to start from, for numeric roots."""
+        """Guesses of the unknowns for numeric roots."""
         match self.kind:
             case "capsize":
                 return [[]]
@@ -124,15 +124,15 @@ class Part:
                 return [[w] for w in _imaginary(z, 2)]
         real, pairs = _real_means(z, self.order), _pair_means(z, self.order)
         if self.kind == "CEP":
-            return [[x for pair in chosen for x in pair] for chosen in combinations(pairs, self.count)]
+            return [[x for pair in choice for x in pair] for choice in combinations(pairs, self.count)]
         if self.count != 2:
-            return [list(chosen) for chosen in combinations(real, self.count)]
+            return [list(choice) for choice in combinations(real, self.count)]
         return [quadratic(np.array([r, t], dtype=complex)) for r, t in combinations(real, 2)] + pairs
 
 
-def parts_of(name: str) -> tuple[Part, ...]:
-    """The parts of a name, each kind and order once, real roots first and the highest multiplicity first."""
-    counted: Counter[tuple[str, int]] = Counter()
+def parse_components(name: str) -> tuple[Component, ...]:
+    """Components of a pattern's name, each kind and order once; real roots and the highest multiplicity come first."""
+    counts: Counter[tuple[str, int]] = Counter()
     axis = []
     for part in name.split("+"):
         match = _PART.fullmatch(part)
@@ -141,43 +141,38 @@ def parts_of(name: str) -> tuple[Part, ...]:
         elif match is None or not 2 <= int(match["order"]) <= _LARGEST or int(match["count"] or 1) > _LARGEST:
             raise ValueError(f"'{name}' is no pattern")
         else:
-            counted[match["kind"], int(match["order"])] += int(match["count"] or 1)
+            counts[match["kind"], int(match["order"])] += int(match["count"] or 1)
     if len(axis) > len(set(axis)):
         raise ValueError(f"'{name}' names {axis[0]} twice")
-    ordered = sorted(counted.items(), key=lambda item: (item[0][0] != "EP", -item[0][1]))
-    return (*(Part(kind, order, count) for (kind, order), count in ordered), *(Part(a, 1, 1) for a in axis))
+    ordered = sorted(counts.items(), key=lambda item: (item[0][0] != "EP", -item[0][1]))
+    return (*(Component(kind, order, count) for (kind, order), count in ordered), *(Component(a, 1, 1) for a in axis))
 
 
 def _real_means(z: Roots, order: int) -> list[float]:
-    """Mean real parts of `order` roots near each other, about each root, closed under conjugation where that can be."""
-    found = []
-    for anchor in z.real:
-        nearest = z[np.argsort(np.abs(z - anchor), kind="stable")[:order]]
-        found.append(float(nearest.real.mean()))
-    return _apart(sorted(found), z)
+    """For each root, the mean real part of the `order` roots nearest to its real part."""
+    nearest = (z[np.argsort(np.abs(z - x), kind="stable")[:order]] for x in z.real)
+    return _remove_repetitions(sorted(float(roots.real.mean()) for roots in nearest), z)
 
 
 def _pair_means(z: Roots, order: int) -> list[list[float]]:
-    """b and c of s² + bs + c for the mean of `order` roots near each other in the upper half-plane."""
+    """For each root in the upper half-plane, b and c of s² + bs + c for the mean of the `order` roots nearest to it."""
     upper = z[z.imag >= 0]
-    found: list[list[float]] = []
-    for anchor in upper:
-        nearest = upper[np.argsort(np.abs(upper - anchor), kind="stable")[:order]]
-        mean = nearest.mean()
+    pairs: list[list[float]] = []
+    for root in upper:
+        mean = upper[np.argsort(np.abs(upper - root), kind="stable")[:order]].mean()
         pair = [float(-2 * mean.real), float(abs(mean) ** 2)]
-        if pair not in found:
-            found.append(pair)
-    return found
+        if pair not in pairs:
+            pairs.append(pair)
+    return pairs
 
 
 def _imaginary(z: Roots, order: int) -> list[float]:
     """W of s² + W for pairs, the nearest to the imaginary axis first."""
-    means = _pair_means(z[np.argsort(np.abs(z.real), kind="stable")], order)
-    return [c for _, c in means]
+    return [c for _, c in _pair_means(z[np.argsort(np.abs(z.real), kind="stable")], order)]
 
 
-def _apart(values: list[float], z: Roots) -> list[float]:
-    """Without repetitions; twice the only one, for two roots that meet."""
-    near = 1e-12 * float(np.abs(z).max())
-    kept = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > near]
-    return kept if len(kept) > 1 else kept * 2
+def _remove_repetitions(values: list[float], z: Roots) -> list[float]:
+    """The distinct values; a single one is returned twice, for two roots that coincide."""
+    tolerance = 1e-12 * float(np.abs(z).max())
+    distinct = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > tolerance]
+    return distinct if len(distinct) > 1 else distinct * 2

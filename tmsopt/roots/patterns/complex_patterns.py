@@ -1,0 +1,94 @@
+"""Patterns and structures of a complex matrix H, converted to and from the real system of twice the size.
+
+Each eigenvalue of H is a complex pair of roots of the real system, so that an EPn of H is a CEPn there. This holds as
+long as no root meets the conjugate of another root, which the carrier frequency of H ensures.
+"""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+from tmsopt.roots.patterns.components import count_in_words, multiplicity_in_words, parse_components
+from tmsopt.roots.patterns.composed import pattern
+from tmsopt.roots.patterns.descriptions import join_in_words, select_in_words
+from tmsopt.roots.patterns.pattern import Pattern
+
+_MEANING = {"weave": "a real eigenfrequency", "resonance": "a real double eigenfrequency"}
+_REAL = "is a pattern of a real system"
+
+
+def complex_pattern_names(size: int) -> tuple[str, ...]:
+    """Names of the patterns of a matrix of a size that are not composed of others."""
+    two = [f"2EP{k}" for k in range(size // 2, 1, -1)]
+    return (*(f"EP{k}" for k in range(size, 1, -1)), *two, "weave", *(["resonance"] if size > 1 else []))
+
+
+@cache
+def complex_pattern(name: str, size: int) -> Pattern:
+    """The pattern with a name such as ``EP3`` or ``EP2+EP2``, for the eigenvalues of complex matrices of a size.
+
+    Its factors are factors of the real polynomial of twice the degree, with the name `Pattern.form`, such as ``CEP3``.
+
+    Raises:
+        ValueError: for an unknown name, or a pattern with more eigenvalues than the matrix has.
+    """
+    compact = "".join(name.split())
+    components = parse_components(compact)
+    for component in components:
+        if component.kind == "CEP":
+            raise ValueError(f"'{name}' {_REAL}; for a complex H write EP{component.order}")
+        if component.kind == "capsize":
+            raise ValueError(f"'{name}' {_REAL}; for a complex H write weave, a real eigenfrequency")
+    count = sum(c.roots for c in components if c.kind == "EP")
+    if count > size:
+        raise ValueError(f"'{name}' takes {count} eigenfrequencies, and H has {size}")
+    real = pattern(compact.replace("EP", "CEP"), 2 * size)
+    words = (_describe(c.kind, c.order, c.count) for c in components)
+    return replace(real, name=complex_name(real.name), meaning=" and ".join(words), marks={}, doubles=real.name)
+
+
+def _describe(kind: str, order: int, count: int) -> str:
+    return count_in_words(count, f"{multiplicity_in_words(order)} eigenfrequency") if kind == "EP" else _MEANING[kind]
+
+
+def complex_name(name: str) -> str:
+    """Name for H of a pattern or structure of the real system: ``EP2+two singles`` for ``CEP2+two pairs``."""
+    return re.sub(r"\bpair", "single", name.replace("CEP", "EP"))
+
+
+def as_complex_pattern(real: Pattern) -> Pattern:
+    """A pattern of the real system as a pattern of H."""
+    words = real.meaning.replace(" on one vertical line", " with one decay rate")
+    words = words.replace("complex double", "double complex")
+    words = re.sub(r"(complex )?pair(s?)", lambda m: "eigenfrequencies" if m[2] else "eigenfrequency", words)
+    return replace(real, name=complex_name(real.name), meaning=words, marks={}, doubles=real.form)
+
+
+def real_form_name(name: str) -> str:
+    """Name for the real system of a pattern or structure of H, the inverse of `complex_name`."""
+    return re.sub(r"\bsingle", "pair", name.replace("EP", "CEP"))
+
+
+def describe_complex_structure(structure: str, size: int, gain: bool = False) -> str:
+    """A structure of eigenfrequencies of H in words; an unknown structure is returned unchanged.
+
+    Args:
+        gain: whether these eigenfrequencies have the most gain, instead of the least damping.
+    """
+    if structure == "undecided":
+        return "double precision cannot tell which eigenfrequencies meet (undecided)"
+    if structure == "single":
+        return f"one eigenfrequency {'has the most gain' if gain else 'is least damped'} (single)"
+    if match := re.fullmatch(r"EP(\d+)", structure):
+        order = int(match[1])
+        most = " of most gain" if gain and order != size else ""
+        which = select_in_words(order, size, "" if gain else "least damped")
+        return f"{which} eigenfrequencies{most} meet in one ({structure})"
+    each = join_in_words([_describe_part(part) for part in structure.split("+")])
+    return f"{each} have one {'gain' if gain else 'decay rate'} ({structure})"
+
+
+def _describe_part(part: str) -> str:
+    if match := re.fullmatch(r"EP(\d+)", part):
+        return _describe("EP", int(match[1]), 1)
+    return "a simple eigenfrequency" if part == "single" else part.replace("singles", "simple eigenfrequencies")
