@@ -55,7 +55,7 @@ def test_a_limit_that_a_needle_meets_is_not_out_of_reach():
 
 def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish():
     """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
-    reach, options = import_module("tmsopt.search.remedies.infeasible")._search_limits, tmsopt.Options()
+    reach, options = import_module("tmsopt.search.remedies.conflict").search_limits, tmsopt.Options()
     found, told = reach(FAST.posed, options, ["far"])
     assert told
     shifted = [Fraction(float(c)) for c in FAST.posed.values(found).coefficients]

@@ -7,7 +7,7 @@ from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import design_of
 from tmsopt.program.ipopt import polisher
-from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, same_objective
+from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, clip_to_box, same_objective
 
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 
@@ -39,8 +39,7 @@ def check_end(state: SearchState, end: LocalEnd) -> CheckedEnd:
 
 def recheck_inside_box(state: SearchState, trial: CheckedEnd) -> CheckedEnd:
     """Clip an end to the box and recheck it, so that no stage or rescue can make it look better than it is."""
-    inside = {n: min(max(trial.parameters[n], low), high) for n, (low, high) in state.part.free.items()}
-    parameters = state.problem.ordered(inside)
+    parameters = state.problem.ordered(clip_to_box(state.part, trial.parameters))
     return replace(trial, parameters=parameters, checked=recheck(state.problem, parameters, trial.end.nlp.cases))
 
 

@@ -65,14 +65,6 @@ class Outcome:
     without_best: bool = False
 
 
-def assess_fixed(problem: Posed, cases: Sequence[Case]) -> Outcome:
-    """The outcome of a problem without free parameters."""
-    parameters = problem.ordered({})
-    checked = recheck(problem, parameters, cases)
-    status = "infeasible" if checked.violations else "optimal"
-    return Outcome(parameters, checked, status, {}, Starts(), "none", tuple(cases))
-
-
 def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None = None) -> Outcome | None:
     """The best design of a search with its status, in the given cases or those of its program; None if infeasible."""
     if state.best is None:
@@ -85,9 +77,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
         return None
     notes = _find_doubts(problem, trial, checked)
     optimal = has_converged(trial) and not notes
-    if not (optimal or notes or checked.violations) and bounded(
-        problem
-    ):  # on a plateau no gradient shows that it is optimal
+    if not (optimal or notes or checked.violations) and bounded(problem):  # no gradient shows it on a plateau
         optimal = instant_bound(problem, checked.objective).proven
     status = "optimal" if optimal and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
@@ -119,12 +109,16 @@ def _find_doubts(problem: Posed, trial: CheckedEnd, checked: Evaluation) -> tupl
     return (f"the solver's objective {claimed:.9g} differs from the design's, {checked.objective:.9g}",)
 
 
-def assess_design(problem: Posed, design: Mapping[str, float], note: str = "") -> Outcome:
-    """Recheck a design not known to be optimal: ``not_converged``, or ``infeasible`` if it violates a limit."""
+def assess_design(problem: Posed, design: Mapping[str, float], note: str = "", fixed: bool = False) -> Outcome:
+    """Recheck a design that no search ended at: ``infeasible`` if it violates a limit, else ``not_converged``.
+
+    Args:
+        fixed: whether nothing is free, which makes it ``optimal`` instead.
+    """
     parameters = problem.ordered(design)
-    cases = find_cases(problem, parameters)
+    cases = merge_cases(problem, worst_cases(problem, parameters) if problem.cases else {})
     checked = recheck(problem, parameters, cases)
-    status = "infeasible" if checked.violations else "not_converged"
+    status = "infeasible" if checked.violations else "optimal" if fixed else "not_converged"
     return Outcome(parameters, checked, status, {}, Starts(), "none", cases, notes=(note,) if note else ())
 
 
@@ -173,8 +167,7 @@ def _find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, flo
     """Gain of the objective per unit by which each active constraint or bound is relaxed.
 
     For an equality constraint: the change of the objective per unit added to its right-hand side. For a constraint that
-        holds
-    in several cases: the gain of relaxing it in all of them.
+    holds in several cases: the gain of relaxing it in all of them.
     """
     active: dict[str, float] = {}
     if problem.objective is None:
@@ -289,11 +282,6 @@ def _is_a0_limited(problem: Posed, outcome: Outcome) -> bool:
             moving.add(name)
     # A quantity may depend on every parameter.
     return not moving or bool(limited & moving or limited - set(problem.free))
-
-
-def find_cases(problem: Posed, parameters: Mapping[str, float]) -> tuple[Case, ...]:
-    """The listed cases of a design and the worst ones between them."""
-    return merge_cases(problem, worst_cases(problem, parameters) if problem.cases else {})
 
 
 def merge_cases(problem: Posed, worst: Mapping[str, Worst]) -> tuple[Case, ...]:

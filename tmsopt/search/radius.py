@@ -43,7 +43,7 @@ def climb(state: SearchState, start: Start) -> LocalEnd:
         claimed, around = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.around
         if around is not None and around.radius >= claimed * (1 - state.tuning.exact_radius):
             return end
-        design = {n: trial.parameters[n] for n in problem.free}
+        design = trial.parameters
         points = [_move_point(case, k, trial) for k, case in enumerate(nlp.cases, start=1) if case.edge]
     return replace(end, feasible=False)
 

@@ -144,8 +144,7 @@ def move_aside(state: SearchState, policy: Policy) -> SearchState:
     problem, lost = state.problem, state.tuning.lost
     for end in select_distinct_ends(state.ends)[: state.tuning.asides]:
         whole = check_end(state, end)
-        own = {n: whole.parameters[n] for n in problem.free}
-        for design in (own, *_propose_near_designs(state, own, end.objective)):
+        for design in (whole.parameters, *_propose_near_designs(state, whole.parameters, end.objective)):
             checked = state.recheck(design)
             moved = replace(whole, parameters=problem.ordered(design), checked=checked)
             if checked.violations or not claim_matches(problem, moved):
@@ -225,7 +224,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     rivals = (find_rivals(state) or state.sample.refined).join(find_singular_rivals(state))
     few = np.unique([*range(len(rivals))][: tuning.open] + [*range(len(rivals))][-tuning.open :])
     starts = [Start(design) for design in box.designs(rivals.take(few))]
-    starts += [Start({n: best.parameters[n] for n in state.problem.free})] if best else []
+    starts += [Start(best.parameters)] if best else []
     starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.open))]
     at_zero = best is not None and abs(compute_relative_a0(state, best.parameters)) < tuning.singular
     least = compute_threshold(state, -tuning.lost if at_zero else tuning.finer)
@@ -248,7 +247,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             if best is not None and near and singular and reached.objective < compute_threshold(state):
                 advice = write_mass_advice(state.problem)
                 words = f"a better design may be close to a singular mass matrix (a0 = 0); {advice}"
-                state = replace(state, fallback=Fallback({n: best.parameters[n] for n in state.problem.free}, words))
+                state = replace(state, fallback=Fallback(best.parameters, words))
             continue
         if not state.problem.sign * own.best.checked.objective < least:
             continue
@@ -257,8 +256,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
         if singular:
             goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * reached.objective:.9g}"
             words = f"no best design: it improves {goal}; {write_mass_advice(state.problem)}"
-            design = {n: own.best.parameters[n] for n in state.problem.free}
-            state = replace(state, fallback=Fallback(design, words, without_best=True))
+            state = replace(state, fallback=Fallback(own.best.parameters, words, without_best=True))
     return state
 
 

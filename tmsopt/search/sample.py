@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product, zip_longest
+from itertools import product
 from zlib import crc32
 
 import numpy as np
@@ -241,12 +241,6 @@ class Sample:
     def rank(self) -> tuple[float, float]:
         """Violation and objective of the best design."""
         return float(self.refined.violation[0]), float(self.refined.objective[0])
-
-    def starts(self) -> Iterator[tuple[int, bool]]:
-        """Rows of the leaders to start from, refined and bold in turn, and whether each is refined."""
-        count = len(self.refined)
-        for pair in zip_longest(range(count), range(count, len(self.leaders))):
-            yield from ((row, row < count) for row in pair if row is not None)
 
     @property
     def far_off(self) -> bool:

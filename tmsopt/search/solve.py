@@ -32,13 +32,11 @@ from tmsopt.search.outcome import (
     UNCLEAR,
     Outcome,
     assess_design,
-    assess_fixed,
-    find_cases,
     is_better_outcome,
     write_mass_advice,
 )
 from tmsopt.search.policy import Policy, check_policy
-from tmsopt.search.remedies.infeasible import explain_infeasible, solve_again
+from tmsopt.search.remedies.infeasible import explain_infeasible
 from tmsopt.search.remedies.required_speed import add_required_speed
 from tmsopt.search.search import POLICY, search_part
 from tmsopt.search.state import SearchState, begin_search, check_near, same_objective
@@ -114,8 +112,7 @@ def solve_any_status(
     problem = as_solvable(design)
     began = time.perf_counter()
     if not problem.free:
-        outcome = assess_fixed(problem, find_cases(problem, problem.ordered({})))
-        return add_cover(_assemble(problem, outcome, (), {}, began, bound))
+        return add_cover(_assemble(problem, assess_design(problem, {}, fixed=True), (), {}, began, bound))
     if options.near:
         check_near(problem, options.near)
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
@@ -145,8 +142,7 @@ def solve_any_status(
         return solution
     try:
         solution = _add_stability(solution, options, began, policy)
-        solve_changed = partial(solve_again, asked=problem, thorough=True)
-        advised, missed = add_required_speed(solution, options, solve_changed)
+        advised, missed = add_required_speed(solution, options)
         words = "this design was reached from a stable design that the search for the lowest speed found"
         return _solve_near(advised, missed, words, options, policy) if missed else advised
     except KeyboardInterrupt:
@@ -193,14 +189,13 @@ def _find_best_so_far(problem: Posed, found: Sequence[SearchedPart], outcome: Ou
     Raises:
         KeyboardInterrupt: if there is none.
     """
-    designs = [outcome.parameters] if outcome else []
+    designs: list[Mapping[str, float]] = [outcome.parameters] if outcome else []
     for state, _ in found:
         designs += [state.design_at(end) for end in sorted(state.ends, key=lambda end: end.rank)[:1]]
         designs += [state.sample.box.design(state.sample.refined)] if state.sample else []
-    known = [assess_design(problem, {n: design[n] for n in problem.free}) for design in designs]
-    if not known:
+    if not designs:
         raise KeyboardInterrupt
-    best = min(known, key=partial(_rank, problem))
+    best = min((assess_design(problem, design) for design in designs), key=partial(_rank, problem))
     ends = [end for state, _ in found for end in state.ends]
     many = f"{len(ends)} start{'' if len(ends) == 1 else 's'} of the solver"
     words = f"the user stopped the search after {many}; this is the best design so far"
@@ -212,8 +207,8 @@ def _find_best_so_far(problem: Posed, found: Sequence[SearchedPart], outcome: Ou
 def _rank(problem: Posed, outcome: Outcome) -> tuple[float, float]:
     """Sort key of designs, the best first: by violation, then by objective."""
     value = problem.sign * outcome.checked.objective
-    worth = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
-    return sum(outcome.checked.violations.values()), worth
+    objective = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
+    return sum(outcome.checked.violations.values()), objective
 
 
 def _add_stability(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -33,7 +34,11 @@ def propose_starts(state: SearchState) -> Iterator[Start]:
 
 def propose_sample_starts(sample: Sample) -> Iterator[Start]:
     """Refined and bold designs of a sample in turn."""
-    return (Start(sample.box.design(sample.leaders, row), near, row) for row, near in sample.starts())
+    count = len(sample.refined)
+    for pair in zip_longest(range(count), range(count, len(sample.leaders))):
+        for row in pair:
+            if row is not None:
+                yield Start(sample.box.design(sample.leaders, row), row < count, row)
 
 
 def is_led(state: SearchState, start: Start) -> bool:

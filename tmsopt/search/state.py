@@ -204,9 +204,7 @@ class SearchState:
         """The best objective so far, in words."""
         best = min((end.objective for end in self.feasible), default=math.inf)
         known = self.problem.objective is not None and math.isfinite(best)
-        return ", ".join(
-            [*([f"best {self.problem.sign * best:.6g}"] if known else []), *([self.side] if self.side else [])]
-        )
+        return ", ".join(filter(None, (f"best {self.problem.sign * best:.6g}" if known else "", self.side)))
 
     @property
     def designs(self) -> list[dict[str, float]]:
@@ -279,6 +277,11 @@ def _restrict_range(problem: Posed, name: str, ends: tuple[float, float]) -> Pos
     """The problem with a smaller range of one parameter, and with its start if that fits."""
     inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
     return problem.derive(free={**problem.free, name: ends}, start=problem.start if inside else {})
+
+
+def clip_to_box(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
+    """The free parameters of a design, moved into their ranges."""
+    return {n: min(max(design[n], low), high) for n, (low, high) in problem.free.items()}
 
 
 def same_objective(a: float, b: float, size: float = 1.0, same: float = TUNING.same) -> bool:

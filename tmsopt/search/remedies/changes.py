@@ -1,9 +1,10 @@
 """Changes of limits that make an infeasible problem feasible, written as in a file and verified by solving again."""
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from tmsopt.problem.problem import Posed
 from tmsopt.program.options import Options
 from tmsopt.records import Table
 from tmsopt.search.remedies.allowance import OutOfTime, limit_time
-from tmsopt.search.remedies.conflict import SolveAgain
+from tmsopt.search.remedies.changed_problem import solve_again
+from tmsopt.search.remedies.conflict import find_conflict, search_limits
 from tmsopt.search.remedies.relaxation import (
     Limit,
     find_holding_limits,
@@ -37,17 +39,8 @@ _FEW = 3  # starts of the relaxation that includes stability
 
 _NO_GOAL: Mapping[str, Any] = {"minimize": None, "maximize": None, "pareto": ()}
 
-FindConflict = Callable[[Posed, Relaxation, Sequence[str], Posed, Options], Relaxation]
-"""Adds to a relaxation the limits that exclude each other; see `conflict.find_conflict`."""
 
-
-def relax(
-    problem: Posed,
-    options: Options,
-    designs: Sequence[Mapping[str, float]],
-    find_conflict: FindConflict,
-    solve_again: SolveAgain,
-) -> Relaxation | None:
+def relax(problem: Posed, options: Options, designs: Sequence[Mapping[str, float]]) -> Relaxation | None:
     """The least relaxation of the constraints, or of the box too if these do not help; None if none is found.
 
     Amounts are added up relative to the limits as written; those of the box relative to its widths. If one limit alone
@@ -64,98 +57,105 @@ def relax(
             continue
         held = find_holding_limits(nlp, limits, trial) if trial and nlp else []
         likely = tuple(dict.fromkeys([*relaxation.amounts, *held]))
-        relaxation = find_conflict(problem, relaxation, likely, widen_box(problem, problem.free), options)
+        wide_box = widen_box(problem, problem.free)
+        search = partial(search_limits, original, options)
+        relaxation = find_conflict(problem, relaxation, likely, wide_box, options, search)
         if not options.alone or not relaxation.amounts:
             return relaxation
         single: dict[str, float] = {}
         if trial and nlp and len(relaxation.conflict) > 1:
             single = relax_each_alone(problem, options, relaxation.conflict, trial, nlp.cases)
         short = limit_time(options, time.process_time() - began)
-        return _add_remedies(original, short, replace(relaxation, alone=Table(single)), wide, limits, solve_again)
+        return _Changes(original, short).add_remedies(replace(relaxation, alone=Table(single)), wide, limits)
     return None
 
 
-def _add_remedies(
-    problem: Posed,
-    options: Options,
-    relaxation: Relaxation,
-    wide: Posed,
-    limits: Sequence[Limit],
-    solve_again: SolveAgain,
-) -> Relaxation:
-    """Add remedies to a relaxation while there is time; `alone` keeps the single limits that were verified.
+@dataclass(frozen=True)
+class _Changes:
+    """Changes of limits, each verified by solving the changed problem again."""
 
-    The joint change is skipped if its design is unstable although stability is needed.
-    """
-    remedies, enough = dict[Table[str], None](), dict[str, float]()
-    wanted = stability_wanted(problem)
-    stable = problem.derive(constraints=wanted, **_NO_GOAL)
-    box = wide.derive(constraints={**wide.constraints, **wanted})
-    joint = [] if recheck(stable, relaxation.parameters).violations else [relaxation.amounts]
-    choices = {tuple(each): each for each in (*joint, *({n: a} for n, a in relaxation.alone.items()))}
-    with suppress(OutOfTime):
-        for names, amounts in choices.items():
-            together = bool(joint) and names == tuple(relaxation.amounts)
-            text, design = _find_change(problem, options, amounts, solve_again)
-            if (
-                text := _shrink_change(problem, options, box, limits, text, design, amounts, solve_again)
-                if text and together
-                else text
-            ):
-                remedies[Table(text)] = None
-                enough |= {n: relaxation.alone[n] for n in text if len(text) == 1 and n in relaxation.alone}
-        if not remedies:
-            remedies |= dict.fromkeys(_relax_with_stability(problem, options, wide, solve_again))
-    return replace(relaxation, alone=Table(enough), remedies=tuple(remedies))
+    original: Posed
+    options: Options
 
+    def add_remedies(self, relaxation: Relaxation, wide: Posed, limits: Sequence[Limit]) -> Relaxation:
+        """Add remedies to a relaxation while there is time; `alone` keeps the single limits that were verified.
 
-def _shrink_change(
-    problem: Posed,
-    options: Options,
-    box: Posed,
-    limits: Sequence[Limit],
-    text: dict[str, str],
-    design: Mapping[str, float],
-    amounts: Mapping[str, float],
-    solve_again: SolveAgain,
-) -> dict[str, str]:
-    """A smaller change, if the design that the change allows shows that limits moved too far; else the same change."""
-    with suppress(OutOfTime):
-        less = find_relaxation_near(options, box, limits, design)
-        share = sum_amounts(limits, less) / sum_amounts(limits, amounts)
-        return (
-            _find_change(
-                problem, options, less, solve_again, [room for room in _MARGINS if share * room[0] < _WORTH_TRYING]
-            )[0]
-            or text
-        )
-    return text
+        The joint change is skipped if its design is unstable although stability is needed.
+        """
+        problem = self.original
+        remedies, enough = dict[Table[str], None](), dict[str, float]()
+        wanted = stability_wanted(problem)
+        stable = problem.derive(constraints=wanted, **_NO_GOAL)
+        box = wide.derive(constraints={**wide.constraints, **wanted})
+        joint = [] if recheck(stable, relaxation.parameters).violations else [relaxation.amounts]
+        choices = {tuple(each): each for each in (*joint, *({n: a} for n, a in relaxation.alone.items()))}
+        with suppress(OutOfTime):
+            for names, amounts in choices.items():
+                text, design = self.find(problem, amounts)
+                if text and joint and names == tuple(relaxation.amounts):
+                    text = self.shrink(problem, box, limits, text, design, amounts)
+                if text:
+                    remedies[Table(text)] = None
+                    enough |= {n: relaxation.alone[n] for n in text if len(text) == 1 and n in relaxation.alone}
+            if not remedies:
+                remedies |= dict.fromkeys(self.relax_with_stability(wide))
+        return replace(relaxation, alone=Table(enough), remedies=tuple(remedies))
 
+    def find(
+        self, problem: Posed, amounts: Mapping[str, float], margins: Sequence[tuple[float, int]] = _MARGINS
+    ) -> tuple[dict[str, str], Mapping[str, float]]:
+        """Limits moved by amounts, or a little further, as written in a file, and the optimum that they allow; else {}.
 
-def _find_change(
-    problem: Posed,
-    options: Options,
-    amounts: Mapping[str, float],
-    solve_again: SolveAgain,
-    rooms: Sequence[tuple[float, int]] = _MARGINS,
-) -> tuple[dict[str, str], Mapping[str, float]]:
-    """Limits moved by amounts, or a little further, as written in a file, and the optimum that they allow; else {}.
+        Changes that let unstable designs in where a limit excluded them are skipped.
+        """
+        tried = list[dict[str, str]]()
+        for factor, digits in margins if amounts and all(map(np.isfinite, amounts.values())) else ():
+            text = moved_limits(problem, {n: factor * amount for n, amount in amounts.items()}, digits)
+            with suppress(InputError):  # a bound outside the physical range
+                moved = with_limits(problem, text)
+                untried = text not in tried and not _loses_stability(problem, moved, text)
+                design = solve_again(moved, self.options, self.original) if untried else None
+                if design:
+                    return text, design
+                if design is not None:  # an unstable optimum: more room does not help
+                    break
+            tried.append(text)
+        return {}, {}
 
-    Changes that let unstable designs in where a limit excluded them are skipped.
-    """
-    tried = list[dict[str, str]]()
-    for more, digits in rooms if amounts and all(map(np.isfinite, amounts.values())) else ():
-        text = moved_limits(problem, {n: more * amount for n, amount in amounts.items()}, digits)
-        with suppress(InputError):  # a bound outside the physical range
-            moved = with_limits(problem, text)
-            untried = text not in tried and not _loses_stability(problem, moved, text)
-            design = solve_again(moved, options) if untried else None
-            if design:
-                return text, design
-            if design is not None:  # an unstable optimum: more room does not help
-                break
-        tried.append(text)
-    return {}, {}
+    def shrink(
+        self,
+        problem: Posed,
+        box: Posed,
+        limits: Sequence[Limit],
+        text: dict[str, str],
+        design: Mapping[str, float],
+        amounts: Mapping[str, float],
+    ) -> dict[str, str]:
+        """A smaller change, if the design that the change allows shows that limits moved too far; else the same."""
+        with suppress(OutOfTime):
+            less = find_relaxation_near(self.options, box, limits, design)
+            share = sum_amounts(limits, less) / sum_amounts(limits, amounts)
+            margins = [margin for margin in _MARGINS if share * margin[0] < _WORTH_TRYING]
+            return self.find(problem, less, margins)[0] or text
+        return text
+
+    def relax_with_stability(self, wide: Posed) -> tuple[Table[str], ...]:
+        """The least verified relaxation of constraints and ends of the box that makes the design stable, if any.
+
+        Args:
+            wide: the problem in the box that was relaxed already without a remedy.
+        """
+        stable = stability_wanted(self.original)
+        problem = self.original.derive(constraints={**self.original.constraints, **stable}, **_NO_GOAL)
+        *_, (box, movable) = list_stages(problem)
+        if not stable and box.free == wide.free:
+            return ()
+        limits = [limit for limit in movable if limit.name != STABLE]
+        relaxation, *_ = find_least_relaxation(problem, replace(self.options, starts=_FEW), box, limits)
+        if relaxation is None:
+            return ()
+        text, design = self.find(problem, relaxation.amounts)
+        return (Table(self.shrink(problem, box, limits, text, design, relaxation.amounts)),) if text else ()
 
 
 def _loses_stability(problem: Posed, moved: Posed, names: Collection[str]) -> bool:
@@ -166,30 +166,3 @@ def _loses_stability(problem: Posed, moved: Posed, names: Collection[str]) -> bo
 
     about = [name for name in names if name in problem.asked_of_roots]
     return any(needs_stability(problem.constraints[n]) and not needs_stability(moved.constraints[n]) for n in about)
-
-
-def _relax_with_stability(
-    problem: Posed, options: Options, wide: Posed, solve_again: SolveAgain
-) -> tuple[Table[str], ...]:
-    """The least verified relaxation of constraints and ends of the box that makes the design stable, if there is one.
-
-    Args:
-        wide: the problem in the box that was relaxed already without a remedy.
-    """
-    stable = stability_wanted(problem)
-    limits = {**problem.constraints, **stable}
-    asked = problem.derive(constraints=limits, **_NO_GOAL)
-    *_, (box, movable) = list_stages(asked)
-    if not stable and box.free == wide.free:
-        return ()
-    moved = [limit for limit in movable if limit.name != STABLE]
-    few = replace(options, starts=_FEW)
-    relaxation, *_ = find_least_relaxation(asked, few, box, moved)
-    if relaxation is None:
-        return ()
-    text, design = _find_change(asked, options, relaxation.amounts, solve_again)
-    return (
-        (Table(_shrink_change(asked, options, box, moved, text, design, relaxation.amounts, solve_again)),)
-        if text
-        else ()
-    )

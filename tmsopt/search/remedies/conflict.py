@@ -7,10 +7,11 @@ from tmsopt.evaluation.recheck import recheck
 from tmsopt.evaluation.worst_case import worst_cases
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.problem import Posed
+from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.options import Options
 from tmsopt.search.acceptance import accept_best
 from tmsopt.search.policy import try_starts
-from tmsopt.search.search import POLICY
+from tmsopt.search.search import POLICY, search_nested
 from tmsopt.search.state import CheckedEnd, SearchState, begin_search
 
 STARTS = 6
@@ -19,11 +20,8 @@ STARTS = 6
 _MOST_SEARCHES = 16  # sets of limits that are searched
 _MOST_CONFLICTS = 3  # times that a conflict is sought anew because a whole search met it
 
-SolveAgain = Callable[[Posed, Options], Mapping[str, float] | None]
-"""Solves a changed problem: its optimum, {} or None; see `infeasible.solve_again`."""
-
 SearchLimits = Callable[[Sequence[str]], tuple[Mapping[str, float] | None, bool]]
-"""A whole search for a design that meets the constraints of these names; and whether it could tell if there is none."""
+"""Searches for a design that meets the constraints of these names, and says whether it can tell; see `search_limits`."""
 
 
 def find_conflict(
@@ -32,20 +30,19 @@ def find_conflict(
     likely: Sequence[str],
     wide: Posed,
     options: Options,
-    search_limits: SearchLimits,
+    search: SearchLimits,
 ) -> Relaxation:
     """Add to a relaxation the limits that exclude each other, and whether any proper subset of them can be met.
 
-    Constraints are dropped one by one while no design meets the rest in the box: first the unlikely ones, then those on
-        the
-    roots. An end of a range takes part if moving it makes the rest feasible. A few starts decide each step; a whole
+    Constraints are dropped one by one while no design meets the rest in the box, first the unlikely ones, then those on
+    the roots. An end of a range takes part if moving it makes the rest feasible. A few starts decide each step; a whole
     search confirms the final set. If that search finds a design, everything is repeated with it.
 
     Args:
         problem: without an objective; no design of it meets all limits.
         likely: the limits that are active in a least relaxation.
         wide: the problem with the ends of its ranges as far out as they may move.
-        search_limits: searches for a design that meets the constraints of these names.
+        search: searches for a design that meets the constraints of these names.
     """
     if not relaxation.amounts:
         return relaxation
@@ -54,7 +51,7 @@ def find_conflict(
     for _ in range(_MOST_CONFLICTS):
         check.designs = designs
         kept, sure = _reduce_constraints(check, likely)
-        design, certain = search_limits(kept) if len(kept) < len(problem.constraints) else (None, True)
+        design, certain = search(kept) if len(kept) < len(problem.constraints) else (None, True)
         if design is None:
             sure = sure and certain
             break
@@ -169,3 +166,20 @@ def _is_feasible(problem: Posed, design: Mapping[str, float]) -> bool:
         return False
     between = [w.case for w in worst_cases(problem, design).values()] if problem.cases else []
     return not between or not recheck(problem, design, (*problem.cases, *between)).violations
+
+
+def search_limits(problem: Posed, options: Options, names: Sequence[str]) -> tuple[Mapping[str, float] | None, bool]:
+    """A design that meets the constraints of these names, by a whole search; and whether the search could tell."""
+    options = replace(options, progress=None, near=None)
+    kept = problem.derive(constraints={n: text for n, text in problem.constraints.items() if n in names}, pareto=())
+    if kept.objective and (RADIUS in kept.objective.names or not (kept.pattern or set(names) & {*kept.asked_of_roots})):
+        kept = kept.derive(minimize=None, maximize=None)
+    states = begin_search(kept, options)
+    about = kept.asked_of_roots or kept.pattern
+    if about and any(seen.singular for s in states if (seen := POLICY.sample(s) or s.limits_sample)):
+        return None, False
+    for state in states:
+        outcome = search_nested(state)
+        if outcome is not None and not outcome.checked.violations:
+            return outcome.parameters, True
+    return None, True

@@ -24,7 +24,7 @@ from tmsopt.search.acceptance import accept_best
 from tmsopt.search.policy import disable_stopping, try_starts
 from tmsopt.search.sample import Box, draw_box
 from tmsopt.search.search import POLICY
-from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, same_objective
+from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, clip_to_box, same_objective
 
 _ROUNDS = 12  # of adding cases, at most
 _MOST_STARTS = 8  # of a relaxation
@@ -220,12 +220,10 @@ _RELAXING = replace(POLICY, enough=_is_least)
 
 def _draw_limit_box(problem: Posed, options: Options, extended: Limit | None = None) -> Box:
     """A sample of the box for the limits alone, with a moved end of the box as the objective, if any."""
-    asked = problem.derive(locate=None)
-    if extended and extended.parameter and extended.name.endswith(".max"):
-        asked = asked.derive(minimize=extended.parameter)
-    elif extended and extended.parameter:
-        asked = asked.derive(maximize=extended.parameter)
-    return draw_box(asked, options.seed)
+    goal = {}
+    if extended and extended.parameter:
+        goal = {"minimize" if extended.name.endswith(".max") else "maximize": extended.parameter}
+    return draw_box(problem.derive(locate=None, **goal), options.seed)
 
 
 def _propose_leads(box: Box, name: str) -> list[dict[str, float]]:
@@ -285,7 +283,7 @@ def relax_each_alone(
         wide = widen_box(problem, [limit.parameter] if limit.parameter else [])
         if not (leads := _propose_leads(_draw_limit_box(wide, options, limit), limit.name)):
             continue
-        here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
+        here = clip_to_box(wide, trial.parameters)
         ended = _solve_relaxation(wide, options, _build_elastic_program(wide, cases, [limit]), [limit], [here, *leads])
         if ended is not None:
             found |= _compute_amounts(wide, [limit], ended.parameters, ended.end.nlp.cases)

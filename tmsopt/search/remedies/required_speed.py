@@ -15,7 +15,8 @@ from tmsopt.program.options import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.search.remedies.allowance import OutOfTime, limit_time
-from tmsopt.search.remedies.conflict import STARTS, SolveAgain, search_briefly
+from tmsopt.search.remedies.changed_problem import solve_again
+from tmsopt.search.remedies.conflict import STARTS, search_briefly
 from tmsopt.search.state import begin_search
 
 _FASTEST, _TIMES = 10.0, 4.0  # highest speed searched: in √(g w), or in the problem's own highest speed if that is more
@@ -23,9 +24,7 @@ _SECONDS = 0.5  # no second range is searched after this time
 _AT_END = 1e-6  # relative: a speed this close to an end of its range is at that end
 
 
-def add_required_speed(
-    solution: Solution, options: Options, solve_again: SolveAgain
-) -> tuple[Solution, Mapping[str, float] | None]:
+def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, Mapping[str, float] | None]:
     """Add the lowest or highest speed at which a design exists, if the present one violates the limits on the roots.
 
     The problem is solved again at the rounded speed that is shown. If the search meets a design inside the box that was
@@ -54,7 +53,8 @@ def add_required_speed(
             short = limit_time(options)
             with suppress(OutOfTime):
                 for shown in _list_rounded(problem.posed, name, design[name], not highest):
-                    if solve_again(_set_range(problem.posed, name, (shown, shown)), short):
+                    fixed = _set_range(problem.posed, name, (shown, shown))
+                    if solve_again(fixed, short, problem.posed, thorough=True):
                         need = Need(name, design[name], highest, ends, Table(design), shown)
                         return replace(solution, need=need), None
             return solution, None
