@@ -31,7 +31,7 @@ MOST = 1024
 """Largest number of starts."""
 
 _DEFAULTS = Options(starts=MOST)
-_FEWEST = 48
+_FEWEST = 48  # starts at least
 _MIN_HITS = 3  # of every solution before the search may end
 _SAME = 1e-7  # of the box: distance below which two designs are one solution
 _INSIDE = 1e-9  # of the box: ends this far outside are moved to its edge
@@ -113,8 +113,8 @@ class Every(Tabular):
         found = plain(self)
         for solution, proved in zip(found["solutions"], self._proved_flags(), strict=True):
             solution["proved"] = proved
-        known = self.completeness
-        return found | {"complete": self.complete, "undecided": len(known.undecided) if known else None}
+        proof = self.completeness
+        return found | {"complete": self.complete, "undecided": len(proof.undecided) if proof else None}
 
 
 @documents_options(Asked, _DEFAULTS)
@@ -171,8 +171,8 @@ def _combine_errors(solution: Solution, own: Mapping[str, float], radius: Mappin
     """Error bounds of a solution: from the proof, else from the search; at least the rounding of doubles and roots."""
     size = max((r.size for r in solution.roots), default=0.0)
     least = {n: abs(solution.parameters[n]) for n in solution.problem.free} | {"abscissa": size}
-    known = {**own, **radius, **({"abscissa": 0.0} if radius else {})}
-    return Table({n: max(known.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
+    errors = {**own, **radius, **({"abscissa": 0.0} if radius else {})}
+    return Table({n: max(errors.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
 
 
 def _search_starts(
@@ -195,7 +195,7 @@ def _search_starts(
         if done % _IPOPT_EVERY == 0:
             local = solve_from(state, Start(design, near=False))
             ends.append((find_zero(system, local.run.x) or make_zero(system, local.run.x)) if local.feasible else None)
-        met: set[int] = set()
+        reached: set[int] = set()
         doubtful = crossed = False
         for end in ends:
             point = None if end is None else _take_parameters(problem, nlp, end.x)
@@ -205,19 +205,19 @@ def _search_starts(
                 checked = recheck(problem, problem.ordered(_name_parameters(problem, point)))
                 doubtful, crossed = doubtful or not checked.violations, crossed or checked.crossing
                 continue
-            known = next((k for k, other in enumerate(found) if _is_same(point, other, width)), None)
-            if known is None:
+            row = next((k for k, other in enumerate(found) if _is_same(point, other, width)), None)
+            if row is None:
                 if recheck(problem, problem.ordered(_name_parameters(problem, point))).violations:
                     continue
-                known = len(found)
+                row = len(found)
                 found.append(point)
                 errors.append(_name_errors(problem, estimate_error(system, end.x)))
                 hits.append(0)
-            met.add(known)
-        for k in met:
+            reached.add(row)
+        for k in reached:
             hits[k] += 1
-        singular += doubtful and not met
-        crossings += crossed and not met
+        singular += doubtful and not reached
+        crossings += crossed and not reached
         done += 1
         if progress:
             progress(done, starts)
@@ -239,7 +239,10 @@ def _build_equations(problem: Posed) -> NLP:
         order = min(max(len(problem.free) + 1, 2), problem.model.degree)  # as many conditions as free parameters
         message = f"needs a pattern and no objective; write e.g. locate = 'EP{order}' instead of minimize or maximize"
         raise InputError([Fault(message, ("objective",))])
-    if counted.kind != "square" or problem.cases:
+    if problem.cases:
+        message = "scenarios and tolerances leave no isolated solutions; remove them"
+        raise InputError([Fault(message, ("parameters",))])
+    if counted.kind != "square":
         advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or drop conditions"
         free = f"{counted.free} free parameter{'' if counted.free == 1 else 's'}"
         conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"

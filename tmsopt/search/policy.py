@@ -133,6 +133,18 @@ def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most
     return state
 
 
+def run_nested(state: SearchState, starts: Iterable[Start], policy: Policy, most: int = 0) -> SearchState:
+    """Solve from these starts inside another search, and accept the best end.
+
+    Raises:
+        KeyboardInterrupt: if the user stops it, so that the outer search stops too.
+    """
+    state = try_starts(state, starts, policy, most)
+    if state.interrupted:
+        raise KeyboardInterrupt
+    return policy.accept(state)
+
+
 def search_again(
     state: SearchState, policy: Policy, starts: Iterable[Start] | None = None, nlp: NLP | None = None, most: int = 0
 ) -> SearchState:

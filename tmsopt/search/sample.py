@@ -113,13 +113,13 @@ class Box:
         """Judge points of shape (n, size)."""
         return _make_batch(u, judge(self.problem, self.space.designs(u)), self.scales, self.tuning)
 
-    def design(self, found: DesignBatch, row: int = 0) -> dict[str, float]:
+    def design(self, batch: DesignBatch, row: int = 0) -> dict[str, float]:
         """The free parameters of one design."""
-        return {n: float(x) for n, x in self.space.designs(found.u[row]).items()}
+        return {n: float(x) for n, x in self.space.designs(batch.u[row]).items()}
 
-    def designs(self, found: DesignBatch) -> Iterator[dict[str, float]]:
+    def designs(self, batch: DesignBatch) -> Iterator[dict[str, float]]:
         """The free parameters of each design."""
-        return (self.design(found, row) for row in range(len(found)))
+        return (self.design(batch, row) for row in range(len(batch)))
 
     @property
     def feasible_share(self) -> float:
@@ -186,8 +186,8 @@ class Box:
         others = replace(self, scales=np.where(ignored, 1e300, self.scales))
         drawn = _make_batch(self.draws.u, self.judged, others.scales, self.tuning)
         leaders = drawn.take_best(self.tuning.ranked).select_apart(self.tuning.leaders, self.tuning.apart)
-        found = others.refine(others.approach_limits(leaders))
-        return found.take(found.order)
+        batch = others.refine(others.approach_limits(leaders))
+        return batch.take(batch.order)
 
     @property
     def unreachable(self) -> float:
@@ -204,9 +204,9 @@ class Box:
         size = self.space.size
         ahead = np.where(u < 0.5, self.tuning.difference, -self.tuning.difference)
         moved = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * ahead[:, None]
-        found = judge(self.problem, self.space.designs(moved.reshape(-1, size)))
-        beyond = found.beyond.reshape(len(found.beyond), len(u), size + 1) / self.scales[:, None, None]
-        violated = found.equal[:, None] | (beyond[:, :, 0] > 0)
+        judged = judge(self.problem, self.space.designs(moved.reshape(-1, size)))
+        beyond = judged.beyond.reshape(len(judged.beyond), len(u), size + 1) / self.scales[:, None, None]
+        violated = judged.equal[:, None] | (beyond[:, :, 0] > 0)
         target = np.where(violated, beyond[:, :, 0], 0.0)
         with np.errstate(over="ignore", invalid="ignore"):  # limits without a value
             slopes = np.where(violated[:, :, None], (beyond[:, :, 1:] - beyond[:, :, :1]) / ahead, 0.0)
@@ -318,12 +318,12 @@ def _add_basins(box: Box, leaders: DesignBatch) -> DesignBatch:
         np.concatenate([np.full((count, 1, box.space.size), far), share * reach[: tuning.basins, None]])
         for far, share in zip((*tuning.reaches, tuning.reaches[-1]), tuning.basin_reaches, strict=True)
     ]
-    found = box.refine(start, steps, tuning.basin_local)
-    others = found.take(np.arange(count, len(found)))
-    return found.take(np.arange(count)).join(others.take_best(tuning.deepest))
+    batch = box.refine(start, steps, tuning.basin_local)
+    others = batch.take(np.arange(count, len(batch)))
+    return batch.take(np.arange(count)).join(others.take_best(tuning.deepest))
 
 
-def find_basins(found: DesignBatch, coordinates: Array, slopes: Array, tuning: Tuning = TUNING) -> tuple[Rows, Array]:
+def find_basins(batch: DesignBatch, coordinates: Array, slopes: Array, tuning: Tuning = TUNING) -> tuple[Rows, Array]:
     """Rows that are best in their cell of a grid and all neighbouring cells, the best first; and the size of a cell.
 
     A path from design to better neighbouring design ends at one of them, as in Törn's topographs.
@@ -332,14 +332,14 @@ def find_basins(found: DesignBatch, coordinates: Array, slopes: Array, tuning: T
         coordinates: of the designs, from 0 to 1, spread as evenly as the designs.
         slopes: of these in the coordinates of the cube; a cell there is smaller by this factor.
     """
-    size = found.u.shape[1]
+    size = batch.u.shape[1]
     each = min(tuning.cells, 3**size / (4 * (size + 2)))
-    count = max(int((each * len(found)) ** (1 / size)), 4)
-    rank = np.empty(len(found), dtype=int)
-    rank[found.order] = np.arange(len(found))
+    count = max(int((each * len(batch)) ** (1 / size)), 4)
+    rank = np.empty(len(batch), dtype=int)
+    rank[batch.order] = np.arange(len(batch))
     cells = np.minimum(coordinates * count, count - 1).astype(int)
     cell = np.ravel_multi_index(tuple(cells.T), (count,) * size)
-    least = np.full(count**size, len(found))
+    least = np.full(count**size, len(batch))
     np.minimum.at(least, cell, rank)
     grid = least.reshape((count,) * size)
     for axis in range(size):

@@ -132,8 +132,8 @@ def solve_any_status(
         if not options.interruptible:
             raise
         interrupted, outcome = True, _find_best_so_far(problem, found, None)
-    looked = sum(len(state.sample.box.draws) for state, _ in found if state.sample)
-    outcome = replace(outcome, starts=replace(outcome.starts, looked=looked))
+    judged = sum(len(state.sample.box.draws) for state, _ in found if state.sample)
+    outcome = replace(outcome, starts=replace(outcome.starts, looked=judged))
     notes = (*_describe_sides(problem, found, outcome), *sense_notes(problem))
     solution = _assemble(problem, outcome, notes, _list_side_values(found), began, bound)
     solution = replace(solution, interrupted=interrupted)
@@ -219,16 +219,16 @@ def _add_stability(solution: Solution, options: Options, began: float, policy: P
     from tmsopt.global_search.stability import any_stable  # slow to import, rarely needed
 
     begin(options.progress, "looking for a stable design", "s")
-    asked = any_stable(problem, options.stability, solution.parameters, options.progress)
-    if asked.design is not None:
+    answer = any_stable(problem, options.stability, solution.parameters, options.progress)
+    if answer.design is not None:
         words = "this design was reached from a stable design that branch and bound found"
-        solution = _solve_near(solution, asked.design, words, options, policy)
-    elif asked.any is False:
-        solution = replace(solution, notes=(*solution.notes, f"no stable design exists, proved {asked.proof}"))
-    if asked.failed:
-        words = f"the search for a stable design failed: {asked.failed}"
+        solution = _solve_near(solution, answer.design, words, options, policy)
+    elif answer.any is False:
+        solution = replace(solution, notes=(*solution.notes, f"no stable design exists, proved {answer.proof}"))
+    if answer.failed:
+        words = f"the search for a stable design failed: {answer.failed}"
         solution = replace(solution, notes=(*solution.notes, words))
-    return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
+    return replace(solution, stable_elsewhere=answer.any, seconds=time.perf_counter() - began)
 
 
 def _solve_near(
@@ -279,8 +279,8 @@ def _describe_sides(problem: Posed, found: Sequence[SearchedPart], best: Outcome
             return (f"both signs were searched: {state.side} is as good as {won}",)
         else:
             which = "the best" if outcome.status == "optimal" else "what was found"
-            asked = unit_at(problem, problem.minimize or problem.maximize or "", outcome.parameters)
-            sentences.append(f"{which} with {state.side} is {asked.show(outcome.checked.objective, 6)}")
+            unit = unit_at(problem, problem.minimize or problem.maximize or "", outcome.parameters)
+            sentences.append(f"{which} with {state.side} is {unit.show(outcome.checked.objective, 6)}")
     return ("; ".join(sentences),)
 
 
@@ -301,8 +301,8 @@ def _assemble(
     optimal, listed = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
     name, worst = user_structure_name(problem.model, checked.structure.name), checked.worst.applied(parameters)
     whole = polynomial_structure(problem.model, name, numbers.roots).roots
-    met = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
-    edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, met)
+    meetings = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
+    edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, meetings)
     return Solution(
         problem=problem.problem,
         status=outcome.status,
@@ -334,10 +334,10 @@ def _assemble(
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
         sides=Table(sides),
         relaxation=outcome.relaxation,
-        meetings=met,
+        meetings=meetings,
         edges=edges,
         edge_is_exact=certain,
-        multiple_as_rounded=bool(met) and not problem.free and not is_exactly_multiple(problem, worst, whole),
+        multiple_as_rounded=bool(meetings) and not problem.free and not is_exactly_multiple(problem, worst, whole),
         without_best=outcome.without_best,
         si=numbers.si,
     )

@@ -9,9 +9,8 @@ from tmsopt.problem.dependence import stability_wanted
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.program.options import Options
-from tmsopt.search.acceptance import accept_best
 from tmsopt.search.outcome import Outcome, assess_best, has_runaway_root, is_better_outcome
-from tmsopt.search.policy import try_starts
+from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
 from tmsopt.search.state import SearchState, begin_search
 from tmsopt.search.stopping import count_starts
@@ -50,19 +49,15 @@ def _require_stability(problem: Posed, original: Posed) -> Posed:
 def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Outcome | None:
     """The outcome of a few starts if it settles the question: a stable design, or one least abscissa for all starts."""
     state = replace(state, sample=POLICY.sample(state))
-    state = accept_best(try_starts(state, POLICY.starts(state), POLICY, _FEW_STARTS))
+    state = run_nested(state, POLICY.starts(state), POLICY, _FEW_STARTS)
     outcome = assess_best(state, Starts())
-    if state.interrupted:
-        raise KeyboardInterrupt
-    one = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
-    if (
-        outcome is None
-        or outcome.status != "optimal"
-        or has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
-    ):
+    if outcome is None or outcome.status != "optimal":
         return None
-    agreed = not thorough and bounded(state.part) and one
-    return outcome if agreed or _is_met(stable, outcome) else None
+    if has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway):
+        return None
+    agreed = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
+    settled = agreed and not thorough and bounded(state.part)
+    return outcome if settled or _is_met(stable, outcome) else None
 
 
 def _is_met(problem: Posed, outcome: Outcome) -> bool:

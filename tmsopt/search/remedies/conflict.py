@@ -9,8 +9,7 @@ from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.options import Options
-from tmsopt.search.acceptance import accept_best
-from tmsopt.search.policy import try_starts
+from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
 from tmsopt.search.state import CheckedEnd, SearchState, begin_search
 
@@ -21,7 +20,7 @@ _MOST_SEARCHES = 16  # sets of limits that are searched
 _MOST_CONFLICTS = 3  # times that a conflict is sought anew because a whole search met it
 
 SearchLimits = Callable[[Sequence[str]], tuple[Mapping[str, float] | None, bool]]
-"""Searches for a design that meets the constraints of these names, and says whether it can tell; see `search_limits`."""
+"""Searches for a design that meets the constraints of these names; also whether it can tell. See `search_limits`."""
 
 
 def find_conflict(
@@ -149,10 +148,7 @@ def search_briefly(state: SearchState) -> CheckedEnd | None:
     state = replace(state, sample=state.sample or POLICY.sample(state))
     if state.out_of_reach:
         return None
-    state = try_starts(state, POLICY.starts(state), POLICY, STARTS)
-    if state.interrupted:
-        raise KeyboardInterrupt
-    return accept_best(state).best
+    return run_nested(state, POLICY.starts(state), POLICY, STARTS).best
 
 
 def _is_inside(problem: Posed, design: Mapping[str, float]) -> bool:

@@ -20,8 +20,7 @@ from tmsopt.program.formulate import formulate
 from tmsopt.program.nlp import NLP, AddedVariable, name_of
 from tmsopt.program.options import Options
 from tmsopt.records import Table
-from tmsopt.search.acceptance import accept_best
-from tmsopt.search.policy import disable_stopping, try_starts
+from tmsopt.search.policy import disable_stopping, run_nested
 from tmsopt.search.sample import Box, draw_box
 from tmsopt.search.search import POLICY
 from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, clip_to_box, same_objective
@@ -69,17 +68,14 @@ def find_least_relaxation(
     designs: Sequence[Mapping[str, float]] = (),
 ) -> tuple[Relaxation, CheckedEnd | None, NLP | None] | tuple[None, None, None]:
     """The least relaxation in a box, with its end and program; without these for a known design."""
-    listed = problem.cases
     sides = begin_search(wide, options)
-    ended = [_find_least_in_cases(side, limits, listed) for side in sides]
-    reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
-    trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
-    met = (
-        []
-        if listed
-        else [found for side in sides for found in islice(_list_known_relaxations(side, limits, designs), 1)]
-    )
-    least, known = min(met, key=lambda found: found[0], default=(np.inf, None))
+    results = [_find_least_in_cases(side, limits, problem.cases) for side in sides]
+    feasible = [(trial, nlp) for trial, nlp in results if trial is not None]
+    trial, nlp = min(feasible, key=lambda found: found[0].point.objective, default=(None, None))
+    candidates: list[tuple[float, Relaxation]] = []
+    for side in sides if not problem.cases else ():
+        candidates += islice(_list_known_relaxations(side, limits, designs), 1)
+    least, known = min(candidates, key=lambda found: found[0], default=(np.inf, None))
     amounts = _compute_amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
     if known and (trial is None or least < sum_amounts(limits, amounts) * (1 - _TIE)):
         return known, None, None
@@ -198,13 +194,10 @@ def _solve_relaxation(
     state = SearchState(_drop_limits(problem, limits), problem, nlp, options)
     if designs is None:
         state = replace(state, sample=POLICY.sample(state))
-        state = try_starts(state, POLICY.starts(state), _RELAXING, min(_MOST_STARTS, options.starts))
+        state = run_nested(state, POLICY.starts(state), _RELAXING, min(_MOST_STARTS, options.starts))
     else:
-        state = try_starts(state, map(Start, designs), disable_stopping(_RELAXING))
-    if state.interrupted:
-        raise KeyboardInterrupt
-    trial = accept_best(state).best
-    return trial if trial is not None and not trial.checked.violations else None
+        state = run_nested(state, map(Start, designs), disable_stopping(_RELAXING))
+    return state.best if state.best is not None and not state.best.checked.violations else None
 
 
 def _is_least(state: SearchState) -> bool:
@@ -284,9 +277,9 @@ def relax_each_alone(
         if not (leads := _propose_leads(_draw_limit_box(wide, options, limit), limit.name)):
             continue
         here = clip_to_box(wide, trial.parameters)
-        ended = _solve_relaxation(wide, options, _build_elastic_program(wide, cases, [limit]), [limit], [here, *leads])
-        if ended is not None:
-            found |= _compute_amounts(wide, [limit], ended.parameters, ended.end.nlp.cases)
+        end = _solve_relaxation(wide, options, _build_elastic_program(wide, cases, [limit]), [limit], [here, *leads])
+        if end is not None:
+            found |= _compute_amounts(wide, [limit], end.parameters, end.end.nlp.cases)
     return found
 
 
