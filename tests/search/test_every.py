@@ -135,8 +135,8 @@ def test_of_seven_roots():
 @pytest.mark.parametrize(
     ("problem", "said"),
     [
-        (oscillators(0.3, 1.2, locate=None, minimize="abscissa"), "all solutions are those of a pattern"),
-        (oscillators(0.3, 1.2, minimize="c1"), "all solutions are those of a pattern"),
+        (oscillators(0.3, 1.2, locate=None, minimize="abscissa"), "needs a pattern and no objective"),
+        (oscillators(0.3, 1.2, minimize="c1"), "needs a pattern and no objective"),
         (
             oscillators(0.3, 1.2, locate="EP2"),
             "2 free parameters and 1 condition .*; free fewer",

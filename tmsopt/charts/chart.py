@@ -85,7 +85,7 @@ class Chart(Printable):
     real_roots = _layer_property("real_roots", "Number of distinct real roots, from the coefficients.")
     satisfied = _layer_property("satisfied", "Whether every inequality constraint of the problem holds.")
     margin = _layer_property(
-        "margin", "Least margin of the inequality constraints, negative if one is violated; nan if undefined."
+        "margin", "Least distance of the sides of an inequality, negative if one is violated; nan if undefined."
     )
 
     @property

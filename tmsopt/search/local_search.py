@@ -50,7 +50,7 @@ def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
 
 
 def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
-    """The end, or that of a run with other settings if the start was better than the end."""
+    """The end, or the end of a run with other settings if the start was better."""
     if state.sample is None or not best.feasible:
         return best
     box, leaders, known = state.sample.box, state.sample.leaders, start.row >= 0

@@ -1,4 +1,4 @@
-"""Rescues: extra stages where the loop alone ends at a wrong design or at none; each improves a benchmark.
+"""Rescues: extra stages for problems on which the loop alone ends at a wrong design or at none.
 
 Each one starts from other designs or on another program, and returns to the same loop.
 """

@@ -345,7 +345,9 @@ def _assemble(
 
 def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str], optimal: bool) -> tuple[str, ...]:
     if "coefficients" in checked.violations:
-        return ("a coefficient has no value at this design; exclude by constraints what has no value, such as 1/0",)
+        return (
+            "a coefficient has no value at this design; exclude division by 0 or roots of negatives by a constraint",
+        )
     if "a0" in checked.violations:
         return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {write_mass_advice(problem)}",)
     asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
