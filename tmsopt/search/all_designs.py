@@ -7,7 +7,6 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tmsopt.algebra.balls import Number
 from tmsopt.errors import Fault, InputError, is_number, short
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.global_search.complete import SECONDS, Completeness, completeness
@@ -25,7 +24,7 @@ from tmsopt.records import Array, Table, Tabular, plain
 from tmsopt.search.local_search import solve_from
 from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
 from tmsopt.search.solve import solve_any_status
-from tmsopt.search.state import SearchState, Start
+from tmsopt.search.state import SearchState, Start, clip_to_box
 
 MOST = 1024
 """Largest number of starts."""
@@ -145,19 +144,20 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
     """
     problem = pose(problem)
     if not is_number(seconds):
-        raise InputError([Fault(f"found {short(seconds)}; accepted: seconds, 0 or more", ("seconds",))])
+        raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
     nlp = _build_equations(problem)
     state = SearchState(problem, problem, nlp, options_of(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
     proof = completeness(problem, seconds, state.options.progress) if seconds > 0 else None
-    proved = [] if proof is None else [_clip_to_box(problem, design) for design in proof.designs]
+    proved_designs = proof.designs if proof else ()
+    proved = [np.array([*clip_to_box(problem, {n: float(x) for n, x in d.items()}).values()]) for d in proved_designs]
     finished = proof is not None and (proof.complete or proof.stopped)
     found, errors, coverage = ([], [], None) if finished else _search_starts(problem, nlp, state)
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     new = [x for x in proved if not any(_is_same(x, y, width) for y in found)]
     if coverage:
         coverage = replace(coverage, hits=(*coverage.hits, *(0 for _ in new)))
-    radii = [{n: float(x.radius) for n, x in design.items()} for design in proof.designs] if proof else []
+    radii = [{n: float(x.radius) for n, x in design.items()} for design in proved_designs]
     solutions, exists, bounds = list[Solution](), list[bool](), list[Table[float]]()
     for x, own in zip([*found, *new], [*errors, *({} for _ in new)], strict=True):
         matches = [radius for y, radius in zip(proved, radii, strict=True) if _is_same(x, y, width)]
@@ -259,11 +259,6 @@ def _build_equations(problem: Posed) -> NLP:
 
 def _is_same(one: Array, other: Array, width: Array) -> bool:
     return bool(np.max(np.abs(one - other) / width) <= _SAME)
-
-
-def _clip_to_box(problem: Posed, design: Mapping[str, Number]) -> Array:
-    """A proved design as doubles in the box."""
-    return np.array([min(max(float(design[n]), lo), hi) for n, (lo, hi) in problem.free.items()])
 
 
 def _name_parameters(problem: Posed, point: Array) -> dict[str, float]:

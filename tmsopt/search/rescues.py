@@ -71,13 +71,8 @@ def can_have_positive_roots(state: SearchState) -> bool:
 def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
     """Search with a damping ratio of −1, without a sector."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
-    most = state.tuning.fewer if (state.best and state.nlp.touches) or is_damping_goal(state) else 0
-    return search_again(state, policy, nlp=nlp, most=most)
-
-
-def is_damping_goal(state: SearchState) -> bool:
-    """Whether the problem maximises the damping ratio alone."""
-    return (state.problem.maximize or "").strip() == "damping_ratio"
+    few = (state.best and state.nlp.touches) or (state.problem.maximize or "").strip() == "damping_ratio"
+    return search_again(state, policy, nlp=nlp, most=state.tuning.fewer if few else 0)
 
 
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:

@@ -122,14 +122,9 @@ class Box:
         return (self.design(batch, row) for row in range(len(batch)))
 
     @property
-    def feasible_share(self) -> float:
-        """Share of the drawn designs that meet all limits."""
-        return float(np.mean(self.draws.violation == 0))
-
-    @property
     def narrow(self) -> bool:
         """Whether few designs meet all limits."""
-        return self.feasible_share < self.tuning.narrow
+        return bool(np.mean(self.draws.violation == 0) < self.tuning.narrow)
 
     def refine(self, start: DesignBatch, reaches: Sequence[float | Array] = (), local: int = 0) -> DesignBatch:
         """Improve each design by random steps that become shorter; less violation comes first.
