@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 
-from tmsopt.charts import LAYERS, Grid, add_tallies, chart, count_tile, open_chart, survey
+from tmsopt.charts import LAYERS, Grid, add_tallies, chart, count_tile, open_chart, plan_survey
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
 from tmsopt.problem import Problem, array_function, load
@@ -134,7 +134,7 @@ def test_a_constraint_that_does_not_exist_is_not_satisfied():
     problem = dataclasses.replace(
         PLANE, constraints={"one": "Fr <= 100", "log": "log(lambda_s) <= 5", "two": "Fr >= -100"}
     )
-    asked = survey(problem, points=POINTS, layers=("satisfied", "margin"))
+    asked = plan_survey(problem, points=POINTS, layers=("satisfied", "margin"))
     layers, _ = asked.compute(range(POINTS[1]))
     forward = np.broadcast_to(asked.grid.values[1][:, None] > 0, asked.grid.shape)
     assert np.array_equal(layers["satisfied"], forward)
@@ -185,7 +185,7 @@ def test_a_worker_that_crashes_ends_the_chart(tmp_path):
 
 def test_one_or_four_free_parameters_make_no_grid():
     for problem in (load("problems/chart.toml"), SPACE):
-        assert survey(problem, points=(3,) * len(problem.free)).grid.size == 3 ** len(problem.free)
+        assert plan_survey(problem, points=(3,) * len(problem.free)).grid.size == 3 ** len(problem.free)
     line = dataclasses.replace(PLANE, fixed=PLANE.fixed | {"Fr": 2.0}, free={"lambda_s": (0.1, 1.0)})
     with pytest.raises(InputError, match="two or three free parameters, and 1 are free"):
-        survey(line, points=(3,))
+        plan_survey(line, points=(3,))

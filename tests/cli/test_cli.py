@@ -329,7 +329,7 @@ def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, run):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(import_module("tmsopt.search.solve"), "search_part", stop)
-    monkeypatch.setattr(import_module("tmsopt.search.solve"), "_so_far", stop)
+    monkeypatch.setattr(import_module("tmsopt.search.solve"), "_find_best_so_far", stop)
     for command in ("solve", "prove", "compare", "speeds"):
         status, out, err = run(command, "problems/ep4.toml")
         assert (status, out, err) == (130, "", "stopped; what was printed before stands\n")
@@ -358,7 +358,7 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
         main(args=["solve", str(path)], prog_name="tmsopt")
     assert stop.value.code == 130
     assert "looking for a stable design: 2 of 5 s" in sys.stderr.getvalue()
-    assert "the user stopped the question whether any design is stable" in sys.stdout.getvalue()
+    assert "the user stopped the search for a stable design" in sys.stdout.getvalue()
 
 
 def test_the_rows_of_a_study_are_written_in_blocks_as_they_would_be_at_once(run, tmp_path, monkeypatch):

@@ -78,7 +78,7 @@ COMMANDS = {
     "plot": ("solve {p}/ep4.toml --plot growth.png", {"following the roots", "writing what --plot asks for"}),
     "report": ("solve {p}/ep4.toml --report page.html", {"writing what --report asks for", "writing the page"}),
     "all": ("solve {p}/ep4_matching.toml --all", {"proving that no design is missed"}),
-    "infeasible": ("solve infeasible.toml --starts 4", {"searching for the least that limits must give"}),
+    "infeasible": ("solve infeasible.toml --starts 4", {"searching for the smallest change of limits"}),
     "front": ("solve {p}/pareto.toml --points 3", {"following the front"}),
     "chart": ("chart {p}/chart.toml --points 60x50", {"charting", "tracing weave", "tracing capsize", "tracing EP2"}),
     "trace": ("trace {p}/ep_set.toml", {"tracing 2EP2"}),

@@ -55,7 +55,7 @@ def test_a_limit_that_a_needle_meets_is_not_out_of_reach():
 
 def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish():
     """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
-    reach, options = import_module("tmsopt.search.remedies.none")._reached, tmsopt.Options()
+    reach, options = import_module("tmsopt.search.remedies.conflict").search_limits, tmsopt.Options()
     found, told = reach(FAST.posed, options, ["far"])
     assert told
     shifted = [Fraction(float(c)) for c in FAST.posed.values(found).coefficients]
@@ -91,19 +91,19 @@ BOUNDS = tmsopt.Problem(
 
 
 def named(problem, reached):
-    """What `irreducible` makes of it; the nearest design moves b."""
+    """What `find_conflict` makes of it; the nearest design moves b."""
     near = {**problem.fixed, "x": 0.8, "y": 0.5}
     relaxation = tmsopt.solve(replace(problem, minimize="x"), throw=False).relaxation
     relaxation = replace(relaxation, parameters=Table(near), amounts=Table({"b": 0.6}), conflict=(), irreducible=False)
     options = import_module("tmsopt.program.options").DEFAULTS
-    irreducible = import_module("tmsopt.search.remedies.needs").irreducible
-    return irreducible(problem.posed, relaxation, ("b",), problem.posed, options, reached)
+    find_conflict = import_module("tmsopt.search.remedies.conflict").find_conflict
+    return find_conflict(problem.posed, relaxation, ("b",), problem.posed, options, reached)
 
 
 @pytest.fixture
 def blind(monkeypatch):
     """A few starts meet nothing but what designs at hand meet."""
-    monkeypatch.setattr("tmsopt.search.remedies.needs._met", lambda *_, **__: False)
+    monkeypatch.setattr("tmsopt.search.remedies.conflict._can_be_met", lambda *_, **__: False)
 
 
 @pytest.mark.usefixtures("blind")

@@ -6,7 +6,7 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients
-from tmsopt.search import coverage_of
+from tmsopt.search import estimate_coverage
 
 x = ca.SX.sym("x")
 
@@ -31,7 +31,9 @@ def test_the_chance_of_another_solution_is_claimed_with_95_percent_confidence(sh
     rng = np.random.default_rng(0)
     for starts in (50, 100, 200):
         drawn = rng.multinomial(starts, shares, size=2000)
-        kept = sum(shares[row == 0].sum() <= coverage_of(starts, [int(h) for h in row if h], 0).chance for row in drawn)
+        kept = sum(
+            shares[row == 0].sum() <= estimate_coverage(starts, [int(h) for h in row if h], 0).chance for row in drawn
+        )
         assert kept >= 0.95 * 2000
 
 

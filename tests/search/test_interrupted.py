@@ -125,7 +125,7 @@ def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatc
     found = tmsopt.solve(asked, progress=meanwhile)
     assert (found.status, found.interrupted, found.any_stable) == ("optimal", True, None)
     assert found.value == pytest.approx(0.5, abs=1e-12)
-    assert "the user stopped the question whether any design is stable" in found.notes
+    assert "the user stopped the search for a stable design" in found.notes
     with pytest.raises(KeyboardInterrupt):
         tmsopt.solve(asked, progress=meanwhile, interruptible=False)
 
@@ -136,7 +136,7 @@ def test_with_nothing_in_hand_there_is_nothing_to_leave():
 
 
 def test_a_second_one_ends_that_too(monkeypatch):
-    monkeypatch.setattr(solving, "as_it_is", stop)
+    monkeypatch.setattr(solving, "assess_design", stop)
     with pytest.raises(KeyboardInterrupt):
         tmsopt.solve(problem(), exhaustive=True, progress=when(third))
 

@@ -79,4 +79,4 @@ def test_an_end_off_the_rows_is_no_optimum(violation, slope, ended):
     run = SimpleNamespace(status="Solve_Succeeded")
     point = SimpleNamespace(violation=violation, stationarity=slope)
     trial = SimpleNamespace(end=SimpleNamespace(run=run), point=point, tuning=tmsopt.TUNING)
-    assert import_module("tmsopt.search.accept").has_converged(trial) is ended
+    assert import_module("tmsopt.search.acceptance").has_converged(trial) is ended

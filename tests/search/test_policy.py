@@ -16,7 +16,7 @@ from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients
 from tmsopt.search import begin_search
 
-accepting, driver, states = (import_module(f"tmsopt.search.{name}") for name in ("accept", "policy", "state"))
+accepting, driver, states = (import_module(f"tmsopt.search.{name}") for name in ("acceptance", "policy", "state"))
 
 x = ca.SX.sym("x")
 LEFT, RIDGE, RIGHT = sorted(np.roots([1, 0, -1, 0.1]).real.tolist())
@@ -47,7 +47,7 @@ def test_the_sample_knows_both_wells():
     places = [sample.box.design(sample.refined, row)["x"] for row in range(len(sample.refined))]
     for well in (LEFT, RIGHT):
         assert min(abs(place - well) for place in places) < 1e-2
-    worth = sample.refined.worth
+    worth = sample.refined.objective
     assert worth[0] == worth.min()
     assert worth[0] == pytest.approx(depth(LEFT), abs=1e-5)
 

@@ -164,7 +164,7 @@ def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients, fr
     """It is −1/x, or −(1 + y)/x: below anything as x goes to 0 from above."""
     design = tmsopt.solve(problem(coefficients, free), throw=False)
     assert design.status == "not_converged"
-    assert any(note.startswith("unbounded") for note in design.notes)
+    assert any("unbounded" in note for note in design.notes)
     assert design.value < -1e6
     assert not design.violations
     numerator = 1 + design.parameters.get("y", 0.0)
@@ -232,7 +232,7 @@ def test_long_work_tells_how_far_it_is(monkeypatch):
     told.clear()
     beyond = problem([1, x, 1], WIDE, ("x >= 10",))
     assert tmsopt.solve(beyond, throw=False, progress=told.append).status == "infeasible"
-    assert any(1 <= t.done <= t.most for t in told if t.what.startswith("searching for the least that limits must"))
+    assert any(1 <= t.done <= t.most for t in told if "change of limits" in t.what)
 
 
 @pytest.mark.parametrize("coefficients", [[1, "c", 0], ["m", "c", 0]])

@@ -63,7 +63,7 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch, off, status):
     ("room", "name", "said"),
     [
         ("outcome", "is_unclear", lambda problem, checked: True),
-        ("search", "demote", lambda state, found: replace(found, status="not_converged")),
+        ("search", "demote_if_unbounded", lambda state, found: replace(found, status="not_converged")),
         ("search", "demote_if_beaten", lambda state, found: replace(found, status="not_converged")),
     ],
 )

@@ -63,13 +63,13 @@ def test_the_designs_of_the_sample_are_counted():
     design = tmsopt.solve(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")))
     starts = design.to_json()["starts"]
     assert set(starts) == {"tried", "converged", "at_best", "expected_unseen"}
-    drawn = draw_box(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")).posed, 0).drawn
+    drawn = draw_box(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")).posed, 0).draws
     assert design.to_json()["looked"] == design.starts.looked == len(drawn) > 2000
 
 
 def test_the_sample_fills_the_box_to_its_faces_and_corners():
     """No hole of a tenth of the box, inside or on a face; and all corners."""
-    drawn = draw_box(problem().posed, 0).drawn
+    drawn = draw_box(problem().posed, 0).draws
     assert drawn.u.min() == 0
     assert drawn.u.max() == 1
     assert {(0, 0), (0, 1), (1, 0), (1, 1)} <= {tuple(u) for u in drawn.u.tolist()}
@@ -94,7 +94,7 @@ def test_the_sample_stands_for_its_seed():
 def sought(stated, seed=0, count=64):
     """A box, designs that violate its limits, and what becomes of them."""
     box = draw_box(stated.posed, seed)
-    start = box.drawn.take(np.flatnonzero((box.drawn.violation > 0) & np.isfinite(box.drawn.violation))[:count])
+    start = box.draws.take(np.flatnonzero((box.draws.violation > 0) & np.isfinite(box.draws.violation))[:count])
     return box, start, box.approach_limits(start)
 
 
@@ -131,7 +131,7 @@ def test_a_pole_is_approached_from_its_own_side():
     box = draw_box(problem(("1/(x - y) >= 1000",)).posed, 0)
     gaps = np.geomspace(2e-3, 0.2, 20)
     points = [box.space.points({"x": 0.3 + gap / 2, "y": 0.3 - gap / 2}) for gap in gaps]
-    ends = box.approach_limits(box.look(np.array(points)))
+    ends = box.approach_limits(box.judge_points(np.array(points)))
     found = box.space.designs(ends.u)
     assert np.all(found["x"] - found["y"] > 0)
     assert np.all(found["x"] - found["y"] <= 0.001 * (1 + 1e-9))
@@ -140,26 +140,26 @@ def test_a_pole_is_approached_from_its_own_side():
 def test_what_is_refined_is_no_worse_limits_first():
     stated = problem(("x**2 + 2*y**2 <= 0.3", "x - y >= 0.5"), minimize="(x - 0.3)**2 - y + 0.1*abscissa")
     box = draw_box(stated.posed, 2)
-    start = box.drawn.take(np.arange(0, 4000, 40))
+    start = box.draws.take(np.arange(0, 4000, 40))
     ends = box.refine(start)
     assert len(ends) == len(start)
-    before, after = zip(start.violation, start.worth, strict=True), zip(ends.violation, ends.worth, strict=True)
+    before, after = zip(start.violation, start.objective, strict=True), zip(ends.violation, ends.objective, strict=True)
     pairs = list(zip(before, after, strict=True))
     assert all(new <= old for old, new in pairs)
     assert sum(new < old for old, new in pairs) > 0.9 * len(pairs)
     assert np.all((ends.u >= 0) & (ends.u <= 1))
-    again = box.look(ends.u)
-    assert np.array_equal(again.worth, ends.worth)
+    again = box.judge_points(ends.u)
+    assert np.array_equal(again.objective, ends.objective)
     assert np.array_equal(again.violation, ends.violation)
 
 
 def test_the_neighbourhood_of_a_design_reaches_from_a_hair_to_the_other_end_of_the_box():
     """Best of all is (−1, −1), a corner; or, of a well 2e-4 wide, its bottom."""
     far = problem(minimize="x + 0.1*abs(y - 0.3)")
-    seen = draw_box(far.posed, 0).around({"x": 1.0, "y": 0.3})
-    assert seen.worth.min() == pytest.approx(-1.0, abs=1e-3)
+    seen = draw_box(far.posed, 0).explore({"x": 1.0, "y": 0.3})
+    assert seen.objective.min() == pytest.approx(-1.0, abs=1e-3)
     well = problem(minimize="-1/(1 + ((x - 0.2003)**2 + (y - 0.3)**2)/1e-8)")
-    assert draw_box(well.posed, 0).around({"x": 0.2, "y": 0.3}).worth.min() < -0.8
+    assert draw_box(well.posed, 0).explore({"x": 0.2, "y": 0.3}).objective.min() < -0.8
 
 
 # Basins

@@ -11,7 +11,7 @@ import pytest
 import tmsopt
 from tmsopt.models import from_coefficients
 from tmsopt.problem import expected_unseen, expects_few_better
-from tmsopt.search import SearchState, no_end
+from tmsopt.search import SearchState, make_failed_end
 
 x = ca.SX.sym("x")
 PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x").posed
@@ -20,8 +20,11 @@ PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, mi
 def settled(ends, share, far_off=False, left=0):
     """Of starts that ended at these objectives, None where at nothing feasible; so many refined designs are left."""
     nlp, start = SimpleNamespace(size=1.0, variables=()), tmsopt.Start({})
-    ended = [no_end(start, nlp) if e is None else replace(no_end(start, nlp), objective=e, feasible=True) for e in ends]
-    refined = import_module("tmsopt.search.sample").Looked(np.zeros((left, 1)), np.zeros(left), np.zeros(left))
+    ended = [
+        make_failed_end(start, nlp) if e is None else replace(make_failed_end(start, nlp), objective=e, feasible=True)
+        for e in ends
+    ]
+    refined = import_module("tmsopt.search.sample").DesignBatch(np.zeros((left, 1)), np.zeros(left), np.zeros(left))
     box = SimpleNamespace(narrow=share < tmsopt.TUNING.narrow)
     sample = SimpleNamespace(box=box, far_off=far_off, refined=refined, leaders=refined)
     state = SearchState(PLAIN, PLAIN, nlp, sample=sample, ends=tuple(ended))

@@ -98,10 +98,10 @@ def test_a_stable_design_that_the_search_missed_is_found():
     """The best design of the box 0 ≤ x ≤ 1, sold as that of 0 ≤ x ≤ 3, where −1/2 is least, at x = 3."""
     part = found(1.0, stability=0.0)
     missed = replace(part, problem=replace(part.problem, free={"x": (0.0, 3.0)}))
-    design = solving._with_stability(missed, tmsopt.Options(stability=10.0), time.perf_counter(), tmsopt.POLICY)
+    design = solving._add_stability(missed, tmsopt.Options(stability=10.0), time.perf_counter(), tmsopt.POLICY)
     assert (design.status, design.stable, design.any_stable) == ("optimal", True, True)
     assert design.value == pytest.approx(-0.5, abs=1e-12)
-    assert any("branch and bound found the stable design" in note for note in design.notes)
+    assert any("stable design that branch and bound found" in note for note in design.notes)
 
 
 @scip

@@ -16,7 +16,7 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Numbers, Printable, plain
 from tmsopt.roots import Root, Structure, backward_error
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
-from tmsopt.search.solve import solved_first
+from tmsopt.search.solve import solve_if_needed
 
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance
 _TIMES = 10.0  # likewise, times the root of the distance from the structure
@@ -92,7 +92,7 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
 
     More: docs/explanation/exceptional_points.md
     """
-    solution = solved_first(design, progress)
+    solution = solve_if_needed(design, progress)
     start_steps(progress, "splitting roots")
     problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)

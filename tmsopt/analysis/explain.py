@@ -12,7 +12,7 @@ from tmsopt.problem.files import Given
 from tmsopt.problem.solution import Bound
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Table, Tabular, plain
-from tmsopt.search.solve import solved_first
+from tmsopt.search.solve import solve_if_needed
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,7 +80,7 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
 
     More: docs/how_to/report.md
     """
-    solution = solved_first(design, progress)
+    solution = solve_if_needed(design, progress)
     steps = start_steps(progress, "moving limits" if resolve else "weighing limits", "limit")
     problem = solution.problem.posed
     alone, together = rounded_designs(solution) if not solution.violations else (Table[Rounded](), ())

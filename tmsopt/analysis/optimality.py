@@ -34,7 +34,7 @@ from tmsopt.program.formulate import formulate
 from tmsopt.program.starts import initial_point
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Printable, Table, plain
-from tmsopt.search.solve import solved_first
+from tmsopt.search.solve import solve_if_needed
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
 
@@ -135,7 +135,7 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
 
     More: docs/how_to/report.md
     """
-    solution = solved_first(design, progress)
+    solution = solve_if_needed(design, progress)
     start_steps(progress, "judging the optimum")
     try:
         problem = _judged(solution)

@@ -1,7 +1,7 @@
-"""Chart: stability over grids of designs, in memory or in a folder.
+"""Charts: classes, roots and quantities over grids of designs, in memory or in a folder.
 
-In: a problem with two or three free parameters. Out: a `Chart` of layers: classes, abscissae, any expression. Open
-`chart` first; `survey` computes it tile by tile, `folder` keeps it on disk.
+In: a problem with two or three free parameters. Out: a `Chart` of layers. Open `chart` first; `survey` computes it tile
+by tile, `folder` keeps it on disk.
 """
 
 import lazy_loader

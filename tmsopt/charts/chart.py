@@ -1,4 +1,4 @@
-"""Charts: what kind of motion each design of a grid over two or three parameters has."""
+"""Charts: the kind of motion of each design on a grid over two or three parameters."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.export import make_dataset, save_layers
 from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_folder
-from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, survey
+from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, plan_survey
 from tmsopt.charts.tally import Tally, add_tallies
 from tmsopt.deprecated import ignore_option
 from tmsopt.errors import InputError, call_faults, count_faults, refusal
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 LARGEST = 20_000_000
-"""Designs of a chart in memory, some 40 bytes each."""
+"""Most designs of a chart in memory, about 40 bytes each."""
 
 TILE = 2**18
-"""Designs of a tile: some 40 MB while it is computed."""
+"""Designs of a tile: about 40 MB during its computation."""
 
 _MOST_WORKERS = 256
 
 
-def _layer(name: str, meaning: str) -> Any:
+def _layer_property(name: str, meaning: str) -> Any:
     return property(lambda self: self.layers[name], doc=meaning)
 
 
@@ -47,15 +47,15 @@ class Chart(Printable):
     """Classes, roots and quantities over a grid of two or three parameters.
 
     Attributes:
-        about: what was charted, as plain data.
+        about: description of the chart, as plain data.
         grid: the values along each axis.
-        layers: name → array of shape (len(second), len(first)), as an image has, a third axis before them. Those in a
-            folder are memory maps, read when they are looked at.
+        layers: name → array of shape (len(second), len(first)), as an image, with a third axis in front. Layers in a
+            folder are memory maps.
         counts: over all designs.
-        domain: the exact boundaries over a plane, if asked for.
+        domain: the exact boundaries in a plane, if requested.
         path: of its folder; None in memory.
-        run: how it was computed: ``engine``, ``seconds``, ``per_second``, for a folder also how many ``designs`` were
-            left; empty where the chart was only opened.
+        run: ``engine``, ``seconds``, ``per_second``, and for a folder the number of ``designs`` computed now; empty for
+            an opened chart.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # stable where c and k are positive
@@ -76,12 +76,17 @@ class Chart(Printable):
     run: Mapping[str, Any] = field(default_factory=dict)
     asked: Problem | None = field(default=None, repr=False)
 
-    kind = _layer("kind", "Class codes, decided by coefficients, places in `tmsopt.roots.CLASSES`.")
-    abscissa = _layer("abscissa", "Jointly right next to an exceptional point; nan if undefined.")
-    damping_ratio = _layer("damping_ratio", "Jointly right next to an exceptional point; nan if undefined.")
-    real_roots = _layer("real_roots", "Number of different real roots, from coefficients.")
-    satisfied = _layer("satisfied", "Where every inequality constraint of the problem holds.")
-    margin = _layer("margin", "Least difference of the sides of an inequality, negative where one is violated, or nan.")
+    kind = _layer_property("kind", "Class codes from the coefficients: indices into `tmsopt.roots.CLASSES`.")
+    abscissa = _layer_property(
+        "abscissa",
+        "Abscissa of roots that give back the coefficients, also near an exceptional point; nan if undefined.",
+    )
+    damping_ratio = _layer_property("damping_ratio", "Damping ratio of the same roots; nan if undefined.")
+    real_roots = _layer_property("real_roots", "Number of distinct real roots, from the coefficients.")
+    satisfied = _layer_property("satisfied", "Whether every inequality constraint of the problem holds.")
+    margin = _layer_property(
+        "margin", "Least distance of the sides of an inequality, negative if one is violated; nan if undefined."
+    )
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -90,37 +95,42 @@ class Chart(Printable):
 
     @property
     def problem(self) -> Problem:
-        """What was charted.
+        """The charted problem.
 
         Raises:
-            InputError: for an opened folder of a model of the user's own, which it does not hold.
+            InputError: for an opened folder with a model of the user, which the folder does not hold.
         """
         if self.asked is None:
             name = self.about["problem"]["model"]
-            raise refusal(f"'{self.path}' does not hold its model {name!r}, only numbers; chart it again")
+            raise refusal(
+                f"'{self.path}' does not hold its model {name!r}, only numbers; compute it again from the problem"
+            )
         return self.asked
 
     @property
     def quantities(self) -> dict[str, NDArray[Any]]:
-        """Name → values of an expression of the user's."""
+        """Name → values of an expression of the user."""
         return {n: layer for n, layer in self.layers.items() if n not in LAYERS}
 
     @property
     def shares(self) -> dict[str, float]:
-        """Share of the grid in each class; empty where the kind was not asked for."""
+        """Share of the grid in each class; empty without the layer ``kind``."""
         return self.counts.shares
 
     @property
     def left_aside(self) -> tuple[str, ...]:
-        """Names of the equality constraints: they hold on curves, which `trace` follows, and nowhere on a grid."""
+        """Names of the equality constraints, which a chart ignores: they hold on curves, which `trace` follows."""
         return tuple(n for n, c in self.problem.posed.conditions.items() if c.equality)
 
     def save(self, path: str | Path, layers: Sequence[str] | None = None) -> None:
-        """Write axes and layers, all of them unless named, as a NumPy archive or, to a name ending in nc, as netCDF.
+        """Write axes and layers as a NumPy archive, or as netCDF if the path ends in ``.nc``.
+
+        Args:
+            layers: names; all by default.
 
         Raises:
-            InputError: for unknown layers; for netCDF where xarray or a library for it is not installed.
-            OSError: when the file cannot be written.
+            InputError: for unknown layers; for netCDF if xarray or a netCDF library is missing.
+            OSError: if the file cannot be written.
         """
         names = tuple(self.layers) if layers is None else layers
         if faults := layer_faults(names, list(self.layers)):
@@ -129,16 +139,16 @@ class Chart(Printable):
         save_layers(self.problem.posed, Grid(self.axes, self.grid), chosen, path_of(path, "the file to write"))
 
     def to_xarray(self) -> "Dataset":
-        """Every layer over the axes, with units.
+        """All layers as a dataset with axes and units.
 
         Raises:
-            InputError: where xarray is not installed.
+            InputError: if xarray is not installed.
         """
         made: Dataset = make_dataset(self.problem.posed, Grid(self.axes, self.grid), self.layers)
         return made
 
     def to_json(self) -> dict[str, Any]:
-        """Summary, boundaries and corners; the arrays themselves go to a file."""
+        """Summary, boundaries and corners, without the arrays."""
         counts, plane = self.counts, self.path is None and len(self.grid) == 2
         of = self.asked.posed.parameter_set if self.asked else None  # a folder may not hold its model
         grid = Grid(self.axes, self.grid)
@@ -179,26 +189,26 @@ def chart(
 ) -> Chart:
     """Classify every design of a grid over the two or three free parameters; the others must be fixed.
 
-    Equality constraints are left aside. A chart in a folder goes on where the same call was ended before.
+    Equality constraints are ignored. A chart in a folder continues where the same call stopped before.
 
     Args:
-        problem: or its file, or a solution of it.
-        axes: the free parameters, the horizontal one first, which runs fastest; by default in the problem's order.
-        folder: where to keep the arrays, e.g. ``big.chart``, up to 1e9 designs; by default in memory, up to 2e7.
-        points: along each axis, by default 400x300 or 120x100x80; the ends of the box are grid points.
-        layers: names among `tmsopt.charts.LAYERS`; by default all, in a folder all but the margin.
-        quantities: name → expression, further layers.
-        single: keep numbers in single precision.
-        workers: processes; 1 is this one.
-        fresh: move a folder of that name aside.
-        tile: designs that a worker computes at a time.
-        boundaries: also trace the exact boundary curves over a plane.
-        progress: called with a `tmsopt.Progress` now and then.
+        problem: a problem, its file, or a solution.
+        axes: the free parameters, the horizontal one first; by default in the problem's order.
+        folder: folder for the arrays, e.g. ``big.chart``, up to 1e9 designs; by default in memory, up to 2e7.
+        points: along each axis, 400x300 or 120x100x80 by default; the ends of the box are grid points.
+        layers: names among `tmsopt.charts.LAYERS`; all by default, all but the margin in a folder.
+        quantities: name → expression of an additional layer.
+        single: store numbers in single precision.
+        workers: number of processes; 1 computes in this one.
+        fresh: move an existing folder aside.
+        tile: designs computed at a time.
+        boundaries: also trace the exact boundary curves in a plane.
+        progress: called with a `tmsopt.Progress` from time to time.
 
     Raises:
-        InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged; where a
-            worker crashes.
-        OSError: where the disk is full; what is recorded stays right.
+        InputError: for bad input; for a damaged folder, or one with another chart, with the differences; if a worker
+            crashes.
+        OSError: if the disk is full; tiles recorded before stay valid.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -214,26 +224,27 @@ def chart(
         raise InputError(faults)
     steps = start_steps(progress, "charting", "design")
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
-    work = survey(problem, axes, points, wanted, quantities, single)
+    work = plan_survey(problem, axes, points, wanted, quantities, single)
     path, grid = None if folder is None else path_of(folder, "a folder"), work.grid
     if path is None and grid.size > LARGEST:
-        message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or {LARGEST:.0e} or less"
+        message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or at most {LARGEST:.0e} designs"
         raise refusal(message, "points")
     about = _describe(work, tile)
-    grid.tiles(tile)  # refuses too many
+    grid.tiles(tile)  # raises for too many tiles
     memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in work.dtypes.items()}
     where = write_folder(path, about, grid, fresh) if path else nullcontext(Tiles(memory, tile))
     with where as target, processes(workers) if workers > 1 else here() as executor:
         began = time.perf_counter()
-        left = [rows for rows in grid.tiles(target.tile) if rows.start not in target.done]
+        remaining = [rows for rows in grid.tiles(target.tile) if rows.start not in target.done]
         done = before = add_tallies(target.done.values()).designs
         if steps:
             steps(done, grid.size)
-        for place, found in executor.map(work.compute, left):
+        for place, found in executor.map(work.compute, remaining):
             if isinstance(found, Crash):
-                message = f"a process that computed {tile} designs ended ({found.cause}); give fewer workers"
+                cause = f"a worker that computed {tile} designs crashed ({found.cause})"
+                message = f"{cause}; give fewer workers or a smaller tile"
                 raise refusal(message, "workers")
-            target.write(left[place], *found)
+            target.write(remaining[place], *found)
             done += found[1].designs
             if steps:
                 steps(done, grid.size)
@@ -242,16 +253,16 @@ def chart(
         layer.flags.writeable = False
     new = done - before
     run = {"engine": "numpy", **({"designs": new} if path else {}), "seconds": seconds, "per_second": new / seconds}
-    asked = work.problem.problem
-    edges = domain(asked, progress=progress) if boundaries and len(grid.axes) == 2 else None
-    return Chart(about, grid.values, target.layers, add_tallies(target.done.values()), edges, path, run, asked)
+    charted = work.problem.problem
+    edges = domain(charted, progress=progress) if boundaries and len(grid.axes) == 2 else None
+    return Chart(about, grid.values, target.layers, add_tallies(target.done.values()), edges, path, run, charted)
 
 
 def open_chart(path: str | Path) -> Chart:
-    """A finished chart in a folder.
+    """Open a finished chart in a folder.
 
     Raises:
-        InputError: where that is none, or is not finished, or damaged.
+        InputError: if the folder holds no chart, or an unfinished or damaged one.
 
     Example:
         >>> from tempfile import TemporaryDirectory
@@ -266,13 +277,15 @@ def open_chart(path: str | Path) -> Chart:
     about, problem, tiles = read_folder(path)
     grid, counts = grid_of(about), add_tallies(tiles.done.values())
     if counts.designs < grid.size:
-        message = f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to go on"
+        message = (
+            f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to finish it"
+        )
         raise refusal(message)
     return Chart(about, grid.values, tiles.layers, counts, path=path, asked=problem)
 
 
 def _describe(work: Survey, tile: int) -> dict[str, Any]:
-    """All that makes a chart another one, as plain data."""
+    """Everything that identifies a chart, as plain data."""
     problem, grid = work.problem, work.grid
     stated: dict[str, Any] = {
         "model": problem.model.name,

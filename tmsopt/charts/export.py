@@ -1,4 +1,4 @@
-"""Charts as one file, a NumPy archive or netCDF, and as a dataset of xarray."""
+"""Export of charts: one NumPy archive or netCDF file, or a dataset of xarray."""
 
 import json
 from collections.abc import Mapping
@@ -19,19 +19,19 @@ Layers = Mapping[str, NDArray[Any]]
 
 
 def save_layers(problem: Posed, grid: Grid, layers: Layers, path: Path) -> None:
-    """Write axes and layers by name, with what they are about, as the ending of the file says.
+    """Write axes and layers, with a description, in the format that the file name's ending selects.
 
     Raises:
-        InputError: for netCDF where xarray or a library for it is not installed.
-        OSError: when the file cannot be written.
+        InputError: for netCDF if xarray or a netCDF library is missing.
+        OSError: if the file cannot be written.
     """
     if path.suffix.lower() == ".nc":
         check_netcdf()
-        made = make_dataset(problem, grid, layers)
+        dataset = make_dataset(problem, grid, layers)
         with write_atomic(path) as place, netcdf_errors():
-            made.to_netcdf(place)
+            dataset.to_netcdf(place)
         return
-    axes = _axes(grid, layers)
+    axes = _name_axes(grid, layers)
     about: dict[str, Any] = {"title": problem.title, "model": problem.model.name, "fixed": dict(problem.fixed)}
     about |= {"dimensions": axes[::-1], "classes": CLASSES}
     if problem.model.statement is not None:
@@ -42,24 +42,24 @@ def save_layers(problem: Posed, grid: Grid, layers: Layers, path: Path) -> None:
 
 
 def check_netcdf() -> None:
-    """Refuse netCDF where it could not be written.
+    """Check that netCDF can be written.
 
     Raises:
-        InputError: where xarray or a library for netCDF is not installed.
+        InputError: if xarray or a netCDF library is missing.
     """
     if find_spec("xarray") is None or all(find_spec(n) is None for n in ("netCDF4", "h5netcdf")):
-        message = 'netCDF needs xarray and netCDF4; run pip install "tmsopt[data]", or give a name ending in npz'
+        message = 'netCDF needs xarray and netCDF4; run pip install "tmsopt[data]", or give a name that ends in .npz'
         raise refusal(message, "--output")
 
 
 def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:
-    """Axes and layers as a dataset of xarray, with their units and meanings.
+    """Axes and layers as an xarray dataset with units and meanings.
 
     Raises:
-        InputError: where xarray is not installed.
+        InputError: if xarray is not installed.
     """
-    xarray, axes, of = import_optional("xarray"), _axes(grid, layers), problem.parameter_set
-    # Names as the climate and forecast conventions want them, blanks between words only.
+    xarray, axes, of = import_optional("xarray"), _name_axes(grid, layers), problem.parameter_set
+    # The climate and forecast conventions separate flag meanings by blanks.
     words = " ".join(n.replace(" ", "_") for n in CLASSES)
     classes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": words}
     variables = {
@@ -74,6 +74,6 @@ def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:
     return xarray.Dataset(variables, coordinates, about)
 
 
-def _axes(grid: Grid, layers: Layers) -> list[str]:
-    """Names of the values along the axes: the parameter's, or ``parameter.kind`` next to a layer of that name."""
+def _name_axes(grid: Grid, layers: Layers) -> list[str]:
+    """Names of the axes: the parameter's, or ``parameter.NAME`` if a layer has that name."""
     return [f"parameter.{n}" if n in layers else n for n in grid.axes]

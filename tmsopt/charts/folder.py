@@ -1,12 +1,12 @@
-"""The layers of a chart, in memory or in a folder of NumPy files with a record of the tiles that are done.
+"""The layers of a chart, in memory or in a folder of NumPy files with a record of the finished tiles.
 
-    NAME.chart/about.json      what was charted, over what, in which layers; never changes
+    NAME.chart/about.json      description: problem, grid, layers; never changes
     NAME.chart/axes/Fr.npy     values along an axis, for other programs
     NAME.chart/layers/kind.npy a layer, shape of the grid
     NAME.chart/tiles.jsonl     a line for every finished tile, with its counts
     NAME.chart/chart.lock      locked by the process that writes
 
-A tile is recorded once its numbers are on the disk, so that whenever a process ends, what is recorded is right.
+A tile is recorded after its numbers are on the disk, so the record is right whenever a process ends.
 """
 
 import errno
@@ -36,11 +36,11 @@ from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 
-# What reading a damaged folder raises; a link to itself is a RuntimeError.
+# Exceptions from reading a damaged folder; a link to itself is a RuntimeError.
 _DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, OverflowError, TokenError)
 _ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
 _LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
-_SYNC = 1.0  # seconds between two records of finished tiles
+_SYNC = 1.0  # seconds between records of finished tiles
 
 Layers = Mapping[str, NDArray[Any]]
 
@@ -50,10 +50,10 @@ class Tiles:
     """Layers that are filled tile by tile.
 
     Attributes:
-        layers: arrays, or memory maps of files, which are written as files: a full disk is an error then.
+        layers: arrays, or memory maps; these are written as files, so that a full disk raises an error.
         tile: designs of a tile.
-        done: first row → counts of the tiles that are there.
-        record: the file that says so, for memory maps, and where its last whole line ends.
+        done: first row → counts of a finished tile.
+        record: file of finished tiles, for memory maps, and where its last whole line ends.
     """
 
     layers: Layers
@@ -64,7 +64,7 @@ class Tiles:
     _synced: float = field(default_factory=time.monotonic)
 
     def write(self, rows: range, layers: Layers, counts: Tally) -> None:
-        """Put a tile into its place; in a folder the next `sync`, which comes once a second, records it."""
+        """Write a tile; in a folder, the next `sync` records it, about once a second."""
         for name, array in layers.items():
             layer = self.layers[name]
             if isinstance(layer, np.memmap):
@@ -81,12 +81,12 @@ class Tiles:
             self.sync()
 
     def sync(self) -> None:
-        """Bring everything written to the disk, then record it."""
+        """Flush all layers to the disk, then record the tiles."""
         if self.record is None or not self._waiting:
             return
         path, end = self.record
         for name in self.layers:
-            with (path.parent / _layer(name)).open("r+b") as stream:
+            with (path.parent / _layer_path(name)).open("r+b") as stream:
                 os.fsync(stream.fileno())
         with path.open("r+b") as stream:
             stream.seek(end)
@@ -100,20 +100,19 @@ class Tiles:
 
 @contextmanager
 def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> Iterator[Tiles]:
-    """Layers in a folder, new or begun earlier for the same chart, to be filled by one process at a time.
+    """Open the layers of a new or unfinished chart in a folder; one process at a time writes them.
 
     Args:
-        about: all that makes a chart another one, but for the versions and the size of the tiles.
-        fresh: move a folder aside that is there already.
+        about: identifies the chart, except for versions and tile size.
+        fresh: move an existing folder aside.
 
     Raises:
-        InputError: for a folder of another chart, or a damaged one, or one that another process is writing; where the
-            disk has no room.
+        InputError: for a damaged folder, another chart, or a folder that another process writes; if the disk is full.
     """
     if fresh and os.path.lexists(path):
-        with _locked(path):
+        with _lock_folder(path):
             move_aside(path)
-    with _writing(path):
+    with _refuse_write_errors(path):
         if not path.exists():
             each = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
             needed, free = each * grid.size, shutil.disk_usage(path.parent).free
@@ -121,13 +120,13 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
                 raise OSError(errno.ENOSPC, f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
             path.mkdir()
         elif not any((path / n).exists() for n in (_ABOUT, _LOCK)):
-            raise _no_chart(path)
-    with _locked(path):
+            raise _make_no_chart_error(path)
+    with _lock_folder(path):
         if not os.path.lexists(path / _ABOUT):
             _create(path, about, grid)
-        there, _, tiles = read_folder(path)
+        existing, _, tiles = read_folder(path)
         ignored = {"versions": None, "tile": None}
-        if changed := list(differences(there | ignored, about | ignored)):
+        if changed := list(differences(existing | ignored, about | ignored)):
             message = f"holds another chart ({'; '.join(changed)}); give another name, or --fresh to move it aside"
             raise refusal(message, str(path))
         try:
@@ -137,43 +136,43 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    with _writing(path):
+def _lock_folder(path: Path) -> Iterator[None]:
+    with _refuse_write_errors(path):
         try:
-            held = FileLock(path / _LOCK, timeout=0).acquire()
+            lock = FileLock(path / _LOCK, timeout=0).acquire()
         except Timeout:
             message = f"'{path}' is being written by another process; wait for it, or give another name"
             raise refusal(message, "--output") from None
-    with held:
+    with lock:
         yield
 
 
 @contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def _refuse_write_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
         raise refusal(f"'{path}' cannot be written: {error.strerror or error}", "--output") from None
 
 
-def _layer(name: str) -> str:
+def _layer_path(name: str) -> str:
     return f"layers/{name}.npy"
 
 
-def _no_chart(path: Path) -> InputError:
-    return refusal(f"'{path}' is no chart: it has no {_ABOUT}; give a chart's folder, or a new name")
+def _make_no_chart_error(path: Path) -> InputError:
+    return refusal(f"'{path}' is no chart: it has no {_ABOUT}; give a chart's folder or a new name")
 
 
 def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
-    """Files of a new chart, about.json last: without it the folder is begun anew."""
-    with _writing(path):
+    """Create the files of a new chart, about.json last: without it the next run starts anew."""
+    with _refuse_write_errors(path):
         for part in ("axes", "layers"):
-            shutil.rmtree(path / part, ignore_errors=True)  # of a process that was killed right then
+            shutil.rmtree(path / part, ignore_errors=True)  # left by a killed process
             (path / part).mkdir()
         for name, values in zip(grid.axes, grid.values, strict=True):
             np.save(path / "axes" / f"{name}.npy", values)
         for name, layer in about["layers"].items():
-            np.lib.format.open_memmap(path / _layer(name), "w+", np.dtype(layer["dtype"]), grid.shape)
+            np.lib.format.open_memmap(path / _layer_path(name), "w+", np.dtype(layer["dtype"]), grid.shape)
         (path / _TILES).touch()
         write_text(path / _ABOUT, json.dumps(about, indent=2, ensure_ascii=False))
 
@@ -198,7 +197,7 @@ _Name = Annotated[str, Field(pattern=r"^\w{1,200}$")]
 
 class _About(BaseModel):
     number: Literal[1] = Field(alias="schema")
-    title: Annotated[str, Field(pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$")]  # it is shown on terminals
+    title: Annotated[str, Field(pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$")]  # shown on terminals
     problem: _Problem
     axes: Annotated[dict[_Name, _Axis], Field(min_length=2, max_length=3)]
     layers: Annotated[dict[_Name, dict[str, str]], Field(min_length=1)]
@@ -209,40 +208,40 @@ _TALLY = TypeAdapter(Tally)
 
 
 def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
-    """What a folder holds, which may come from anybody: about.json, the problem unless its model is missing, layers.
+    """Read and validate a folder: its description, its problem (None if it does not hold the model), its layers.
 
     Raises:
-        InputError: where that is no folder of a chart, or a damaged one.
+        InputError: if it is no folder of a chart, or a damaged one.
     """
     if not (path / _ABOUT).exists():
-        raise _no_chart(path)
+        raise _make_no_chart_error(path)
     name = _ABOUT
     try:
-        about = from_json(read_text(str(_own(path, name)), "JSON file", _LONG_ABOUT), _LONG_ABOUT)
+        about = from_json(read_text(str(_find_file(path, name)), "JSON file", _LONG_ABOUT), _LONG_ABOUT)
         _About.model_validate(about, strict=True)
         problem, grid, layers = _state_problem(about), grid_of(about), {}
         if grid.size > MOST:
             raise ValueError(f"more than {MOST:.0e} designs")
         for layer, stated in about["layers"].items():
-            name = _layer(layer)
-            layers[layer] = _read_layer(_own(path, name), grid.shape, stated.get("dtype"))
+            name = _layer_path(layer)
+            layers[layer] = _read_layer(_find_file(path, name), grid.shape, stated.get("dtype"))
         name = _TILES
-        record = _own(path, name)
+        record = _find_file(path, name)
         done, end = _read_record(record, about["tile"], grid)
     except _DAMAGE as error:
-        said = " ".join(str(error).split())[:300]
-        raise refusal(f"'{path}' is damaged: {name}: {said}; give --fresh to move it aside and begin anew") from None
+        reason = " ".join(str(error).split())[:300]
+        raise refusal(f"'{path}' is damaged: {name}: {reason}; give --fresh to move it aside and start anew") from None
     return about, problem, Tiles(layers, about["tile"], done, (record, end))
 
 
 def grid_of(about: Mapping[str, Any]) -> Grid:
-    """The grid that about.json states."""
+    """The grid that about.json describes."""
     axes = about["axes"]
     return Grid(tuple(axes), tuple(np.linspace(a["min"], a["max"], a["points"]) for a in axes.values()))
 
 
 def _state_problem(about: Mapping[str, Any]) -> Problem | None:
-    """The problem, but for equality constraints; None for a model of the user's own."""
+    """The problem without equality constraints; None for a model of the user."""
     stated = about["problem"]
     if "statement" in stated or stated["model"] not in MODELS:
         return None
@@ -250,8 +249,8 @@ def _state_problem(about: Mapping[str, Any]) -> Problem | None:
     return Problem(MODELS[stated["model"]], stated["fixed"], free, stated["constraints"], title=about["title"])
 
 
-def _own(path: Path, name: str) -> Path:
-    """A regular file in the folder, not reached through a link: what is elsewhere is not written."""
+def _find_file(path: Path, name: str) -> Path:
+    """Path of a regular file in the folder; refuses links, so that nothing outside is written."""
     place = path.resolve() / name
     if place.resolve() != place or not place.is_file():
         raise ValueError("no file, or a link")
@@ -266,17 +265,17 @@ def _read_layer(place: Path, shape: tuple[int, ...], dtype: str | None) -> NDArr
 
 
 def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], int]:
-    """First row → counts, and where the last whole line ends."""
+    """First row → counts of each recorded tile; and where the last whole line ends."""
     done, end = dict[int, Tally](), 0
     tiles = {rows.start: rows for rows in grid.tiles(tile)}
     for line in read_lines(str(place), "JSON record", MOST_TILES * _LONG_LINE, _LONG_LINE):
         if not line.endswith("\n"):
-            break  # it was being written
+            break  # cut off while it was written
         end += len(line)
-        told = from_json(line)
-        if told["least"] is None:
-            told["least"] = math.nan
-        row, counts = told["row"], _TALLY.validate_python(told)
+        entry = from_json(line)
+        if entry["least"] is None:
+            entry["least"] = math.nan
+        row, counts = entry["row"], _TALLY.validate_python(entry)
         if counts.designs != len(tiles.get(row, ())) * grid.shape[-1] or not -1 <= counts.place < grid.size:
             raise ValueError(f"{line:.100} is no tile")
         done[row] = counts

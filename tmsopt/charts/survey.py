@@ -1,4 +1,4 @@
-"""Grids over two or three parameters, and what is computed of their designs, a few rows at a time."""
+"""Grids over two or three parameters, and what is computed for their designs, a few rows at a time."""
 
 import math
 import operator
@@ -28,27 +28,27 @@ LAYERS: Mapping[str, DTypeLike] = {
     "satisfied": np.bool_,
     "margin": np.float64,
 }
-"""Layers of every chart that can be asked for, and the numbers in them; see `Chart`."""
+"""Layers that a chart can have, with their types; see `Chart`."""
 
 USUAL = tuple(LAYERS)[:-1]
-"""Layers of a chart in a folder unless others are asked for."""
+"""Default layers of a chart in a folder."""
 
 USUAL_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
-"""Points along two or three axes unless others are asked for."""
+"""Default points along two or three axes."""
 
 MOST = 10**9
-"""Designs of a grid."""
+"""Most designs of a grid."""
 
 LONGEST = 10**6
-"""Points along one axis."""
+"""Most points along one axis."""
 
 MOST_TILES = 10**6
-"""Tiles of one chart."""
+"""Most tiles of a chart."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Values along two or three axes; arrays have the last axis first, and the first one runs fastest, as in an image.
+    """Values along two or three axes; arrays have the last axis first, as an image has.
 
     Attributes:
         axes: names of the parameters.
@@ -60,7 +60,7 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the arrays."""
+        """Shape of the arrays."""
         return tuple(len(v) for v in reversed(self.values))
 
     @property
@@ -80,30 +80,30 @@ class Grid:
         return {n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} for n, v in axes}
 
     def design(self, place: int) -> dict[str, float]:
-        """Parameters of a design by its place in the flat arrays."""
+        """Parameters of the design at an index of the flat arrays."""
         indices = np.unravel_index(place, self.shape)[::-1]
         return {n: float(v[k]) for n, v, k in zip(self.axes, self.values, indices, strict=True)}
 
     def tiles(self, points: int) -> list[range]:
-        """All rows, in parts of about so many points.
+        """All rows, in tiles of about this many points.
 
         Raises:
-            InputError: for too many parts.
+            InputError: for too many tiles.
         """
         each, rows = max(1, points // self.shape[-1]), range(self.size // self.shape[-1])
         if (count := len(rows[::each])) > MOST_TILES:
-            raise refusal(f"found {points}, which makes {count} tiles; accepted: {MOST_TILES}", "tile")
+            raise refusal(f"found {points}, which makes {count} tiles; accepted: {MOST_TILES} tiles or fewer", "tile")
         return [rows[k : k + each] for k in rows[::each]]
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What to compute of every design of a grid.
+    """The layers to compute for every design of a grid.
 
     Attributes:
-        dtypes: layer → the kind of its numbers; layers are names among `LAYERS`, and quantities.
-        quantities: name → expression, further layers.
-        before, after: what is computed before the roots, coefficients among it, and what takes them.
+        dtypes: layer → its type, for names among `LAYERS` and for quantities.
+        quantities: name → expression of an additional layer.
+        before, after: functions computed before the roots, including the coefficients, and those that need roots.
     """
 
     problem: Posed
@@ -116,38 +116,38 @@ class Survey:
     def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
         """The layers of a few rows, shape (len(rows), n), and their counts."""
         model, shape = self.problem.model, (len(rows), self.grid.shape[-1])
-        columns, fallbacks, asked = {**self.problem.fixed, **self.grid.columns(rows)}, 0, self.dtypes.keys()
-        with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
+        columns, fallbacks, layers = {**self.problem.fixed, **self.grid.columns(rows)}, 0, self.dtypes.keys()
+        with np.errstate(all="ignore"):  # overflow counts as undefined
             values = self.before(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
-            if {"kind", "real_roots"} & asked:
+            if {"kind", "real_roots"} & layers:
                 values |= vars(classify(coefficients))
-            if self.after.names or {"abscissa", "damping_ratio"} & asked:
+            if self.after.names or {"abscissa", "damping_ratio"} & layers:
                 motion = find_motion(coefficients)
                 fallbacks = motion.fallbacks
                 ratio = motion.damping_ratio if model.carrier is None else np.full(shape, np.nan)
                 found = {"abscissa": motion.abscissa, "damping_ratio": ratio}
                 values |= found | self.after(columns | found)
-            if {"satisfied", "margin"} & asked:
+            if {"satisfied", "margin"} & layers:
                 sides = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
                 values["margin"] = reduce(np.minimum, sides, np.inf)
                 values["satisfied"] = values["margin"] >= 0
             values |= {n: values[_QUANTITY + n] for n in self.quantities}
-            given = {n: (np.broadcast_to(values[n], shape), dtype) for n, dtype in self.dtypes.items()}
-            layers = {n: np.ascontiguousarray(*array) for n, array in given.items()}
-        return layers, count_tile(layers, rows.start * shape[1], fallbacks)
+            whole = {n: np.broadcast_to(values[n], shape) for n in layers}
+            arrays = {n: np.ascontiguousarray(whole[n], dtype) for n, dtype in self.dtypes.items()}
+        return arrays, count_tile(arrays, rows.start * shape[1], fallbacks)
 
 
 _QUANTITY, _LIMIT = "quantity ", "limit "
-"""Before the names of outputs, which users choose."""
+"""Prefixes that keep output names apart from parameters."""
 
 
 def limits_of(problem: Posed) -> dict[str, Any]:
-    """The constraints that hold on parts of a grid: all but equalities."""
+    """The inequality constraints."""
     return {n: c for n, c in problem.conditions.items() if not c.equality}
 
 
-def survey(
+def plan_survey(
     problem: Given,
     axes: Sequence[str] | None = None,
     points: Sequence[int] | None = None,
@@ -155,11 +155,11 @@ def survey(
     quantities: Mapping[str, str] | None = None,
     single: bool = False,
 ) -> Survey:
-    """What to compute over a grid of the free parameters, validated; arguments as of `chart`.
+    """Validate the arguments of `chart` and plan its survey.
 
     Raises:
-        InputError: unless two or three parameters are free and the axes name them; for other numbers of points,
-            unknown layers, bad expressions.
+        InputError: unless two or three parameters are free and the axes name them; for bad numbers of points, unknown
+            layers, bad expressions.
     """
     problem = pose(problem)
     names = axes_of(problem, axes)
@@ -177,40 +177,40 @@ def survey(
     if faults:
         raise InputError(faults)
     wanted = {_QUANTITY + n: e for n, e in parse_all(problem, extra).items()}
-    if searched := [n for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
-        message = f"uses {RADIUS}, which takes a search for every design; a chart has what is computed at once"
-        raise InputError([Fault(message, ("quantities", n)) for n in searched])
+    if with_radius := [n for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
+        message = f"found {RADIUS}, which needs a search for every design; accepted: quantities with a formula"
+        raise InputError([Fault(message, ("quantities", n)) for n in with_radius])
     if {"satisfied", "margin"} & set(layers):
         wanted |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
     wanted |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
-    late = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
+    on_roots = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
     dtypes = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *extra)}
     return Survey(
         problem,
         Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
         {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in dtypes.items()},
         dict(extra),
-        before=array_function(problem, {n: e for n, e in wanted.items() if n not in late}),
-        after=array_function(problem, late),
+        before=array_function(problem, {n: e for n, e in wanted.items() if n not in on_roots}),
+        after=array_function(problem, on_roots),
     )
 
 
 def layer_faults(names: Any, accepted: Sequence[str]) -> list[Fault]:
-    """Faults of a list of layers."""
+    """Faults in a list of layers."""
     return list_faults("layers", names, "['kind', 'abscissa']") or [
         Fault(f"found {short(n)}; {suggest(n, accepted)}", ("layers",)) for n in names if n not in accepted
     ]
 
 
 def axes_of(problem: Posed, axes: Sequence[str] | None = None) -> tuple[str, ...]:
-    """The two or three free parameters of a problem, in the order asked for.
+    """The two or three free parameters of a problem, in the order of the axes.
 
     Raises:
-        InputError: unless there are two or three, and the axes name them.
+        InputError: unless two or three parameters are free and the axes name them.
     """
     free = list(problem.free)
     if len(free) not in (2, 3):
-        message = f"a grid has two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
+        message = f"a grid needs two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
         fixed = [n for n in ("Fr", "v", *problem.fixed) if n in problem.fixed]
         freed = f"; write e.g. {example_of(problem.parameter_set[fixed[0]])[1]}" if fixed else ""
         raise refusal(message + ("; fix the others" if len(free) > 3 else freed), "parameters")
@@ -225,8 +225,7 @@ def _sizes(points: Any, count: int) -> tuple[int, ...]:
     except (TypeError, ValueError):
         sizes = ()
     if len(sizes) != count or min(sizes) < 2 or max(sizes) > LONGEST or math.prod(sizes) > MOST:
-        accepted = (
-            f"{('two', 'three')[count - 2]} whole numbers, each from 2 to {LONGEST}, their product {MOST:.0e} or less"
-        )
+        number = ("two", "three")[count - 2]
+        accepted = f"{number} whole numbers, each from 2 to {LONGEST}, with a product of {MOST:.0e} or less"
         raise refusal(f"found {points!r}; accepted: {accepted}", "points")
     return sizes

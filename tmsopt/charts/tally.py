@@ -1,4 +1,4 @@
-"""Counts over the designs of a chart, tile by tile: shares of the classes, the best design."""
+"""Counts over the designs of a chart: shares of the classes, the best design."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -16,11 +16,11 @@ class Tally:
     """Counts over some of the designs.
 
     Attributes:
-        designs: how many.
-        classes: number in each class; empty where the kind was not asked for.
-        satisfied: number that satisfy every inequality; None where that was not asked for.
-        least: least abscissa of those; nan where there is none.
-        place: its place in the flat arrays, the first of equals; -1 where there is none.
+        designs: number of designs.
+        classes: number in each class; empty without the layer ``kind``.
+        satisfied: number that satisfy every inequality; None without that layer.
+        least: least abscissa of these; nan if there is none.
+        place: its index in the flat arrays, the first of equals; -1 if there is none.
         fallbacks: number of designs whose roots came from companion eigenvalues.
     """
 
@@ -33,12 +33,12 @@ class Tally:
 
     @property
     def shares(self) -> dict[str, float]:
-        """Share of the designs in each class; empty where the kind was not asked for."""
+        """Share of the designs in each class; empty without the layer ``kind``."""
         return {n: count / self.designs for n, count in zip(CLASSES, self.classes, strict=False)}
 
 
 def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0) -> Tally:
-    """Counts over a tile whose first design has the place `first`."""
+    """Count over a tile whose first design has the index `first`."""
     kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
     least, place = math.nan, -1
     if abscissa is not None:
@@ -57,7 +57,7 @@ def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 
 
 
 def add_tallies(tallies: Iterable[Tally]) -> Tally:
-    """Counts of several tiles together; their order does not matter."""
+    """Add the counts of several tiles, in any order."""
     every = list(tallies)
     least, place = min(((t.least, t.place) for t in every if t.place >= 0), default=(math.nan, -1))
     satisfied = [t.satisfied for t in every if t.satisfied is not None]

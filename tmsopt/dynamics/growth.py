@@ -21,7 +21,7 @@ from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Tabular, Truth, plain
 from tmsopt.roots import Root, is_stable, roots
-from tmsopt.search.solve import solved_first
+from tmsopt.search.solve import solve_if_needed
 
 SPEEDS = ("Fr", "v")
 """Parameters that are speeds."""
@@ -117,7 +117,7 @@ def growth(
 
     More: docs/explanation/weave_and_capsize.md
     """
-    design = solved_first(design, progress)
+    design = solve_if_needed(design, progress)
     start_steps(progress, "following the roots")
     if not (end is None or (is_number(end) and end != 0)):
         raise refusal(f"found {short(end)}; accepted: a number other than 0", "end")

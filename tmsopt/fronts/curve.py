@@ -11,7 +11,7 @@ from tmsopt.fronts.subproblems import FrontSolver, least, point
 from tmsopt.fronts.team import AT_ONCE, each
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps
-from tmsopt.search.solve import covered
+from tmsopt.search.solve import add_cover
 
 Objectives = tuple[float, ...]
 
@@ -315,7 +315,7 @@ def _thinned(search: _Search, front: Front) -> Front:
 
 
 def _covered(_: FrontSolver, solution: Solution) -> Solution:
-    return covered(solution)
+    return add_cover(solution)
 
 
 def _missing(ask: FrontSolver, s: _Stretch) -> str:

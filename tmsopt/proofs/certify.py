@@ -20,7 +20,7 @@ from tmsopt.problem.solution import Bound, Solution
 from tmsopt.program.formulate import Builder
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.proofs.improvement import FLOOR, confirmed, feasible
-from tmsopt.search.solve import solved_first
+from tmsopt.search.solve import solve_if_needed
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -60,7 +60,7 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
     check_installed()
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
         raise InputError([Fault(f"found {seconds!r}; accepted: a positive number of seconds", ("seconds",))])
-    found = solved_first(design, progress)
+    found = solve_if_needed(design, progress)
     problem = as_solvable(found)
     if not problem.free:
         return _noted(found, "nothing is free, so there is nothing to bound")

@@ -1,7 +1,7 @@
-"""Solve: parts of the box, starts, outcome, relaxation, all designs.
+"""Search for designs: a sample of the box, local solves, rescues, remedies, all designs.
 
-In: a `Problem`. Out: a `Solution` that was rechecked, or the least that would have to give. Open `policy` first, which
-is the loop; then `search`, where its stages are put together, and `solve`, which makes a `Solution` of what it finds.
+In: a `Problem`. Out: a rechecked `Solution`, or the least change of limits that makes one possible. Open `policy`
+first: it holds the loop. Then read `search`, which puts its stages together, and `solve`, which makes the `Solution`.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""All designs with a pattern in a box: proved to be all, or as far as many starts find them and what these cover."""
+"""All designs with a pattern in a box: proved complete, or those that many starts find, with an estimate of others."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -7,7 +7,6 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tmsopt.algebra.balls import Number
 from tmsopt.errors import Fault, InputError, is_number, short
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.global_search.complete import SECONDS, Completeness, completeness
@@ -22,38 +21,37 @@ from tmsopt.program.options import Asked, Options, documents_options, options_of
 from tmsopt.program.starts import completions, spread
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain
-from tmsopt.search.local import run_from
-from tmsopt.search.newton import error, newton, newton_step, square_system
+from tmsopt.search.local_search import solve_from
+from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
 from tmsopt.search.solve import solve_any_status
-from tmsopt.search.state import SearchState, Start
+from tmsopt.search.state import SearchState, Start, clip_to_box
 
 MOST = 1024
-"""Starts at most."""
+"""Largest number of starts."""
 
 _DEFAULTS = Options(starts=MOST)
-_FEWEST = 48
-_AGAIN = 3  # times that every solution must have been met before the search may end
-_SAME = 1e-7  # of the box: distance of designs that are one solution, whatever their factors are called
-_INSIDE = 1e-9  # of the box: how far outside an end counts as on it
-_BY_IPOPT = 4  # every so many starts, IPOPT is asked too: it reaches what Newton's method runs away from
+_FEWEST = 48  # starts at least
+_MIN_HITS = 3  # of every solution before the search may end
+_SAME = 1e-7  # of the box: distance below which two designs are one solution
+_INSIDE = 1e-9  # of the box: ends this far outside are moved to its edge
+_IPOPT_EVERY = 4  # starts per run of IPOPT, which finds solutions that Newton's method misses
 _ROUNDING = 1e-15  # relative, of a double and of a root
-_DEVIATIONS = 2.0  # beyond the estimate: with `_NEVER`, 95 % for few solutions and for many, alike and unlike
-_NEVER = 3.0  # −ln 5 %: what was met in none of n starts is met in fewer than 3/n of them, with 95 %
+_DEVIATIONS = 2.0  # added to the estimate: with `_NEVER`, 95 % for few or many solutions, equally likely or not
+_NEVER = 3.0  # −ln 5 %: an event seen in none of n starts has a chance below 3/n, with 95 % confidence
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What a search of many starts says about what it has not found.
+    """How completely a search of many starts covered the solutions.
 
     Attributes:
-        starts: designs that were started from, spread evenly over the box.
-        hits: starts that led to each solution.
-        expected: number of solutions to be expected in all, from how often each was met (Boender and Rinnooy Kan
-            1987); it is an estimate, not a proof.
-        chance: with 95 % confidence, the chance that one more start finds another is smaller.
-        singular: starts that ended at designs with the pattern where the equations are singular, and at no other: one
-            of a continuum of solutions, or one where two meet. These are not counted as solutions.
-        crossings: starts that ended where roots meet without the Jordan chain of an exceptional point, and at no other.
+        starts: number of starts, spread evenly over the box.
+        hits: number of starts that led to each solution.
+        expected: estimated number of solutions in all, from `hits` (Boender and Rinnooy Kan 1987); not a proof.
+        chance: upper bound of the chance that one more start finds a new solution, with 95 % confidence.
+        singular: starts that ended only at designs with the pattern and singular equations: in a continuum of
+            solutions, or where two meet. These are not counted as solutions.
+        crossings: starts that ended only where roots meet without the Jordan chain of an exceptional point.
     """
 
     starts: int
@@ -72,14 +70,14 @@ class Coverage:
 
 @dataclass(frozen=True, repr=False)
 class Every(Tabular):
-    """All solutions that were found.
+    """All solutions found.
 
     Attributes:
-        solutions: in the order of their parameters where they are proved to be all, else those met most often first.
-        coverage: of the search; None where there was none.
-        completeness: of the proof; None where none was asked for.
-        proved: of each solution, whether it is proved to exist.
-        errors: of each solution, how far its free parameters and its abscissa may be off.
+        solutions: ordered by their parameters if proved complete, else the most frequent first.
+        coverage: of the search; None without one.
+        completeness: of the proof; None without one.
+        proved: for each solution, whether it is proved to exist.
+        errors: for each solution, error bounds of its free parameters and its abscissa.
 
     Example:
         >>> every = tmsopt.solve_all("problems/coupled_pair.toml")
@@ -97,43 +95,44 @@ class Every(Tabular):
 
     @property
     def complete(self) -> bool:
-        """Whether these are proved to be all."""
+        """Whether these are proved to be all solutions."""
         return self.completeness is not None and self.completeness.complete
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The designs, one a row."""
-        for solution, proved in zip(self.solutions, self._known(), strict=True):
+        """One row for each design."""
+        for solution, proved in zip(self.solutions, self._proved_flags(), strict=True):
             found = {"abscissa": solution.abscissa, "structure": solution.structure, "stable": solution.stable}
             yield {**solution.parameters, **found, "proved": proved}
 
-    def _known(self) -> tuple[bool, ...]:
+    def _proved_flags(self) -> tuple[bool, ...]:
         return self.proved or (False,) * len(self.solutions)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``: each solution with ``proved``, beside them ``complete`` and ``undecided``."""
+        """Plain data for ``json.dumps``: each solution with ``proved``; also ``complete`` and ``undecided``."""
         found = plain(self)
-        for solution, proved in zip(found["solutions"], self._known(), strict=True):
+        for solution, proved in zip(found["solutions"], self._proved_flags(), strict=True):
             solution["proved"] = proved
-        known = self.completeness
-        return found | {"complete": self.complete, "undecided": len(known.undecided) if known else None}
+        proof = self.completeness
+        return found | {"complete": self.complete, "undecided": len(proof.undecided) if proof else None}
 
 
 @documents_options(Asked, _DEFAULTS)
 def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Asked]) -> Every:
-    """Every design in the box with the pattern that a problem locates, where that leaves no freedom.
+    """Find every design in the box with the located pattern, if the pattern leaves no freedom.
 
-    Interval branch and prune shows which designs there are, and that there is no other. Where it does not come to an
-    end in time, Newton's method runs from designs spread over the box with every way to share out their roots, and
-    IPOPT from some of them, until each solution was met three times and an estimate expects no more, or after `starts`.
-    Solutions are told apart by their parameters, so factors that change places are no other solution.
+    Interval branch and prune proves which designs exist and that there is no other. If it takes too long, Newton's
+    method starts from designs spread over the box, with every assignment of their roots to factors, and IPOPT from some
+    of them. This ends when each solution was met three times and the estimate expects no more, or after `starts`.
+    Solutions differ in their parameters: exchanged factors do not count.
 
     Args:
-        seconds: for the proof at most; 0 for the search alone.
+        seconds: time limit of the proof; 0 skips it.
         options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``; see
             `tmsopt.Options`.
 
     Raises:
-        InputError: for a problem that locates no pattern, leaves freedom, or constrains a quantity without a formula.
+        InputError: for a problem without a located pattern, with freedom left, or with a constraint on a quantity that
+            has no formula.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # (s + 1)² and (s - 1)²
@@ -146,38 +145,43 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
     problem = pose(problem)
     if not is_number(seconds):
         raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
-    nlp = _posed(problem)
+    nlp = _build_equations(problem)
     state = SearchState(problem, problem, nlp, options_of(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
     proof = completeness(problem, seconds, state.options.progress) if seconds > 0 else None
-    proved = [] if proof is None else [_clipped(problem, design) for design in proof.designs]
-    known = proof is not None and (proof.complete or proof.stopped)
-    found, errors, coverage = ([], [], None) if known else _search(problem, nlp, state)
+    proved_designs = proof.designs if proof else ()
+    proved = [np.array([*clip_to_box(problem, {n: float(x) for n, x in d.items()}).values()]) for d in proved_designs]
+    finished = proof is not None and (proof.complete or proof.stopped)
+    found, errors, coverage = ([], [], None) if finished else _search_starts(problem, nlp, state)
     width = np.array([hi - lo for lo, hi in problem.free.values()])
-    new = [x for x in proved if not any(_same(x, y, width) for y in found)]
+    new = [x for x in proved if not any(_is_same(x, y, width) for y in found)]
     if coverage:
         coverage = replace(coverage, hits=(*coverage.hits, *(0 for _ in new)))
-    solutions = tuple(_solution(problem, _named(problem, x)) for x in [*found, *new])
-    told = tuple(any(_same(x, y, width) for y in proved) for x in [*found, *new])
-    radii = [{n: float(x.radius) for n, x in design.items()} for design in proof.designs] if proof else []
-    proofs = [next((r for r, y in zip(radii, proved, strict=True) if _same(x, y, width)), {}) for x in [*found, *new]]
-    each = zip(solutions, [*errors, *({} for _ in new)], proofs, strict=True)
-    return Every(solutions, coverage, proof, told, tuple(_errors(s, own, radius) for s, own, radius in each))
+    radii = [{n: float(x.radius) for n, x in design.items()} for design in proved_designs]
+    solutions, exists, bounds = list[Solution](), list[bool](), list[Table[float]]()
+    for x, own in zip([*found, *new], [*errors, *({} for _ in new)], strict=True):
+        matches = [radius for y, radius in zip(proved, radii, strict=True) if _is_same(x, y, width)]
+        solutions.append(_make_solution(problem, _name_parameters(problem, x)))
+        exists.append(bool(matches))
+        bounds.append(_combine_errors(solutions[-1], own, matches[0] if matches else {}))
+    return Every(tuple(solutions), coverage, proof, tuple(exists), tuple(bounds))
 
 
-def _errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, float]) -> Table[float]:
-    """What a proof says of a parameter, or else the search; a double is rounded, and so are roots."""
+def _combine_errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, float]) -> Table[float]:
+    """Error bounds of a solution: from the proof, else from the search; at least the rounding of doubles and roots."""
     size = max((r.size for r in solution.roots), default=0.0)
     least = {n: abs(solution.parameters[n]) for n in solution.problem.free} | {"abscissa": size}
-    known = {**own, **radius, **({"abscissa": 0.0} if radius else {})}
-    return Table({n: max(known.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
+    errors = {**own, **radius, **({"abscissa": 0.0} if radius else {})}
+    return Table({n: max(errors.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
 
 
-def _search(problem: Posed, nlp: NLP, state: SearchState) -> tuple[list[Array], list[dict[str, float]], Coverage]:
-    """Solutions that many starts lead to, those met most often first, and their errors."""
+def _search_starts(
+    problem: Posed, nlp: NLP, state: SearchState
+) -> tuple[list[Array], list[dict[str, float]], Coverage]:
+    """Solutions found from many starts, the most frequent first, with their errors and the coverage."""
     starts, progress = state.options.starts, state.options.progress
     begin(progress, "searching", "start")
-    system = square_system(nlp)
+    system = build_square_system(nlp)
     assert system is not None  # as many conditions as parameters
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     found: list[Array] = []
@@ -185,91 +189,85 @@ def _search(problem: Posed, nlp: NLP, state: SearchState) -> tuple[list[Array], 
     hits: list[int] = []
     done = singular = crossings = 0
     for design in spread(problem, state.options.seed):
-        if done >= starts or _covered(done, hits):
+        if done >= starts or _is_covered(done, hits):
             break
-        ends = [newton(system, x) for x in completions(nlp, problem, design)]
-        if done % _BY_IPOPT == 0:
-            ended = run_from(state, Start(design, near=False))
-            ends.append((newton(system, ended.run.x) or newton_step(system, ended.run.x)) if ended.feasible else None)
-        met: set[int] = set()
+        ends = [find_zero(system, x) for x in completions(nlp, problem, design)]
+        if done % _IPOPT_EVERY == 0:
+            local = solve_from(state, Start(design, near=False))
+            ends.append((find_zero(system, local.run.x) or make_zero(system, local.run.x)) if local.feasible else None)
+        reached: set[int] = set()
         doubtful = crossed = False
         for end in ends:
-            point = None if end is None else _inside(problem, nlp, end.x)
+            point = None if end is None else _take_parameters(problem, nlp, end.x)
             if end is None or point is None:
                 continue
             if not end.isolated:
-                checked = recheck(problem, problem.ordered(_named(problem, point)))
+                checked = recheck(problem, problem.ordered(_name_parameters(problem, point)))
                 doubtful, crossed = doubtful or not checked.violations, crossed or checked.crossing
                 continue
-            known = next((k for k, other in enumerate(found) if _same(point, other, width)), None)
-            if known is None:
-                if recheck(problem, problem.ordered(_named(problem, point))).violations:
+            row = next((k for k, other in enumerate(found) if _is_same(point, other, width)), None)
+            if row is None:
+                if recheck(problem, problem.ordered(_name_parameters(problem, point))).violations:
                     continue
-                known = len(found)
+                row = len(found)
                 found.append(point)
-                errors.append(_off(problem, error(system, end.x)))
+                errors.append(_name_errors(problem, estimate_error(system, end.x)))
                 hits.append(0)
-            met.add(known)
-        for k in met:
+            reached.add(row)
+        for k in reached:
             hits[k] += 1
-        singular += doubtful and not met
-        crossings += crossed and not met
+        singular += doubtful and not reached
+        crossings += crossed and not reached
         done += 1
         if progress:
             progress(done, starts)
     order = np.argsort([-h for h in hits], kind="stable")
-    coverage = coverage_of(done, [hits[k] for k in order], singular)
+    coverage = estimate_coverage(done, [hits[k] for k in order], singular)
     return [found[k] for k in order], [errors[k] for k in order], replace(coverage, crossings=crossings)
 
 
-def _off(problem: Posed, off: Array) -> dict[str, float]:
-    """Errors of free parameters, of an angle no greater than that of its tangent, and of the roots."""
-    own = dict(zip(problem.free, off.tolist(), strict=False))
-    return own | {"abscissa": max(off[len(own) :].tolist(), default=0.0)}
+def _name_errors(problem: Posed, errors: Array) -> dict[str, float]:
+    """Errors by name: of the free parameters and of the abscissa. An angle's error is at most its tangent's."""
+    own = dict(zip(problem.free, errors.tolist(), strict=False))
+    return own | {"abscissa": max(errors[len(own) :].tolist(), default=0.0)}
 
 
-def _posed(problem: Posed) -> NLP:
-    """The equations of a problem; refused where they are not those of single solutions in the parameters alone."""
+def _build_equations(problem: Posed) -> NLP:
+    """The equations of a problem; refuses problems whose solutions are not isolated."""
     counted = degrees_of_freedom(problem)
     if problem.pattern is None or problem.objective is not None:
-        order = min(
-            max(len(problem.free) + 1, 2), problem.model.degree
-        )  # as many conditions as there are free parameters
-        message = (
-            f"all solutions are those of a pattern; write locate = 'EP{order}', or another, and no minimize or maximize"
-        )
+        order = min(max(len(problem.free) + 1, 2), problem.model.degree)  # as many conditions as free parameters
+        message = f"needs a pattern and no objective; write e.g. locate = 'EP{order}' instead of minimize or maximize"
         raise InputError([Fault(message, ("objective",))])
-    if counted.kind != "square" or problem.cases:
-        advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or ask for less"
+    if problem.cases:
+        message = "scenarios and tolerances leave no isolated solutions; remove them"
+        raise InputError([Fault(message, ("parameters",))])
+    if counted.kind != "square":
+        advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or drop conditions"
         free = f"{counted.free} free parameter{'' if counted.free == 1 else 's'}"
         conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"
-        message = f"{free} and {conditions} do not make single solutions; {advice}"
+        message = f"{free} and {conditions} do not give isolated solutions; {advice}"
         raise InputError([Fault(message, ("parameters",))])
     nlp = matching(problem)
     if nlp.touches:
         found = f"the constraints use {', '.join(nlp.touches)}, which only the roots define"
         accepted = "parameters, coefficients, and quantities with a formula in these"
-        advice = "write them so, or ask for one design alone by solve, which names other solutions too"
+        advice = "rewrite the constraints, or use solve, which finds one design and names other solutions"
         raise InputError([Fault(f"{found}; accepted: {accepted}; {advice}", ("constraints",))])
     return nlp
 
 
-def _same(one: Array, other: Array, width: Array) -> bool:
+def _is_same(one: Array, other: Array, width: Array) -> bool:
     return bool(np.max(np.abs(one - other) / width) <= _SAME)
 
 
-def _clipped(problem: Posed, design: Mapping[str, Number]) -> Array:
-    """A proved design as doubles in the box."""
-    return np.array([min(max(float(design[n]), lo), hi) for n, (lo, hi) in problem.free.items()])
-
-
-def _named(problem: Posed, point: Array) -> dict[str, float]:
-    """What is nearer to 0 than any number of a problem is 0."""
+def _name_parameters(problem: Posed, point: Array) -> dict[str, float]:
+    """Parameters by name; numbers too small for a problem become 0."""
     return {n: x if abs(x) >= SMALLEST else 0.0 for n, x in zip(problem.free, point.tolist(), strict=True)}
 
 
-def _inside(problem: Posed, nlp: NLP, x: Array) -> Array | None:
-    """The free parameters of a solution in the box; None for one outside."""
+def _take_parameters(problem: Posed, nlp: NLP, x: Array) -> Array | None:
+    """The free parameters of a solution in the box; None if it is outside."""
     lower, upper = (np.array(ends[: len(problem.free)]) for ends in (nlp.lower, nlp.upper))
     room = _INSIDE * (upper - lower)
     own = x[: len(problem.free)]
@@ -278,27 +276,28 @@ def _inside(problem: Posed, nlp: NLP, x: Array) -> Array | None:
     return np.array(list(design_of(problem, x.tolist()).values()))
 
 
-def _covered(done: int, hits: list[int]) -> bool:
-    """Whether more starts would be waste."""
+def _is_covered(done: int, hits: list[int]) -> bool:
+    """Whether more starts are unlikely to find another solution."""
     if done < _FEWEST:
         return False
-    return not hits or (min(hits) >= _AGAIN and _expected(hits) <= len(hits) + 0.5)
+    return not hits or (min(hits) >= _MIN_HITS and _estimate_total(hits) <= len(hits) + 0.5)
 
 
-def _expected(hits: list[int]) -> float:
-    """w (n − 1)/(n − w − 2) solutions in all, for w different ones among n that were met."""
+def _estimate_total(hits: list[int]) -> float:
+    """Estimated number of solutions, w (n − 1)/(n − w − 2), from w different ones met n times in all."""
     w, n = len(hits), sum(hits)
     return w * (n - 1) / (n - w - 2) if n > w + 2 else math.inf if w else 0.0
 
 
-def coverage_of(done: int, hits: list[int], singular: int = 0) -> Coverage:
+def estimate_coverage(done: int, hits: list[int], singular: int = 0) -> Coverage:
+    """The coverage of a search, with the chance of a new solution by Good and Turing (Good 1953)."""
     once, twice = (sum(h == k for h in hits) for k in (1, 2))
-    deviation = math.sqrt(once + 2 * twice)  # of n times the chance, which Turing estimates by `once` (Good 1953)
+    deviation = math.sqrt(once + 2 * twice)  # of `once`, Turing's estimate of n times the chance
     chance = min(1.0, (once + _DEVIATIONS * deviation + _NEVER) / max(done, 1))
-    return Coverage(done, tuple(hits), _expected(hits), chance, singular)
+    return Coverage(done, tuple(hits), _estimate_total(hits), chance, singular)
 
 
-def _solution(problem: Posed, design: Mapping[str, float]) -> Solution:
-    """A design with its standing: of the same problem, where nothing is free."""
+def _make_solution(problem: Posed, design: Mapping[str, float]) -> Solution:
+    """The solution at a design: of the same problem with nothing free."""
     fixed = solve_any_status(problem.derive(fixed=problem.ordered(design), free={}, start={}))
     return replace(fixed, problem=problem.problem, freedom=degrees_of_freedom(problem), formulation="matching")

@@ -1,4 +1,4 @@
-"""Solutions of a square system of equations that Newton's method finds, box or no box."""
+"""Newton's method for the square systems of equations of a problem, inside the box or outside."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -10,30 +10,30 @@ from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 
 _STEPS = 60
-_STALLS = 3  # steps that may lead nowhere: some way on, a solution may still be met
-_ULPS, _MOVES = 4, 8  # units in the last place, and how often, by which rounding is seen
-_ISOLATED = 1e-9  # ratio of singular values below which a solution is one of a continuum, such as p = 0
+_STALLS = 3  # steps without progress before Newton gives up
+_ULPS, _MOVES = 4, 8  # size, in units in the last place, and number of the moves that measure rounding
+_ISOLATED = 1e-9  # ratio of singular values below which the Jacobian counts as singular
 
 
-def solutions(nlp: NLP, starts: Iterable[Array], mirrored: int) -> Iterator[Array]:
-    """Isolated solutions of an NLP's equations, by damped Newton: what is found exists, but more may.
+def find_solutions(nlp: NLP, starts: Iterable[Array], mirrored: int) -> Iterator[Array]:
+    """Isolated solutions of an NLP's equations, by damped Newton; there may be more.
 
-    From each start, and from its images with one of the first `mirrored` variables at a time of the other sign, where
-    its physical range would forbid it. The same solution may come again. None unless the equations are square.
+    Newton starts from each start, and from its images with the sign of one of the first `mirrored` variables changed.
+    The same solution may come again. Yields nothing unless the equations are square.
     """
-    system = square_system(nlp)
+    system = build_square_system(nlp)
     if system is None:
         return
     for start in starts:
         images = (np.where(np.arange(len(start)) == k, -start, start) for k in range(mirrored))
         for image in (start, *images):
-            ended = newton(system, image)
-            if ended is not None and ended.isolated:
-                yield ended.x
+            zero = find_zero(system, image)
+            if zero is not None and zero.isolated:
+                yield zero.x
 
 
-def square_system(nlp: NLP) -> ca.Function | None:
-    """x → the equations of an NLP, and their Jacobian; None unless there are as many as variables."""
+def build_square_system(nlp: NLP) -> ca.Function | None:
+    """A function x → equations of an NLP and their Jacobian; None unless there are as many as variables."""
     x = ca.SX.sym("x", len(nlp.variables))
     g = nlp.symbolic(x)[1]
     equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
@@ -48,15 +48,15 @@ class Zero:
     """A solution of the equations.
 
     Attributes:
-        isolated: whether their Jacobian is regular there; else it may be one of a continuum, or of two that meet.
+        isolated: whether their Jacobian is regular there; else there may be a continuum, or two solutions that meet.
     """
 
     x: Array
     isolated: bool
 
 
-def newton(system: ca.Function, x: Array) -> Zero | None:
-    """A solution of the equations near a point, by damped steps, or None."""
+def find_zero(system: ca.Function, x: Array) -> Zero | None:
+    """A solution of the equations near a point, by damped Newton steps; None if it does not converge."""
     residual, stalls = np.inf, 0
     for _ in range(_STEPS):
         value, jacobian = (np.array(part) for part in system(x))
@@ -74,32 +74,32 @@ def newton(system: ca.Function, x: Array) -> Zero | None:
             damping /= 2
         else:
             stalls += 1
-            if stalls >= _STALLS:  # beside many factors, rounding of the residual is reached before that of x
+            if stalls >= _STALLS:  # with many factors, the residual reaches its rounding before x does
                 break
         x = x + damping * step
-    return Zero(x, _regular(jacobian)) if residual <= 1e-11 * (1 + np.abs(x).max()) else None
+    return Zero(x, _is_regular(jacobian)) if residual <= 1e-11 * (1 + np.abs(x).max()) else None
 
 
-def newton_step(system: ca.Function, x: Array) -> Zero:
-    """A point that another method calls a solution, as it is."""
-    return Zero(x, _regular(np.array(system(x)[1])))
+def make_zero(system: ca.Function, x: Array) -> Zero:
+    """A `Zero` at a point that another method found."""
+    return Zero(x, _is_regular(np.array(system(x)[1])))
 
 
-def error(system: ca.Function, x: Array) -> Array:
-    """How far each variable of a solution may be off: by what is left of the equations, and by their own rounding.
+def estimate_error(system: ca.Function, x: Array) -> Array:
+    """Error of each variable of a solution: from the residual of the equations and from their rounding.
 
-    The rounding is seen where the solution is moved by units in the last place, beside what slopes say; that of sums
-    that swallow a small term is not, so one unit of the terms is counted besides.
+    The rounding is measured by moving the solution by a few units in the last place and subtracting the linear change.
+    Sums that swallow a small term hide it, so one unit of the terms is added.
     """
     value, jacobian = (np.array(part) for part in system(x))
     moves = np.random.default_rng(0).choice([-_ULPS, _ULPS], (_MOVES, len(x))) * np.finfo(float).eps * np.abs(x)
     noise = [np.abs(np.array(system(x + d)[0]) - value - jacobian @ d[:, None]) for d in moves]
     terms = np.finfo(float).eps * np.abs(jacobian) @ np.abs(x)[:, None]
-    left = np.abs(value) + 2 * np.max(noise, axis=0) + terms
-    off = np.abs(np.linalg.pinv(jacobian)) @ left
-    return np.asarray(off.ravel() + np.finfo(float).eps * np.abs(x))
+    residual = np.abs(value) + 2 * np.max(noise, axis=0) + terms
+    errors = np.abs(np.linalg.pinv(jacobian)) @ residual
+    return np.asarray(errors.ravel() + np.finfo(float).eps * np.abs(x))
 
 
-def _regular(jacobian: Array) -> bool:
-    spread = np.linalg.svd(jacobian, compute_uv=False)
-    return bool(spread[-1] > _ISOLATED * spread[0])
+def _is_regular(jacobian: Array) -> bool:
+    singular_values = np.linalg.svd(jacobian, compute_uv=False)
+    return bool(singular_values[-1] > _ISOLATED * singular_values[0])

@@ -1,7 +1,7 @@
-"""The search as a policy: sample, starts, local, accept, enough, and rescues; `search` is the driver.
+"""The search as a policy: sample, starts, local search, acceptance, stopping rule and rescues; `search` is the loop.
 
-In: a `SearchState` at its beginning. Out: the state at its end. Each stage is a function of the state and can be
-replaced: ``tmsopt.solve(problem, policy=replace(POLICY, enough=mine))``.
+Each stage is a function of the `SearchState` and can be replaced: ``tmsopt.solve(problem, policy=replace(POLICY,
+enough=mine))``.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -12,7 +12,7 @@ from tmsopt.errors import Fault, InputError, refusal, short, suggest
 from tmsopt.program.formulate import middle
 from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
-from tmsopt.search.accept import is_better
+from tmsopt.search.acceptance import is_better
 from tmsopt.search.sample import Sample
 from tmsopt.search.starts import is_led
 from tmsopt.search.state import LocalEnd, SearchState, Start
@@ -21,13 +21,13 @@ from tmsopt.search.tuning import TUNING, Tuning
 
 @dataclass(frozen=True)
 class Rescue:
-    """What a search does where its loop alone would end wrongly or with nothing.
+    """A stage that runs after the loop, where the loop alone ends at a wrong design or at none.
 
     Attributes:
-        name: to call it by, as in `Policy.without`.
-        evidence: suites whose verdicts get worse without it, with the number of problems.
-        applies: whether it steps in.
-        run: the search taken up again; gets the policy to run starts with.
+        name: for `Policy.without`.
+        evidence: benchmark suites that get worse without it, with the number of problems.
+        applies: whether it runs in this state.
+        run: continues the search, with the policy for its starts.
 
     Example:
         >>> [rescue.name for rescue in tmsopt.POLICY.rescues][-1]
@@ -47,14 +47,14 @@ class Policy:
     """How a part of the box is searched.
 
     Attributes:
-        sample: what is seen of the part before any solver.
-        starts: designs to start from, one after the other.
-        local: where one start ends: IPOPT on the program of the state.
-        accept: the state with the best of its ends, polished and rechecked.
-        enough: whether more starts would be waste; asked after each start, of the ends on the same program. Rescues
-            that have few starts, and cases that are added, try them all.
-        rescues: in the order in which they are asked.
-        tuning: the numbers that all these depend on.
+        sample: samples the part before any solve; may return None.
+        starts: yields designs to start from.
+        local: solves from one start, by IPOPT on the program of the state.
+        accept: adds the best end to the state, polished and rechecked.
+        enough: whether to stop; called after each start, with the ends on the same program. Rescues with few starts
+            and added cases try all their starts.
+        rescues: in the order in which they run.
+        tuning: the numbers that the stages use.
 
     Example:
         >>> from dataclasses import replace
@@ -74,10 +74,10 @@ class Policy:
     tuning: Tuning = TUNING
 
     def without(self, name: str) -> "Policy":
-        """The same without one rescue.
+        """A copy without one rescue.
 
         Raises:
-            InputError: when there is none of this name.
+            InputError: if no rescue has this name.
         """
         names = [rescue.name for rescue in self.rescues]
         if name not in names:
@@ -86,10 +86,10 @@ class Policy:
 
 
 def check_policy(policy: Any) -> None:
-    """Refuse what cannot be a policy.
+    """Check that an object can be used as a policy.
 
     Raises:
-        InputError: with everything that is wrong.
+        InputError: with all faults.
     """
     if not isinstance(policy, Policy):
         raise refusal(f"found {short(policy)}; accepted: a tmsopt.Policy, such as tmsopt.POLICY", "policy")
@@ -102,7 +102,7 @@ def check_policy(policy: Any) -> None:
 
 
 def search(state: SearchState, policy: Policy) -> SearchState:
-    """Search one part of the box; where the user ends that, the state has what was found so far."""
+    """Search one part of the box; if the user stops it, return what was found so far."""
     try:
         begin(state.options.progress, "looking at designs")
         state = replace(state, tuning=policy.tuning)
@@ -118,7 +118,7 @@ def search(state: SearchState, policy: Policy) -> SearchState:
 
 
 def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most: int = 0) -> SearchState:
-    """The state after these starts, as far as they are needed."""
+    """Solve from these starts until there are enough ends."""
     most = most or state.options.starts
     whole = (replace(start, design={**middle(state.part), **start.design}) for start in starts)
     try:
@@ -133,10 +133,22 @@ def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most
     return state
 
 
+def run_nested(state: SearchState, starts: Iterable[Start], policy: Policy, most: int = 0) -> SearchState:
+    """Solve from these starts inside another search, and accept the best end.
+
+    Raises:
+        KeyboardInterrupt: if the user stops it, so that the outer search stops too.
+    """
+    state = try_starts(state, starts, policy, most)
+    if state.interrupted:
+        raise KeyboardInterrupt
+    return policy.accept(state)
+
+
 def search_again(
     state: SearchState, policy: Policy, starts: Iterable[Start] | None = None, nlp: NLP | None = None, most: int = 0
 ) -> SearchState:
-    """The search with more starts, perhaps on another program: their ends are added, and the better design is kept."""
+    """Solve from more starts, possibly on another program; add their ends and keep the better design."""
     own = state.with_program(nlp or state.nlp)
     own = policy.accept(try_starts(own, policy.starts(own) if starts is None else starts, policy, most))
     ends = (*state.ends, *own.ends)
@@ -146,6 +158,6 @@ def search_again(
     return replace(state, ends=ends, accepted=len(ends), interrupted=own.interrupted)
 
 
-def try_all(policy: Policy) -> Policy:
-    """The same policy where every start given is tried."""
+def disable_stopping(policy: Policy) -> Policy:
+    """A copy of the policy that tries every start."""
     return replace(policy, enough=lambda state: False)

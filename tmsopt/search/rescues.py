@@ -1,6 +1,6 @@
-"""Rescues: what a search does where its loop alone ends wrongly or with nothing, each earned on a benchmark.
+"""Rescues: extra stages for problems on which the loop alone ends at a wrong design or at none.
 
-Every one starts from other designs or on another program, and hands what it finds to the same loop.
+Each one starts from other designs or on another program, and returns to the same loop.
 """
 
 import math
@@ -14,33 +14,33 @@ from tmsopt.models.user_spectrum import full_patterns
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.program.formulate import formulate, matching
 from tmsopt.program.starts import designs
-from tmsopt.search.accept import check_end, claim_matches, is_better, is_sound
-from tmsopt.search.enough import distinct_ends
-from tmsopt.search.local import run_once
-from tmsopt.search.outcome import KEPT, mass_advice, runs_away
-from tmsopt.search.policy import Policy, Rescue, search_again, try_all, try_starts
-from tmsopt.search.sample import Looked, sample_box
-from tmsopt.search.starts import sample_starts
+from tmsopt.search.acceptance import check_end, claim_matches, is_better, is_sound
+from tmsopt.search.local_search import run_once
+from tmsopt.search.outcome import KEPT, has_runaway_root, write_mass_advice
+from tmsopt.search.policy import Policy, Rescue, disable_stopping, search_again, try_starts
+from tmsopt.search.sample import DesignBatch, sample_box
+from tmsopt.search.starts import propose_sample_starts
 from tmsopt.search.state import CheckedEnd, Fallback, SearchState, Start
+from tmsopt.search.stopping import select_distinct_ends
 
 # Roots that meet
 
 
-def is_mixed(state: SearchState) -> bool:
-    """Whether sectors and half-planes are asked for together, which are singular where real roots meet."""
+def has_both_root_limits(state: SearchState) -> bool:
+    """Whether abscissa and damping ratio are both variables: their factors are singular where real roots meet."""
     return {"abscissa", "damping_ratio"} <= set(state.nlp.variables)
 
 
 def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
-    """The search where all roots are real; from designs of least abscissa with all roots in one, if there are any."""
+    """Search with all roots real; start from designs of least abscissa with one multiple root, if there are any."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=1.0)
     if leads := find_multiple_roots(state, policy):
-        return search_again(search_again(state, try_all(policy), leads), try_all(policy), leads, nlp)
+        return search_again(search_again(state, disable_stopping(policy), leads), disable_stopping(policy), leads, nlp)
     return search_again(state, policy, nlp=nlp, most=state.tuning.fewer)
 
 
 def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
-    """Designs of least abscissa with one root, or one pair, of full multiplicity: equations lead there."""
+    """Designs of least abscissa with one root, or one pair, of full multiplicity, found from their equations."""
     part, tuning, leads = state.part, state.tuning, list[Start]()
     limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
     free = {"minimize": "abscissa", "maximize": None, "constraints": limits, "scenarios": {}, "tolerances": {}}
@@ -53,13 +53,13 @@ def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
         asked = part.derive(locate=pattern, **free)
         if degrees_of_freedom(asked).count >= 0 and state.sample:
             own = replace(state.with_program(matching(asked)), problem=asked, part=asked)
-            own = try_starts(own, sample_starts(state.sample), few)
-            leads += [Start(state.design_at(end)) for end in distinct_ends(own.ends)[: tuning.leads]]
+            own = try_starts(own, propose_sample_starts(state.sample), few)
+            leads += [Start(state.design_at(end)) for end in select_distinct_ends(own.ends)[: tuning.leads]]
     return leads
 
 
-def may_have_positive_roots(state: SearchState) -> bool:
-    """Whether the best design may have a positive real root, which has a damping ratio of −1 and no sector."""
+def can_have_positive_roots(state: SearchState) -> bool:
+    """Whether the best design may have a positive real root, whose damping ratio −1 belongs to no sector."""
     if "damping_ratio" not in state.nlp.variables:
         return False
     if state.best is None or "damping_ratio" in state.nlp.touches:  # the less of it the better, somewhere
@@ -69,19 +69,14 @@ def may_have_positive_roots(state: SearchState) -> bool:
 
 
 def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
-    """The search without a sector, where the damping ratio is −1."""
+    """Search with a damping ratio of −1, without a sector."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
-    most = state.tuning.fewer if (state.best and state.nlp.touches) or maximises_damping(state) else 0
-    return search_again(state, policy, nlp=nlp, most=most)
-
-
-def maximises_damping(state: SearchState) -> bool:
-    """Whether the goal is the damping ratio alone."""
-    return (state.problem.maximize or "").strip() == "damping_ratio"
+    few = (state.best and state.nlp.touches) or (state.problem.maximize or "").strip() == "damping_ratio"
+    return search_again(state, policy, nlp=nlp, most=state.tuning.fewer if few else 0)
 
 
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
-    """Exceptional points nearest to other starts, where roots only cross nearest to the first."""
+    """Search for exceptional points from other starts, if the point nearest to the first start is only a crossing."""
     part = state.part
     for design in designs(part, state.options.seed, state.tuning.chains):
         nlp = matching(part.derive(minimize=None, maximize=None, start=design))
@@ -91,45 +86,45 @@ def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
     return state
 
 
-# The sample contradicts
+# Better designs in the sample
 
 
-def rivals_of(state: SearchState) -> Looked | None:
-    """Designs of the sample, and about the best end, that are better than that, the best first."""
+def find_rivals(state: SearchState) -> DesignBatch | None:
+    """Designs of the sample and near the best end that are better than the best end, the best first."""
     if state.sample is None:
         return None
     rivals = state.sample.refined
     if state.best:
-        rivals = rivals.joined(state.sample.box.around(state.best.parameters))
-    return rivals.better(least_worth(state))
+        rivals = rivals.join(state.sample.box.explore(state.best.parameters))
+    return rivals.select_better(compute_threshold(state))
 
 
-def least_worth(state: SearchState, lost: float | None = None) -> float:
-    """What a design must be worth less than to be better than the best end."""
+def compute_threshold(state: SearchState, lost: float | None = None) -> float:
+    """The objective below which a design is better than the best end."""
     best, lost = state.best, state.tuning.lost if lost is None else lost
     if best is None or best.checked.violations:
         return math.inf
-    worth = state.problem.sign * best.checked.objective
-    return worth - lost * (best.end.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
+    objective = state.problem.sign * best.checked.objective
+    return objective - lost * (best.end.nlp.size + abs(objective)) if math.isfinite(objective) else math.inf
 
 
-def appeal(state: SearchState, policy: Policy) -> SearchState:
-    """Starts from designs that are better than the best end, as long as that helps."""
+def restart_from_rivals(state: SearchState, policy: Policy) -> SearchState:
+    """Start from designs that are better than the best end, as long as that helps."""
     for _ in range(state.tuning.appeals):
-        rivals = rivals_of(state)
+        rivals = find_rivals(state)
         if not rivals or not state.sample:
             break
         before = state.best
-        starts = (Start(design) for design in state.sample.box.designs(rivals.best(state.tuning.rivals_seen)))
-        state = search_again(state, try_all(policy), starts)
+        starts = (Start(design) for design in state.sample.box.designs(rivals.take_best(state.tuning.rivals_seen)))
+        state = search_again(state, disable_stopping(policy), starts)
         if state.best is before:
             break
     return state
 
 
-def claims_more(state: SearchState) -> bool:
-    """Whether an end claims to be better than its design is, or a root of it is 0, whose damping ratio may jump."""
-    goal, best, least = state.problem.objective, state.best, least_worth(state)
+def has_doubtful_claim(state: SearchState) -> bool:
+    """Whether an end claims more than the best design has, or a root near 0 makes its damping ratio jump."""
+    goal, best, least = state.problem.objective, state.best, compute_threshold(state)
     if state.sample is None:
         return False
     if best is not None and goal is not None and "damping_ratio" in goal.names:
@@ -140,46 +135,47 @@ def claims_more(state: SearchState) -> bool:
 
 
 def move_aside(state: SearchState, policy: Policy) -> SearchState:
-    """A design a hair's breadth from one of the best ends that is what that end claims."""
+    """Replace the best end by a design a tiny step away that has the objective which one of the best ends claims."""
     problem, lost = state.problem, state.tuning.lost
-    for end in distinct_ends(state.ends)[: state.tuning.asides]:
+    for end in select_distinct_ends(state.ends)[: state.tuning.asides]:
         whole = check_end(state, end)
-        own = {n: whole.parameters[n] for n in problem.free}
-        for design in (own, *_designs_beside(state, own, end.objective)):
+        for design in (whole.parameters, *_propose_near_designs(state, whole.parameters, end.objective)):
             checked = state.recheck(design)
             moved = replace(whole, parameters=problem.ordered(design), checked=checked)
             if checked.violations or not claim_matches(problem, moved):
                 continue
             exact = certified_numbers(problem, moved.parameters, checked, state.nlp.cases).value
-            told = math.isclose(exact, problem.sign * end.objective, rel_tol=lost, abs_tol=lost)
-            if told and (state.best is None or not is_better(problem, state.best, moved)):
+            confirmed = math.isclose(exact, problem.sign * end.objective, rel_tol=lost, abs_tol=lost)
+            if confirmed and (state.best is None or not is_better(problem, state.best, moved)):
                 return replace(state, best=moved)
     return state
 
 
-def _designs_beside(state: SearchState, design: Mapping[str, float], objective: float) -> Iterator[dict[str, float]]:
-    """Designs next to one, towards others, that meet the limits and are worth about as much."""
+def _propose_near_designs(
+    state: SearchState, design: Mapping[str, float], objective: float
+) -> Iterator[dict[str, float]]:
+    """Designs close to one, towards others, that meet the limits and have nearly the given objective."""
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
     own = box.space.points(design)
     random = box.stream("aside").random((tuning.towards, len(own)))
     towards = np.concatenate([state.sample.refined.u[: tuning.rivals_seen], random])
-    seen = box.look((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
-    close = (seen.violation == 0) & (np.abs(seen.worth - objective) <= tuning.edge * (1 + abs(objective)))
-    rows = np.flatnonzero(close)  # from far to near: far ones may be worth less, of near ones rounding decides
+    seen = box.judge_points((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
+    close = (seen.violation == 0) & (np.abs(seen.objective - objective) <= tuning.edge * (1 + abs(objective)))
+    rows = np.flatnonzero(close)  # from far to near: far ones may be worse, and rounding decides between near ones
     return box.designs(seen.take(rows[:: max(len(rows) // tuning.kept, 1)]))
 
 
 def keep_rival(state: SearchState, policy: Policy) -> SearchState:
-    """A design of the sample that is still better than all ends is given as it is."""
-    rivals = rivals_of(state)
+    """Keep a sampled design that is still better than all ends, as a fallback."""
+    rivals = find_rivals(state)
     if not rivals or not state.sample:
         return state
     box = state.sample.box
-    finest = box.refine(rivals.first(1), state.tuning.finest).joined(rivals)
-    for design in box.designs(finest.first(state.tuning.kept)):
+    finest = box.refine(rivals.take_first(1), state.tuning.finest).join(rivals)
+    for design in box.designs(finest.take_first(state.tuning.kept)):
         checked = state.recheck(design)
-        if not checked.violations and state.problem.sign * checked.objective < least_worth(state):
+        if not checked.violations and state.problem.sign * checked.objective < compute_threshold(state):
             return replace(state, fallback=Fallback(design, KEPT))
     return state
 
@@ -187,12 +183,12 @@ def keep_rival(state: SearchState, policy: Policy) -> SearchState:
 # a0 = 0
 
 
-def is_open(state: SearchState) -> bool:
-    """Whether designs may improve towards a0 = 0, where a root leaves for infinity."""
+def can_approach_infinity(state: SearchState) -> bool:
+    """Whether designs may improve towards a0 = 0, where a root goes to infinity."""
     sample, best = state.sample, state.best
     if sample is None or not state.nlp.products:
         return False
-    if rivals_of(state):
+    if find_rivals(state):
         return True
     if not sample.singular:
         return False
@@ -200,37 +196,37 @@ def is_open(state: SearchState) -> bool:
     return (
         failed
         or best is None
-        or runs_away(best.checked.structure.roots, state.tuning.far_root)
-        or bool(singular_rivals(state))
+        or has_runaway_root(best.checked.structure.roots, state.tuning.far_root)
+        or bool(find_singular_rivals(state))
     )
 
 
-def singular_rivals(state: SearchState) -> Looked:
-    """Designs with a singular mass matrix that are better than the best end, their roots at infinity left aside."""
+def find_singular_rivals(state: SearchState) -> DesignBatch:
+    """Designs with a singular mass matrix that beat the best end, roots at infinity ignored."""
     assert state.sample is not None
     if not state.sample.singular:
-        return state.sample.refined.first(0)
+        return state.sample.refined.take_first(0)
     a0 = state.part.model.coefficient_names()[0]
     limits = {**state.part.constraints, "a singular mass matrix": f"{a0} == 0"}
     sample = sample_box(state.part.derive(constraints=limits), state.options.seed, state.tuning)
-    return sample.refined.better(least_worth(state))
+    return sample.refined.select_better(compute_threshold(state))
 
 
 def search_singular(state: SearchState, policy: Policy) -> SearchState:
-    """The search where a0 may come to 0, from either side: an optimum that no end reached, or none but an infimum."""
+    """Search where a0 may reach 0, from either side: for an optimum that no end reached, or an infimum at a0 = 0."""
     assert state.sample is not None
     tuning, box, best = state.tuning, state.sample.box, state.best
-    rivals = (rivals_of(state) or state.sample.refined).joined(singular_rivals(state))
+    rivals = (find_rivals(state) or state.sample.refined).join(find_singular_rivals(state))
     few = np.unique([*range(len(rivals))][: tuning.open] + [*range(len(rivals))][-tuning.open :])
     starts = [Start(design) for design in box.designs(rivals.take(few))]
-    starts += [Start({n: best.parameters[n] for n in state.problem.free})] if best else []
-    starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.first(tuning.open))]
-    there = best is not None and abs(leading_of(state, best.parameters)) < tuning.singular  # all but there already
-    least = least_worth(state, -tuning.lost if there else tuning.finer)
+    starts += [Start(best.parameters)] if best else []
+    starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.open))]
+    at_zero = best is not None and abs(compute_relative_a0(state, best.parameters)) < tuning.singular
+    least = compute_threshold(state, -tuning.lost if at_zero else tuning.finer)
     for sign in (1, -1):
-        ours = [s for s in starts if sign * leading_of(state, s.design) > -tuning.singular]
+        own_starts = [s for s in starts if sign * compute_relative_a0(state, s.design) > -tuning.singular]
         nlp = formulate(state.part, state.nlp.cases, lead=sign)
-        own = try_starts(state.with_program(nlp), ours, try_all(policy))
+        own = try_starts(state.with_program(nlp), own_starts, disable_stopping(policy))
         reached = min(own.feasible, key=lambda end: end.objective, default=None)
         if reached is None or not reached.objective < least:
             continue
@@ -239,34 +235,34 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
         if singular:
             lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
             own = state.with_program(replace(nlp, row_lower=lower))
-            own = try_starts(own, [Start(state.design_at(reached))], try_all(policy))
+            own = try_starts(own, [Start(state.design_at(reached))], disable_stopping(policy))
         own = policy.accept(own)
-        if own.best is None or own.best.checked.violations or is_merged(own.best):
-            near = best is not None and runs_away(best.checked.structure.roots, tuning.far_root)
-            if best is not None and near and singular and reached.objective < least_worth(state):
-                words = f"a better design may be next to a singular mass matrix (a0 = 0); {mass_advice(state.problem)}"
-                state = replace(state, fallback=Fallback({n: best.parameters[n] for n in state.problem.free}, words))
+        if own.best is None or own.best.checked.violations or has_merged_roots(own.best):
+            near = best is not None and has_runaway_root(best.checked.structure.roots, tuning.far_root)
+            if best is not None and near and singular and reached.objective < compute_threshold(state):
+                advice = write_mass_advice(state.problem)
+                words = f"a better design may be close to a singular mass matrix (a0 = 0); {advice}"
+                state = replace(state, fallback=Fallback(best.parameters, words))
             continue
         if not state.problem.sign * own.best.checked.objective < least:
             continue
-        ends, least = (*state.ends, *own.ends), least_worth(own, tuning.finer)
+        ends, least = (*state.ends, *own.ends), compute_threshold(own, tuning.finer)
         state = replace(own, ends=ends, accepted=len(ends), fallback=None)
         if singular:
             goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * reached.objective:.9g}"
-            words = f"no best design: it improves {goal}; {mass_advice(state.problem)}"
-            design = {n: own.best.parameters[n] for n in state.problem.free}
-            state = replace(state, fallback=Fallback(design, words, without_best=True))
+            words = f"no best design: it improves {goal}; {write_mass_advice(state.problem)}"
+            state = replace(state, fallback=Fallback(own.best.parameters, words, without_best=True))
     return state
 
 
-def leading_of(state: SearchState, design: Mapping[str, float]) -> float:
-    """a0 relative to the other coefficients."""
+def compute_relative_a0(state: SearchState, design: Mapping[str, float]) -> float:
+    """a0 relative to the largest coefficient."""
     a = [float(c) for c in state.problem.values(state.problem.ordered(design)).coefficients]
     return a[0] / (max(map(abs, a)) or 1.0)
 
 
-def is_merged(trial: CheckedEnd) -> bool:
-    """Whether roots that are far apart count as one: next to a0 = 0 rounding leaves little of the coefficients."""
+def has_merged_roots(trial: CheckedEnd) -> bool:
+    """Whether distant roots count as one, because rounding near a0 = 0 dominates the coefficients."""
     ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
     return abs(ideal - stored) > trial.tuning.merged * abs(ideal)
 
@@ -282,11 +278,11 @@ RESCUES = (
         ),
         search_other_chains,
     ),
-    Rescue("real roots", "hard 3", is_mixed, search_real_roots),
-    Rescue("positive roots", "hard 7, systems 1, variety 4", may_have_positive_roots, search_positive_roots),
-    Rescue("appeals", "sixfold 14", lambda s: bool(rivals_of(s)), appeal),
-    Rescue("aside", "narrow 14, hard 4, variety 1", claims_more, move_aside),
-    Rescue("infinity", "hard 9", is_open, search_singular),
-    Rescue("kept design", "", lambda s: bool(rivals_of(s)) and s.fallback is None, keep_rival),
+    Rescue("real roots", "hard 3", has_both_root_limits, search_real_roots),
+    Rescue("positive roots", "hard 7, systems 1, variety 4", can_have_positive_roots, search_positive_roots),
+    Rescue("appeals", "sixfold 14", lambda s: bool(find_rivals(s)), restart_from_rivals),
+    Rescue("aside", "narrow 14, hard 4, variety 1", has_doubtful_claim, move_aside),
+    Rescue("infinity", "hard 9", can_approach_infinity, search_singular),
+    Rescue("kept design", "", lambda s: bool(find_rivals(s)) and s.fallback is None, keep_rival),
 )
-"""In the order in which they are asked."""
+"""In the order in which they run."""

@@ -1,9 +1,9 @@
-"""A quasi-random sample of the whole box, judged by arrays and refined: where to start, and what no answer may miss."""
+"""A quasi-random sample of the box, judged by arrays and refined: the source of starts and of better designs."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product, zip_longest
+from itertools import product
 from zlib import crc32
 
 import numpy as np
@@ -21,46 +21,46 @@ Rows = NDArray[np.int_]
 
 
 @dataclass(frozen=True)
-class Looked:
-    """Designs as points of the unit cube, judged; the first ones come first where nothing else decides.
+class DesignBatch:
+    """Designs as points of the unit cube, judged; ties keep their order.
 
     Attributes:
         u: points, shape (designs, free parameters).
-        worth: the objective, larger is worse; inf where it does not exist.
-        violation: sum of the excesses, each relative to its scale; 0 where all limits are met.
+        objective: less is better, whatever the problem asks for; inf where it has no value.
+        violation: sum of the excesses over the limits, each relative to its scale; 0 where all limits hold.
     """
 
     u: Array
-    worth: Array
+    objective: Array
     violation: Array
 
     def __len__(self) -> int:
         return len(self.u)
 
-    def take(self, rows: Rows) -> "Looked":
-        """Some of them."""
-        return Looked(self.u[rows], self.worth[rows], self.violation[rows])
+    def take(self, rows: Rows) -> "DesignBatch":
+        """These rows."""
+        return DesignBatch(self.u[rows], self.objective[rows], self.violation[rows])
 
-    def joined(self, other: "Looked") -> "Looked":
-        """These and others."""
-        pairs = (self.u, other.u), (self.worth, other.worth), (self.violation, other.violation)
-        return Looked(*map(np.concatenate, pairs))
+    def join(self, other: "DesignBatch") -> "DesignBatch":
+        """These designs and others."""
+        pairs = (self.u, other.u), (self.objective, other.objective), (self.violation, other.violation)
+        return DesignBatch(*map(np.concatenate, pairs))
 
     @cached_property
-    def ranked(self) -> Rows:
-        """Rows by violation, then by worth."""
-        return np.lexsort((self.worth, self.violation))
+    def order(self) -> Rows:
+        """Rows by violation, then by objective."""
+        return np.lexsort((self.objective, self.violation))
 
-    def best(self, most: int) -> "Looked":
-        """The first few by rank."""
-        return self.take(self.ranked[:most])
+    def take_best(self, most: int) -> "DesignBatch":
+        """The best few."""
+        return self.take(self.order[:most])
 
-    def first(self, most: int) -> "Looked":
-        """The first few, if there are so many."""
+    def take_first(self, most: int) -> "DesignBatch":
+        """The first few."""
         return self.take(np.arange(min(most, len(self))))
 
-    def apart(self, most: int, distance: float) -> "Looked":
-        """The first few that lie so far apart from each other."""
+    def select_apart(self, most: int, distance: float) -> "DesignBatch":
+        """The first few that are at least this far apart."""
         rows: list[int] = []
         left = np.arange(len(self))
         while left.size and len(rows) < most:
@@ -68,90 +68,86 @@ class Looked:
             left = left[np.abs(self.u[left] - self.u[left[0]]).max(axis=1) >= distance]
         return self.take(np.array(rows, dtype=int))
 
-    def scattered(self, most: int, cell: float) -> "Looked":
-        """The first few in cells of their own: what `apart` gives for many, in a fraction of its time."""
+    def select_scattered(self, most: int, cell: float) -> "DesignBatch":
+        """The first of each cell of a grid, at most so many; faster than `select_apart`."""
         cells = np.floor(self.u / cell) @ np.random.default_rng(0).random(self.u.shape[1])
         return self.take(np.sort(np.unique(cells, return_index=True)[1])[:most])
 
-    def better(self, least: float) -> "Looked":
-        """Those that meet all limits and are worth less, the best first."""
-        some = self.take(np.flatnonzero((self.violation == 0) & (self.worth < least)))
-        return some.take(some.ranked)
+    def select_better(self, least: float) -> "DesignBatch":
+        """Feasible designs with a lower objective, the best first."""
+        some = self.take(np.flatnonzero((self.violation == 0) & (self.objective < least)))
+        return some.take(some.order)
 
     def misses_by(self, amount: float) -> bool:
-        """Whether all of them violate limits by more than this."""
+        """Whether all designs violate limits by more than this amount."""
         return bool(np.all(self.violation > amount))
 
 
 @dataclass(frozen=True)
 class Box:
-    """The box of a problem as a place to look at designs.
+    """The box of a problem, with the designs drawn from it.
 
     Attributes:
-        scales: of each limit's excess.
-        drawn: the designs of the sample.
-        judged: what these are, limit by limit.
+        scales: unit of each limit's excess.
+        draws: the drawn designs.
+        judged: their values, limit by limit.
     """
 
     space: Cube
     seed: int
     scales: Array
-    drawn: Looked
+    draws: DesignBatch
     judged: Judged
     tuning: Tuning = TUNING
 
     @property
     def problem(self) -> Posed:
-        """Whose box it is."""
+        """The problem whose box it is."""
         return self.space.problem
 
     def stream(self, stage: str) -> np.random.Generator:
-        """Random numbers of one stage, whatever others draw."""
+        """Random numbers of one stage, independent of other stages."""
         return stream(self.seed, stage)
 
-    def look(self, u: Array) -> Looked:
+    def judge_points(self, u: Array) -> DesignBatch:
         """Judge points of shape (n, size)."""
-        return _looked(u, judge(self.problem, self.space.designs(u)), self.scales, self.tuning)
+        return _make_batch(u, judge(self.problem, self.space.designs(u)), self.scales, self.tuning)
 
-    def design(self, found: Looked, row: int = 0) -> dict[str, float]:
+    def design(self, batch: DesignBatch, row: int = 0) -> dict[str, float]:
         """The free parameters of one design."""
-        return {n: float(x) for n, x in self.space.designs(found.u[row]).items()}
+        return {n: float(x) for n, x in self.space.designs(batch.u[row]).items()}
 
-    def designs(self, found: Looked) -> Iterator[dict[str, float]]:
+    def designs(self, batch: DesignBatch) -> Iterator[dict[str, float]]:
         """The free parameters of each design."""
-        return (self.design(found, row) for row in range(len(found)))
-
-    @property
-    def met(self) -> float:
-        """Share of the designs drawn that meet all limits."""
-        return float(np.mean(self.drawn.violation == 0))
+        return (self.design(batch, row) for row in range(len(batch)))
 
     @property
     def narrow(self) -> bool:
         """Whether few designs meet all limits."""
-        return self.met < self.tuning.narrow
+        return bool(np.mean(self.draws.violation == 0) < self.tuning.narrow)
 
-    def refine(self, start: Looked, reaches: Sequence[float | Array] = (), local: int = 0) -> Looked:
-        """Each design improved by random steps that become shorter, limits first.
+    def refine(self, start: DesignBatch, reaches: Sequence[float | Array] = (), local: int = 0) -> DesignBatch:
+        """Improve each design by random steps that become shorter; less violation comes first.
 
         Args:
-            reaches: of the box, round after round, or of each design in each direction, shape (designs, 1, size).
-            local: designs looked at around each, in each round.
+            reaches: step sizes round after round, as shares of the box, or for each design and direction, shape
+                (designs, 1, size).
+            local: designs judged around each, in each round.
         """
         kept, rng, local, size = start, self.stream("refine"), local or self.tuning.local, self.space.size
         count = len(kept)
         rows = np.arange(count)
         for reach in (reaches or self.tuning.reaches) if count else ():
             steps = rng.standard_normal((count, local, size))
-            steps[:, ::2] *= rng.random((count, (local + 1) // 2, size)) < 0.5  # not in all directions
-            near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, size))
-            both, of = kept.joined(near), np.concatenate([rows, np.repeat(rows, local)])
-            order = np.lexsort((both.worth, both.violation, of))
+            steps[:, ::2] *= rng.random((count, (local + 1) // 2, size)) < 0.5  # change some directions only
+            near = self.judge_points(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, size))
+            both, of = kept.join(near), np.concatenate([rows, np.repeat(rows, local)])
+            order = np.lexsort((both.objective, both.violation, of))
             kept = both.take(order[np.searchsorted(of[order], rows)])
         return kept
 
-    def approach_limits(self, start: Looked) -> Looked:
-        """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way."""
+    def approach_limits(self, start: DesignBatch) -> DesignBatch:
+        """Move each design by Newton's method, the shortest way, towards the limits that it violates."""
         kept, moving = start, np.isfinite(start.violation)
         for step in range(self.tuning.newton_steps):
             rows = np.flatnonzero((kept.violation > 0) & moving)
@@ -159,16 +155,16 @@ class Box:
                 break
             steps, shares = self._newton_steps(kept.u[rows]), np.array(self.tuning.shares)
             tried = np.clip(kept.u[rows][:, None] + steps[:, None] * shares[:, None], 0.0, 1.0)
-            ends = self.look(tried.reshape(-1, self.space.size))
+            ends = self.judge_points(tried.reshape(-1, self.space.size))
             best = np.argmin(ends.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(shares)
             better = moving[rows] = ends.violation[best] < kept.violation[rows]
             places = np.arange(len(kept))
             places[rows[better]] = len(kept) + best[better]
-            kept = kept.joined(ends).take(places)
+            kept = kept.join(ends).take(places)
         return kept
 
-    def around(self, design: Mapping[str, float]) -> Looked:
-        """The best of the designs about one: near it at all distances, and with parameters at other ends of the box."""
+    def explore(self, design: Mapping[str, float]) -> DesignBatch:
+        """The best designs around one: at all distances, and with single parameters at either end of the box."""
         tuning, size = self.tuning, self.space.size
         u, rng = self.space.points(design), self.stream("around")
         reach = np.repeat(np.geomspace(0.5, 1e-5, tuning.shells), tuning.shell)[:, None]
@@ -176,39 +172,38 @@ class Box:
         steps[::2] *= rng.random((len(reach[::2]), size)) < 0.5
         ends = np.repeat(u[None], 2 * size, axis=0)
         ends[np.arange(len(ends)), np.repeat(np.arange(size), 2)] = np.tile([0.0, 1.0], size)
-        seen = self.look(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))
-        return seen.best(tuning.ranked).apart(tuning.leaders, tuning.beside)
+        seen = self.judge_points(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))
+        return seen.take_best(tuning.ranked).select_apart(tuning.leaders, tuning.beside)
 
-    def without(self, limit: str) -> Looked:
-        """Designs far from each other that violate the other limits least, refined; all of them count for no limit."""
+    def ignore_limit(self, limit: str) -> DesignBatch:
+        """Designs far apart that violate the other limits least, refined; their violations leave this limit out."""
         ignored = [name == limit for name in self.problem.conditions]
         others = replace(self, scales=np.where(ignored, 1e300, self.scales))
-        seen = _looked(self.drawn.u, self.judged, others.scales, self.tuning)
-        found = others.refine(
-            others.approach_limits(seen.best(self.tuning.ranked).apart(self.tuning.leaders, self.tuning.apart))
-        )
-        return found.take(found.ranked)
+        drawn = _make_batch(self.draws.u, self.judged, others.scales, self.tuning)
+        leaders = drawn.take_best(self.tuning.ranked).select_apart(self.tuning.leaders, self.tuning.apart)
+        batch = others.refine(others.approach_limits(leaders))
+        return batch.take(batch.order)
 
     @property
     def unreachable(self) -> float:
-        """Violation that no n-fold root explains, which no sample meets: it is missed by the n-th root of a step."""
+        """Violation that no n-fold root explains: a sample misses such a root by the n-th root of its step."""
         return self.tuning.unreachable * float(self.tuning.reaches[-1] ** (1 / max(self.problem.model.degree, 4)))
 
-    def leading(self, u: Array) -> Array:
+    def compute_a0(self, u: Array) -> Array:
         """The leading coefficient of designs."""
         a0 = coefficients_of(self.problem, self.problem.ordered(self.space.designs(u)))[0]
         return np.asarray(np.nan_to_num(np.broadcast_to(a0, len(u))))
 
     def _newton_steps(self, u: Array) -> Array:
-        """Shortest steps to where violated limits are met, to first order."""
+        """Shortest steps that meet the violated limits, to first order."""
         size = self.space.size
         ahead = np.where(u < 0.5, self.tuning.difference, -self.tuning.difference)
         moved = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * ahead[:, None]
-        found = judge(self.problem, self.space.designs(moved.reshape(-1, size)))
-        beyond = found.beyond.reshape(len(found.beyond), len(u), size + 1) / self.scales[:, None, None]
-        violated = found.equal[:, None] | (beyond[:, :, 0] > 0)
+        judged = judge(self.problem, self.space.designs(moved.reshape(-1, size)))
+        beyond = judged.beyond.reshape(len(judged.beyond), len(u), size + 1) / self.scales[:, None, None]
+        violated = judged.equal[:, None] | (beyond[:, :, 0] > 0)
         target = np.where(violated, beyond[:, :, 0], 0.0)
-        with np.errstate(over="ignore", invalid="ignore"):  # of limits without a value
+        with np.errstate(over="ignore", invalid="ignore"):  # limits without a value
             slopes = np.where(violated[:, :, None], (beyond[:, :, 1:] - beyond[:, :, :1]) / ahead, 0.0)
         slopes, target = np.nan_to_num(slopes, posinf=0.0, neginf=0.0), np.nan_to_num(target)
         inverse = np.linalg.pinv(np.moveaxis(slopes, 0, 1), rcond=1e-10)
@@ -217,83 +212,77 @@ class Box:
 
 @dataclass(frozen=True)
 class Sample:
-    """What was seen of the whole box, before any solver.
+    """Designs seen in the box before any solve.
 
     Attributes:
-        refined: designs far from each other that violate least, or are best of those that violate nothing, refined.
-        boldest: designs far from each other that are best whatever they violate.
-        spread: of the objective, over half of the designs drawn.
-        singular: whether a0 comes near 0 among those that violate least, so that the mass matrix may be singular.
+        refined: designs far apart that violate limits least, or are best among the feasible ones, refined.
+        boldest: designs far apart with the best objective, whatever they violate.
+        spread: of the objective, over half of the drawn designs.
+        singular: whether a0 comes near 0 among the designs that violate limits least: the mass matrix may be singular.
     """
 
     box: Box
-    refined: Looked
-    boldest: Looked
+    refined: DesignBatch
+    boldest: DesignBatch
     spread: float
     singular: bool
 
     @cached_property
-    def leaders(self) -> Looked:
+    def leaders(self) -> DesignBatch:
         """Designs to start from: the refined ones, then the boldest."""
-        return self.refined.joined(self.boldest)
+        return self.refined.join(self.boldest)
 
     @property
-    def first(self) -> tuple[float, float]:
-        """Violation and worth of the best design."""
-        return float(self.refined.violation[0]), float(self.refined.worth[0])
-
-    def starts(self) -> Iterator[tuple[int, bool]]:
-        """Rows of the leaders to start from, refined and bold by turns, and whether each is refined."""
-        count = len(self.refined)
-        for pair in zip_longest(range(count), range(count, len(self.leaders))):
-            yield from ((row, row < count) for row in pair if row is not None)
+    def rank(self) -> tuple[float, float]:
+        """Violation and objective of the best design."""
+        return float(self.refined.violation[0]), float(self.refined.objective[0])
 
     @property
     def far_off(self) -> bool:
-        """Whether limits seem to exclude each other: where they can be met, some refined design meets them."""
+        """Whether limits seem to exclude each other: no refined design comes near to meeting them."""
         return self.refined.misses_by(self.box.tuning.far_off)
 
     @property
     def out_of_reach(self) -> bool:
-        """The same by so much that it is not for a multiple root alone."""
+        """The same, by more than a multiple root explains."""
         return self.refined.misses_by(self.box.unreachable)
 
 
 def stream(seed: int, stage: str) -> np.random.Generator:
-    """Random numbers of one stage, whatever others draw."""
+    """Random numbers of one stage, independent of other stages."""
     return np.random.default_rng([seed, crc32(stage.encode())])
 
 
 def draw_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Box:
-    """Judge corners, a quasi-random sequence, and some of it moved to faces."""
+    """Draw and judge corners, a quasi-random sequence, and some of its points moved to faces."""
     space = Cube(problem)
-    u = _drawn(space, seed, tuning)
+    u = _draw_points(space, seed, tuning)
     judged = judge(problem, space.designs(u))
     sizes = [np.abs(beyond[np.isfinite(beyond)]) for beyond in judged.beyond]
     medians = np.array([float(np.median(x)) if x.size else 0.0 for x in sizes])
     scales = np.where(medians > 0, medians, 1.0)
-    return Box(space, seed, scales, _looked(u, judged, scales, tuning), judged, tuning)
+    return Box(space, seed, scales, _make_batch(u, judged, scales, tuning), judged, tuning)
 
 
 def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
-    """See the box."""
+    """Draw a sample and refine its best designs."""
     box = draw_box(problem, seed, tuning)
-    drawn, ranked = box.drawn, box.drawn.best(tuning.ranked)
+    drawn, ranked = box.draws, box.draws.take_best(tuning.ranked)
     if box.narrow:
-        near = box.approach_limits(ranked.scattered(tuning.sought, tuning.cell))
-        refined = box.refine(near.take(near.ranked).apart(2 * tuning.leaders, tuning.apart))
+        near = box.approach_limits(ranked.select_scattered(tuning.sought, tuning.cell))
+        refined = box.refine(near.take(near.order).select_apart(2 * tuning.leaders, tuning.apart))
     else:
-        refined = _with_basins(box, ranked.apart(tuning.leaders, tuning.apart))
-    bold = drawn.take(np.argsort(drawn.worth, kind="stable")[: tuning.ranked])
-    known = drawn.worth[np.isfinite(drawn.worth)]
+        refined = _add_basins(box, ranked.select_apart(tuning.leaders, tuning.apart))
+    bold = drawn.take(np.argsort(drawn.objective, kind="stable")[: tuning.ranked])
+    known = drawn.objective[np.isfinite(drawn.objective)]
     spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
-    a0 = box.leading(ranked.u)
+    a0 = box.compute_a0(ranked.u)
     singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < tuning.vanishing * np.median(np.abs(a0)))
-    return Sample(box, refined.take(refined.ranked), bold.apart(tuning.bold, tuning.apart), spread, singular)
+    return Sample(box, refined.take(refined.order), bold.select_apart(tuning.bold, tuning.apart), spread, singular)
 
 
-def _drawn(space: Cube, seed: int, tuning: Tuning) -> Array:
-    """Points of the sample: a third of them beside 0 in all parameters, another in some; a few on faces."""
+def _draw_points(space: Cube, seed: int, tuning: Tuning) -> Array:
+    """Points of the sample: a third near 0 in all parameters, a third in some; a few on faces."""
     problem, size = space.problem, space.size
     cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= 4 else tuning.slower)
     most = min(tuning.first * 4 ** min(size, 4), tuning.most)
@@ -308,44 +297,44 @@ def _drawn(space: Cube, seed: int, tuning: Tuning) -> Array:
     return np.concatenate([np.full((1, size), 0.5), corners, u])
 
 
-def _looked(u: Array, judged: Judged, scales: Array, tuning: Tuning) -> Looked:
-    worth = np.zeros(len(u)) if judged.worth is None else judged.worth
+def _make_batch(u: Array, judged: Judged, scales: Array, tuning: Tuning) -> DesignBatch:
+    objective = np.zeros(len(u)) if judged.worth is None else judged.worth
     excess = judged.excess / scales[:, None]
     violation = np.where(excess <= tuning.met, 0.0, excess).sum(axis=0)
-    return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
+    return DesignBatch(u, np.where(np.isfinite(objective), objective, np.inf), violation)
 
 
-def _with_basins(box: Box, leaders: Looked) -> Looked:
-    """Leaders refined, and after them the best of the basins that the designs drawn show, refined alike."""
+def _add_basins(box: Box, leaders: DesignBatch) -> DesignBatch:
+    """The leaders refined, then the best designs of the basins that the sample shows, refined too."""
     tuning = box.tuning
-    rows, reach = find_basins(box.drawn, *box.space.even(box.drawn.u), tuning)
-    count, start = len(leaders), leaders.joined(box.drawn.take(rows[: tuning.basins]))
+    rows, reach = find_basins(box.draws, *box.space.even(box.draws.u), tuning)
+    count, start = len(leaders), leaders.join(box.draws.take(rows[: tuning.basins]))
     steps: list[float | Array] = [
         np.concatenate([np.full((count, 1, box.space.size), far), share * reach[: tuning.basins, None]])
         for far, share in zip((*tuning.reaches, tuning.reaches[-1]), tuning.basin_reaches, strict=True)
     ]
-    found = box.refine(start, steps, tuning.basin_local)
-    others = found.take(np.arange(count, len(found)))
-    return found.take(np.arange(count)).joined(others.best(tuning.deepest))
+    batch = box.refine(start, steps, tuning.basin_local)
+    others = batch.take(np.arange(count, len(batch)))
+    return batch.take(np.arange(count)).join(others.take_best(tuning.deepest))
 
 
-def find_basins(found: Looked, coordinates: Array, slopes: Array, tuning: Tuning = TUNING) -> tuple[Rows, Array]:
-    """Rows that are the best of all in the cells of a grid beside their own, the best first; and the size of a cell.
+def find_basins(batch: DesignBatch, coordinates: Array, slopes: Array, tuning: Tuning = TUNING) -> tuple[Rows, Array]:
+    """Rows that are best in their cell of a grid and all neighbouring cells, the best first; and the size of a cell.
 
-    Each of them is where a way from design to better design beside it ends, as in Törn's topographs.
+    A path from design to better neighbouring design ends at one of them, as in Törn's topographs.
 
     Args:
-        coordinates: of the designs, from 0 to 1, about as even as they are.
-        slopes: of these in the coordinates of the cube, by which the cells there are smaller.
+        coordinates: of the designs, from 0 to 1, spread as evenly as the designs.
+        slopes: of these in the coordinates of the cube; a cell there is smaller by this factor.
     """
-    size = found.u.shape[1]
+    size = batch.u.shape[1]
     each = min(tuning.cells, 3**size / (4 * (size + 2)))
-    count = max(int((each * len(found)) ** (1 / size)), 4)
-    rank = np.empty(len(found), dtype=int)
-    rank[found.ranked] = np.arange(len(found))
+    count = max(int((each * len(batch)) ** (1 / size)), 4)
+    rank = np.empty(len(batch), dtype=int)
+    rank[batch.order] = np.arange(len(batch))
     cells = np.minimum(coordinates * count, count - 1).astype(int)
     cell = np.ravel_multi_index(tuple(cells.T), (count,) * size)
-    least = np.full(count**size, len(found))
+    least = np.full(count**size, len(batch))
     np.minimum.at(least, cell, rank)
     grid = least.reshape((count,) * size)
     for axis in range(size):

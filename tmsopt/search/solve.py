@@ -1,4 +1,4 @@
-"""The solution of a design problem, rechecked before it is believed."""
+"""The solution of a design problem, rechecked independently of the solver."""
 
 import math
 import time
@@ -28,43 +28,52 @@ from tmsopt.program.nlp import objective_size
 from tmsopt.program.options import DEFAULTS, AskedOfSolve, Options, documents_options, options_of
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.records import Table
-from tmsopt.search.enough import count_starts
-from tmsopt.search.outcome import UNCLEAR, Outcome, as_it_is, beats, evaluated, evaluated_cases, mass_advice
+from tmsopt.search.outcome import (
+    UNCLEAR,
+    Outcome,
+    assess_design,
+    is_better_outcome,
+    write_mass_advice,
+)
 from tmsopt.search.policy import Policy, check_policy
-from tmsopt.search.remedies.needs import add_required_speed
-from tmsopt.search.remedies.none import answered, explain_none
+from tmsopt.search.remedies.infeasible import explain_infeasible
+from tmsopt.search.remedies.required_speed import add_required_speed
 from tmsopt.search.search import POLICY, search_part
 from tmsopt.search.state import SearchState, begin_search, check_near, same_objective
+from tmsopt.search.stopping import count_starts
 
 UNSTABLE = "no stable design was found that meets the other limits"
-"""Of a design that is not stable though a limit asks for it."""
+"""Note for a problem with a limit on stability and no stable design found."""
 
 _ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
-_TOLD = 1e-6  # relative and absolute: difference of a value in doubles from the exact one, above which rounding decided
-Found = tuple[SearchState, Outcome | None]
-"""The search of a part of the box at its end, and its best design."""
+_SAME_VALUE = (
+    1e-6  # relative and absolute: difference of a value in doubles from the exact one, above which rounding decided
+)
+SearchedPart = tuple[SearchState, Outcome | None]
+"""The final state of the search of one part of the box, and its best design."""
 
-_NEAR = 4  # starts where branch and bound found a stable design, that design the first of them
+_NEAR = 4  # starts near a design that branch and bound found, including this design
 
 
 @documents_options(AskedOfSolve, _ASKING)
 def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[AskedOfSolve]) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
-    Ctrl-C ends the search with the best design so far, ``not_converged`` and `interrupted`; a second one ends that too.
+    Ctrl-C stops the search and returns the best design so far, ``not_converged`` and `interrupted`; a second Ctrl-C
+    stops at once.
 
     Args:
         problem: or the path of its file.
-        throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
-        policy: how each part of the box is searched; see `tmsopt.Policy`. The robustness radius is climbed first, in a
-            way of its own, and what limits must give where nothing is feasible is asked of `tmsopt.POLICY`.
+        throw: raise NotSolved unless the status is ``optimal``; if False, return the best point with its status.
+        policy: how to search each part of the box; see `tmsopt.Policy`. Two searches do not use it: the robustness
+            radius first has its own, and the advice for infeasible problems uses `tmsopt.POLICY`.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
             ``stability`` and ``interruptible``; see `tmsopt.Options`.
 
     Raises:
-        NotSolved: carrying the best point found, when `throw`.
-        InputError: when parameters are free and nothing is asked of them, or for a policy that is none.
-        KeyboardInterrupt: when the user ends it before there is any design, or `interruptible` is False.
+        NotSolved: with the best point found, if `throw`.
+        InputError: for free parameters without an objective, constraint or pattern, or for an invalid policy.
+        KeyboardInterrupt: if the user stops it before any design is found, or `interruptible` is False.
 
     Example:
         >>> design = tmsopt.solve("problems/ep4.toml")
@@ -90,21 +99,20 @@ def solve_any_status(
     bound: bool = True,
     policy: Policy = POLICY,
 ) -> Solution:
-    """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status.
+    """Solve a problem or a file, whatever the status; return a solution as it is.
 
     Args:
-        extra_starts: designs that may be close to the optimum, to be started from.
-        without_sample: search from these and the problem's start alone; and without `covered`.
-        without: parts of the box to be left out, such as ``normal rake``.
-        bound: whether to say how good the design is at best.
+        extra_starts: designs to start from that may be close to the optimum.
+        without_sample: start only from these and from the problem's start, and skip `add_cover`.
+        without: parts of the box to skip, such as ``normal rake``.
+        bound: whether to add a bound on the best possible objective.
     """
     if isinstance(design, Solution):
         return design
     problem = as_solvable(design)
     began = time.perf_counter()
     if not problem.free:
-        outcome = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
-        return covered(_assembled(problem, outcome, (), {}, began, bound))
+        return add_cover(_assemble(problem, assess_design(problem, {}, fixed=True), (), {}, began, bound))
     if options.near:
         check_near(problem, options.near)
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
@@ -112,83 +120,82 @@ def solve_any_status(
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     states = [s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in without]
     found = _search_sides(states, policy)
-    best = _winner(problem, found)
+    best = _pick_best(problem, found)
     interrupted = any(state.interrupted for state, _ in found)
     if interrupted:
         if not options.interruptible:
             raise KeyboardInterrupt
-        best = _so_far(problem, found, best)
+        best = _find_best_so_far(problem, found, best)
     try:
-        outcome = best or explain_none(problem, [state for state, _ in found], policy)
+        outcome = best or explain_infeasible(problem, [state for state, _ in found], policy)
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
-        interrupted, outcome = True, _so_far(problem, found, None)
-    looked = sum(len(state.sample.box.drawn) for state, _ in found if state.sample)
-    outcome = replace(outcome, starts=replace(outcome.starts, looked=looked))
-    notes = (*_sides_note(problem, found, outcome), *sense_notes(problem))
-    solution = _assembled(problem, outcome, notes, _side_values(found), began, bound)
+        interrupted, outcome = True, _find_best_so_far(problem, found, None)
+    judged = sum(len(state.sample.box.draws) for state, _ in found if state.sample)
+    outcome = replace(outcome, starts=replace(outcome.starts, looked=judged))
+    notes = (*_describe_sides(problem, found, outcome), *sense_notes(problem))
+    solution = _assemble(problem, outcome, notes, _list_side_values(found), began, bound)
     solution = replace(solution, interrupted=interrupted)
-    solution = solution if without_sample else covered(solution)
-    if interrupted or not options.stability or options.near:  # which keeps to its side of the box
+    solution = solution if without_sample else add_cover(solution)
+    if interrupted or not options.stability or options.near:
         return solution
     try:
-        judged = _with_stability(solution, options, began, policy)
-        needy, missed = add_required_speed(judged, options, partial(answered, asked=problem, thorough=True))
-        words = "a search for the least speed found the stable design from which this one was reached"
-        return _follow(needy, missed, words, options, policy) if missed else needy
+        solution = _add_stability(solution, options, began, policy)
+        advised, missed = add_required_speed(solution, options)
+        words = "this design was reached from a stable design that the search for the lowest speed found"
+        return _solve_near(advised, missed, words, options, policy) if missed else advised
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
-        words = "the user stopped the question whether any design is stable"
+        words = "the user stopped the search for a stable design"
         return replace(solution, interrupted=True, notes=(*solution.notes, words))
 
 
-def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[Found]:
-    """The search of each part of the box, in the order of these; that with the best design of a sample comes first."""
+def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[SearchedPart]:
+    """Search each part of the box, the one with the best sampled design first; return them in the given order."""
     if len(states) > 1:
         begin(states[0].options.progress, "looking at designs")
         states = [replace(state, sample=policy.sample(state)) for state in states]
-    found: dict[str, Found] = {}
-    for state in sorted(states, key=lambda state: state.sample.first if state.sample else (0.0, 0.0)):
+    found: dict[str, SearchedPart] = {}
+    for state in sorted(states, key=lambda state: state.sample.rank if state.sample else (0.0, 0.0)):
         found[state.side] = search_part(state, policy)
         if found[state.side][0].interrupted:
             break
     return [found[state.side] for state in states if state.side in found]
 
 
-def covered(solution: Solution) -> Solution:
-    """The same, with the proof that no case between those listed is worse, where that is asked of an optimum."""
+def add_cover(solution: Solution) -> Solution:
+    """Add to an optimum the proof that no case between the listed ones is worse, if the problem has such cases."""
     problem = solution.problem.posed
     if solution.status != "optimal" or solution.cover or not (problem.scenarios or problem.tolerances):
         return solution
     return replace(solution, cover=cover(problem, solution.parameters, solution.abscissa))
 
 
-def solved_first(design: Given, progress: Listener | None) -> Solution:
-    """The same for a verb that takes no options but its listener."""
+def solve_if_needed(design: Given, progress: Listener | None) -> Solution:
+    """Solve a problem or a file with default options, whatever the status; return a solution as it is."""
     return solve_any_status(design, replace(DEFAULTS, progress=steps_for(progress)))
 
 
 def evaluate_design(problem: Posed, design: Mapping[str, float], note: str) -> Solution:
-    """A design as it is, whoever found it: ``not_converged``, or ``infeasible`` where it violates something."""
-    return _assembled(problem, as_it_is(problem, design, note), (), {}, time.perf_counter())
+    """Recheck a design found elsewhere: ``not_converged``, or ``infeasible`` if it violates a limit."""
+    return _assemble(problem, assess_design(problem, design, note), (), {}, time.perf_counter())
 
 
-def _so_far(problem: Posed, found: Sequence[Found], outcome: Outcome | None) -> Outcome:
-    """The best design that an interrupted search has met: where starts ended, or of those looked at before.
+def _find_best_so_far(problem: Posed, found: Sequence[SearchedPart], outcome: Outcome | None) -> Outcome:
+    """The best design of an interrupted search: where starts ended, or in the sample.
 
     Raises:
-        KeyboardInterrupt: where there is none.
+        KeyboardInterrupt: if there is none.
     """
-    designs = [outcome.parameters] if outcome else []
+    designs: list[Mapping[str, float]] = [outcome.parameters] if outcome else []
     for state, _ in found:
         designs += [state.design_at(end) for end in sorted(state.ends, key=lambda end: end.rank)[:1]]
         designs += [state.sample.box.design(state.sample.refined)] if state.sample else []
-    known = [as_it_is(problem, {n: design[n] for n in problem.free}) for design in designs]
-    if not known:
+    if not designs:
         raise KeyboardInterrupt
-    best = min(known, key=partial(_order, problem))
+    best = min((assess_design(problem, design) for design in designs), key=partial(_rank, problem))
     ends = [end for state, _ in found for end in state.ends]
     many = f"{len(ends)} start{'' if len(ends) == 1 else 's'} of the solver"
     words = f"the user stopped the search after {many}; this is the best design so far"
@@ -197,35 +204,37 @@ def _so_far(problem: Posed, found: Sequence[Found], outcome: Outcome | None) -> 
     return replace(best, starts=starts, formulation=formulation, notes=(words,))
 
 
-def _order(problem: Posed, outcome: Outcome) -> tuple[float, float]:
-    """Of two designs as they are, the better one comes first: by violation, then by objective."""
+def _rank(problem: Posed, outcome: Outcome) -> tuple[float, float]:
+    """Sort key of designs, the best first: by violation, then by objective."""
     value = problem.sign * outcome.checked.objective
-    worth = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
-    return sum(outcome.checked.violations.values()), worth
+    objective = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
+    return sum(outcome.checked.violations.values()), objective
 
 
-def _with_stability(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
-    """Of a search for stability that found none: whether there is any, and the design that one leads to."""
+def _add_stability(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
+    """If no stable design was found, search for one by branch and bound, and solve again from it."""
     problem = solution.problem.posed
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
-    from tmsopt.global_search.stability import any_stable  # a tenth of all imports, which few problems need
+    from tmsopt.global_search.stability import any_stable  # slow to import, rarely needed
 
     begin(options.progress, "looking for a stable design", "s")
-    asked = any_stable(problem, options.stability, solution.parameters, options.progress)
-    if asked.design is not None:
-        words = "branch and bound found the stable design from which this one was reached"
-        solution = _follow(solution, asked.design, words, options, policy)
-    elif asked.any is False:
-        solution = replace(solution, notes=(*solution.notes, f"that none is stable is proved {asked.proof}"))
-    if asked.failed:
-        words = f"whether any design is stable is not known: {asked.failed}"
+    answer = any_stable(problem, options.stability, solution.parameters, options.progress)
+    if answer.design is not None:
+        words = "this design was reached from a stable design that branch and bound found"
+        solution = _solve_near(solution, answer.design, words, options, policy)
+    elif answer.any is False:
+        solution = replace(solution, notes=(*solution.notes, f"no stable design exists, proved {answer.proof}"))
+    if answer.failed:
+        words = f"the search for a stable design failed: {answer.failed}"
         solution = replace(solution, notes=(*solution.notes, words))
-    return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
+    return replace(solution, stable_elsewhere=answer.any, seconds=time.perf_counter() - began)
 
 
-def _follow(solution: Solution, design: Mapping[str, float], words: str, options: Options, policy: Policy) -> Solution:
-    """Where a design leads that the search has missed, if that is better."""
+def _solve_near(
+    solution: Solution, design: Mapping[str, float], words: str, options: Options, policy: Policy
+) -> Solution:
+    """Solve again near a design that the search has missed; keep the solution unless the new one is better."""
     problem = solution.problem.posed
     few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
     found = solve_any_status(problem, replace(few, near=design), policy=policy)
@@ -234,11 +243,11 @@ def _follow(solution: Solution, design: Mapping[str, float], words: str, options
     return replace(found, notes=(*found.notes, words)) if better else solution
 
 
-def _winner(problem: Posed, found: Sequence[Found]) -> Outcome | None:
-    """The best design of all parts of the box, with the starts of all of them."""
+def _pick_best(problem: Posed, found: Sequence[SearchedPart]) -> Outcome | None:
+    """The best design of all parts of the box, with the starts of all parts."""
     best: Outcome | None = None
     for state, outcome in found:
-        if outcome is not None and (best is None or beats(problem, outcome, best, state.tuning)):
+        if outcome is not None and (best is None or is_better_outcome(problem, outcome, best, state.tuning)):
             best = outcome
     if best is None or len(found) == 1:
         return best
@@ -246,14 +255,14 @@ def _winner(problem: Posed, found: Sequence[Found]) -> Outcome | None:
     return replace(best, starts=replace(starts, at_best=best.starts.at_best))
 
 
-def _side_values(found: Sequence[Found]) -> dict[str, float]:
-    """The best objective of each part of the box; nan where it has no optimal design."""
+def _list_side_values(found: Sequence[SearchedPart]) -> dict[str, float]:
+    """The best objective of each part of the box; nan if it has no optimal design."""
     named = {state.side: outcome for state, outcome in found if state.side}
     return {n: o.checked.objective if o and o.status == "optimal" else math.nan for n, o in named.items()}
 
 
-def _sides_note(problem: Posed, found: Sequence[Found], best: Outcome) -> tuple[str, ...]:
-    """Which part of the box the best design is in, and what the other one offers."""
+def _describe_sides(problem: Posed, found: Sequence[SearchedPart], best: Outcome) -> tuple[str, ...]:
+    """Note which part of the box has the best design, and what the other one has."""
     won = next((state.side for state, o in found if o and o.parameters == best.parameters), None)
     if len(found) == 1 or won is None or best.status != "optimal":
         return ()
@@ -265,17 +274,17 @@ def _sides_note(problem: Posed, found: Sequence[Found], best: Outcome) -> tuple[
             stable = "stable and " if problem.asks_radius else ""
             sentences.append(f"with {state.side} nothing {stable}feasible was found")
         elif problem.objective is None:
-            sentences.append(f"there is one with {state.side} too")
+            sentences.append(f"{state.side} has a solution too")
         elif same_objective(outcome.checked.objective, best.checked.objective, objective_size(problem)):
             return (f"both signs were searched: {state.side} is as good as {won}",)
         else:
             which = "the best" if outcome.status == "optimal" else "what was found"
-            asked = unit_at(problem, problem.minimize or problem.maximize or "", outcome.parameters)
-            sentences.append(f"{which} with {state.side} is {asked.show(outcome.checked.objective, 6)}")
+            unit = unit_at(problem, problem.minimize or problem.maximize or "", outcome.parameters)
+            sentences.append(f"{which} with {state.side} is {unit.show(outcome.checked.objective, 6)}")
     return ("; ".join(sentences),)
 
 
-def _assembled(
+def _assemble(
     problem: Posed,
     outcome: Outcome,
     notes: tuple[str, ...],
@@ -286,14 +295,14 @@ def _assembled(
     parameters, checked, lost = held(problem, outcome.parameters, outcome.checked, outcome.cases)
     outcome = replace(outcome, parameters=parameters, checked=checked)
     numbers = certified_numbers(problem, outcome.parameters, checked, outcome.cases)
-    told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
-    if outcome.status == "optimal" and problem.free and problem.objective is not None and not told:
+    confirmed = math.isclose(numbers.value, checked.objective, rel_tol=_SAME_VALUE, abs_tol=_SAME_VALUE)
+    if outcome.status == "optimal" and problem.free and problem.objective is not None and not confirmed:
         outcome = replace(outcome, status="not_converged", notes=(*outcome.notes, UNCLEAR))
     optimal, listed = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
     name, worst = user_structure_name(problem.model, checked.structure.name), checked.worst.applied(parameters)
     whole = polynomial_structure(problem.model, name, numbers.roots).roots
-    met = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
-    edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, met)
+    meetings = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
+    edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, meetings)
     return Solution(
         problem=problem.problem,
         status=outcome.status,
@@ -314,26 +323,33 @@ def _assembled(
         formulation=outcome.formulation,
         freedom=degrees_of_freedom(problem),
         branches=outcome.branches,
-        notes=(*outcome.notes, *missed_note(problem, lost), *notes, *_stability_note(problem, checked, edges, optimal)),
+        notes=(
+            *outcome.notes,
+            *missed_note(problem, lost),
+            *notes,
+            *_describe_stability(problem, checked, edges, optimal),
+        ),
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
         sides=Table(sides),
         relaxation=outcome.relaxation,
-        meetings=met,
+        meetings=meetings,
         edges=edges,
         edge_is_exact=certain,
-        multiple_as_rounded=bool(met) and not problem.free and not is_exactly_multiple(problem, worst, whole),
+        multiple_as_rounded=bool(meetings) and not problem.free and not is_exactly_multiple(problem, worst, whole),
         without_best=outcome.without_best,
         si=numbers.si,
     )
 
 
-def _stability_note(problem: Posed, checked: Evaluation, edges: Sequence[str], optimal: bool) -> tuple[str, ...]:
+def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str], optimal: bool) -> tuple[str, ...]:
     if "coefficients" in checked.violations:
-        return ("a coefficient has no value at this design; keep away from what divides by 0, or has no root",)
+        return (
+            "a coefficient has no value at this design; exclude division by 0 or roots of negatives by a constraint",
+        )
     if "a0" in checked.violations:
-        return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {mass_advice(problem)}",)
+        return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {write_mass_advice(problem)}",)
     asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
     unstable = (UNSTABLE,) if asked and checked.structure.abscissa >= 0 else ()
     beyond = beyond_axis(problem.model, problem.located, checked.structure.roots) if optimal else None
@@ -345,6 +361,8 @@ def _stability_note(problem: Posed, checked: Evaluation, edges: Sequence[str], o
     largest = max((r.size for r in checked.structure.roots), default=0.0)
     found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
     if problem.free and (problem.minimize or "").strip() == "abscissa":
-        least = "no design that decays was found in the box; whether those of abscissa 0 grow depends on multiple roots"
-        return (least if found.on_edge else "no stable design was found in the box; this is the least unstable one",)
+        at_edge = (
+            "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
+        )
+        return (at_edge if found.on_edge else "no stable design was found in the box; this is the least unstable one",)
     return () if found.on_edge else ("the design is not stable: abscissa >= 0",)

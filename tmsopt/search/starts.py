@@ -1,25 +1,26 @@
-"""Designs to start from: those of a problem and its caller, those of the sample by turns, then a sequence."""
+"""Designs to start from: the caller's, then the sample's refined and bold ones in turn, then a sequence."""
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 
 from tmsopt.program.starts import designs
-from tmsopt.search.enough import is_proven
 from tmsopt.search.sample import Sample, sample_box
 from tmsopt.search.state import LocalEnd, SearchState, Start
+from tmsopt.search.stopping import is_proven
 
 
 def sample_part(state: SearchState) -> Sample | None:
-    """The sample of the part; None where arrays cannot judge what is asked: a pattern, or the radius."""
+    """Sample the part; None if arrays cannot judge the problem because it asks for a pattern or the radius."""
     if state.part.pattern is not None or state.part.asks_radius:
         return None
     return sample_box(state.part, state.options.seed, state.tuning)
 
 
 def propose_starts(state: SearchState) -> Iterator[Start]:
-    """Starts in their order: the best refined design, the boldest one, the next refined one, and so on."""
+    """Starts in order: the caller's, the best refined design, the boldest, the next refined one, and so on."""
     part = state.part
     if state.options.near:
         yield Start(state.options.near)
@@ -27,39 +28,43 @@ def propose_starts(state: SearchState) -> Iterator[Start]:
         yield Start(part.start)
     yield from (Start(design) for design in state.extra if state.holds(design))
     if state.sample:
-        yield from sample_starts(state.sample)
+        yield from propose_sample_starts(state.sample)
     yield from (Start(design, near=False) for design in designs(part, state.options.seed, state.options.starts))
 
 
-def sample_starts(sample: Sample) -> Iterator[Start]:
-    """The designs of a sample by turns."""
-    return (Start(sample.box.design(sample.leaders, row), near, row) for row, near in sample.starts())
+def propose_sample_starts(sample: Sample) -> Iterator[Start]:
+    """Refined and bold designs of a sample in turn."""
+    count = len(sample.refined)
+    for pair in zip_longest(range(count), range(count, len(sample.leaders))):
+        for row in pair:
+            if row is not None:
+                yield Start(sample.box.design(sample.leaders, row), row < count, row)
 
 
 def is_led(state: SearchState, start: Start) -> bool:
-    """Whether a straight way falls from a design of the sample to where a start ended: it would end there too."""
+    """Whether the sampled design of this start leads straight down to an end, so that it would end there too."""
     return any(start.row in end.led for end in state.ends)
 
 
-def with_led(state: SearchState, end: LocalEnd) -> LocalEnd:
-    """An end with the designs of the sample, not led before, from which a straight way falls to it."""
+def add_led_designs(state: SearchState, end: LocalEnd) -> LocalEnd:
+    """Add to an end the sampled designs that lead straight down to it and to no earlier end."""
     if not (state.sample and end.feasible and state.part.objective) or state.options.exhaustive:
         return end
     tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
     place = box.space.points(state.design_at(end))
     known = (box.space.points(state.design_at(other)) for other in state.feasible)
     if is_proven(state, end) or any(np.abs(place - other).max() <= tuning.same for other in known):
-        return end  # there are no more starts, or the ways to this design have been looked at
-    left = [row for row in state.left if row != end.start.row]
-    seen, near = leaders.take(np.array(left, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
-    if not left:
+        return end  # the search ends here, or an earlier end has the same design
+    rows = [row for row in state.left if row != end.start.row]
+    seen, near = leaders.take(np.array(rows, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
+    if not rows:
         return end
     shares = np.arange(1, 8)[:, None] / 8
-    way = box.look((seen.u[:, None] + shares * (place - seen.u[:, None])).reshape(-1, box.space.size))
-    worth, violation = (x.reshape(len(left), -1) for x in (way.worth, way.violation))
-    gain = seen.worth - end.objective
-    heights = np.concatenate([seen.worth[:, None], worth], axis=1)
+    path = box.judge_points((seen.u[:, None] + shares * (place - seen.u[:, None])).reshape(-1, box.space.size))
+    objective, violation = (x.reshape(len(rows), -1) for x in (path.objective, path.violation))
+    gain = seen.objective - end.objective
+    heights = np.concatenate([seen.objective[:, None], objective], axis=1)
     falls = np.all(heights[:, 1:] <= heights[:, :-1] + (tuning.level * np.abs(gain) + near)[:, None], axis=1)
-    down = falls & (gain >= -near) & np.isfinite(seen.worth) & (violation.max(axis=1) <= seen.violation)
+    down = falls & (gain >= -near) & np.isfinite(seen.objective) & (violation.max(axis=1) <= seen.violation)
     down |= (np.abs(gain) <= near) & (seen.violation == 0)
-    return replace(end, led=frozenset(np.array(left)[down].tolist()))
+    return replace(end, led=frozenset(np.array(rows)[down].tolist()))

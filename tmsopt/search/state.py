@@ -1,4 +1,4 @@
-"""What a search knows: one frozen record, which every stage returns anew."""
+"""The state of a search: a frozen record, which every stage returns anew."""
 
 import math
 from collections.abc import Mapping
@@ -24,9 +24,9 @@ class Start:
     """A design to start from.
 
     Attributes:
-        design: free parameters; one that is left out is at the start of the problem, or in the middle of its range.
-        near: whether it may be close to an optimum.
-        row: of the sample's designs; -1 for another one.
+        design: free parameters; a missing one takes its value in the problem's start, or the middle of its range.
+        near: whether the design may be close to an optimum.
+        row: its row in the sample; -1 for another design.
 
     Example:
         >>> tmsopt.Start({"Fr": 2.0, "chi_B": 1.4}).near
@@ -42,17 +42,17 @@ class Start:
 
 @dataclass(frozen=True)
 class LocalEnd:
-    """Where one start ended.
+    """The end of one start.
 
     Attributes:
-        start: from which.
-        nlp: with the limits that held.
-        objective: of the NLP, less is better whatever the problem asks for, with what its rows may flatter it by; inf
-            unless finite.
-        feasible: whether the rows hold as IPOPT left them, the factors tell of all roots, and located ones have Jordan
-            chains; the recheck may still find a limit violated.
-        crossing: whether these chains alone are missing.
-        led: rows of the sample's designs from which a straight way falls to this end.
+        start: the start.
+        nlp: the program with the limits that were active.
+        objective: of the NLP, less is better whatever the problem asks for, plus what its rows may gain by rounding;
+            inf unless finite.
+        feasible: whether the rows hold at IPOPT's end, the factors cover all roots, and located roots have Jordan
+            chains; the recheck may still find a violated limit.
+        crossing: whether only these chains are missing.
+        led: rows of the sample's designs from which the objective falls along a straight line to this end.
 
     Example:
         >>> from dataclasses import replace
@@ -77,23 +77,23 @@ class LocalEnd:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """Of two ends, the better one has the lower rank."""
+        """Sort key: the better of two ends has the lower rank."""
         return not self.feasible, self.objective
 
 
-def no_end(start: Start, nlp: NLP) -> LocalEnd:
-    """The end of a start that leads nowhere."""
+def make_failed_end(start: Start, nlp: NLP) -> LocalEnd:
+    """An infeasible end of a start that led nowhere."""
     return LocalEnd(start, nlp, Run(np.full(len(nlp.variables), np.nan), np.empty(0), np.empty(0), ""), math.inf, False)
 
 
 @dataclass(frozen=True)
 class CheckedEnd:
-    """An end, polished and rechecked.
+    """A polished and rechecked end.
 
     Attributes:
-        point: the end once polished.
+        point: the polished end.
         parameters: every parameter of the design there.
-        checked: what the recheck found.
+        checked: the result of the recheck.
 
     Example:
         >>> from dataclasses import replace
@@ -118,12 +118,12 @@ class CheckedEnd:
 
 @dataclass(frozen=True)
 class Fallback:
-    """A design that is given where no optimum is known: one better than all ends, or one next to an infimum.
+    """A design returned if no optimum is known: one better than all ends, or one near an infimum.
 
     Attributes:
         design: its free parameters.
         words: why it is no optimum.
-        without_best: whether there is none.
+        without_best: whether no optimum exists.
     """
 
     design: Mapping[str, float]
@@ -136,17 +136,17 @@ class SearchState:
     """A search of one part of the box.
 
     Attributes:
-        problem: as it was asked.
-        part: the same on the part of the box that is searched, e.g. one sign of one parameter.
+        problem: as posed.
+        part: the problem on the part of the box that is searched, e.g. one sign of one parameter.
         side: name of the part, e.g. ``normal rake``; empty for the whole box.
-        nlp: the program that starts are run on.
+        nlp: the program to solve from each start.
         extra: designs that may be close to the optimum.
-        sample: of the part; None where arrays cannot judge what is asked, or none was asked for.
-        ends: where starts ended, in order.
+        sample: of the part; None if arrays cannot judge the problem, or the policy takes no sample.
+        ends: ends of the starts, in order.
         accepted: how many of these were considered for `best`.
-        best: the best of these that passed the recheck, or that fails it least.
-        fallback: the design to be given in place of `best`, which is no optimum either.
-        interrupted: whether the user ended the search.
+        best: the best end that passed the recheck, or the one that fails it least.
+        fallback: a design to return instead of `best`; no optimum either.
+        interrupted: whether the user stopped the search.
 
     Example:
         >>> counts = []
@@ -177,65 +177,63 @@ class SearchState:
 
     @property
     def feasible(self) -> list[LocalEnd]:
-        """Ends that are, as IPOPT left them."""
+        """Feasible ends, before the recheck."""
         return [end for end in self.ends if end.feasible]
 
     @property
     def left(self) -> list[int]:
-        """Rows of the sample's designs that no start began at and that no way leads from to where one ended."""
+        """Rows of the sample's designs that were not started from and lead straight to no end."""
         done = {end.start.row for end in self.ends}.union(*(end.led for end in self.ends))
         return [row for row in range(len(self.sample.leaders) if self.sample else 0) if row not in done]
 
     @property
     def out_of_reach(self) -> bool:
-        """Whether all designs of a sample are far from what the limits allow, even without the pattern asked for."""
+        """Whether all sampled designs are far from meeting the limits, even without the pattern."""
         sample = self.limits_sample
         return sample is not None and sample.out_of_reach
 
     @property
     def limits_sample(self) -> Sample | None:
-        """The sample; for a pattern that of the limits alone."""
+        """The sample; for a pattern, a sample for the limits alone."""
         if self.sample or not (self.part.pattern and self.part.conditions) or self.part.asks_radius:
             return self.sample
         return sample_limits(self.part, self.options.seed, self.tuning)
 
     @property
     def so_far(self) -> str:
-        """How good the best is so far, in words."""
+        """The best objective so far, in words."""
         best = min((end.objective for end in self.feasible), default=math.inf)
         known = self.problem.objective is not None and math.isfinite(best)
-        return ", ".join(
-            [*([f"best {self.problem.sign * best:.6g}"] if known else []), *([self.side] if self.side else [])]
-        )
+        return ", ".join(filter(None, (f"best {self.problem.sign * best:.6g}" if known else "", self.side)))
 
     @property
     def designs(self) -> list[dict[str, float]]:
-        """The designs at which starts ended."""
+        """The designs at the ends."""
         return [self.design_at(end) for end in self.ends if np.all(np.isfinite(end.run.x))]
 
     def design_at(self, end: LocalEnd) -> dict[str, float]:
-        """The free parameters at an end, inside the part of the box."""
+        """The free parameters at an end, clipped to the part of the box."""
         return design_of(self.part, end.run.x.tolist())
 
     def holds(self, design: Mapping[str, float]) -> bool:
-        """Whether a design, as far as it is given, is on this part."""
+        """Whether the given parameters of a design are in this part."""
         return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in self.part.free.items())
 
     def recheck(self, design: Mapping[str, float]) -> Evaluation:
-        """What a design is, in the cases of the program."""
+        """Recheck a design in the cases of the program."""
         return recheck(self.problem, self.problem.ordered(design), self.nlp.cases)
 
     def with_program(self, nlp: NLP) -> "SearchState":
-        """The same search on another program, of which nothing is known yet."""
+        """A copy with another program and no ends."""
         return replace(self, nlp=nlp, ends=(), accepted=0, best=None)
 
 
 def split_sides(problem: Posed, near: Mapping[str, float] | None = None, thin: float = TUNING.thin) -> dict[str, Posed]:
-    """The parts into which a parameter with two sides divides the box, by name, positive values first.
+    """Split the box at 0 of the first parameter with two named sides; return name → part, positive values first.
 
     Args:
-        near: a design; only the parts that it is on.
-        thin: width of a part that is worth no search of its own.
+        near: a design; return only the parts that contain it.
+        thin: width below which a part is not searched on its own.
     """
     for name, (lower, upper) in problem.free.items():
         names = problem.parameter_set[name].sides
@@ -243,7 +241,7 @@ def split_sides(problem: Posed, near: Mapping[str, float] | None = None, thin: f
             halves = {names[1]: (0.0, upper), names[0]: (lower, 0.0)}
             at = (near or {}).get(name)
             kept = {side: ends for side, ends in halves.items() if at is None or ends[0] <= at <= ends[1]}
-            return {side: _on(problem, name, ends) for side, ends in kept.items()}
+            return {side: _restrict_range(problem, name, ends) for side, ends in kept.items()}
     return {"": problem}
 
 
@@ -253,7 +251,7 @@ def begin_search(
     extra: tuple[Mapping[str, float], ...] = (),
     tuning: Tuning = TUNING,
 ) -> list[SearchState]:
-    """The searches of a problem, one for each part of its box."""
+    """The initial states of a problem, one for each part of its box."""
     parts = split_sides(problem, options.near, tuning.thin)
     return [
         SearchState(problem, part, formulate(part, problem.cases), options, tuning, side, extra)
@@ -262,10 +260,10 @@ def begin_search(
 
 
 def check_near(problem: Posed, near: Mapping[str, float]) -> None:
-    """Refuse a design to start near that names no parameters, or has no numbers.
+    """Check that a design to start near names parameters and has numbers.
 
     Raises:
-        InputError: with everything that is wrong.
+        InputError: with all faults.
     """
     names = problem.parameter_set.names
     faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
@@ -275,14 +273,19 @@ def check_near(problem: Posed, near: Mapping[str, float]) -> None:
         raise InputError(faults)
 
 
-def _on(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
-    """The problem with a smaller range of one parameter, and its start where that fits."""
+def _restrict_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
+    """The problem with a smaller range of one parameter, and with its start if that fits."""
     inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
     return problem.derive(free={**problem.free, name: ends}, start=problem.start if inside else {})
 
 
+def clip_to_box(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
+    """The free parameters of a design, moved into their ranges."""
+    return {n: min(max(design[n], low), high) for n, (low, high) in problem.free.items()}
+
+
 def same_objective(a: float, b: float, size: float = 1.0, same: float = TUNING.same) -> bool:
-    """Whether two objectives, of this size or larger, count as the same optimum."""
+    """Whether two objectives count as the same optimum; `size` is the least scale of the comparison."""
     return abs(a - b) <= same * (size + abs(b))
 
 
@@ -295,5 +298,5 @@ def coefficients_at(problem: Posed, nlp: NLP, run: Run) -> Array:
 
 @lru_cache(maxsize=8)
 def sample_limits(problem: Posed, seed: int, tuning: Tuning) -> Sample:
-    """The sample of a problem for its limits alone, whatever pattern it asks for."""
+    """The sample of a problem for its limits alone, without its pattern."""
     return sample_box(problem.derive(locate=None), seed, tuning)

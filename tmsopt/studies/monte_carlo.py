@@ -18,7 +18,7 @@ from tmsopt.problem.verdict.status import NotSolved
 from tmsopt.program.options import STARTS
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Column, Table
-from tmsopt.search.solve import solve, solved_first
+from tmsopt.search.solve import solve, solve_if_needed
 from tmsopt.studies.sampling import MOST_ROWS
 from tmsopt.studies.store import check_same, view_store
 from tmsopt.studies.study import Study, common_faults
@@ -123,7 +123,7 @@ def monte_carlo(
 
     More: docs/tutorials/study.md
     """
-    solution = solved_first(design, progress)
+    solution = solve_if_needed(design, progress)
     asked = Sampling(solution.problem, rows, seed, distribution, tolerances or {}, title, report=report)
     return _around(asked, solution, progress)
 

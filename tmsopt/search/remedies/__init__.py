@@ -1,4 +1,4 @@
-"""Remedies for problems without an answer: limits in conflict, changes of them, speeds.
+"""Remedies for infeasible problems: limits in conflict, changes that help, required speeds.
 
-In: the problem, and how it is solved again. Out: a `Relaxation` or a `Need` that was tried. Open `changes` first.
+In: the problem, and a function that solves it again. Out: a `Relaxation` or a `Need`. Open `infeasible` first.
 """

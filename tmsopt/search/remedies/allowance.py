@@ -1,4 +1,4 @@
-"""Time that advice may take to be tried, so that an answer does not wait long for it."""
+"""The time that advice may take, so that the answer is not delayed much."""
 
 import time
 from dataclasses import replace
@@ -7,24 +7,24 @@ from tmsopt.program.options import Options
 from tmsopt.progress import Progress, Steps
 
 SECONDS = 2.5
-"""Of this process, at least: what a problem of seven free parameters takes to be solved again."""
+"""Least allowance in seconds of process time: enough to solve a problem with seven free parameters again."""
 
 SHARE = 0.3
-"""Of what was spent before."""
+"""Allowance as a share of the time spent before."""
 
 
-class Spent(Exception):
-    """The time is over: what was being tried is not told."""
+class OutOfTime(Exception):
+    """Raised when the allowance is used up."""
 
 
-def within(options: Options, spent: float = 0.0) -> Options:
-    """The same options for work that ends with `Spent` once it has taken its share of the time spent before."""
+def limit_time(options: Options, spent: float = 0.0) -> Options:
+    """A copy of the options with which work raises `OutOfTime` once its allowance is used up."""
     end = time.process_time() + max(SECONDS, SHARE * spent)
 
-    def told(_: Progress) -> None:
+    def check_time(_: Progress) -> None:
         if time.process_time() > end:
-            raise Spent
+            raise OutOfTime
 
-    steps = Steps(told)
+    steps = Steps(check_time)
     steps.begin("solving again", "start")
     return replace(options, progress=steps, near=None)

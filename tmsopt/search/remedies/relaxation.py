@@ -1,4 +1,4 @@
-"""The least by which limits of a problem without an answer must be moved for a design that meets them."""
+"""The least change of limits that makes an infeasible problem feasible."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,23 +20,22 @@ from tmsopt.program.formulate import formulate
 from tmsopt.program.nlp import NLP, AddedVariable, name_of
 from tmsopt.program.options import Options
 from tmsopt.records import Table
-from tmsopt.search.accept import accept_best
-from tmsopt.search.policy import try_all, try_starts
+from tmsopt.search.policy import disable_stopping, run_nested
 from tmsopt.search.sample import Box, draw_box
 from tmsopt.search.search import POLICY
-from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, same_objective
+from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, clip_to_box, same_objective
 
-_ROUNDS = 12  # times that cases are added
-_TRIED = 8  # starts of a relaxation at most
-_LED = 2  # starts for one limit alone
-_AGREE = 3  # of them at the best value that end it
-_TIE = 1e-3  # of a scale, by which equal limits differ: one moved is easier to read than two moved by halves
-_WIDER = 3.0  # widths of the box by which its bounds may give way
-_INSET = 1e-3  # share of the width kept from a physical end that is excluded
-_HOLDS = 1e-5  # multiplier, per scale or width of the box, above which a limit takes part in the conflict
-_NOTHING = 1e-12  # sum of amounts at which the problem is feasible as it is
-_FINEST = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # of the box: steps that improve a design that is kept as it is
-_ROUND_UP = 1e-12  # of an amount, so that the relaxed design is inside
+_ROUNDS = 12  # of adding cases, at most
+_MOST_STARTS = 8  # of a relaxation
+_LEADS = 2  # starts for one limit alone
+_AGREE = 3  # starts at the best value that end the search
+_TIE = 1e-3  # relative difference of the scales of equal limits: moving one is easier to read than two halves
+_WIDER = 3.0  # widths of the box by which its bounds may move
+_INSET = 1e-3  # share of the width kept from an excluded physical end
+_ACTIVE = 1e-5  # multiplier, per scale or width of the box, above which a limit is in the conflict
+_NOTHING = 1e-12  # sum of amounts below which the problem is feasible
+_FINEST = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # of the box: steps that refine the best sampled design
+_ROUND_UP = 1e-12  # of an amount, so that the design is inside the relaxed limits
 
 
 @dataclass(frozen=True)
@@ -44,8 +43,8 @@ class Limit:
     """A constraint, or an end of a free parameter's range such as ``Fr.max``, that a relaxation may move.
 
     Attributes:
-        scale: the amount that counts as 1 when amounts are added up.
-        parameter, end: of an end of a range, whose it is and where it lies.
+        scale: the amount that counts as 1 in sums.
+        parameter, end: for an end of a range, its parameter and value.
     """
 
     name: str
@@ -53,73 +52,76 @@ class Limit:
     parameter: str = ""
     end: float = 0.0
 
-    def needed(self, parameters: Mapping[str, float], excess: Mapping[str, float]) -> float:
-        """By how much the limit must be moved for a design."""
+    def measure_need(self, parameters: Mapping[str, float], excess: Mapping[str, float]) -> float:
+        """The amount by which a design needs the limit moved."""
         if not self.parameter:
             return excess.get(self.name, 0.0)
         beyond = parameters[self.parameter] - self.end
         return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
 
 
-def least_relaxation(
+def find_least_relaxation(
     problem: Posed,
     options: Options,
     wide: Posed,
     limits: Sequence[Limit],
     designs: Sequence[Mapping[str, float]] = (),
 ) -> tuple[Relaxation, CheckedEnd | None, NLP | None] | tuple[None, None, None]:
-    """The least relaxation in a box, with where it ended; without, for a design that was met on the way."""
-    listed = problem.cases
+    """The least relaxation in a box, with its end and program; without these for a known design."""
     sides = begin_search(wide, options)
-    ended = [_least_covered(side, limits, listed) for side in sides]
-    reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
-    trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
-    met = [] if listed else [found for side in sides for found in islice(_met(side, limits, designs), 1)]
-    least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
-    amounts = _amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
-    if seen and (trial is None or least < total(limits, amounts) * (1 - _TIE)):
-        return seen, None, None
+    results = [_find_least_in_cases(side, limits, problem.cases) for side in sides]
+    feasible = [(trial, nlp) for trial, nlp in results if trial is not None]
+    trial, nlp = min(feasible, key=lambda found: found[0].point.objective, default=(None, None))
+    candidates: list[tuple[float, Relaxation]] = []
+    for side in sides if not problem.cases else ():
+        candidates += islice(_list_known_relaxations(side, limits, designs), 1)
+    least, known = min(candidates, key=lambda found: found[0], default=(np.inf, None))
+    amounts = _compute_amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
+    if known and (trial is None or least < sum_amounts(limits, amounts) * (1 - _TIE)):
+        return known, None, None
     if trial is None or nlp is None:
         return None, None, None
     return Relaxation(Table(trial.parameters), Table(amounts)), trial, nlp
 
 
-def least_near(options: Options, box: Posed, limits: Sequence[Limit], design: Mapping[str, float]) -> dict[str, float]:
-    """How far limits must be moved for the nearest design that this one leads to; {} where it leads to none."""
-    trial = _relaxed(box, options, _elastic(box, box.cases, limits), limits, [design])
-    return _amounts(box, limits, trial.parameters, trial.end.nlp.cases) if trial else {}
+def find_relaxation_near(
+    options: Options, box: Posed, limits: Sequence[Limit], design: Mapping[str, float]
+) -> dict[str, float]:
+    """Amounts of the least relaxation that this design leads to; {} if it leads to none."""
+    trial = _solve_relaxation(box, options, _build_elastic_program(box, box.cases, limits), limits, [design])
+    return _compute_amounts(box, limits, trial.parameters, trial.end.nlp.cases) if trial else {}
 
 
-def _met(
+def _list_known_relaxations(
     side: SearchState, limits: Sequence[Limit], designs: Sequence[Mapping[str, float]]
 ) -> Iterator[tuple[float, Relaxation]]:
-    """What designs met on the way need, and the least violating one of a sample; those least in need first."""
-    known, unlimited = list(designs), _unlimited(side.problem, limits)
+    """Relaxations for known designs and the best sampled design, the least first."""
+    known, unlimited = list(designs), _drop_limits(side.problem, limits)
     if sample := POLICY.sample(side):
-        known += [*sample.box.designs(sample.box.refine(sample.refined.first(1), _FINEST))]
-    needs = [(p, _amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, known)]
-    totals = [total(limits, amounts) for _, amounts in needs]
+        known += [*sample.box.designs(sample.box.refine(sample.refined.take_first(1), _FINEST))]
+    needs = [(p, _compute_amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, known)]
+    totals = [sum_amounts(limits, amounts) for _, amounts in needs]
     for row in np.argsort(totals, kind="stable").tolist():
         parameters, amounts = needs[row]
         if not recheck(unlimited, parameters).violations:
             yield totals[row], Relaxation(Table(parameters), Table(amounts))
 
 
-def total(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
-    """Amounts added up, each in units of its limit."""
+def sum_amounts(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
+    """Sum of the amounts, each in units of its limit."""
     return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
 
 
-def stages(problem: Posed) -> Iterator[tuple[Posed, list[Limit]]]:
-    """The problem with limits to move: the constraints in its own box, then also the box."""
-    constraints = _constraint_limits(problem)
+def list_stages(problem: Posed) -> Iterator[tuple[Posed, list[Limit]]]:
+    """The problem with the limits to move: first the constraints in its own box, then also the box."""
+    constraints = _make_constraint_limits(problem)
     if constraints:
         yield problem, constraints
-    yield widened(problem, problem.free), [*constraints, *_bound_limits(problem)]
+    yield widen_box(problem, problem.free), [*constraints, *_make_bound_limits(problem)]
 
 
-def _constraint_limits(problem: Posed) -> list[Limit]:
-    """Constraints in units of the limit as written, or of the size of the sides where it is 0 or no number."""
+def _make_constraint_limits(problem: Posed) -> list[Limit]:
+    """Constraints in units of the limit as written, or of the size of the sides if it is 0 or no number."""
     ends = [{n: lo + share * (hi - lo) for n, (lo, hi) in problem.free.items()} for share in (0.5, 0.3)]
     one, other = (problem.values(problem.ordered(design)) for design in ends)
     found: list[Limit] = []
@@ -132,7 +134,7 @@ def _constraint_limits(problem: Posed) -> list[Limit]:
     return found
 
 
-def _bound_limits(problem: Posed) -> list[Limit]:
+def _make_bound_limits(problem: Posed) -> list[Limit]:
     return [
         Limit(f"{name}.{end}", ends[1] - ends[0], name, ends[k])
         for name, ends in problem.free.items()
@@ -140,8 +142,8 @@ def _bound_limits(problem: Posed) -> list[Limit]:
     ]
 
 
-def widened(problem: Posed, names: Collection[str]) -> Posed:
-    """The problem in a larger box, inside what is physical."""
+def widen_box(problem: Posed, names: Collection[str]) -> Posed:
+    """The problem with wider ranges of these parameters, inside the physical ones."""
     free = dict(problem.free)
     for name in names:
         lower, upper = problem.free[name]
@@ -152,55 +154,54 @@ def widened(problem: Posed, names: Collection[str]) -> Posed:
     return problem.derive(free=free)
 
 
-def _least_covered(side: SearchState, limits: Sequence[Limit], listed: Sequence[Case]) -> tuple[CheckedEnd | None, NLP]:
+def _find_least_in_cases(
+    side: SearchState, limits: Sequence[Limit], listed: Sequence[Case]
+) -> tuple[CheckedEnd | None, NLP]:
     """The least relaxation of one part of the box, with cases added until none between them needs more."""
-    trial, nlp = _least(side, limits, listed)
+    trial, nlp = _find_least(side, limits, listed)
     movable = [limit for limit in limits if not limit.parameter]
-    thorough = side.options.starts >= _TRIED
+    thorough = side.options.starts >= _MOST_STARTS
     if thorough and trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
-        box = _box(side.part, side.options)
-        leads = {tuple(d.values()): d for limit in movable for d in _leads(box, limit.name)}
-        again = _relaxed(side.part, side.options, nlp, limits, list(leads.values()))
+        box = _draw_limit_box(side.part, side.options)
+        leads = {tuple(d.values()): d for limit in movable for d in _propose_leads(box, limit.name)}
+        again = _solve_relaxation(side.part, side.options, nlp, limits, list(leads.values()))
         if again is not None and again.point.objective < trial.point.objective * (1 - _TIE):
             trial = again
     for _ in range(_ROUNDS if listed else 0):
-        if trial is None or not (more := _beyond(side.problem, limits, trial, nlp.cases)):
+        if trial is None or not (more := _find_worse_cases(side.problem, limits, trial, nlp.cases)):
             break
-        trial, nlp = _least(side, limits, (*nlp.cases, *more), trial)
+        trial, nlp = _find_least(side, limits, (*nlp.cases, *more), trial)
     return trial, nlp
 
 
-def _least(
+def _find_least(
     side: SearchState, limits: Sequence[Limit], cases: Sequence[Case], before: CheckedEnd | None = None
 ) -> tuple[CheckedEnd | None, NLP]:
-    """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
-    nlp = _elastic(side.part, cases, limits)
-    trial = _relaxed(side.part, side.options, nlp, limits, [before.parameters]) if before else None
-    return trial or _relaxed(side.part, side.options, nlp, limits), nlp
+    """The least relaxation that the end `before` leads to, or else a few starts."""
+    nlp = _build_elastic_program(side.part, cases, limits)
+    trial = _solve_relaxation(side.part, side.options, nlp, limits, [before.parameters]) if before else None
+    return trial or _solve_relaxation(side.part, side.options, nlp, limits), nlp
 
 
-def _relaxed(
+def _solve_relaxation(
     problem: Posed,
     options: Options,
     nlp: NLP,
     limits: Sequence[Limit],
     designs: Sequence[Mapping[str, float]] | None = None,
 ) -> CheckedEnd | None:
-    """The least relaxation that these designs lead to, or a few of the sample, if all that may not move is met."""
-    state = SearchState(_unlimited(problem, limits), problem, nlp, options)
+    """The least relaxation from these designs, or from a few starts; None if a fixed limit is violated."""
+    state = SearchState(_drop_limits(problem, limits), problem, nlp, options)
     if designs is None:
         state = replace(state, sample=POLICY.sample(state))
-        state = try_starts(state, POLICY.starts(state), _RELAXING, min(_TRIED, options.starts))
+        state = run_nested(state, POLICY.starts(state), _RELAXING, min(_MOST_STARTS, options.starts))
     else:
-        state = try_starts(state, map(Start, designs), try_all(_RELAXING))
-    if state.interrupted:
-        raise KeyboardInterrupt
-    trial = accept_best(state).best
-    return trial if trial is not None and not trial.checked.violations else None
+        state = run_nested(state, map(Start, designs), disable_stopping(_RELAXING))
+    return state.best if state.best is not None and not state.best.checked.violations else None
 
 
 def _is_least(state: SearchState) -> bool:
-    """Whether nothing has to give, or enough starts agree on what has."""
+    """Whether nothing must move, or enough starts agree on the least sum."""
     objectives = [end.objective for end in state.feasible]
     best = min(objectives, default=np.inf)
     agreed = sum(same_objective(value, best) for value in objectives) >= _AGREE and len(state.ends) >= 2 * _AGREE
@@ -210,89 +211,87 @@ def _is_least(state: SearchState) -> bool:
 _RELAXING = replace(POLICY, enough=_is_least)
 
 
-def _box(problem: Posed, options: Options, extended: Limit | None = None) -> Box:
-    """A place to look at designs for their limits alone, and for how far one end of the box must be moved."""
-    asked = problem.derive(locate=None)
-    if extended and extended.parameter and extended.name.endswith(".max"):
-        asked = asked.derive(minimize=extended.parameter)
-    elif extended and extended.parameter:
-        asked = asked.derive(maximize=extended.parameter)
-    return draw_box(asked, options.seed)
+def _draw_limit_box(problem: Posed, options: Options, extended: Limit | None = None) -> Box:
+    """A sample of the box for the limits alone, with a moved end of the box as the objective, if any."""
+    goal = {}
+    if extended and extended.parameter:
+        goal = {"minimize" if extended.name.endswith(".max") else "maximize": extended.parameter}
+    return draw_box(problem.derive(locate=None, **goal), options.seed)
 
 
-def _leads(box: Box, name: str) -> list[dict[str, float]]:
-    """Designs that may do with one limit moved, as far as it takes; none where the others exclude each other."""
-    found = box.without(name)
+def _propose_leads(box: Box, name: str) -> list[dict[str, float]]:
+    """Designs that may need only this limit moved; none if the other limits exclude each other."""
+    found = box.ignore_limit(name)
     excluded = found.misses_by(box.unreachable if box.problem.pattern else box.tuning.far_off)
-    return [] if excluded else [*box.designs(found.first(_LED))]
+    return [] if excluded else [*box.designs(found.take_first(_LEADS))]
 
 
-def _unlimited(problem: Posed, limits: Sequence[Limit]) -> Posed:
-    """The same without the constraints that may move, whose violation is the point of it."""
+def _drop_limits(problem: Posed, limits: Sequence[Limit]) -> Posed:
+    """The problem without the constraints that may move."""
     moved = {limit.name for limit in limits}
     kept = {n: c for n, c in problem.constraints.items() if n not in moved}
     return problem.derive(constraints=kept, minimize=None, maximize=None)
 
 
-def _beyond(wide: Posed, limits: Sequence[Limit], trial: CheckedEnd, cases: Sequence[Case]) -> list[Case]:
-    """Cases between those listed in which a design needs more."""
+def _find_worse_cases(wide: Posed, limits: Sequence[Limit], trial: CheckedEnd, cases: Sequence[Case]) -> list[Case]:
+    """Cases between the listed ones in which a design needs more."""
     worst = [w.case for w in worst_cases(wide, trial.parameters).values()]
-    known, all_ = (_amounts(wide, limits, trial.parameters, c) for c in (cases, (*cases, *worst)))
+    known, all_ = (_compute_amounts(wide, limits, trial.parameters, c) for c in (cases, (*cases, *worst)))
     grown = any(abs(a) > abs(known.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in all_.items())
     return [case for case in worst if case not in cases] if grown else []
 
 
-def _amounts(
+def _compute_amounts(
     wide: Posed, limits: Sequence[Limit], parameters: Mapping[str, float], cases: Sequence[Case]
 ) -> dict[str, float]:
-    """What the design itself needs, whatever the solver claims."""
+    """The amounts that a design needs, by its own recheck."""
     excess = excesses(wide, parameters, cases)
-    needed = {limit.name: (limit.needed(parameters, excess), limit.scale) for limit in limits}
+    needed = {limit.name: (limit.measure_need(parameters, excess), limit.scale) for limit in limits}
     return {
         name: amount * (1 + _ROUND_UP) for name, (amount, scale) in needed.items() if abs(amount) > FEASIBLE * scale
     }
 
 
-def holding(nlp: NLP, limits: Sequence[Limit], trial: CheckedEnd) -> list[str]:
-    """Limits with a multiplier: were one of them not there, less would do."""
+def find_holding_limits(nlp: NLP, limits: Sequence[Limit], trial: CheckedEnd) -> list[str]:
+    """Limits with a multiplier: without one of them, less would suffice."""
     scales = {limit.name: limit.scale for limit in limits}
     rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
-    names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _HOLDS]
+    names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _ACTIVE]
     for k, name in enumerate(trial.end.nlp.variables):
         multiplier = float(trial.point.bound_multipliers[k])
         parameter = name.removeprefix("tan(").removesuffix(")")
         width = trial.end.nlp.upper[k] - trial.end.nlp.lower[k]
-        if parameter in trial.parameters and abs(multiplier) * width > _HOLDS:
+        if parameter in trial.parameters and abs(multiplier) * width > _ACTIVE:
             names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
     return names
 
 
-def alone(
+def relax_each_alone(
     problem: Posed, options: Options, conflict: Sequence[str], trial: CheckedEnd, cases: Sequence[Case]
 ) -> dict[str, float]:
-    """How far each limit of a conflict must be moved if nothing else is; those that cannot do it alone are left out."""
-    limits = {limit.name: limit for limit in (*_constraint_limits(problem), *_bound_limits(problem))}
+    """How far each limit of a conflict must move if no other does; limits that cannot help alone are left out."""
+    limits = {limit.name: limit for limit in (*_make_constraint_limits(problem), *_make_bound_limits(problem))}
     found: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
-        wide = widened(problem, [limit.parameter] if limit.parameter else [])
-        if not (leads := _leads(_box(wide, options, limit), limit.name)):
+        wide = widen_box(problem, [limit.parameter] if limit.parameter else [])
+        if not (leads := _propose_leads(_draw_limit_box(wide, options, limit), limit.name)):
             continue
-        here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
-        ended = _relaxed(wide, options, _elastic(wide, cases, [limit]), [limit], [here, *leads])
-        if ended is not None:
-            found |= _amounts(wide, [limit], ended.parameters, ended.end.nlp.cases)
+        here = clip_to_box(wide, trial.parameters)
+        end = _solve_relaxation(wide, options, _build_elastic_program(wide, cases, [limit]), [limit], [here, *leads])
+        if end is not None:
+            found |= _compute_amounts(wide, [limit], end.parameters, end.end.nlp.cases)
     return found
 
 
-def _elastic(wide: Posed, cases: Sequence[Case], limits: Sequence[Limit]) -> NLP:
-    """minimise Σ slack / scale, with each limit moved by its slack; everything else holds."""
+def _build_elastic_program(wide: Posed, cases: Sequence[Case], limits: Sequence[Limit]) -> NLP:
+    """Minimise Σ slack/scale with each limit moved by its slack, all others kept."""
     nlp = formulate(wide, cases, elastic=True)
     names = [limit.name for limit in limits]
     inputs = [symbol(name_of(k)) for k in range(len(nlp.variables) + len(limits))]
     x, slack = inputs[: len(nlp.variables)], inputs[len(nlp.variables) :]
     _, *g = fold(nlp.formula, {n: symbol(n) for n in nlp.formula.names}, NODES)
     rows: list[tuple[str, Any, float, float]] = []
-    second: list[tuple[str, Any, float, float]] = []  # after all others, whose numbers touches and kinks know
+    second: list[tuple[str, Any, float, float]] = []  # last, because touches and kinks refer to rows by number
     for k, name in enumerate(nlp.rows):
         lower, upper = nlp.row_lower[k], nlp.row_upper[k]
         if name not in names:
@@ -322,12 +321,12 @@ def _elastic(wide: Posed, cases: Sequence[Case], limits: Sequence[Limit]) -> NLP
         rows=tuple(r[0] for r in rows),
         row_lower=tuple(r[2] for r in rows),
         row_upper=tuple(r[3] for r in rows),
-        lifts=(*nlp.lifts, AddedVariable("slack", len(names), partial(_slack_guess, wide, names))),
+        lifts=(*nlp.lifts, AddedVariable("slack", len(names), partial(_guess_slack, wide, names))),
     )
 
 
-def _slack_guess(wide: Posed, names: Sequence[str], values: Sequence[Values], z: Any) -> list[list[float]]:
-    """What a design needs, and a little more."""
+def _guess_slack(wide: Posed, names: Sequence[str], values: Sequence[Values], z: Any) -> list[list[float]]:
+    """Initial slacks: what a design needs, and a little more."""
     found = []
     for name in names:
         condition = wide.conditions.get(name)

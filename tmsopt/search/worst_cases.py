@@ -1,4 +1,4 @@
-"""Designs for many cases: cases are added until none between those listed is worse."""
+"""Designs for many cases: add the worst case between the listed ones until none is worse."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,21 +11,21 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.formulate import formulate
 from tmsopt.records import Table
-from tmsopt.search.accept import is_better
-from tmsopt.search.enough import count_starts, distinct_ends
-from tmsopt.search.outcome import Outcome, found, listed_cases
-from tmsopt.search.policy import Policy, search, try_starts
+from tmsopt.search.acceptance import is_better
+from tmsopt.search.outcome import Outcome, assess_best, merge_cases
+from tmsopt.search.policy import Policy, disable_stopping, search, try_starts
 from tmsopt.search.radius import RADIUS_POLICY
 from tmsopt.search.state import CheckedEnd, SearchState, Start, same_objective
+from tmsopt.search.stopping import count_starts, select_distinct_ends
 
 
 def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
     """The best design once cases have been added until none between them is worse."""
     problem, tuning = state.problem, state.tuning
     starts = count_starts(state.ends, state.best.end.objective if state.best else math.nan)
-    every = replace(policy, enough=lambda _: False)
+    exhaustive = disable_stopping(policy)
     if state.best and problem.asks_radius and not any(case.edge for case in state.nlp.cases):
-        designs = (state.best.parameters, *_leaders(state))
+        designs = (state.best.parameters, *_list_leaders(state))
         climbed = search(replace(state.with_program(state.nlp), extra=designs), replace(RADIUS_POLICY, tuning=tuning))
         state = climbed if climbed.best else state
     best, worst = state.best, dict[str, Worst]()
@@ -34,31 +34,31 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
         if trial is None or best is None:
             return None
         if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
-            break  # not even the cases at hand are met
+            break  # the current cases are not met
         worst = worst_cases(problem, trial.parameters)
-        more = [*_uncovered(problem, trial, worst), *_nearer(trial, tuning.nearer)]
+        more = [*_find_uncovered_cases(problem, trial, worst), *_find_nearer_boundary(trial, tuning.nearer)]
         if not more:
             break
         best, worst = trial if is_better(problem, trial, best) else best, {}
-        ours = [best.parameters] if best is trial else [best.parameters, trial.parameters]
-        leaders = _apart(problem, [*ours, *_leaders(state)], tuning.alike_designs)
+        current = [best.parameters] if best is trial else [best.parameters, trial.parameters]
+        leaders = _select_apart(problem, [*current, *_list_leaders(state)], tuning.alike_designs)
         state = state.with_program(formulate(state.part, (*trial.end.nlp.cases, *more)))
-        state = policy.accept(try_starts(state, (Start(d) for d in leaders), every))
-        if _is_lost(state, leaders):
-            state = policy.accept(try_starts(state, (Start(d, near=False) for d in leaders), every))
-            if not problem.asks_radius and _is_lost(state, leaders):
+        state = policy.accept(try_starts(state, (Start(d) for d in leaders), exhaustive))
+        if _is_worse_than_leaders(state, leaders):
+            state = policy.accept(try_starts(state, (Start(d, near=False) for d in leaders), exhaustive))
+            if not problem.asks_radius and _is_worse_than_leaders(state, leaders):
                 state = policy.accept(try_starts(state, policy.starts(state), policy))
         if state.interrupted:
             break
     if state.best is None:
         return None
     cases = state.best.end.nlp.cases
-    listed = listed_cases(problem, worst or worst_cases(problem, state.best.parameters))
-    return found(state, starts, (*cases, *(c for c in listed if c not in cases)))
+    listed = merge_cases(problem, worst or worst_cases(problem, state.best.parameters))
+    return assess_best(state, starts, (*cases, *(c for c in listed if c not in cases)))
 
 
-def _is_lost(state: SearchState, leaders: Sequence[Mapping[str, float]]) -> bool:
-    """Whether a search is worse, in the cases of its program, than one of the designs that it was started from."""
+def _is_worse_than_leaders(state: SearchState, leaders: Sequence[Mapping[str, float]]) -> bool:
+    """Whether the best design is worse, in the cases of its program, than a design that it started from."""
     if state.best is None:
         return True
     if state.problem.objective is None:
@@ -69,11 +69,11 @@ def _is_lost(state: SearchState, leaders: Sequence[Mapping[str, float]]) -> bool
     return reached > known and not same_objective(reached, known, state.nlp.size, state.tuning.same)
 
 
-def _uncovered(problem: Posed, trial: CheckedEnd, found: Mapping[str, Worst]) -> list[Case]:
-    """Cases in which the design does worse than in all that it was made for."""
+def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, Worst]) -> list[Case]:
+    """Cases in which the design is worse than in all cases that it was made for."""
     more: list[Case] = []
     known = trial.checked
-    for name, worst in found.items():
+    for name, worst in worst_cases.items():
         match name:
             case "abscissa":
                 excess = worst.value - known.structure.abscissa
@@ -85,13 +85,13 @@ def _uncovered(problem: Posed, trial: CheckedEnd, found: Mapping[str, Worst]) ->
                 excess = abs(worst.value - known.objective)
             case _:
                 beyond = problem.conditions[name.removeprefix("constraint ")].excess(worst.value)
-                excess = float(beyond) if beyond > 0 else 0.0  # what does not exist is no excess
+                excess = float(beyond) if beyond > 0 else 0.0  # nan counts as none
         if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in more:
             more.append(worst.case)
     return more
 
 
-def _nearer(trial: CheckedEnd, least: float) -> list[Case]:
+def _find_nearer_boundary(trial: CheckedEnd, least: float) -> list[Case]:
     """The direction in which stability is lost before the radius that the design claims."""
     around, nlp = trial.checked.around, trial.end.nlp
     if around is None or RADIUS not in nlp.variables:
@@ -107,8 +107,8 @@ def _nearer(trial: CheckedEnd, least: float) -> list[Case]:
     return [Case(direction=Table(step))]
 
 
-def _apart(problem: Posed, designs: Sequence[Mapping[str, float]], share: float) -> list[Mapping[str, float]]:
-    """The designs without those next to an earlier one, as an end of the solver is next to what it was polished to."""
+def _select_apart(problem: Posed, designs: Sequence[Mapping[str, float]], share: float) -> list[Mapping[str, float]]:
+    """The designs without those that nearly equal an earlier one."""
     kept: list[Mapping[str, float]] = []
     for d in designs:
         if not any(all(abs(d[n] - k[n]) <= share * (hi - lo) for n, (lo, hi) in problem.free.items()) for k in kept):
@@ -116,6 +116,6 @@ def _apart(problem: Posed, designs: Sequence[Mapping[str, float]], share: float)
     return kept
 
 
-def _leaders(state: SearchState) -> list[dict[str, float]]:
-    """The designs of the best few different optima."""
-    return [state.design_at(end) for end in distinct_ends(state.ends)[: state.tuning.followed]]
+def _list_leaders(state: SearchState) -> list[dict[str, float]]:
+    """The designs of the best few distinct optima."""
+    return [state.design_at(end) for end in select_distinct_ends(state.ends)[: state.tuning.followed]]

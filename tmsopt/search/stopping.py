@@ -1,4 +1,4 @@
-"""When a search ends: at a proof, where it is hopeless, or by the rule of `Starts`, which gives reports their words."""
+"""When a search ends: at a proven bound, when it is hopeless, or by the rule of `Starts`."""
 
 import math
 from collections.abc import Sequence
@@ -12,17 +12,17 @@ from tmsopt.search.tuning import TUNING
 
 
 def is_enough(state: SearchState) -> bool:
-    """Whether more starts would be waste.
+    """Whether more starts are unlikely to help.
 
-    Enough are starts that leave few better optima to be expected (`expects_few_better`), one that reaches a proven
-    bound, one for a pattern without freedom or an objective, or so many that end nowhere.
+    A search ends when few better optima are expected (`expects_few_better`), when a design reaches a proven bound, when
+    a pattern without freedom or objective is met once, or when too many starts fail.
     """
     tuning, feasible, sample = state.tuning, state.feasible, state.sample
     if not feasible:
         return is_hopeless(state)
     best, count = min(end.objective for end in feasible), len(state.ends)
     starts = count_starts(state.ends, best, tuning.same)
-    if state.problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
+    if state.problem.objective is None:  # any solution will do, of a square or an over-determined pattern
         freedom = degrees_of_freedom(state.part).count
         met = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
         return starts.at_best >= (1 if met else tuning.agree)
@@ -32,12 +32,12 @@ def is_enough(state: SearchState) -> bool:
         return count >= tuning.fewest_blind and starts.at_best >= tuning.agree and starts.suffice()
     alone = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
     enough = count >= tuning.fewest_narrow or not sample.box.narrow
-    # Where no way leads down from a design of the sample, it may lie in a basin of its own.
+    # A sampled design that leads to no end may lie in its own basin.
     return (enough and starts.suffice(alone)) or count - len(feasible) >= 2 * tuning.hopeless
 
 
 def is_hopeless(state: SearchState) -> bool:
-    """Whether so many starts ended nowhere that more would too."""
+    """Whether so many starts failed that more would fail too."""
     tuning, sample, failed = state.tuning, state.sample, len(state.ends) - len(state.feasible)
     if failed >= tuning.hopeless_afar and (sample.far_off if sample else state.out_of_reach):
         return True
@@ -45,7 +45,7 @@ def is_hopeless(state: SearchState) -> bool:
 
 
 def is_proven(state: SearchState, end: LocalEnd) -> bool:
-    """Whether an end reaches a bound; this is looked at only where the design has all roots of one modulus."""
+    """Whether an end reaches a proven bound; tested only where all roots have nearly the same modulus."""
     problem = state.part
     if not (end.feasible and bounded(problem)):
         return False
@@ -56,7 +56,7 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
 
 
 def count_starts(ends: Sequence[LocalEnd], best: float, same: float = TUNING.same) -> Starts:
-    """How starts ended; a design of the sample from which a way falls to an end counts as a start that led there."""
+    """Count starts by how they ended; a sampled design that leads straight to an end counts as a start."""
     weights = [(end, 1 + len(end.led)) for end in ends]
     feasible = [(end, weight) for end, weight in weights if end.feasible]
     objectives = sorted(end.objective for end, _ in feasible)
@@ -70,7 +70,7 @@ def count_starts(ends: Sequence[LocalEnd], best: float, same: float = TUNING.sam
     )
 
 
-def distinct_ends(ends: Sequence[LocalEnd], same: float = TUNING.same) -> list[LocalEnd]:
+def select_distinct_ends(ends: Sequence[LocalEnd], same: float = TUNING.same) -> list[LocalEnd]:
     """The best end of each optimum, the best first."""
     kept: list[LocalEnd] = []
     for end in sorted((e for e in ends if e.feasible), key=lambda e: e.objective):

@@ -1,4 +1,4 @@
-"""Where one start ends: IPOPT on the program of the state, once more where that ended badly."""
+"""One local search: IPOPT from one start, repeated if it ends badly."""
 
 import math
 from dataclasses import replace
@@ -13,29 +13,29 @@ from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import initial_point
 from tmsopt.records import Array
 from tmsopt.roots import roots
-from tmsopt.search.starts import with_led
+from tmsopt.search.starts import add_led_designs
 from tmsopt.search.state import LocalEnd, SearchState, Start, coefficients_at
 
 
-def run_from(state: SearchState, start: Start) -> LocalEnd:
-    """The best end of a start: its factors are shared out anew where IPOPT did not converge, as long as that helps."""
+def solve_from(state: SearchState, start: Start) -> LocalEnd:
+    """Solve from one start; if IPOPT does not converge, factor the roots anew and go on while that helps."""
     tuning, nlp = state.tuning, state.nlp
     exact = bool(nlp.cases) and nlp.exact
     best = run_once(state, start, "near" if start.near else "exact" if exact else "far")
     for again in range(tuning.restarts):
         converged = best.feasible and best.run.status == "Solve_Succeeded" and not best.nlp.tangled(best.run.x)
-        tired = not best.feasible and again >= count_restarts(state)
-        if converged or tired or not np.all(np.isfinite(best.run.x)):
+        exhausted = not best.feasible and again >= count_restarts(state)
+        if converged or exhausted or not np.all(np.isfinite(best.run.x)):
             break
-        ended = run_once(state, replace(start, design=state.design_at(best)), "far" if again % 2 else "near")
-        if best.feasible and (not ended.feasible or ended.objective >= best.objective - tuning.same):
+        end = run_once(state, replace(start, design=state.design_at(best)), "far" if again % 2 else "near")
+        if best.feasible and (not end.feasible or end.objective >= best.objective - tuning.same):
             break
-        best = ended
-    return with_led(state, keep_to_start(state, start, exchange_contacts(state, best)))
+        best = end
+    return add_led_designs(state, keep_to_start(state, start, exchange_contacts(state, best)))
 
 
 def count_restarts(state: SearchState) -> int:
-    """How often an end that violates rows is taken up again: by what speaks for a feasible one."""
+    """How often to restart from an end that violates rows: more often if feasible ends are likely."""
     if state.feasible:
         return state.tuning.restarts if state.sample is None else 1
     blind = state.sample is None and len(state.ends) >= state.tuning.blind
@@ -43,30 +43,30 @@ def count_restarts(state: SearchState) -> int:
 
 
 def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
-    """Where IPOPT ends, in the best of the ways in which root quantities and kinks are held at the start."""
+    """The best end of IPOPT over the ways in which root quantities and kinks can be held at the start."""
     x = initial_point(state.nlp, state.part, start.design, settings == "near")
     ways = islice(state.nlp.touchings(x), state.tuning.ways)
-    return min((_ended(state, start, x, way, settings) for way in ways), key=lambda end: end.rank)
+    return min((_run_ipopt(state, start, x, way, settings) for way in ways), key=lambda end: end.rank)
 
 
 def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
-    """The end, or that of a run which keeps to the start, or does not, where the start was better than the end."""
+    """The end, or the end of a run with other settings if the start was better."""
     if state.sample is None or not best.feasible:
         return best
-    box, known = state.sample.box, start.row >= 0
-    seen = state.sample.leaders.take(np.array([start.row])) if known else box.look(box.space.points(start.design)[None])
-    if seen.violation[0] > 0 or seen.worth[0] >= best.objective - state.tuning.same:
+    box, leaders, known = state.sample.box, state.sample.leaders, start.row >= 0
+    seen = leaders.take(np.array([start.row])) if known else box.judge_points(box.space.points(start.design)[None])
+    if seen.violation[0] > 0 or seen.objective[0] >= best.objective - state.tuning.same:
         return best
     kept = run_once(state, start, "far" if start.near else "near")
     return kept if kept.feasible and kept.objective < best.objective else best
 
 
 def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
-    """The best that is reached from an end at which other ways are as close as the one that was held."""
+    """The best end over other ways of holding root quantities that are as close as the current one."""
     for _ in range(state.tuning.exchanges if state.nlp.touches and best.feasible else 0):
         x, held = best.run.x, _limits(best.nlp)
         others = (way for way in state.nlp.touchings(x, state.tuning.meets) if _limits(way) != held)
-        ends = [_ended(state, best.start, x, way, "near") for way in islice(others, 2 * state.tuning.ways)]
+        ends = [_run_ipopt(state, best.start, x, way, "near") for way in islice(others, 2 * state.tuning.ways)]
         other = min(ends, key=lambda end: end.rank, default=best)
         if not (other.feasible and other.objective < best.objective - state.tuning.same):
             break
@@ -74,15 +74,15 @@ def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
     return best
 
 
-def _ended(state: SearchState, start: Start, x: Array, limits: NLP, settings: str) -> LocalEnd:
-    """What one run of IPOPT came to."""
+def _run_ipopt(state: SearchState, start: Start, x: Array, limits: NLP, settings: str) -> LocalEnd:
+    """Run IPOPT once and judge its end."""
     run = ipopt(state.nlp, state.options, settings)(x, limits)
     f, rows = limits.at(run.x)
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(f)):
         return LocalEnd(start, limits, run, math.inf, False)
     outside = np.maximum(np.array(limits.row_lower) - rows, rows - np.array(limits.row_upper)).clip(0)
     feasible = outside.max(initial=0.0) <= state.tuning.feasible and run.status != "Infeasible_Problem_Detected"
-    # What rows, met to 1e-12, may give where they are singular: a double root off by 1e-6, as its square is by that.
+    # Rows that hold to 1e-12 may hide 1e-6 in a double root, whose square they constrain.
     claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if limits.touches else 0.0
     if not feasible or _is_spurious(state, limits, run):
         return LocalEnd(start, limits, run, f + claim, False)
@@ -92,7 +92,7 @@ def _ended(state: SearchState, start: Start, x: Array, limits: NLP, settings: st
 
 
 def _is_spurious(state: SearchState, nlp: NLP, run: Run) -> bool:
-    """Whether the factors claim an abscissa left of the roots: near a0 = 0 equations hold as all terms vanish."""
+    """Whether the factors claim an abscissa left of the roots: near a0 = 0 all terms of the equations vanish."""
     if "abscissa" not in nlp.variables:
         return False
     a = coefficients_at(state.part, nlp, run)
@@ -100,7 +100,7 @@ def _is_spurious(state: SearchState, nlp: NLP, run: Run) -> bool:
         return True
     z = roots(a)
     claimed = run.x[nlp.variables.index("abscissa")] * nlp.unit
-    size = np.maximum(np.abs(z).max(axis=1), nlp.unit)  # all of them may be at 0
+    size = np.maximum(np.abs(z).max(axis=1), nlp.unit)  # all roots may be 0
     scatter = max(state.tuning.scatter, state.tuning.residual ** (1 / state.part.model.degree))
     return bool(np.any(claimed < z.real.max(axis=1) - scatter * size))
 

@@ -1,0 +1,64 @@
+"""A problem with changed limits, solved again."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from tmsopt.evaluation.bound import bounded
+from tmsopt.evaluation.recheck import recheck
+from tmsopt.problem.dependence import stability_wanted
+from tmsopt.problem.problem import Posed
+from tmsopt.problem.searches import Starts
+from tmsopt.program.options import Options
+from tmsopt.search.outcome import Outcome, assess_best, has_runaway_root, is_better_outcome
+from tmsopt.search.policy import run_nested
+from tmsopt.search.search import POLICY, search_nested
+from tmsopt.search.state import SearchState, begin_search
+from tmsopt.search.stopping import count_starts
+
+_FEW_STARTS = 6  # of a problem with changed limits
+_LEAST_DECAY = 1e-6  # of the roots' mean size: a design that decays this fast counts as stable
+
+
+def solve_again(
+    problem: Posed, options: Options, original: Posed, thorough: bool = False
+) -> Mapping[str, float] | None:
+    """The optimum of a changed problem; {} if it is not stable though `original` needs that; None without an optimum.
+
+    A few starts suffice if they end at a stable design. They also suffice if all end at one least abscissa that is not
+    stable, unless `thorough`. Otherwise the whole search runs.
+    """
+    stable = _require_stability(problem, original)
+    best: Outcome | None = None
+    for state in begin_search(problem, options):
+        outcome = None if problem.cases else _search_few_starts(state, stable, thorough)
+        outcome = outcome or search_nested(state)
+        best = (
+            outcome if outcome and (best is None or is_better_outcome(problem, outcome, best, state.tuning)) else best
+        )
+    if best is None or best.status != "optimal":
+        return None
+    return best.parameters if _is_met(stable, best) else {}
+
+
+def _require_stability(problem: Posed, original: Posed) -> Posed:
+    """The limits of a problem, and stability if the original problem needs it."""
+    limits = {**problem.constraints, **stability_wanted(original, _LEAST_DECAY)}
+    return problem.derive(constraints=limits, minimize=None, maximize=None)
+
+
+def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Outcome | None:
+    """The outcome of a few starts if it settles the question: a stable design, or one least abscissa for all starts."""
+    state = replace(state, sample=POLICY.sample(state))
+    state = run_nested(state, POLICY.starts(state), POLICY, _FEW_STARTS)
+    outcome = assess_best(state, Starts())
+    if outcome is None or outcome.status != "optimal":
+        return None
+    if has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway):
+        return None
+    agreed = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
+    settled = agreed and not thorough and bounded(state.part)
+    return outcome if settled or _is_met(stable, outcome) else None
+
+
+def _is_met(problem: Posed, outcome: Outcome) -> bool:
+    return not recheck(problem, outcome.parameters, outcome.cases).violations
