@@ -51,7 +51,7 @@ class Fault:
     def __str__(self) -> str:
         place = _cut(self.file, _PATH) + (f":{self.line}" if self.line else "")
         key, message = _cut(".".join(map(str, self.key)), 2 * _WIDTH), _cut(self.message, _LONGEST)
-        return visible(": ".join(part for part in (place, key, message) if part))
+        return escape_unprintable(": ".join(part for part in (place, key, message) if part))
 
 
 class InputError(ValueError):
@@ -77,7 +77,7 @@ class InputError(ValueError):
         return InputError, (self.faults,)
 
 
-def refusal(message: str, *key: str) -> InputError:
+def input_error(message: str, *key: str) -> InputError:
     """The error for one thing wrong."""
     return InputError([Fault(message, key)])
 
@@ -136,10 +136,10 @@ def unshowable(text: str, but: str = "") -> str:
         but: characters that may stand in it.
     """
     found = next((c[0] for c in _UNSHOWABLE.finditer(text) if c[0] not in but), None)
-    return f"found the control character {visible(found)} in {short(text)}" if found else ""
+    return f"found the control character {escape_unprintable(found)} in {short(text)}" if found else ""
 
 
-def visible(text: str) -> str:
+def escape_unprintable(text: str) -> str:
     """A text as it may stand on a terminal: what has no picture there, such as line breaks, as escapes."""
     return _NOT_ASCII.sub(lambda found: found[0] if found[0].isprintable() else repr(found[0])[1:-1], text)
 
@@ -159,7 +159,7 @@ def nearest(name: str, names: Iterable[str], cutoff: float = 0.5) -> list[str]:
     return [] if len(name) > _NAME else get_close_matches(name, islice(names, _NAMES), n=1, cutoff=cutoff)
 
 
-def at_first(advise: Callable[..., str]) -> Callable[..., str]:
+def limit_advice(advise: Callable[..., str]) -> Callable[..., str]:
     """Advice for as many faults as are listed: what takes time is not looked for where it is only counted."""
     left = iter(range(LISTED))
     return lambda *about: advise(*about) if next(left, None) is not None else "accepted: as above"
@@ -167,7 +167,7 @@ def at_first(advise: Callable[..., str]) -> Callable[..., str]:
 
 def short(value: Any) -> str:
     """A value as found, cut where it is long, control characters as escapes."""
-    return _cut(visible(_text(value, _WIDTH)), _WIDTH)
+    return _cut(escape_unprintable(_text(value, _WIDTH)), _WIDTH)
 
 
 def _cut(text: str, most: int) -> str:

@@ -74,7 +74,7 @@ class Executor(Protocol):
         ...
 
 
-def silent(line: str) -> None:
+def ignore_note(line: str) -> None:
     """A `Note` that goes nowhere."""
 
 
@@ -90,7 +90,7 @@ def here() -> Executor:
     return _Loop()
 
 
-def processes(workers: int, note: Note = silent) -> Executor:
+def processes(workers: int, note: Note = ignore_note) -> Executor:
     """Processes of this machine, with one thread each.
 
     Raises:
@@ -101,7 +101,7 @@ def processes(workers: int, note: Note = silent) -> Executor:
     return _Spread(_LokyPool(workers, note), note)
 
 
-def cluster(address: str, note: Note = silent) -> Executor:
+def cluster(address: str, note: Note = ignore_note) -> Executor:
     """The workers of the Dask scheduler at an address. They may come and go; with none left, items wait.
 
     Raises:

@@ -115,7 +115,7 @@ def _numbered(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.{number}{path.suffix}")
 
 
-def differences(
+def list_differences(
     known: Any, asked: Any, sides: tuple[str, str] = ("there", "asked for"), key: str = ""
 ) -> Iterator[str]:
     """Where two pieces of plain data differ, one phrase each; numbers differ where any bit of their doubles does.
@@ -129,7 +129,7 @@ def differences(
             for name in dict.fromkeys((*known, *asked)):
                 inner = f"{key}.{name}" if key else str(name)
                 if name in known and name in asked:
-                    yield from differences(known[name], asked[name], sides, inner)
+                    yield from list_differences(known[name], asked[name], sides, inner)
                 else:
                     one, other = (_shown(side[name]) if name in side else "none" for side in (known, asked))
                     yield f"{inner}: {one} {sides[0]}, {other} {sides[1]}"
@@ -144,7 +144,7 @@ def differences(
                 yield f"{key}: {len(differ)} of {most} values differ, the first in row {first}: {values}"
         case list(), list() if len(known) == len(asked):
             for index, (one, other) in enumerate(zip(known, asked, strict=True)):
-                yield from differences(one, other, sides, f"{key}[{index}]")
+                yield from list_differences(one, other, sides, f"{key}[{index}]")
         case _ if not _same(known, asked):
             yield f"{key}: {_shown(known)} {sides[0]}, {_shown(asked)} {sides[1]}"
 
@@ -248,7 +248,7 @@ def from_json(text: str, largest: int = LARGEST_JSON) -> Any:
     raise ValueError(f"lists and tables more than {_DEEPEST} deep")
 
 
-def path_of(given: object, what: str) -> Path:
+def as_path(given: object, what: str) -> Path:
     """The path of a file that a user names.
 
     Raises:
@@ -266,13 +266,13 @@ def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]], unit
         OSError: when the file cannot be written.
     """
     with (
-        write_atomic(path_of(path, "the file to write")) as place,
+        write_atomic(as_path(path, "the file to write")) as place,
         place.open("w", newline="", encoding="utf-8") as stream,
     ):
         names = list(rows[0]) if rows else []
         writer = csv.writer(stream)
-        writer.writerow(cell(headed(n, units.get(n, ""))) for n in names)
-        writer.writerows([cell(row[n]) for n in names] for row in rows)
+        writer.writerow(format_cell(format_header(n, units.get(n, ""))) for n in names)
+        writer.writerows([format_cell(row[n]) for n in names] for row in rows)
 
 
 def write_text(path: str | PathLike[str], text: str, *, new: bool = False) -> None:
@@ -284,14 +284,14 @@ def write_text(path: str | PathLike[str], text: str, *, new: bool = False) -> No
     Raises:
         OSError: when the file cannot be written.
     """
-    path = path_of(path, "the file to write")
+    path = as_path(path, "the file to write")
     if new and os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
     with write_atomic(path) as place:
         place.write_bytes(text.encode())
 
 
-def cell(value: Any) -> Any:
+def format_cell(value: Any) -> Any:
     """What stands in a cell of a CSV.
 
     A text that a spreadsheet would take for a formula gets an apostrophe, and a carriage return, at which some begin
@@ -303,6 +303,6 @@ def cell(value: Any) -> Any:
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\n")) else text
 
 
-def headed(name: str, unit: str) -> str:
+def format_header(name: str, unit: str) -> str:
     """The head of a column: ``v (m/s)``."""
     return f"{name} ({unit})" if unit else name

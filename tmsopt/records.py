@@ -67,7 +67,7 @@ class Tabular(Printable, Protocol):
         return frame(self.records())
 
 
-def asked_above(name: str, *given: Any, **options: Any) -> Any:
+def call_documents(name: str, *given: Any, **options: Any) -> Any:
     """Call a function of `tmsopt.documents` for a method of a result, which knows nothing of what stands above it."""
     return getattr(_documents(), name)(*given, **options)
 

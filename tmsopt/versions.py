@@ -34,16 +34,16 @@ def environment() -> dict[str, object]:
         "implementation": platform.python_implementation(),
         "system": platform.platform(),
         "machine": platform.machine(),
-        "packages": {**installed((*NEEDED, *EXTRA)), "ipopt": ipopt()},
+        "packages": {**installed_versions((*NEEDED, *EXTRA)), "ipopt": ipopt_version()},
     }
 
 
-def installed(names: Iterable[str]) -> dict[str, str | None]:
+def installed_versions(names: Iterable[str]) -> dict[str, str | None]:
     """The version of each distribution; None where it is not installed, as of a checkout that is only on the path."""
     return {name: _version(name) for name in names}
 
 
-def ipopt() -> str | None:
+def ipopt_version() -> str | None:
     """The version in the name of the library that the CasADi wheel brings; it tells nowhere else without a solve."""
     try:
         folder = Path(str(distribution("casadi").locate_file("casadi")))

@@ -27,7 +27,7 @@ from tmsopt.cli.common import (
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.cli.terminal import shown
 from tmsopt.deprecated import no_longer_needed
-from tmsopt.errors import refusal, suggest
+from tmsopt.errors import input_error, suggest
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -198,7 +198,7 @@ def _moved_aside(folder: Path | None) -> Iterator[None]:
         if folder is None:
             raise
         message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
-        raise refusal(message, "--output") from None
+        raise input_error(message, "--output") from None
     if folder is not None:
         for aside in sorted(set(folder.parent.glob("*.chart")) - there - {folder}):
             click.echo(f"moved the old folder to {aside}", err=True)
@@ -221,7 +221,7 @@ def _space(free: tuple[str, ...], axes: str | None) -> tuple[str, ...]:
 
     names = tuple(n.strip() for n in axes.split(",")) if axes is not None else free
     if sorted(names) != sorted(free):
-        raise refusal(f"found {axes}; accepted: {', '.join(free)} in any order", "--axes")
+        raise input_error(f"found {axes}; accepted: {', '.join(free)} in any order", "--axes")
     return names
 
 
@@ -233,7 +233,7 @@ def _sizes(points: tuple[int, ...] | None, axes: int) -> tuple[int, ...]:
     sizes = points * axes if len(points) == 1 else points
     if len(sizes) != axes:
         message = f"found {'x'.join(map(str, points))}; accepted: one number, or one for each of the {axes} axes"
-        raise refusal(message, "--points")
+        raise input_error(message, "--points")
     return sizes
 
 
@@ -243,7 +243,7 @@ def _check_memory(sizes: tuple[int, ...], output: Path | None) -> None:
 
     if (designs := math.prod(sizes)) > LARGEST:
         message = f"{designs:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
-        raise refusal(message, "--points")
+        raise input_error(message, "--points")
     if output is not None and output.suffix.lower() == ".nc":
         check_netcdf()
 
@@ -251,12 +251,12 @@ def _check_memory(sizes: tuple[int, ...], output: Path | None) -> None:
 def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: int, cut: dict[str, str]) -> None:
 
     if layer not in accepted:
-        raise refusal(f"found '{layer}'; {suggest(layer, accepted)}", "--layer")
+        raise input_error(f"found '{layer}'; {suggest(layer, accepted)}", "--layer")
     if plot is not None and axes == 3 and not cut:
         message = "three parameters are free, and a figure shows two; hold one, as in --slice lambda_s=0.4"
-        raise refusal(message, "--plot")
+        raise input_error(message, "--plot")
     if cut and axes == 2:
-        raise refusal("two parameters are free, so there is nothing to hold; leave it out", "--slice")
+        raise input_error("two parameters are free, so there is nothing to hold; leave it out", "--slice")
 
 
 def _held(problem: "Posed", cut: dict[str, str]) -> dict[str, float]:
@@ -265,9 +265,9 @@ def _held(problem: "Posed", cut: dict[str, str]) -> dict[str, float]:
     held = {}
     for name, text in cut.items():
         if name not in problem.free:
-            raise refusal(f"found '{name}'; {suggest(name, problem.free)}", "--slice")
+            raise input_error(f"found '{name}'; {suggest(name, problem.free)}", "--slice")
         low, high = problem.free[name]
         held[name] = number(text, problem.parameter_set[name].unit, "--slice", name)
         if not low <= held[name] <= high:
-            raise refusal(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
+            raise input_error(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
     return held

@@ -12,7 +12,7 @@ import click
 
 from tmsopt.cli.ending import BAD_INPUT, answering
 from tmsopt.cli.terminal import doing, quiet, shown
-from tmsopt.errors import MOST_STARTS, Fault, InputError, refusal
+from tmsopt.errors import MOST_STARTS, Fault, InputError, input_error
 
 if TYPE_CHECKING:
     from tmsopt.problem import Posed
@@ -75,7 +75,7 @@ def number(text: str, unit: str, *key: str) -> float:
         try:
             return with_unit(text, unit)
         except ValueError as error:
-            raise refusal(str(error), *key) from None
+            raise input_error(str(error), *key) from None
 
 
 def check_output(option: str, path: Path | None, endings: Sequence[str], folders: Sequence[str] = ()) -> None:
@@ -84,14 +84,14 @@ def check_output(option: str, path: Path | None, endings: Sequence[str], folders
         return
     ending = path.suffix.lstrip(".").lower()
     if ending not in endings:
-        raise refusal(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", option)
+        raise input_error(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", option)
     try:
         problem = "is a directory" if path.is_dir() and ending not in folders else ""
         problem = problem or ("" if path.parent.is_dir() else "is in a directory that does not exist")
     except OSError as error:  # a name longer than the file system takes
         problem = f"is no name for a file here ({error.strerror})"
     if problem:
-        raise refusal(f"'{path}' {problem}; give the path of a file to write", option)
+        raise input_error(f"'{path}' {problem}; give the path of a file to write", option)
 
 
 file_argument = click.argument("file", type=PATH)
@@ -180,7 +180,7 @@ def plane(problem: "Posed", axes: str | None) -> tuple[str, str]:
     names = [n.strip() for n in axes.split(",")] if axes is not None else free[:2]
     if len(names) != 2 or names[0] == names[1] or not set(names) <= set(free):
         found = axes or ", ".join(names) or "none"
-        raise refusal(f"found {found}; accepted: two of the free parameters ({', '.join(free)})", "--axes")
+        raise input_error(f"found {found}; accepted: two of the free parameters ({', '.join(free)})", "--axes")
     return names[0], names[1]
 
 

@@ -30,7 +30,7 @@ from tmsopt.cli.common import (
 )
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import MOST_POINTS, Fault, InputError, refusal
+from tmsopt.errors import MOST_POINTS, Fault, InputError, input_error
 
 if TYPE_CHECKING:
     from tmsopt.report import Findings
@@ -285,7 +285,7 @@ def _scale(option: str, text: str, unit: str) -> float:
     """A positive length or mass of the command line."""
     value = number(text, unit, option)
     if not 0 < value < math.inf:
-        raise refusal(f"found {text}; accepted: a positive number of {unit}", option)
+        raise input_error(f"found {text}; accepted: a positive number of {unit}", option)
     return value
 
 

@@ -26,7 +26,7 @@ from tmsopt.cli.common import (
 )
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, answering
 from tmsopt.cli.terminal import doing, quiet, shown
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.files import read_text
 from tmsopt.progress import Progress
 
@@ -148,7 +148,7 @@ def _check_apart(file: Path, written: Sequence[tuple[str, Path]]) -> None:
     taken = {realpath(path): "what the study is read from" for path in read}
     for option, path in written:
         if (place := realpath(path)) in taken:
-            raise refusal(f"'{path}' is {taken[place]}; give another name", option)
+            raise input_error(f"'{path}' is {taken[place]}; give another name", option)
         taken[place] = f"what {option} writes"
 
 
@@ -158,9 +158,9 @@ def _check_together(row: int | None, scheduler: str | None, workers: int | None,
     given += [name for name, value in (("--scheduler", scheduler), ("--workers", workers)) if value is not None]
     if row is not None and given:
         message = f"solves one row in this process and keeps nothing; leave out {', '.join(given)}"
-        raise refusal(message, "--row")
+        raise input_error(message, "--row")
     if scheduler is not None and workers is not None:
-        raise refusal("is for processes of this machine; leave it out with --scheduler", "--workers")
+        raise input_error("is for processes of this machine; leave it out with --scheduler", "--workers")
 
 
 def _planned(asked: "Study | Sampling") -> "Study":

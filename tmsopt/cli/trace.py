@@ -21,7 +21,7 @@ from tmsopt.cli.common import (
     write_report,
 )
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 
 _EXAMPLES = """
 \b
@@ -70,7 +70,7 @@ def trace(
     problem = nominal_of(tmsopt.load(file).posed)
     if axes is not None:
         if plot is None:
-            raise refusal("says what --plot draws; add --plot FILE", "--axes")
+            raise input_error("says what --plot draws; add --plot FILE", "--axes")
         plane(problem, axes)
     found = tmsopt.trace(problem, pattern, progress=shown(), **asked)
     answer(as_json, found.to_json, lambda: tmsopt.report.trace_table(found))

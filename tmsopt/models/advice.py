@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterable
 
-from tmsopt.models.names import MEANT
+from tmsopt.models.names import AMBIGUOUS_NAMES
 from tmsopt.models.tables import read_table
 
 _NUMBER = r"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)"
@@ -36,7 +36,7 @@ _WITH_UNIT = re.compile(_NUMBER + rf"\s*({'|'.join(_UNITS)}|deg|°)(?!\w)")
 def call_advice(name: str, arguments: Iterable[str]) -> str:
     """The end of a sentence that says what to write for a function that there is not; empty likewise."""
     functions = _WORDS["functions"]
-    meant = f"write {functions[name]}" if name in functions else MEANT["t"] if "t" in arguments else ""
+    meant = f"write {functions[name]}" if name in functions else AMBIGUOUS_NAMES["t"] if "t" in arguments else ""
     return f"; {meant}" if meant else ""
 
 

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 
-from tmsopt.errors import Fault, InputError, at_first, short, suggest, visible
-from tmsopt.files import path_of, read_text, write_text
+from tmsopt.errors import Fault, InputError, escape_unprintable, limit_advice, short, suggest
+from tmsopt.files import as_path, read_text, write_text
 from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.records import Table
 
@@ -88,12 +88,12 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
 
     More: docs/how_to/import.md
     """
-    file = path_of(path, "a file of bicycle parameters")
+    file = as_path(path, "a file of bicycle parameters")
     kind = "YAML" if file.suffix.lower() in _YAML else "TXT"
     text = read_text(str(path), f"{kind} file of bicycle parameters")
     entries = list(_entries(text, kind == "YAML"))
     faults, found, off, others = [], {}, {}, {}
-    advice = at_first(suggest)
+    advice = limit_advice(suggest)
     for number, name, written in entries:
         numbers = _numbers(written)
         if kind == "YAML" and name == "parameterization":
@@ -124,7 +124,9 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     if faults:
         raise InputError(faults)
     ordered = {n: found[n] for n in _OF.names if n in found}
-    return Bicycle(visible(file.stem), Table(ordered), Table({n: off[n] for n in ordered if off[n] > 0}), Table(others))
+    return Bicycle(
+        escape_unprintable(file.stem), Table(ordered), Table({n: off[n] for n in ordered if off[n] > 0}), Table(others)
+    )
 
 
 def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[str]) -> None:
@@ -145,7 +147,7 @@ def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[s
 
     More: docs/how_to/import.md
     """
-    file = path_of(path, "the file to write")
+    file = as_path(path, "the file to write")
     ending = file.suffix.lower()
     if ending not in (*_TEXT, *_YAML):
         raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join((*_TEXT, *_YAML))}")])
@@ -224,4 +226,4 @@ def _decimal(value: float) -> str:
 
 
 def _quoted(text: str) -> str:
-    return '"' + "".join(c for c in visible(text) if c not in '"\\') + '"'
+    return '"' + "".join(c for c in escape_unprintable(text) if c not in '"\\') + '"'

@@ -60,7 +60,7 @@ class Exact:
             return Exact.of(self.fraction * factor)
         return self if factor == 1 else Exact(self.node * factor, f"({self.text})*{factor}")
 
-    def in_degrees(self) -> "Exact":
+    def to_radians(self) -> "Exact":
         """So many degrees."""
         return Exact(self.node * PI / 180, f"{self.text} deg") if self.fraction != 0 else self
 
@@ -138,7 +138,7 @@ def _is_long(x: Any) -> bool:
 
 
 @dataclass(frozen=True)
-class Written:
+class ExactDesign:
     """A design in exact numbers.
 
     Attributes:
@@ -197,7 +197,7 @@ def written(
     parameters: Mapping[str, float],
     stated: Mapping[str, Any] | None = None,
     typed: Mapping[str, str] = MappingProxyType({}),
-) -> Written:
+) -> ExactDesign:
     """A design's doubles as decimals, save those for which an exact number is given.
 
     Args:
@@ -233,7 +233,7 @@ def written(
     if faults:
         raise InputError(faults)
     left = Table({n: v for n, v in values.items() if n not in tangents})
-    return Written(left, Table(tangents), tuple(stated or ()))
+    return ExactDesign(left, Table(tangents), tuple(stated or ()))
 
 
 def _parsed(given: Any, angle: bool) -> Exact | None:
@@ -242,7 +242,7 @@ def _parsed(given: Any, angle: bool) -> Exact | None:
     try:
         if isinstance(given, str):
             degrees = _DEGREES.fullmatch(given.strip()) if angle else None
-            return constant(degrees[1]).in_degrees() if degrees else constant(given)
+            return constant(degrees[1]).to_radians() if degrees else constant(given)
         if isinstance(given, flint.fmpq | flint.fmpz):
             fraction = rational(given) if isinstance(given, flint.fmpq) else flint.fmpq(given)
             given = Fraction(int(fraction.p), int(fraction.q))

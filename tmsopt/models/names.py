@@ -19,7 +19,7 @@ TAKEN = ("abscissa", "damping_ratio", "angular_frequency", "radius", "structure"
 
 _WORDS = read_table("advice")
 OUTSIDE: str = _WORDS["outside"]
-MEANT = {name: meant.format(outside=OUTSIDE) for name, meant in _WORDS["names"].items()}
+AMBIGUOUS_NAMES = {name: meant.format(outside=OUTSIDE) for name, meant in _WORDS["names"].items()}
 """Names that may stand for more than a parameter → what to do then."""
 
 _EIGENVALUE = (

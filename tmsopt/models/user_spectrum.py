@@ -90,7 +90,7 @@ def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Stru
     return Structure(doubled_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
 
 
-def structure_in_words(model: Model, structure: str, gain: bool = False) -> str:
+def describe_structure(model: Model, structure: str, gain: bool = False) -> str:
     """A structure, as it is told, in words; of a complex H by its gain where it has any."""
     if model.carrier is None:
         return in_words(structure, model.degree)
@@ -99,11 +99,11 @@ def structure_in_words(model: Model, structure: str, gain: bool = False) -> str:
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """ω = i s of roots as they are told; of a real system none."""
-    each = () if model.carrier is None else without_rounding(model, roots)
+    each = () if model.carrier is None else remove_rounding(model, roots)
     return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in each)
 
 
-def without_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
+def remove_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """Roots as they are told, with parts that are 0 but for a carrier's rounding as 0."""
     each = tuple(roots)
     nothing = 0.0 if model.carrier is None else _NOTHING * _size(model, each)
@@ -111,7 +111,7 @@ def without_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(own, each, strict=True))
 
 
-def on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
+def roots_on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """Those of roots, as they are told, that are on the imaginary axis: the real ones of the eigenfrequencies of H."""
     each = tuple(roots)
     return tuple(r for r in each if abs(r.re) <= ON_AXIS * _size(model, each))

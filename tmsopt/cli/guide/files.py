@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import check_output, file_argument, output_option, saving, write_json
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.files import write_text
 
 _OF_NEW = """
@@ -86,7 +86,7 @@ def example(name: str | None, output: Path | None, as_json: bool) -> None:
         path = output or Path(f"{name.removesuffix('.toml')}.toml")
         write_with_companions("NAME" if output is None else "--output", path, text_of(name))
     elif output is not None:
-        raise refusal("found no NAME; tmsopt example lists all", "NAME")
+        raise input_error("found no NAME; tmsopt example lists all", "NAME")
     elif as_json:
         write_json(examples())
     else:

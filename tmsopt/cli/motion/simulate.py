@@ -20,7 +20,7 @@ from tmsopt.cli.common import (
     write_report,
 )
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 
 _EXAMPLES = """
 \b
@@ -76,7 +76,7 @@ def simulate(
 ) -> None:
     """Show what the design of FILE does after a lean, a push of the handlebar, or in noise."""
     if whole and csv_file is None:
-        raise refusal("says what --csv writes; add --csv FILE", "--path")
+        raise input_error("says what --csv writes; add --csv FILE", "--path")
     states = _numbers("--start", start, "phidot=0.1")
     problem = tmsopt.load(file)
     values = _numbers("--at", at, "v=1.5")
@@ -95,5 +95,5 @@ def _numbers(option: str, given: tuple[str, ...], example: str) -> dict[str, flo
         try:
             found[name] = float(text)
         except ValueError:
-            raise refusal(f"found '{text}'; accepted: a number", option, name) from None
+            raise input_error(f"found '{text}'; accepted: a number", option, name) from None
     return found

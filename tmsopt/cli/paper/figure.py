@@ -8,7 +8,7 @@ import click
 
 from tmsopt.cli.common import FIGURES, PATH, check_output, saving, write_json
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.progress import start_steps
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def figure(name: str | None, output: Path | None, ending: str | None, as_json: b
     from tmsopt.plots.paper import GALLERY, find
 
     if not (name or as_list):  # no label of the paper is empty either
-        raise refusal(f"missing; accepted: {' '.join(GALLERY)} all", "NAME")
+        raise input_error(f"missing; accepted: {' '.join(GALLERY)} all", "NAME")
     every = as_list or name == "all"
     items = list(GALLERY.values()) if every else [find(str(name))]
     data = [{"name": item.name, "alias": item.alias, "caption": item.caption} for item in items]
@@ -74,7 +74,7 @@ def _files(names: list[str], every: bool, output: Path | None, ending: str | Non
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise refusal(f"'{folder}' cannot be a directory: {error.strerror}", "--output") from None
+            raise input_error(f"'{folder}' cannot be a directory: {error.strerror}", "--output") from None
         files = [folder / f"{name}.{ending or 'png'}" for name in names]
     else:
         files = [output or Path(f"{names[0]}.{ending or 'png'}")]

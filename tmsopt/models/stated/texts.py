@@ -151,7 +151,7 @@ def place(key: str, i: int, j: int) -> str:
     return f"entry {j}" if key == "coefficients" else f"row {i}, column {j}"
 
 
-def untexted(
+def parse_entries(
     matrices: Mapping[str, Matrix], derived: Mapping[Any, Any], fault: Callable[..., None]
 ) -> tuple[dict[str, Matrix], dict[Any, Any]]:
     """Texts in matrices and quantities as nodes; entries of a complex H as pairs, whatever they are."""

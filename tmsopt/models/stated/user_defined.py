@@ -24,7 +24,7 @@ from tmsopt.models.stated.degree import faulty
 from tmsopt.models.stated.equations import IMAGINARY, in_order, pencil, polynomial, whole
 from tmsopt.models.stated.pairs import complex_text
 from tmsopt.models.stated.real_form import carriers, complex_model
-from tmsopt.models.stated.texts import Unfit, place, untexted
+from tmsopt.models.stated.texts import Unfit, parse_entries, place
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
@@ -187,7 +187,7 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
         raise Unfit("name", f"'{name.strip()}' is a model of tmsopt's own; give yours another name")
     if not isinstance(quantities or {}, Mapping):
         raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")
-    matrices, derived = untexted(
+    matrices, derived = parse_entries(
         matrices, {n: _node("quantities", n, x) for n, x in (quantities or {}).items()}, _unfit
     )
     if kind == "hamiltonian":
