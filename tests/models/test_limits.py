@@ -29,7 +29,7 @@ REFUSED = {
     "Fr**9223372036854775808": "has the exponent 9.22",
     "Fr**(500 + 600)": "'Fr**(500 + 600)' has the exponent 1100",
     "9**9**9**9*Fr": "'9**9**9' has the exponent 387420489",
-    "((Fr**99)**99)**99": "has the degree 970299 when it is multiplied out; accepted: up to 10000",
+    "((Fr**99)**99)**99": "has the degree 970299 when multiplied out; accepted: up to 10000",
     "0**-1*Fr": "'0**-1' is inf",
     "2 + 1/0": "'1/0' divides by 0",
     "Fr/(2 - 2)": "'Fr/(2 - 2)' divides by 0",
