@@ -133,7 +133,7 @@ def replace_literals(text: str) -> str:
 
 
 def complex_text(re: str, im: str) -> str:
-    """The text of a complex number from those of its parts."""
+    """The text of a complex number from the texts of its parts."""
     return re if im == "0" else f"1j*{im}" if re == "0" else f"{re} + 1j*{im}"
 
 

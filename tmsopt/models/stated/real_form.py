@@ -51,7 +51,7 @@ def complex_model(
     with_carrier: Callable[[float], Model],
     double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]],
 ) -> Model:
-    """The model of a complex H from that of its real system.
+    """The model of a complex H from the model of its real system.
 
     Args:
         real: the model of the real system with the carrier.
