@@ -211,7 +211,7 @@ def test_a_search_says_that_a_mass_next_to_nought_is_singular():
     ids=range(6),
 )
 def test_exact_numbers_have_as_many_digits_as_doubles_need(exact):
-    written = import_module("tmsopt.models.exact").written
+    written = import_module("tmsopt.models.exact").as_exact_design
     of = tmsopt.models.tms.sets[0]
     design = dict.fromkeys(of.names, 0.3)
     with pytest.raises(tmsopt.InputError, match=r"lambda_s: found .* of up to 400 digits"):
