@@ -31,7 +31,7 @@ def test_version_as_json_says_what_is_installed(run, words):
     assert (data["schema"], data["tmsopt"], data["python"]) == (1, tmsopt.__version__, platform.python_version())
     assert data["machine"] == platform.machine()
     for name, version in data["packages"].items():
-        if name != "ipopt_version":
+        if name != "ipopt":
             there = [d.version for d in metadata.distributions(name=name)]
             assert version == (there[0] if there else None), name
 
@@ -39,7 +39,7 @@ def test_version_as_json_says_what_is_installed(run, words):
 def test_all_that_tmsopt_needs_or_can_use_is_listed(run):
     extras = [PROJECT["optional-dependencies"][name] for name in ("certify", "cluster", "data")]
     stated = {re.split("[<>=!~;\\[ ]", text)[0] for text in sum(extras, PROJECT["dependencies"])}
-    assert set(json.loads(run("--version", "--json")[1])["packages"]) == stated | {"ipopt_version"}
+    assert set(json.loads(run("--version", "--json")[1])["packages"]) == stated | {"ipopt"}
 
 
 def test_what_is_not_installed_is_null(run, monkeypatch):
@@ -58,11 +58,11 @@ def test_the_version_of_ipopt_is_the_one_that_solves(capfd):
     import casadi
 
     x = casadi.SX.sym("x")
-    casadi.nlpsol("s", "ipopt_version", {"x": x, "f": x * x}, {"print_time": False})(x0=1)
+    casadi.nlpsol("s", "ipopt", {"x": x, "f": x * x}, {"print_time": False})(x0=1)
     banner = re.search(r"This is Ipopt version (\d+(?:\.\d+)+)", capfd.readouterr().out)
     with pytest.raises(SystemExit):
         main(args=["--version", "--json"], prog_name="tmsopt")
-    told = json.loads(capfd.readouterr().out)["packages"]["ipopt_version"]
+    told = json.loads(capfd.readouterr().out)["packages"]["ipopt"]
     assert banner is not None
     assert told in (banner[1], None)
 
