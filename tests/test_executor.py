@@ -136,7 +136,7 @@ def test_kills_from_outside_cost_nothing(tmp_path):
 
 
 def test_no_worker_at_all_is_refused():
-    with pytest.raises(InputError, match="workers: 0; accepted: 1 or more"):
+    with pytest.raises(InputError, match="workers: found 0; accepted: 1 or more"):
         processes(0)
 
 

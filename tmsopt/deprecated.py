@@ -1,4 +1,4 @@
-"""What earlier versions had: options that do nothing any more, attributes that stand elsewhere."""
+"""Options without effect and moved attributes of earlier versions."""
 
 import warnings
 from collections.abc import Callable
@@ -10,7 +10,7 @@ R = TypeVar("R")
 
 
 def ignore_option(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A decorator: the function takes one keyword more, warns that it is no longer needed, and leaves it out."""
+    """A decorator that accepts one more keyword, ignores it, and warns that it is no longer needed."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @wraps(function)
@@ -25,11 +25,11 @@ def ignore_option(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def no_longer_needed(option: str) -> str:
-    """What a user reads who gives such an option."""
+    """The warning about an option without effect."""
     return f"{option} is no longer needed: NumPy computes every chart; leave it out"
 
 
-OF_POSED = frozenset(
+MOVED_TO_POSED = frozenset(
     (
         "asked_of_roots",
         "asks",
@@ -53,16 +53,16 @@ OF_POSED = frozenset(
         "vocabulary",
     )
 )
-"""Attributes of a `Problem` in 1.1 that are those of its `posed`."""
+"""Attributes of a `Problem` in 1.1 that have moved to `Problem.posed`."""
 
 
 def read_from_posed(problem: Any, name: str) -> Any:
-    """An attribute of a problem that is one of its `posed`.
+    """An attribute that has moved from a problem to its `posed`, with a warning.
 
     Raises:
-        AttributeError: for any other.
+        AttributeError: if `name` is not one of these.
     """
-    if name not in OF_POSED:
+    if name not in MOVED_TO_POSED:
         raise AttributeError(f"'{type(problem).__name__}' object has no attribute '{name}'", name=name, obj=problem)
-    warnings.warn(f"Problem.{name} is moved: write problem.posed.{name}", DeprecationWarning, stacklevel=3)
+    warnings.warn(f"Problem.{name} has moved; write problem.posed.{name}", DeprecationWarning, stacklevel=3)
     return getattr(problem.posed, name)

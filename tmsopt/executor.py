@@ -1,7 +1,7 @@
-"""Executors: a function called for many items, in this process, in processes of this machine or on a Dask cluster.
+"""Executors call a function for many items: in this process, in processes of this machine or on a Dask cluster.
 
-A crash is data: an item that ends its worker becomes a `Crash`, and no other item is lost. Closing the iterator, Ctrl-C
-and the end of this process, even by kill -9, end the workers at once.
+An item that ends its worker yields a `Crash`, and no other item is lost. The workers end at once when the iterator is
+closed, on Ctrl-C, and with this process, even by kill -9.
 """
 
 import asyncio
@@ -25,17 +25,17 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.threads import ONE_THREAD
 
 PATIENCE = 10.0
-"""s for a Dask scheduler to answer."""
+"""Time limit in s for an answer of a Dask scheduler."""
 
 Note = Callable[[str], None]
-"""Takes one line about workers that come, go and end."""
+"""A callback for one line about workers that join, leave or crash."""
 
-_BATCH = 0.2  # s of work in one message
-_RECENT = 64  # batches whose mean time per item says how long the next ones take
-_AHEAD = 2  # batches in flight per worker: one is solved while the next is on its way
-_LOOK = 1.0  # s between looks at the workers; some systems do not hear Ctrl-C while they wait
-_TRIES = 2  # crashes after which an item is given up that had all workers for itself
-_STILLBORN = 3  # pools in a row whose workers end before they can do anything; then it is not chance
+_BATCH = 0.2  # s of work in one batch
+_RECENT = 64  # batches whose mean time per item predicts the next ones
+_AHEAD = 2  # batches in flight per worker: it computes one while the next travels
+_CHECK = 1.0  # s between checks of the workers; some systems ignore Ctrl-C during a wait
+_TRIES = 2  # crashes of an item, alone in flight, before it is given up
+_START_TRIES = 3  # attempts to start a pool whose workers end at once
 _ENVIRONMENT = ONE_THREAD | {
     "PYTHONFAULTHANDLER": "",  # or loky prints a traceback of every crash
     "LOKY_MAX_MEMORY_LEAK_SIZE": "1e15",  # or it replaces workers that have built many solvers, with a warning
@@ -44,70 +44,72 @@ _ENVIRONMENT = ONE_THREAD | {
 
 @dataclass(frozen=True)
 class Crash:
-    """The end of the workers that were given an item.
+    """The result of an item that ended its workers.
 
     Attributes:
-        cause: such as ``signal 9``; empty where it is not known.
+        cause: e.g. ``signal 9``; empty if unknown.
     """
 
     cause: str
 
 
 class EngineError(RuntimeError):
-    """An executor that cannot go on; the results it has yielded stand, and the other items can be given again."""
+    """The executor cannot continue. Results that it has yielded are valid; the other items can be submitted again."""
 
 
 class Executor(Protocol):
-    """Calls a function for items. A context manager; closing it ends the workers."""
+    """Calls a function for items. It is a context manager; leaving it ends the workers."""
 
     def __enter__(self) -> Self: ...
 
     def __exit__(self, *error: object) -> None: ...
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
-        """The place of each item with its result or `Crash`, in the order in which they finish.
+        """Yield the index of each item with its result or `Crash`, in the order in which they finish.
 
         Raises:
-            Exception: what the function raises.
-            EngineError: the workers cannot go on.
+            Exception: any that the function raises.
+            EngineError: if the workers cannot continue.
         """
         ...
 
 
-def silent(line: str) -> None:
-    """A `Note` that goes nowhere."""
+def ignore_note(line: str) -> None:
+    """A `Note` that does nothing."""
 
 
 def cores() -> int:
-    """How many processes this one may keep busy: cores within affinity, quotas and LOKY_MAX_CPU_COUNT."""
+    """Number of usable cores, within affinity, quotas and LOKY_MAX_CPU_COUNT."""
     import loky
 
     return int(loky.cpu_count())
 
 
 def here() -> Executor:
-    """A loop in this process. A crash ends it."""
+    """A loop in this process, which a crash ends."""
     return _Loop()
 
 
-def processes(workers: int, note: Note = silent) -> Executor:
+def processes(workers: int, note: Note = ignore_note) -> Executor:
     """Processes of this machine, with one thread each.
 
     Raises:
-        InputError: for less than one worker.
+        InputError: if `workers` is less than 1.
     """
     if workers < 1:
-        raise InputError([Fault(f"{workers}; accepted: 1 or more, here up to {cores()} are of use", ("workers",))])
-    return _Spread(_LokyPool(workers, note), note)
+        message = f"found {workers}; accepted: 1 or more; this machine has {cores()} cores"
+        raise InputError([Fault(message, ("workers",))])
+    return _Distributor(_LokyPool(workers, note), note)
 
 
-def cluster(address: str, note: Note = silent) -> Executor:
-    """The workers of the Dask scheduler at an address. They may come and go; with none left, items wait.
+def cluster(address: str, note: Note = ignore_note) -> Executor:
+    """The workers of the Dask scheduler at an address. They may join and leave; without any, items wait.
 
     Raises:
-        InputError: `distributed` is not installed, no scheduler answers, or a worker has several threads or no tmsopt.
+        InputError: if `distributed` is not installed, no scheduler answers, or a worker has several threads or no
+            tmsopt.
     """
-    return _Spread(_DaskPool(address, note), note)
+    return _Distributor(_DaskPool(address, note), note)
 
 
 class _Loop:
@@ -129,26 +131,26 @@ class _Pool(Protocol):
     """Workers that take calls.
 
     Attributes:
-        workers: how many there are now.
+        workers: their present number.
     """
 
     workers: int
 
     def submit(self, *call: Any) -> Any:
-        """A future of a call in a worker; it has a done callback."""
+        """A future of a call in a worker, with `add_done_callback`."""
 
     def result(self, future: Any) -> Any:
-        """What a finished future has to say, or the exception of the call; `_Died` if its worker ended."""
+        """The result or exception of a finished future; `_Died` if its worker ended."""
 
     def look(self) -> None:
-        """Once in a while: see how the workers are."""
+        """Check the workers; called about once a second."""
 
     def end(self) -> None:
         """End all calls and workers."""
 
 
-class _Spread:
-    """Items over a pool."""
+class _Distributor:
+    """Distributes items over the workers of a pool."""
 
     def __init__(self, pool: _Pool, note: Note) -> None:
         self._pool, self._note = pool, note
@@ -160,14 +162,13 @@ class _Spread:
         self._pool.end()
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
-        """Batches of items out and results in.
+        """Send batches of items and yield their results.
 
-        What was in flight when a worker ended is tried again with nothing else in flight: first a batch as it is, then
-        its items one by one.
+        When a worker ends, each batch in flight is tried again with nothing else in flight, then its items one by one.
         """
         try:
             yield from self._results(function, list(items))
-        except BaseException:  # interrupted, closed or failed: what is in flight is of no use
+        except BaseException:  # interrupted, closed or failed: nobody reads the rest
             self._pool.end()
             raise
 
@@ -175,28 +176,30 @@ class _Spread:
         import cloudpickle
 
         pool, blob, inbox = self._pool, cloudpickle.dumps(function), SimpleQueue[Any]()
-        flying, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
-        recent, first, alone, last_error = deque[float](maxlen=_RECENT), 0, False, None
+        in_flight, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
+        recent, first, is_alone, last_error = deque[float](maxlen=_RECENT), 0, False, None
 
         def send(batch: Sequence[int]) -> None:
             future = pool.submit(blob, cloudpickle.dumps([items[place] for place in batch]))
-            flying[future] = batch
+            in_flight[future] = batch
             future.add_done_callback(inbox.put)
 
-        while flying or suspects or first < len(items):
-            if suspects and not flying:
-                alone = True
+        while in_flight or suspects or first < len(items):
+            if suspects and not in_flight:
+                is_alone = True
                 send(suspects.popleft())
-            while not suspects and not alone and first < len(items) and len(flying) < _AHEAD * max(1, pool.workers):
+            while (
+                not suspects and not is_alone and first < len(items) and len(in_flight) < _AHEAD * max(1, pool.workers)
+            ):
                 size = _batch_size(recent, len(items) - first, pool.workers)
                 send(range(first, first + size))
                 first += size
             try:
-                future = inbox.get(timeout=_LOOK)
+                future = inbox.get(timeout=_CHECK)
             except Empty:
                 pool.look()
                 continue
-            batch, was_alone, alone = flying.pop(future), alone, False
+            batch, was_alone, is_alone = in_flight.pop(future), is_alone, False
             try:
                 results, seconds, error = pickle.loads(pool.result(future))
             except _Died as died:
@@ -211,8 +214,8 @@ class _Spread:
                     if not given_up:
                         suspects.appendleft(batch)
                 if died.__cause__ is not last_error:  # one crash may end several batches
-                    told = "given up" if given_up else "tried again, alone"
-                    self._note(f"worker died{f' ({cause})' if cause else ''}; what it worked at is {told}")
+                    action = "given up" if given_up else "tried again, alone"
+                    self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
                 last_error = died.__cause__
                 if given_up:
                     yield batch[0], Crash(cause)
@@ -224,7 +227,7 @@ class _Spread:
 
 
 def _batch_size(recent: Sequence[float], left: int, workers: int) -> int:
-    """Items that take `_BATCH` seconds, as far as is known; fewer towards the end, so that all workers end together."""
+    """Number of items for `_BATCH` seconds at the recent rate; fewer near the end, so that all workers end together."""
     if not recent:
         return 1
     wanted = math.ceil(_BATCH * len(recent) / max(sum(recent), 1e-9))
@@ -236,7 +239,7 @@ def _batch_size(recent: Sequence[float], left: int, workers: int) -> int:
 
 @lru_cache(maxsize=4)
 def _load(blob: bytes) -> Callable[[Any], Any]:
-    """A function, kept with all that it has built."""
+    """Unpickle a function once, so that it keeps its caches."""
     try:
         function: Callable[[Any], Any] = pickle.loads(blob)
     except Exception as error:
@@ -245,7 +248,7 @@ def _load(blob: bytes) -> Callable[[Any], Any]:
 
 
 def _call(blob: bytes, items: bytes) -> bytes:
-    """Pickled results of items, the seconds that they took, and the exception that ended them."""
+    """Pickled results of items, their time in s, and the exception that ended them, if any."""
     import cloudpickle
 
     results, error, began = list[Any](), None, time.perf_counter()
@@ -259,14 +262,14 @@ def _call(blob: bytes, items: bytes) -> bytes:
 
 
 def _begin(parent: int) -> None:
-    """What a process does first: Ctrl-C is for its parent alone, and it ends with it."""
+    """Set up a worker: it ignores Ctrl-C, prints nothing and ends with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     silence = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silence, 1)  # the parent alone writes to stdout
+    os.dup2(silence, 1)  # only the parent writes to stdout
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(_LOOK / 2)
+            time.sleep(_CHECK / 2)
         os.kill(os.getpid(), signal.SIGTERM if os.name == "nt" else signal.SIGKILL)
 
     threading.Thread(target=watch, daemon=True).start()
@@ -277,7 +280,7 @@ def _begin(parent: int) -> None:
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Hold Ctrl-C back in this thread and in the processes that it starts."""
+    """Block Ctrl-C in this thread and in the processes that it starts."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -289,14 +292,14 @@ def _no_interrupt() -> Iterator[None]:
 
 
 class _LokyPool:
-    """A pool of loky, made anew when it breaks."""
+    """A pool of loky, restarted when it breaks."""
 
     def __init__(self, workers: int, note: Note) -> None:
-        self.workers, self._note, self._stuck = workers, note, False
+        self.workers, self._note, self._has_dead = workers, note, False
         self._pool: Any = None
 
     def submit(self, *call: Any) -> Any:
-        for _ in range(_STILLBORN):
+        for _ in range(_START_TRIES):
             self._pool = self._pool or self._start()
             with suppress(*_broken()), _no_interrupt():
                 return self._pool.submit(_call, *call)
@@ -310,14 +313,14 @@ class _LokyPool:
             raise _Died(_cause(error)) from error
 
     def look(self) -> None:
-        """Free a pool that waits for the rest of a message whose worker was killed while it wrote."""
+        """Release a pool that waits for the rest of a message, because its worker was killed while writing."""
         pool = self._pool
         dead = pool is not None and any(worker.exitcode is not None for worker in [*pool._processes.values()])
-        if dead and self._stuck:
+        if dead and self._has_dead:
             for worker in [*pool._processes.values()]:
-                worker.terminate()  # loky's have no kill
-            pool._result_queue._writer.close()  # the last one; the pool reads the end of the file, and breaks
-        self._stuck = dead
+                worker.terminate()  # loky workers have no kill()
+            pool._result_queue._writer.close()  # the last open writer: the pool reads the end of the file and breaks
+        self._has_dead = dead
 
     def end(self) -> None:
         pool, self._pool = self._pool, None
@@ -325,14 +328,14 @@ class _LokyPool:
             pool.shutdown(wait=True, kill_workers=True)
 
     def _start(self) -> Any:
-        """A pool, one of whose workers has answered."""
+        """A pool with a worker that has answered."""
         from loky import ProcessPoolExecutor
 
         cause = ""
-        for _ in range(_STILLBORN):
+        for _ in range(_START_TRIES):
             self._pool = pool = ProcessPoolExecutor(
                 self.workers, initializer=_begin, initargs=(os.getpid(),), env=_ENVIRONMENT
-            )  # its context runs no script of the user again
+            )  # its context does not run the user's script again
             try:
                 with _no_interrupt():
                     answer = pool.submit(os.getpid)
@@ -345,14 +348,14 @@ class _LokyPool:
 
 
 def _broken() -> tuple[type[Exception], ...]:
-    """What tells that a worker has ended, also while it was being started."""
+    """Exceptions that mean that a worker has ended, also during its start."""
     from loky.process_executor import BrokenProcessPool
 
     return BrokenProcessPool, OSError
 
 
 def _cause(error: BaseException) -> str:
-    """``signal 9`` or ``exit code 1``, as loky tells it."""
+    """``signal 9`` or ``exit code 1``, from the text of loky's exception; empty if absent."""
     code = re.search(r"\w+\((-?\d+)\)", str(error))
     if code is None:
         return ""
@@ -363,13 +366,13 @@ def _cause(error: BaseException) -> str:
 
 
 class _DaskPool:
-    """A client of a Dask scheduler, which itself tries a call again whose worker ended."""
+    """A client of a Dask scheduler, which itself repeats the calls of a worker that ended."""
 
     def __init__(self, address: str, note: Note) -> None:
         self._address, self._note = address, note
         self._client: Any = None
-        self._known, self._futures = frozenset[str](), list[Any]()
-        self.workers, self._looked = -1, 0.0
+        self._checked, self._futures = frozenset[str](), list[Any]()
+        self.workers, self._last_check = -1, 0.0
 
     def submit(self, *call: Any) -> Any:
         self.look()
@@ -385,23 +388,23 @@ class _DaskPool:
         except KilledWorker as error:
             raise _Died("") from error
         except (CancelledError, OSError) as error:
-            raise self._lost() from error
+            raise self._lost_error() from error
 
     def look(self) -> None:
         now, self._client = time.monotonic(), self._client or _connect(self._address)
         if self._client.status != "running":
-            raise self._lost()
-        if now - self._looked < _LOOK:
+            raise self._lost_error()
+        if now - self._last_check < _CHECK:
             return
-        self._looked = now
+        self._last_check = now
         try:
             threads = self._client.nthreads()
         except OSError as error:
-            raise self._lost() from error
+            raise self._lost_error() from error
         _check_threads(threads)
-        for place in threads.keys() - self._known:
+        for place in threads.keys() - self._checked:
             _check_tmsopt(self._client, place)
-        self._known = frozenset(threads)
+        self._checked = frozenset(threads)
         if not threads and self.workers:
             self._note(f"no workers at {self._address}; rows wait until one joins")
         self.workers = len(threads)
@@ -409,34 +412,36 @@ class _DaskPool:
     def end(self) -> None:
         client, self._client, futures, self._futures = self._client, None, self._futures, []
         if client is not None:
-            with suppress(Exception):  # the scheduler may be gone; where it is not, it forgets what is not started yet
+            with suppress(Exception):  # the scheduler may be gone; if not, it drops calls not yet started
                 client.cancel(futures)
             with suppress(Exception):
                 client.close(timeout=PATIENCE)
 
-    def _lost(self) -> EngineError:
+    def _lost_error(self) -> EngineError:
         return EngineError(
-            f"the Dask scheduler at {self._address} is lost; rows that have come are kept, run again for the others"
+            f"the Dask scheduler at {self._address} is lost; finished rows are kept; run again for the others"
         )
 
 
 def _connect(address: str) -> Any:
     """A client of the scheduler at an address.
 
-    Whether there is one is asked before, for a `Client` that cannot connect neither gives up at once nor quietly.
+    The address is probed first, because a `Client` that cannot connect retries and logs for long.
     """
     try:
         import distributed
     except ImportError:
-        raise _refused('a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"') from None
+        raise _scheduler_error(
+            'a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"'
+        ) from None
     try:
-        with ThreadPoolExecutor(1) as thread:  # notebooks run a loop of their own in this one
+        with ThreadPoolExecutor(1) as thread:  # notebooks already run an event loop in this thread
             kind = thread.submit(asyncio.run, _server_kind(address)).result()
         reason = "" if kind == "Scheduler" else f"a Dask {kind.lower()} does"
-    except Exception as error:  # whatever listens there may answer anything
+    except Exception as error:  # any program may listen there
         reason = str(error) or type(error).__name__
     if reason:
-        raise _refused(
+        raise _scheduler_error(
             f"no Dask scheduler answers at '{address}' ({reason}); start one with 'dask scheduler', which prints its "
             "address, tcp://HOST:8786, and workers with 'dask worker ADDRESS --nthreads 1'"
         )
@@ -459,24 +464,24 @@ async def _server_kind(address: str) -> str:
 def _check_threads(threads: dict[str, int]) -> None:
     wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
     if wrong:
-        raise _refused(
+        raise _scheduler_error(
             f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}: "
             "start every worker with 'dask worker ADDRESS --nthreads 1'"
         )
 
 
 def _check_tmsopt(client: Any, place: str) -> None:
-    def has_tmsopt() -> bool:  # travels whole, so it answers where tmsopt is missing
+    def has_tmsopt() -> bool:  # pickled by value, so it runs without tmsopt
         from importlib.util import find_spec
 
         return find_spec("tmsopt") is not None
 
     answer = client.run(has_tmsopt, workers=[place], on_error="return").get(place, OSError(place))
-    if isinstance(answer, Exception) and not isinstance(answer, OSError):  # one that is gone is no fault
-        raise _refused(f"worker {place} does not answer: {answer!r}; it needs the same Python and packages")
+    if isinstance(answer, Exception) and not isinstance(answer, OSError):  # OSError: the worker has left
+        raise _scheduler_error(f"worker {place} does not answer: {answer!r}; it needs the same Python and packages")
     if answer is False:
-        raise _refused(f"worker {place} has no tmsopt: install the same version there and start it again")
+        raise _scheduler_error(f"worker {place} has no tmsopt: install the same version there and start it again")
 
 
-def _refused(message: str) -> InputError:
+def _scheduler_error(message: str) -> InputError:
     return InputError([Fault(message, ("scheduler",))])

@@ -1,4 +1,4 @@
-"""Files and folders: read within limits, written as a whole or not at all, compared and moved aside."""
+"""Files and folders: bounded reads, atomic writes, comparisons and backups."""
 
 import csv
 import errno
@@ -21,29 +21,29 @@ from typing import Any, BinaryIO
 from tmsopt.errors import Fault, InputError, nearest, short
 
 LARGEST = 500_000
-"""Bytes; a longer file is not a problem file."""
+"""Most bytes of a problem file."""
 
 LARGEST_JSON = 24_000_000
-"""Characters of JSON that is read, some 1 200 000 numbers."""
+"""Most characters of a JSON text, some 1 200 000 numbers."""
 
-_DEEPEST, _MARKS = 100, 1_000_000  # lists and tables inside each other; lists, tables, texts and keys of JSON in all
-_WIDTH = 80  # of a value in a message
+_DEEPEST, _MARKS = 100, 1_000_000  # most levels of JSON; most lists, tables, texts and keys
+_WIDTH = 80  # most characters of a value in a message
 _UNDECODED = re.compile("[\udc80-\udcff]")
 _NEAR = 3  # close names that a message offers
-_NEIGHBOURS = 1000  # files of a folder that are looked at for one that was meant
+_NEIGHBOURS = 1000  # most files of a folder compared with a misspelled name
 
 
 @contextmanager
 def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
-    """A free name for a file or folder, which takes the place of `path` if all went well; a link stays one.
+    """Yield a temporary path, which replaces `path` if no exception is raised; links are followed.
 
-    A device or a pipe is given what is finished.
+    A device or a pipe receives the finished contents.
 
     Args:
-        locked: nobody else writes here: the name is always the same, and what a killed process left there goes.
+        locked: no other process writes `path`: the temporary name is fixed, and leftovers are deleted.
 
     Raises:
-        OSError: with the name of `path`, when it cannot be written.
+        OSError: naming `path`, if it cannot be written.
     """
     try:
         try:
@@ -54,7 +54,7 @@ def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
         if locked:
             temporary = target.with_name(f".{target.name}.unfinished")
             _remove(temporary)
-        else:  # a file, for a folder takes an open file to be removed
+        else:  # the caller may replace this file by a folder
             handle, name = tempfile.mkstemp(
                 dir=None if special else target.parent, prefix=".tmsopt-", suffix=target.suffix
             )
@@ -66,20 +66,20 @@ def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
                 with temporary.open("rb") as source, target.open("wb") as sink:
                     shutil.copyfileobj(source, sink)
                 return
-            if not locked:  # a temporary file is for its owner alone
+            if not locked:  # temporary files are private to their owner
                 umask = os.umask(0)
                 os.umask(umask)
                 os.chmod(temporary, 0o666 & ~umask)
             os.replace(temporary, target)
         finally:
             _remove(temporary)
-    except OSError as error:  # some know no file, or only the temporary one
+    except OSError as error:  # it may name no file, or the temporary one
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 
 
 @contextmanager
 def netcdf_errors() -> Iterator[None]:
-    """What the HDF5 library says of a full disk, in a RuntimeError, as the OSError that it is."""
+    """Turn RuntimeErrors of the HDF5 library, e.g. about a full disk, into OSErrors."""
     try:
         yield
     except RuntimeError as error:
@@ -94,70 +94,68 @@ def _remove(path: Path) -> None:
 
 
 def move_aside(path: Path, companions: tuple[str, ...] = ()) -> Path:
-    """Move a file or folder to ``name.1.ending``, or the first number that is free; its new place.
+    """Move a file or folder to ``name.1.ending``, or the first free number, and return its new path.
 
     Args:
-        companions: what the names of files beside it end in, after its own; they go with it where they are.
+        companions: suffixes after the whole name, for files that move with it if they exist.
 
     Raises:
-        OSError: when it cannot be moved, e.g. while somebody reads it on Windows.
+        OSError: if it cannot be moved, e.g. while a program reads it on Windows.
     """
-    parts, number = ("", *companions), 1
-    while any(os.path.lexists(f"{_numbered(path, number)}{part}") for part in parts):
+    suffixes, number = ("", *companions), 0
+    while True:
         number += 1
-    moved = _numbered(path, number)
-    for part in parts:
-        if os.path.lexists(f"{path}{part}"):
-            os.rename(f"{path}{part}", f"{moved}{part}")
-    return moved
+        target = path.with_name(f"{path.stem}.{number}{path.suffix}")
+        if not any(os.path.lexists(f"{target}{suffix}") for suffix in suffixes):
+            break
+    for suffix in suffixes:
+        if os.path.lexists(f"{path}{suffix}"):
+            os.rename(f"{path}{suffix}", f"{target}{suffix}")
+    return target
 
 
-def _numbered(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.stem}.{number}{path.suffix}")
-
-
-def differences(
+def list_differences(
     known: Any, asked: Any, sides: tuple[str, str] = ("there", "asked for"), key: str = ""
 ) -> Iterator[str]:
-    """Where two pieces of plain data differ, one phrase each; numbers differ where any bit of their doubles does.
+    """One phrase for each difference between two pieces of plain data; numbers are compared as doubles, bit by bit.
 
     Args:
-        known, asked: what JSON knows, and columns as ``array("d")``.
-        sides: what follows a value of the one and of the other.
+        known, asked: JSON data, with columns as ``array("d")``.
+        sides: words that follow a value of `known` and of `asked`.
     """
     match known, asked:
         case Mapping(), Mapping():
             for name in dict.fromkeys((*known, *asked)):
                 inner = f"{key}.{name}" if key else str(name)
                 if name in known and name in asked:
-                    yield from differences(known[name], asked[name], sides, inner)
+                    yield from list_differences(known[name], asked[name], sides, inner)
                 else:
-                    one, other = (_shown(side[name]) if name in side else "none" for side in (known, asked))
+                    one, other = (_format_value(side[name]) if name in side else "none" for side in (known, asked))
                     yield f"{inner}: {one} {sides[0]}, {other} {sides[1]}"
         case array(), array():
             if len(known) != len(asked):
                 yield f"{key}: {len(known)} values {sides[0]}, {len(asked)} {sides[1]}"
             if known.tobytes() == asked.tobytes():
                 return
-            if differ := [row for row, pair in enumerate(zip(known, asked, strict=False)) if not _same(*pair)]:
+            if differ := [row for row, pair in enumerate(zip(known, asked, strict=False)) if not _is_same(*pair)]:
                 most, first = min(len(known), len(asked)), differ[0]
                 values = f"{known[first]!r} {sides[0]}, {asked[first]!r} {sides[1]}"
                 yield f"{key}: {len(differ)} of {most} values differ, the first in row {first}: {values}"
         case list(), list() if len(known) == len(asked):
             for index, (one, other) in enumerate(zip(known, asked, strict=True)):
-                yield from differences(one, other, sides, f"{key}[{index}]")
-        case _ if not _same(known, asked):
-            yield f"{key}: {_shown(known)} {sides[0]}, {_shown(asked)} {sides[1]}"
+                yield from list_differences(one, other, sides, f"{key}[{index}]")
+        case _ if not _is_same(known, asked):
+            yield f"{key}: {_format_value(known)} {sides[0]}, {_format_value(asked)} {sides[1]}"
 
 
-def _same(a: Any, b: Any) -> bool:
-    """Equal to the bit: 1 is 1.0, but 0.0 is not −0.0, true is not 1, and nan is nan."""
+def _is_same(a: Any, b: Any) -> bool:
+    """Equality of doubles bit by bit: 1 equals 1.0 and nan equals nan, but 0.0 differs from −0.0, and true from 1."""
     if isinstance(a, bool) or isinstance(b, bool) or not (isinstance(a, int | float) and isinstance(b, int | float)):
         return type(a) is type(b) and bool(a == b)
     return repr(float(a)) == repr(float(b)) and (a == b or isnan(a))
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if isinstance(value, array):
         return f"{len(value)} values"
     text = json.dumps(value, ensure_ascii=False)
@@ -165,15 +163,15 @@ def _shown(value: Any) -> str:
 
 
 def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
-    """The text of a file in UTF-8, a byte order mark left out.
+    """The text of a UTF-8 file, without a byte order mark.
 
     Args:
-        kind: what is accepted, such as ``TOML problem file``; its first word is the format.
+        kind: kind of file for messages, such as ``TOML problem file``; its first word is the format.
 
     Raises:
-        InputError: for a file that is not there, no file, too long, or no text.
+        InputError: if the file is missing, irregular, too long or not UTF-8.
     """
-    with _opened(file, kind, largest) as stream:
+    with _open(file, kind, largest) as stream:
         raw = stream.read(largest)
     try:
         return raw.decode("utf-8-sig")
@@ -182,47 +180,52 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
 
 
 def read_lines(file: str, kind: str, largest: int, longest: int) -> Generator[str]:
-    """The lines of such a file with their ends, one after the other, none of more than `longest` characters.
+    """Yield the lines of a UTF-8 file, line ends included, of up to `longest` characters each.
 
     Raises:
-        InputError: likewise, when the line at fault is asked for.
+        InputError: as `read_text`, at the line at fault.
     """
-    with _opened(file, kind, largest) as stream:
+    with _open(file, kind, largest) as stream:
         text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="surrogateescape", newline="")
         for number, line in enumerate(iter(partial(text.readline, longest + 1), ""), start=1):
             if len(line) > longest:
-                message = f"is longer than {longest} characters; accepted: lines of up to {longest}"
-                raise InputError([Fault(f"the line {message}").at(file, number)])
+                message = f"the line is longer than {longest} characters; accepted: lines of up to {longest}"
+                raise InputError([Fault(message).at(file, number)])
             if not line.isascii() and (wrong := _UNDECODED.search(line)):
                 raise _not_text(file, kind, ord(wrong[0]) - 0xDC00, number)
             yield line
 
 
 @contextmanager
-def _opened(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
-    """A regular file of up to `largest` bytes; nothing else is opened, for a pipe or a device may have no end."""
-    path, form = Path(file), kind.split(maxsplit=1)[0]
+def _open(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
+    """Open a regular file of up to `largest` bytes; a pipe or a device might never end."""
+    path = Path(file)
     try:
-        if path.is_dir():
-            raise InputError([Fault(f"is a directory; accepted: a {kind}", file=file)])
-        if path.is_symlink() and not path.exists():
-            raise InputError([Fault(f"is a link to no file; accepted: a {kind}", file=file)])
-        if not path.exists():
-            others = path.parent.glob(f"*.{form.lower()}") if path.parent.is_dir() else ()
-            near = nearest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)), most=_NEAR)
-            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-            raise InputError([Fault(f"no such file{hint}", file=file)])
-        if not path.is_file():
-            raise InputError([Fault(f"is not a regular file; accepted: a {kind}", file=file)])
+        if wrong := _path_fault(path, kind):
+            raise InputError([Fault(wrong, file=file)])
         with path.open("rb") as stream:
             if os.fstat(stream.fileno()).st_size > largest:
                 raise InputError([Fault(f"is larger than {largest} bytes; accepted: a {kind} of less", file=file)])
             yield stream
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise InputError([Fault(f"cannot be read: {reason}", file=file)]) from None
+
+
+def _path_fault(path: Path, kind: str) -> str:
+    if path.is_dir():
+        return f"is a directory; accepted: a {kind}"
+    if path.is_file():
+        return ""
+    if path.exists():
+        return f"is not a regular file; accepted: a {kind}"
+    if path.is_symlink():
+        return f"is a link to no file; accepted: a {kind}"
+    others = path.parent.glob(f"*.{kind.split(maxsplit=1)[0].lower()}") if path.parent.is_dir() else ()
+    near = nearest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)), most=_NEAR)
+    return f"no such file; did you mean {' or '.join(map(repr, near))}?" if near else "no such file"
 
 
 def _not_text(file: str, kind: str, byte: int, line: int) -> InputError:
@@ -231,29 +234,32 @@ def _not_text(file: str, kind: str, byte: int, line: int) -> InputError:
 
 
 def from_json(text: str, largest: int = LARGEST_JSON) -> Any:
-    """What a text in JSON says, which may come from anybody: its length, depth and memory have limits.
+    """Parse JSON from an untrusted source, within limits of length, depth and memory.
 
     Raises:
-        ValueError: for another text.
+        ValueError: if the text is not JSON, or beyond a limit.
     """
     if len(text) > largest or sum(map(text.count, '[{:"')) > _MARKS:
         raise ValueError(f"more than {largest} characters of JSON, or {_MARKS} lists, tables and texts")
     with suppress(RecursionError):
-        made = json.loads(text)
-        level, depth = [made], 0
+        data = json.loads(text)
+        level, depth = [data], 0
         while depth <= _DEEPEST:
             inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, dict | list)]
             if not inner:
-                return made
+                return data
             level, depth = [value for values in inner for value in values], depth + 1
     raise ValueError(f"lists and tables more than {_DEEPEST} deep")
 
 
-def path_of(given: object, what: str) -> Path:
-    """The path of a file that a user names.
+def as_path(given: object, what: str) -> Path:
+    """A path that a user gave as text or path.
+
+    Args:
+        what: the file in words, for messages.
 
     Raises:
-        InputError: for what is none.
+        InputError: if it is neither.
     """
     if not isinstance(given, str | PathLike):
         raise InputError([Fault(f"found {short(given)}; accepted: the path of {what}", ("path",))])
@@ -261,42 +267,42 @@ def path_of(given: object, what: str) -> Path:
 
 
 def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> None:
-    """Write rows with the same names as one table, headed by the names with the units that they have.
+    """Write rows with the same names as a CSV table; its header has names and units.
 
     Raises:
-        OSError: when the file cannot be written.
+        OSError: if the file cannot be written.
     """
     with (
-        write_atomic(path_of(path, "the file to write")) as place,
+        write_atomic(as_path(path, "the file to write")) as place,
         place.open("w", newline="", encoding="utf-8") as stream,
     ):
         names = list(rows[0]) if rows else []
         writer = csv.writer(stream)
-        writer.writerow(cell(headed(n, units.get(n, ""))) for n in names)
-        writer.writerows([cell(row[n]) for n in names] for row in rows)
+        writer.writerow(format_cell(format_header(n, units.get(n, ""))) for n in names)
+        writer.writerows([format_cell(row[n]) for n in names] for row in rows)
 
 
 def write_text(path: str | PathLike[str], text: str, *, new: bool = False) -> None:
-    """Write a text in UTF-8, as a whole or not at all, line breaks as they are.
+    """Write a text atomically in UTF-8, line breaks unchanged.
 
     Args:
-        new: only where nothing has that name.
+        new: fail if `path` exists.
 
     Raises:
-        OSError: when the file cannot be written.
+        OSError: if the file cannot be written.
     """
-    path = path_of(path, "the file to write")
+    path = as_path(path, "the file to write")
     if new and os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
     with write_atomic(path) as place:
         place.write_bytes(text.encode())
 
 
-def cell(value: Any) -> Any:
-    """What stands in a cell of a CSV.
+def format_cell(value: Any) -> Any:
+    """A value as a cell of a CSV file.
 
-    A text that a spreadsheet would take for a formula gets an apostrophe, and a carriage return, at which some begin
-    another row, becomes a line feed.
+    A text that a spreadsheet would evaluate as a formula gets an apostrophe. A carriage return, at which some programs
+    begin another row, becomes a line feed.
     """
     if not isinstance(value, str):
         return value
@@ -304,6 +310,6 @@ def cell(value: Any) -> Any:
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\n")) else text
 
 
-def headed(name: str, unit: str) -> str:
-    """The head of a column: ``v (m/s)``."""
+def format_header(name: str, unit: str) -> str:
+    """The header of a column, such as ``v (m/s)``."""
     return f"{name} ({unit})" if unit else name

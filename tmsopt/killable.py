@@ -1,6 +1,6 @@
-"""A process for calls that may crash or have to end at a deadline: of SCIP.
+"""A process for calls of SCIP, which may crash or must end at a deadline.
 
-It is no child of `multiprocessing`, for workers of Dask may have none of those.
+It does not use `multiprocessing`, because Dask workers may not have such children.
 """
 
 import os
@@ -17,19 +17,19 @@ from typing import IO, Any
 
 
 class ProcessEnded(RuntimeError):
-    """The process ended before it had an answer."""
+    """The process ended before it answered."""
 
 
 class Killable:
-    """A process that makes one call at a time. It never hears Ctrl-C, and ends with this program however that ends.
+    """A process that makes one call at a time. It ignores Ctrl-C, and ends with this program even after a crash.
 
     Args:
-        prepare: called there at once; what it raises is not heard.
+        prepare: called there first; its exceptions are ignored.
     """
 
     def __init__(self, prepare: Callable[[], object] = bool) -> None:
         self._process = start()
-        with suppress(OSError):  # it has ended, as its first call tells
+        with suppress(OSError):  # it has ended: the first call raises that
             self._send(prepare)
 
     def _send(self, message: object) -> None:
@@ -37,7 +37,7 @@ class Killable:
         self._process.stdin.flush()
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """What the function returns or raises there; `ProcessEnded` where the process does not answer."""
+        """A future of the result or exception of a call in the process; `ProcessEnded` if it does not answer."""
         future = Future[Any]()
         threading.Thread(target=self._exchange, args=(future, (function, arguments)), daemon=True).start()
         return future
@@ -58,48 +58,48 @@ class Killable:
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
-            with suppress(OSError):  # what is left in it cannot be sent
+            with suppress(OSError):  # unsent data in the pipe
                 pipe.close()
 
 
 def start() -> Any:
-    """A process that serves. It finds what this one finds, but neither copies it nor runs its script again."""
+    """Start a process that runs `serve`, with this import path; it does not run the user's script again."""
     code = "import sys; sys.path[:] = sys.argv[1:]; from tmsopt.killable import serve; serve()"
     return subprocess.Popen(
         [sys.executable, "-c", code, *sys.path],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        start_new_session=True,  # out of reach of Ctrl-C; systems give its session the time of one more user
+        start_new_session=True,  # Ctrl-C does not reach it; some schedulers share time between sessions
     )
 
 
 def serve() -> None:
-    """Make calls until nobody is left to answer to, even in the midst of one."""
+    """Answer calls until the parent ends, even during a call."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     calls, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     silence = os.open(os.devnull, os.O_RDWR)
-    for stream in (0, 1):  # what is printed is no answer
+    for stream in (0, 1):  # printed text must not reach the pipe of answers
         os.dup2(silence, stream)
-    waiting = SimpleQueue[Any]()
-    threading.Thread(target=_listen, args=(calls, waiting), daemon=True).start()
+    queue = SimpleQueue[Any]()
+    threading.Thread(target=_listen, args=(calls, queue), daemon=True).start()
     with suppress(Exception):
-        waiting.get()()
+        queue.get()()
     while True:
-        function, arguments = waiting.get()
+        function, arguments = queue.get()
         answer, error = None, None
         try:
             answer = function(*arguments)
         except Exception as raised:
             error = raised
-        with suppress(OSError):  # nobody reads any more
+        with suppress(OSError):  # the parent has ended
             pickle.dump((answer, error), answers, protocol=pickle.HIGHEST_PROTOCOL)
             answers.flush()
 
 
-def _listen(calls: IO[bytes], waiting: SimpleQueue[Any]) -> None:
+def _listen(calls: IO[bytes], queue: SimpleQueue[Any]) -> None:
     while True:
         try:
-            waiting.put(pickle.load(calls))
+            queue.put(pickle.load(calls))
         except (EOFError, OSError):
             os._exit(0)

@@ -1,7 +1,7 @@
 """Closed-form laws of the two-mass-skate (TMS) bicycle, each named after its equation label in the source.
 
 Source: O. N. Kirillov, *Localizing EP sets in dissipative systems and the self-stability of bicycles* (2018).
-It imports nothing from the package: it is an oracle, and an oracle shares no code with what it checks.
+The module imports nothing from the package: tests use it as an independent reference.
 
 Symbols, all dimensionless (lengths over the wheelbase w, time over sqrt(w/g)): `Fr` Froude number
 v/sqrt(g w), `mu` mass ratio m_H/m_B, `chi_B`, `chi_H` horizontal and `zeta_B`, `zeta_H` vertical positions
@@ -9,9 +9,9 @@ of the two masses (z points down, so zeta < 0), `lambda_s` steer axis tilt in ra
 (negative). In the notes r = sqrt(zeta_B/zeta_H) and h = sqrt(zeta_B zeta_H).
 
 Every function takes floats or arrays, broadcasts them, and returns float64 of the broadcast shape, with a
-leading axis where it says so. None raises on values: a pole gives inf or nan, and the root of a negative
-number nan, without a warning. "chi_H = 1" in a docstring is a condition, not an argument. Exact numbers that are no
-floats give exact results, if they have `sqrt` and what stands for lambda_s has `tan`.
+leading axis where the docstring says so. No value raises or warns: a pole gives inf or nan, and the root of a
+negative number nan. "chi_H = 1" in a docstring is a condition, not an argument. Exact number types give exact results
+if they have `sqrt`, and the type of lambda_s has `tan`.
 """
 
 from collections.abc import Callable
@@ -67,14 +67,14 @@ bench: dict[str, float] = {
 
 
 def _law(formula: Callable[P, R]) -> Callable[P, R]:
-    """Evaluate a formula in float64, where a pole is inf or nan rather than an exception or a warning."""
+    """Evaluate a formula in float64 without exceptions or warnings; a pole gives inf or nan."""
 
     @wraps(formula)
     def evaluate(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             positional = [np.asarray(value, float)[()] for value in args]
             named = {name: np.asarray(value, float)[()] for name, value in kwargs.items()}
-        except TypeError:  # numbers that no float stands for
+        except TypeError:  # exact numbers
             return formula(*args, **kwargs)
         with np.errstate(all="ignore"):
             return cast(Callable[..., R], formula)(*positional, **named)
@@ -131,7 +131,7 @@ def copo(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
     """Coefficients a0, ..., a4 of the characteristic polynomial, shape (5, ...). Equation `copo`.
 
     They are det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)): not monic, and a0 < 0 where nu_H < 0. The order
-    is that of `np.polyval`.
+    is the one of `np.polyval`.
 
     Example:
         >>> a = tmsopt.laws.copo(2.337214017, 20.84626701, 1.19, 1.02, -0.4, -0.2, 0.8514403685)  # four roots at -1
@@ -153,9 +153,9 @@ def copo(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
 def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """Square of the critical Froude number of weaving; not finite at chi_B = chi_H. Equation `flus`.
 
-    It is the zero of a1 a2 a3 - a0 a3^2 - a1^2 a4 in Fr^2, for every chi_H and either sign of lambda_s;
-    negative where no speed gives one. It bounds the stable speeds only where a0, a1, a3, a4 have one sign,
-    and is positive there for chi_H > 0. Elsewhere a positive value is no boundary of stability.
+    It is the zero of a1 a2 a3 - a0 a3^2 - a1^2 a4 in Fr^2, for every chi_H and either sign of lambda_s. It is
+    negative if no speed gives a zero. It bounds the stable speeds only where a0, a1, a3, a4 have one sign, and is
+    positive there for chi_H > 0. Elsewhere a positive value is not a stability boundary.
 
     Example:
         >>> square = tmsopt.laws.flus(0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench["lambda_s"])
@@ -190,10 +190,10 @@ def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
     """The five printed stability conditions in printed order, boolean of shape (5, ...). Equation `lscf`.
 
     For lambda_s > 0 all five are necessary, and with chi_H >= 1 sufficient. With chi_H < 1 they are NOT
-    sufficient, although printed so: a1 > 0, that is zeta_B chi_H < zeta_H chi_B, is missing. Counterexample:
+    sufficient, contrary to the paper: a1 > 0, or zeta_B chi_H < zeta_H chi_B, is missing. Counterexample:
     chi_H = 0.9, chi_B = 1.2, zeta_B = -0.5, zeta_H = -0.4, mu = 5, tan(lambda_s) = 0.5, where Fr_c = 1:
     unstable at every Fr > 1. For lambda_s < 0 they never hold together; there a bicycle is stable exactly if
-    the first four are reversed, zeta_B chi_H > zeta_H chi_B and Fr > Fr_c. `lscf_complete` holds everywhere.
+    the first four are reversed, zeta_B chi_H > zeta_H chi_B and Fr > Fr_c. `lscf_complete` is valid everywhere.
 
     Example:
         >>> benchmark = 0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench["lambda_s"]
@@ -215,9 +215,9 @@ def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
 
 @_law
 def lscf_complete(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Truth:
-    """Whether the bicycle is asymptotically stable, by the complete Lienard-Chipart conditions on `copo`.
+    """True if the bicycle is asymptotically stable, by the complete Lienard-Chipart conditions on `copo`.
 
-    Holds for any chi_H and either sign of lambda_s: the coefficients are first divided by the sign of a0.
+    It holds for any chi_H and either sign of lambda_s, because the coefficients are divided by the sign of a0.
 
     Example:
         >>> from math import atan
@@ -238,7 +238,7 @@ def lscf_complete(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, ze
 
 
 class EP4(NamedTuple):
-    """A design with a four-fold root `omega0`; `mu` is nan where the mass ratio is free (chi_H = 1).
+    """A design with a four-fold root `omega0`; `mu` is nan if the mass ratio is free (chi_H = 1).
 
     Example:
         >>> design = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2)
@@ -375,7 +375,7 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
     """Both designs with the four-fold root `omega0`, from `chib`, `a1a3`, `a2` and `w0`; fields of one shape.
 
     For zeta_B, zeta_H < 0 both are real. The first is the bicycle: Fr > 0 if omega0 < 0 < chi_H, and mu > 0
-    requires (chi_H - 1) (zeta_H - zeta_B) (abs(w01) - abs(omega0)) > 0. The second has mu < 0 always. Fr, mu and
+    requires (chi_H - 1) (zeta_H - zeta_B) (abs(w01) - abs(omega0)) > 0. The second always has mu < 0. Fr, mu and
     tan_lambda_s are nan where complex (possible for zeta_H > 0), at zeta_B = zeta_H (no EP4 exists), and at
     chi_H = 1, where omega0 must be `w01` and mu is free: use `ep4_chi_H_1`.
 
@@ -386,9 +386,9 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
 
     More: docs/explanation/paper.md
     """
-    # With u = zeta_H T - k the conditions leave a quadratic in u. Its discriminant looks like a difference
-    # but is a sum of squares in y = -omega0^2 zeta_H, and S > 2: neither root cancels, however close they
-    # are. The second has u + k = k lift / (zeta_B S), again without a difference.
+    # With u = zeta_H T - k the conditions leave a quadratic in u. Its discriminant is a sum of squares in
+    # y = -omega0^2 zeta_H, and S > 2, so neither root cancels, however close they are. The second root has
+    # u + k = k lift / (zeta_B S), also without a difference.
     k, y, fall = chi_H - 1, -(omega0**2) * zeta_H, zeta_B - zeta_H
     S = 1 + 6 * y + y**2 + _sqrt((1 - y) ** 4 + 16 * y * (1 + y) ** 2 * (1 - 2 / chi_H) ** 2)
     u = -S * fall * chi_H**2 / (32 * y * (1 + y) ** 2 * zeta_B)
@@ -416,7 +416,7 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
 
 @_law
 def Frc1(chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Square of the critical Froude number for chi_H = 1; negative where `flus` is. Equation `Frc1`.
+    """Square of the critical Froude number for chi_H = 1; it has the sign of `flus`. Equation `Frc1`.
 
     Example:
         >>> square = tmsopt.laws.Frc1(2**0.5, -0.4, -0.2, tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s)
@@ -476,7 +476,7 @@ def chib1(zeta_B: Real, zeta_H: Real) -> Real:
     """chi_B at EP4 and on the EP set; the same value as `chibm`. Equation `chib1`.
 
     Example:
-        >>> print(f"{tmsopt.laws.chib1(-1.158, -0.526):.3f}")  # the machine that was built has 1.526
+        >>> print(f"{tmsopt.laws.chib1(-1.158, -0.526):.3f}")  # the built machine has 1.526
         1.484
 
     More: docs/explanation/paper.md
@@ -503,7 +503,7 @@ def tls(zeta_B: Real, zeta_H: Real) -> Real:
 def frep4(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
     """Both roots of the printed quadratic for Fr at EP4: the true one, then the spurious. Equation `frep4`.
 
-    tan(lambda_s) in it is `tls`. The true root is positive; the spurious one, no EP4, is never positive:
+    The quadratic contains `tls`. The true root is positive. The spurious one is not an EP4 and never positive:
     -(r - 1)^2 abs(omega0) / (4 (r + 1)).
 
     Example:
@@ -554,12 +554,12 @@ def dp(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
     return chib1(zeta_B, zeta_H), tls(zeta_B, zeta_H)
 
 
-# chi_H = 1, compact forms that are not printed
+# chi_H = 1, compact forms not in the paper
 
 
 @_law
 def ep4_chi_H_1(zeta_B: Real, zeta_H: Real) -> EP4:
-    """The EP4 for chi_H = 1 in compact form; mu is nan, as any mass ratio serves. nan at zeta_B = zeta_H.
+    """The EP4 for chi_H = 1 in compact form; mu is nan, because any mass ratio works. All nan at zeta_B = zeta_H.
 
     Example:
         >>> design = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2)
@@ -589,10 +589,10 @@ def Fr_c2_chi_H_1(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 
 @_law
 def dual(Fr: Real, chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> dict[str, Real]:
-    """The other design with the same spectrum for chi_H = 1, by keyword; applied twice it restores the first.
+    """The dual design, with the same spectrum for chi_H = 1, as keywords; its dual is the first design.
 
-    It exchanges the heights of the masses and the sign of lambda_s, and so maps the two classes of stable
-    bicycles onto each other. Pass it to `copo` with chi_H = 1 and any mu.
+    Duality exchanges the heights of the masses and the sign of lambda_s, so it maps the two classes of stable
+    bicycles onto each other. Pass the result to `copo` with chi_H = 1 and any mu.
 
     Example:
         >>> bicycle = dict(Fr=2, chi_B=1.4, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.3)

@@ -1,4 +1,4 @@
-"""How far long work is: one record, the same for every verb, told to whoever called no oftener than one can read."""
+"""Progress of long work: one kind of record for every function, sent to a listener at most 20 times a second."""
 
 import math
 import time
@@ -8,34 +8,34 @@ from dataclasses import dataclass
 from tmsopt.errors import InputError, call_faults
 
 PAUSE = 0.05
-"""Seconds between two records of one piece of work, but for its first and its last."""
+"""Least time in s between two records of one task; its first and last are always sent."""
 
 _SETTLED, _STEPS, _PART = 2.0, 8, 0.05
-"""Seconds, and steps or a part of all of them, from which on a rate is one: before, processes start and modules are
-loaded, and one step may take many times as long as another."""
+"""The remaining time is estimated after so many seconds, and so many steps or such a part of all. Before that, modules
+and processes start, and single steps differ widely."""
 
-_SHARE = 9.0  # times as long as a listener takes it is left alone, so that it costs a tenth of the time at most
+_SHARE = 9.0  # pause after a call of the listener, in times that call took: it costs a tenth of the time at most
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a piece of work is.
+    """Progress of one task.
 
     Attributes:
-        what: is being done, in words, such as ``searching``.
-        done: how much of it is, never less than before; nan where nothing is counted.
-        most: of how much, at most; nan where that is not known.
-        unit: of both: ``start``, ``row``, ``design`` …, ``s`` of work that ends with its time; empty where nothing is
-            counted.
-        seconds: since this piece of work began.
-        left: seconds that it takes at most at its rate so far; nan where that cannot be known, as after a few steps.
-        note: how good it is so far, such as ``gap 0.001``; often empty.
+        what: name of the task, such as ``searching``.
+        done: amount done, which never decreases; nan if the task counts nothing.
+        most: upper bound of `done`; nan if unknown.
+        unit: unit of both: ``start``, ``row``, ``design`` …, or ``s`` for a task with a time limit; empty if the task
+            counts nothing.
+        seconds: time since the task began.
+        left: upper estimate of the remaining time in s; nan while unknown, as after a few steps.
+        note: quality so far, such as ``gap 0.001``; often empty.
 
     Example:
         >>> from itertools import pairwise
-        >>> told = []
-        >>> design = tmsopt.solve("problems/ep4.toml", progress=told.append)
-        >>> all(now.done <= then.done for now, then in pairwise(told) if now.what == then.what == "searching")
+        >>> records = []
+        >>> design = tmsopt.solve("problems/ep4.toml", progress=records.append)
+        >>> all(now.done <= then.done for now, then in pairwise(records) if now.what == then.what == "searching")
         True
 
     More: docs/reference/python.md
@@ -51,32 +51,32 @@ class Progress:
 
 
 Listener = Callable[[Progress], None]
-"""What is called meanwhile. What it raises ends the work: KeyboardInterrupt as Ctrl-C does."""
+"""A callback. An exception raised in it stops the work; KeyboardInterrupt acts like Ctrl-C."""
 
 Counts = Callable[..., None]
-"""What work calls inside, with what is done, what there is at most, and perhaps a note."""
+"""Called by the work with the amount done, its upper bound, and perhaps a note."""
 
 
 class Steps:
-    """What work counts, one piece after the other, told as records: a `Counts`."""
+    """Turns counts of one task after the other into records for a listener; a `Counts`."""
 
-    def __init__(self, told: Listener) -> None:
-        self._told = told
-        self._before: dict[str, float] = {}  # done of each piece of work, when it was last left or begun anew
+    def __init__(self, listener: Listener) -> None:
+        self._listener = listener
+        self._before: dict[str, float] = {}  # amount done of each task, when it was last left or restarted
         self._what, self._done = "", 0.0
 
     def begin(self, what: str, unit: str = "") -> None:
-        """Another piece of work, or more of the same."""
+        """Begin a task, or continue it if it is the current one."""
         if what != self._what:
             self._before[self._what] = self._done
             self._what, self._unit, self._note = what, unit, ""
             self._began, self._due = time.perf_counter(), 0.0
             self._first: tuple[float, float] | None = None
             self._done, self._last = self._before.setdefault(what, 0.0), 0.0
-            self._tell(self._done if unit else math.nan, math.nan)
+            self._send(self._done if unit else math.nan, math.nan)
 
     def __call__(self, done: float, most: float, note: str = "") -> None:
-        """How far it is; where it has less than before, it was begun anew, and what was done before counts too."""
+        """Report the amount done. If it has decreased, the task was restarted, and the earlier amount is added."""
         if done < self._last:
             self._before[self._what] = self._done
         self._last, before = done, self._before[self._what]
@@ -84,40 +84,40 @@ class Steps:
         now = time.perf_counter()
         self._first = self._first or (self._done, now)
         if done >= most or now >= self._due:
-            self._tell(self._done, before + most)
+            self._send(self._done, before + most)
             after = time.perf_counter()
             self._due = after + max(PAUSE, _SHARE * (after - now)) if PAUSE else 0.0
 
-    def _tell(self, done: float, most: float) -> None:
+    def _send(self, done: float, most: float) -> None:
         now, left = time.perf_counter(), math.nan
         if self._unit == "s":
             left = most - done
-        elif self._first:  # from the first on: what was there before took no time now
+        elif self._first:  # rate since the first report: earlier amounts took no time in this task
             steps, took = done - self._first[0], now - self._first[1]
             if took >= _SETTLED and (steps >= _STEPS or steps > _PART * (most - self._first[0])):
                 left = (most - done) * took / steps
-        self._told(Progress(self._what, done, most, self._unit, now - self._began, left, self._note))
+        self._listener(Progress(self._what, done, most, self._unit, now - self._began, left, self._note))
 
 
 def begin(steps: Steps | None, what: str, unit: str = "") -> None:
-    """Say what is done next, if anybody listens."""
+    """Begin a task, if there is a listener."""
     if steps is not None:
         steps.begin(what, unit)
 
 
-def steps_for(told: Listener | None) -> Steps | None:
-    """The counts of a verb, for whoever listens to it.
+def steps_for(listener: Listener | None) -> Steps | None:
+    """The `Steps` that report to a listener; None without one.
 
     Raises:
-        InputError: for what cannot be called.
+        InputError: if the listener cannot be called.
     """
-    if faults := call_faults("progress", told):
+    if faults := call_faults("progress", listener):
         raise InputError(faults)
-    return None if told is None else Steps(told)
+    return None if listener is None else Steps(listener)
 
 
-def start_steps(told: Listener | None, what: str, unit: str = "") -> Steps | None:
-    """The same for one piece of work, which begins."""
-    steps = steps_for(told)
+def start_steps(listener: Listener | None, what: str, unit: str = "") -> Steps | None:
+    """`steps_for` a listener, with its first task begun."""
+    steps = steps_for(listener)
     begin(steps, what, unit)
     return steps

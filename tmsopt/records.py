@@ -1,4 +1,4 @@
-"""What records are made of, what results show of themselves, and records as plain data."""
+"""Base classes of results, read-only containers, and records as plain data."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,21 +22,21 @@ Complex = NDArray[np.complex128]
 Truth = NDArray[np.bool_]
 
 Numbers = Mapping[str, float]
-"""Name → number: a design by its parameters, weights, amounts."""
+"""Name → number, such as the parameters of a design."""
 
 
 class Printable(Protocol):
-    """What every result shows of itself. Who writes it stands floors above, and is found when first asked."""
+    """A result that prints and draws itself. `tmsopt.documents`, imported on first use, writes it."""
 
     def report(self, full: bool = False) -> str:
-        """The text that the command line prints; with all the rest where it is `full`."""
+        """The text that the command line prints; every section if `full`."""
         return str(_documents().report(self, full))
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw it, into the given Axes or into new ones, which a notebook and ``plt.show()`` show.
+        """Draw the result into `ax`, or into new Axes, which a notebook and ``plt.show()`` show.
 
         Raises:
-            InputError: where there is no picture of it.
+            InputError: if results of this kind have no figure.
         """
         axes: Axes = _documents().plot(self, ax)
         return axes
@@ -52,34 +52,34 @@ class Printable(Protocol):
 
 
 class Tabular(Printable, Protocol):
-    """A result that is a table as well."""
+    """A result that is also a table."""
 
     def records(self) -> Iterable[Mapping[str, Any]]:
         """One record per row."""
         ...
 
     def to_frame(self) -> "DataFrame":
-        """The table in pandas.
+        """The table as a pandas DataFrame.
 
         Raises:
-            InputError: where pandas is not installed.
+            InputError: if pandas is not installed.
         """
         return frame(self.records())
 
 
-def asked_above(name: str, *given: Any, **options: Any) -> Any:
-    """Call a function of `tmsopt.documents` for a method of a result, which knows nothing of what stands above it."""
-    return getattr(_documents(), name)(*given, **options)
+def call_documents(name: str, *arguments: Any, **options: Any) -> Any:
+    """Call a function of `tmsopt.documents` by name: results cannot import that package, which imports them."""
+    return getattr(_documents(), name)(*arguments, **options)
 
 
 def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
-    """Rows, or columns by name, as a table of pandas.
+    """Rows, or columns by name, as a pandas DataFrame.
 
     Raises:
-        InputError: where pandas is not installed.
+        InputError: if pandas is not installed.
     """
-    made: DataFrame = import_optional("pandas").DataFrame(rows if isinstance(rows, Mapping) else list(rows))
-    return made
+    table: DataFrame = import_optional("pandas").DataFrame(rows if isinstance(rows, Mapping) else list(rows))
+    return table
 
 
 def _documents() -> Any:
@@ -87,7 +87,7 @@ def _documents() -> Any:
 
 
 class Table(Mapping[str, V]):
-    """Names with values, in a fixed order, read-only."""
+    """A read-only, hashable mapping that keeps its order."""
 
     __slots__ = ("_items",)
 
@@ -111,7 +111,7 @@ class Table(Mapping[str, V]):
 
 
 class Column(Sequence[float]):
-    """Numbers in order, read-only; equal where every number is."""
+    """A read-only sequence of floats, compared by value."""
 
     __slots__ = ("_values",)
 
@@ -147,23 +147,23 @@ class Column(Sequence[float]):
         return Column, (self._values,)
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{value:.6g}" for value in self._values[:4].tolist())
-        return f"Column({shown}{', …' if len(self) > 4 else ''}; {len(self)})"
+        first = ", ".join(f"{value:.6g}" for value in self._values[:4].tolist())
+        return f"Column({first}{', …' if len(self) > 4 else ''}; {len(self)})"
 
 
 def plain(record: Any, names: str = "", digits: int | None = None) -> dict[str, Any]:
-    """A record or a table as data for ``json.dumps``: numbers that do not exist are None, a complex one has re and im.
+    """A record or a table as data for ``json.dumps``.
 
-    Records inside are written as their own `to_json` says, where they have one.
+    nan and infinity become None, complex numbers tables of re and im; inner records are written by their `to_json`.
 
     Args:
-        names: which attributes, in this order; by default every field.
-        digits: significant digits of the numbers; by default all.
+        names: attributes to take, in this order; by default every field.
+        digits: significant digits of numbers; by default all.
     """
     if isinstance(record, Mapping):
         return {str(name): _plain(value, digits) for name, value in record.items()}
-    chosen = names.split() or [f.name for f in fields(record)]
-    return {name: _plain(getattr(record, name), digits) for name in chosen}
+    attributes = names.split() or [f.name for f in fields(record)]
+    return {name: _plain(getattr(record, name), digits) for name in attributes}
 
 
 def _plain(value: Any, digits: int | None) -> Any:

@@ -1,4 +1,4 @@
-"""What is installed here: versions of tmsopt, of Python and of the libraries, told without importing any of them."""
+"""Versions of tmsopt, Python and the libraries, read without importing them."""
 
 import platform
 from collections.abc import Iterable
@@ -6,9 +6,9 @@ from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 
 SCHEMA = 1
-"""Version of the JSON of every command."""
+"""Version of the JSON schema of every command."""
 
-NEEDED = (
+REQUIRED = (
     "casadi",
     "numpy",
     "scipy",
@@ -24,28 +24,28 @@ NEEDED = (
     "loky",
     "filelock",
 )
-EXTRA = ("pyscipopt", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
-"""Distributions that tmsopt needs, and those of its extras certify, cluster and data."""
+OPTIONAL = ("pyscipopt", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
+"""Distributions that tmsopt requires, and those of its extras certify, cluster and data."""
 
 
 def environment() -> dict[str, object]:
-    """What an answer may depend on, as plain data: Python, system and libraries; None for what is not there."""
+    """Python, system and library versions, on which results may depend, as plain data; None if not installed."""
     return {
         "python": platform.python_version(),
         "implementation": platform.python_implementation(),
         "system": platform.platform(),
         "machine": platform.machine(),
-        "packages": {**installed((*NEEDED, *EXTRA)), "ipopt": ipopt()},
+        "packages": {**installed_versions((*REQUIRED, *OPTIONAL)), "ipopt": ipopt_version()},
     }
 
 
-def installed(names: Iterable[str]) -> dict[str, str | None]:
-    """The version of each distribution; None where it is not installed, as of a checkout that is only on the path."""
+def installed_versions(names: Iterable[str]) -> dict[str, str | None]:
+    """The version of each distribution; None if not installed, as for a checkout that is only on the path."""
     return {name: _version(name) for name in names}
 
 
-def ipopt() -> str | None:
-    """The version in the name of the library that the CasADi wheel brings; it tells nowhere else without a solve."""
+def ipopt_version() -> str | None:
+    """The IPOPT version, from the file name of the library in the CasADi wheel; no function of CasADi returns it."""
     try:
         folder = Path(str(distribution("casadi").locate_file("casadi")))
     except PackageNotFoundError:

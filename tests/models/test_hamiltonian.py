@@ -148,14 +148,14 @@ def test_functions_of_complex_numbers():
     [
         ([["j*g"]], "write the imaginary unit as 1j"),
         ([["sin(1j*g)"]], "'sin(1j*g)' takes sin of a complex number"),
-        ([["(g + 1j)**g"]], "'(g + 1j)**g' is a complex number to a power"),
+        ([["(g + 1j)**g"]], "'(g + 1j)**g' raises a complex number to a power; accepted: whole"),
         ([["g", 1]], "found rows of 2 entries"),
         ([["g*2j", 1], [0, "conj(g)"]], "calls 'conj'"),
         ([["g*"]], "does not parse"),
         ([[0.5]], "names no parameter"),
         ([["g", float("nan")], [0, 1j]], "row 1, column 2: is nan"),
         ([["g" if i == j else 0 for i in range(7)] for j in range(7)], "accepted: up to 6 × 6"),
-        ([[(1, 2, 3)]], "accepted: two, the real and the imaginary part"),
+        ([[(1, 2, 3)]], "found (1, 2, 3); accepted: a real and an imaginary part"),
     ],
 )
 def test_what_is_refused_is_told(H, words):
@@ -173,7 +173,7 @@ def test_what_is_refused_is_told(H, words):
         ('H = [["1j*w", 1]]', "found rows of 2 entries"),
         ('H = [["w - 2j*"]]', "'w - 2j*' does not parse"),
         ('H = "w"', "accepted: rows in brackets"),
-        ('A = [["1j*w"]]', "a complex matrix goes in H"),
+        ('A = [["1j*w"]]', "only the matrix H may be complex"),
     ],
 )
 def test_a_file_is_refused_at_its_line(tmp_path, table, words):

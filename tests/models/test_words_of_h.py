@@ -39,7 +39,7 @@ def test_a_bare_j_is_told_where_it_is_alone(tmp_path):
 
 
 def test_numbers_alone_make_no_model():
-    with pytest.raises(Unfit, match="name one entry, such as 'k'"):
+    with pytest.raises(Unfit, match="names no parameter"):
         from_hamiltonian(np.array([[1 - 1j, 1], [1, 2]]))
 
 

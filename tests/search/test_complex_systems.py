@@ -345,7 +345,7 @@ def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix():
 def test_words_of_a_matrix_with_gain():
     model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
     told, chart = import_module("tmsopt.models.user_spectrum"), import_module("tmsopt.plots.chart")
-    lossy, gaining = (told.structure_in_words(model, "EP2", gain) for gain in (False, True))
+    lossy, gaining = (told.describe_user_structure(model, "EP2", gain) for gain in (False, True))
     assert lossy == "the two least damped eigenfrequencies meet in one (EP2)"
     assert gaining == "the two eigenfrequencies of most gain meet in one (EP2)"
     (patch,) = chart.class_handles(np.array([chart.CLASSES.index("weave")], dtype=np.int8), model)

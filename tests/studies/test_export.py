@@ -12,7 +12,7 @@ import pytest
 from helpers.rows import faults
 
 from tmsopt import Problem, load, models
-from tmsopt.files import headed, write_csv
+from tmsopt.files import format_header, write_csv
 from tmsopt.records import Table
 from tmsopt.studies import FORMATS, Row, RowTable, Study, check_export, export, header, part_of
 
@@ -256,7 +256,7 @@ def test_heads_of_csv_name_units():
     bare = import_module("tmsopt.studies.export")._bare
     names = ("v", "varied.lambda_s.max", "varied.arm.limit", "report.u_H", "violation.arm", "law.w0")
     assert [bare(name) for name in names] == ["v", "lambda_s", "arm", "u_H", "arm", "law.w0"]
-    assert (headed("v", "m/s"), headed("mu", "")) == ("v (m/s)", "mu")
+    assert (format_header("v", "m/s"), format_header("mu", "")) == ("v (m/s)", "mu")
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])

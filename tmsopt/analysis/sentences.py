@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from tmsopt.analysis.summary import faster_than, none_of
-from tmsopt.models.user_spectrum import structure_in_words
+from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.problem.solution import Bound, Solution
@@ -21,7 +21,7 @@ def structure_line(problem: Posed, structure: str, abscissa: float, known: Seque
     Args:
         known: what meets in each multiple root.
     """
-    words = structure_in_words(problem.model, structure, abscissa > 0)
+    words = describe_user_structure(problem.model, structure, abscissa > 0)
     about = known if problem.pattern is not None else [m for m in known if m.re == known[0].re]
     if crossing := next((m for m in about if not m.exceptional), None):
         return f"{words}: {crossing_in_words(crossing)}"

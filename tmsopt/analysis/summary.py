@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt.analysis.limits import is_physical
 from tmsopt.models.expression import Expression
-from tmsopt.models.user_spectrum import structure_in_words
+from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_QUANTITIES
 from tmsopt.problem.solution import Solution
@@ -27,7 +27,7 @@ def summary(solution: Solution) -> str:
         if not solution.problem.free:
             return f"the design as given violates {names}"
         return f"no design in the box was found that meets all that is asked; the nearest one violates {names}"
-    words = structure_in_words(solution.problem.model, solution.structure, solution.abscissa > 0)
+    words = describe_user_structure(solution.problem.model, solution.structure, solution.abscissa > 0)
     if solution.status != "optimal":
         return f"{words}; the search did not converge, so a better design may be near"
     return f"{words}: {_quality(solution)}"

@@ -6,7 +6,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.models.exact import Written, written
+from tmsopt.models.exact import ExactDesign, as_exact_design
 from tmsopt.models.user_spectrum import beyond_axis
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot, longest_on_line
@@ -100,10 +100,10 @@ def is_exactly_multiple(problem: Posed, parameters: Numbers, roots: Sequence[Roo
     return sorted(r.multiplicity for r in roots) == sorted(m for _, m in isolated_roots(a))
 
 
-def as_typed(problem: Posed, parameters: Numbers) -> Written:
+def as_typed(problem: Posed, parameters: Numbers) -> ExactDesign:
     """A design in exact numbers: what was typed for the fixed ones, decimals for the others."""
     typed = {n: text for n, text in problem.typed(parameters).items() if n in problem.fixed}
-    return written(problem.parameter_set, parameters, None, typed)
+    return as_exact_design(problem.parameter_set, parameters, None, typed)
 
 
 def _on_axis(roots: Sequence[Root], off: Array) -> tuple[str, ...] | None:

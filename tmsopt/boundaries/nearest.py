@@ -13,7 +13,7 @@ from tmsopt.boundaries.boundaries import Edge, edges
 from tmsopt.boundaries.rays import RayCrossing, between, elsewhere, most_damped, ray_crossings
 from tmsopt.boundaries.surroundings import WeightedDesign, placed
 from tmsopt.boundaries.witness import exactly_stable, is_boundary
-from tmsopt.errors import InputError, refusal, suggest, table_faults
+from tmsopt.errors import InputError, input_error, suggest, table_faults
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -174,7 +174,7 @@ def nearest(
     More: docs/how_to/tolerances.md
     """
     if pattern not in KINDS:
-        raise refusal(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", "pattern")
+        raise input_error(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", "pattern")
     place = _place(design, parameters, weights)
     start_steps(progress, f"looking for the nearest {pattern}")
     return _nearest(place, ray_crossings(place), pattern)
@@ -253,7 +253,7 @@ def _place(design: Given, parameters: Numbers | None, weights: Numbers | None) -
         return placed(problem, design.parameters if parameters is None else parameters, weights)
     if parameters is None and problem.free:
         message = f"missing; the problem frees {' '.join(problem.free)}: give their values, or a solution"
-        raise refusal(message, "parameters")
+        raise input_error(message, "parameters")
     return placed(problem, problem.ordered(parameters or {}), weights)
 
 

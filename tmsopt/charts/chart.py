@@ -16,9 +16,9 @@ from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_fold
 from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, plan_survey
 from tmsopt.charts.tally import Tally, add_tallies
 from tmsopt.deprecated import ignore_option
-from tmsopt.errors import InputError, call_faults, count_faults, refusal
+from tmsopt.errors import InputError, call_faults, count_faults, input_error
 from tmsopt.executor import Crash, here, processes
-from tmsopt.files import path_of
+from tmsopt.files import as_path
 from tmsopt.problem.files import Given
 from tmsopt.problem.problem import Problem
 from tmsopt.progress import Listener, start_steps
@@ -102,7 +102,7 @@ class Chart(Printable):
         """
         if self.asked is None:
             name = self.about["problem"]["model"]
-            raise refusal(
+            raise input_error(
                 f"'{self.path}' does not hold its model {name!r}, only numbers; compute it again from the problem"
             )
         return self.asked
@@ -136,7 +136,7 @@ class Chart(Printable):
         if faults := layer_faults(names, list(self.layers)):
             raise InputError(faults)
         chosen = {n: self.layers[n] for n in names}
-        save_layers(self.problem.posed, Grid(self.axes, self.grid), chosen, path_of(path, "the file to write"))
+        save_layers(self.problem.posed, Grid(self.axes, self.grid), chosen, as_path(path, "the file to write"))
 
     def to_xarray(self) -> "Dataset":
         """All layers as a dataset with axes and units.
@@ -225,10 +225,10 @@ def chart(
     steps = start_steps(progress, "charting", "design")
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = plan_survey(problem, axes, points, wanted, quantities, single)
-    path, grid = None if folder is None else path_of(folder, "a folder"), work.grid
+    path, grid = None if folder is None else as_path(folder, "a folder"), work.grid
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or at most {LARGEST:.0e} designs"
-        raise refusal(message, "points")
+        raise input_error(message, "points")
     about = _describe(work, tile)
     grid.tiles(tile)  # raises for too many tiles
     memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in work.dtypes.items()}
@@ -243,7 +243,7 @@ def chart(
             if isinstance(found, Crash):
                 cause = f"a worker that computed {tile} designs crashed ({found.cause})"
                 message = f"{cause}; give fewer workers or a smaller tile"
-                raise refusal(message, "workers")
+                raise input_error(message, "workers")
             target.write(remaining[place], *found)
             done += found[1].designs
             if steps:
@@ -273,14 +273,14 @@ def open_chart(path: str | Path) -> Chart:
 
     More: docs/how_to/charts.md
     """
-    path = path_of(path, "a folder that tmsopt.chart made")
+    path = as_path(path, "a folder that tmsopt.chart made")
     about, problem, tiles = read_folder(path)
     grid, counts = grid_of(about), add_tallies(tiles.done.values())
     if counts.designs < grid.size:
         message = (
             f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to finish it"
         )
-        raise refusal(message)
+        raise input_error(message)
     return Chart(about, grid.values, tiles.layers, counts, path=path, asked=problem)
 
 

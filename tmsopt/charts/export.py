@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.charts.survey import Grid
-from tmsopt.errors import import_optional, refusal
+from tmsopt.errors import import_optional, input_error
 from tmsopt.files import netcdf_errors, write_atomic
 from tmsopt.problem.problem import Posed
 from tmsopt.roots import CLASSES
@@ -49,7 +49,7 @@ def check_netcdf() -> None:
     """
     if find_spec("xarray") is None or all(find_spec(n) is None for n in ("netCDF4", "h5netcdf")):
         message = 'netCDF needs xarray and netCDF4; run pip install "tmsopt[data]", or give a name that ends in .npz'
-        raise refusal(message, "--output")
+        raise input_error(message, "--output")
 
 
 def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:

@@ -29,8 +29,8 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid
 from tmsopt.charts.tally import Tally
-from tmsopt.errors import InputError, refusal
-from tmsopt.files import differences, from_json, move_aside, read_lines, read_text, write_text
+from tmsopt.errors import InputError, input_error
+from tmsopt.files import from_json, list_differences, move_aside, read_lines, read_text, write_text
 from tmsopt.models import MODELS
 from tmsopt.problem.problem import Problem
 
@@ -126,9 +126,9 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
             _create(path, about, grid)
         existing, _, tiles = read_folder(path)
         ignored = {"versions": None, "tile": None}
-        if changed := list(differences(existing | ignored, about | ignored)):
+        if changed := list(list_differences(existing | ignored, about | ignored)):
             message = f"holds another chart ({'; '.join(changed)}); give another name, or --fresh to move it aside"
-            raise refusal(message, str(path))
+            raise input_error(message, str(path))
         try:
             yield tiles
         finally:
@@ -142,7 +142,7 @@ def _lock_folder(path: Path) -> Iterator[None]:
             lock = FileLock(path / _LOCK, timeout=0).acquire()
         except Timeout:
             message = f"'{path}' is being written by another process; wait for it, or give another name"
-            raise refusal(message, "--output") from None
+            raise input_error(message, "--output") from None
     with lock:
         yield
 
@@ -152,7 +152,7 @@ def _refuse_write_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise refusal(f"'{path}' cannot be written: {error.strerror or error}", "--output") from None
+        raise input_error(f"'{path}' cannot be written: {error.strerror or error}", "--output") from None
 
 
 def _layer_path(name: str) -> str:
@@ -160,7 +160,7 @@ def _layer_path(name: str) -> str:
 
 
 def _make_no_chart_error(path: Path) -> InputError:
-    return refusal(f"'{path}' is no chart: it has no {_ABOUT}; give a chart's folder or a new name")
+    return input_error(f"'{path}' is no chart: it has no {_ABOUT}; give a chart's folder or a new name")
 
 
 def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
@@ -230,7 +230,9 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         done, end = _read_record(record, about["tile"], grid)
     except _DAMAGE as error:
         reason = " ".join(str(error).split())[:300]
-        raise refusal(f"'{path}' is damaged: {name}: {reason}; give --fresh to move it aside and start anew") from None
+        raise input_error(
+            f"'{path}' is damaged: {name}: {reason}; give --fresh to move it aside and start anew"
+        ) from None
     return about, problem, Tiles(layers, about["tile"], done, (record, end))
 
 

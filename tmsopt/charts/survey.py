@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.tally import Tally, count_tile
-from tmsopt.errors import Fault, InputError, list_faults, refusal, short, suggest, table_faults
+from tmsopt.errors import Fault, InputError, input_error, list_faults, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
 from tmsopt.problem.evaluate import ArrayFunction, array_function, parse_all
 from tmsopt.problem.files import Given, pose
@@ -92,7 +92,9 @@ class Grid:
         """
         each, rows = max(1, points // self.shape[-1]), range(self.size // self.shape[-1])
         if (count := len(rows[::each])) > MOST_TILES:
-            raise refusal(f"found {points}, which makes {count} tiles; accepted: {MOST_TILES} tiles or fewer", "tile")
+            raise input_error(
+                f"found {points}, which makes {count} tiles; accepted: {MOST_TILES} tiles or fewer", "tile"
+            )
         return [rows[k : k + each] for k in rows[::each]]
 
 
@@ -213,9 +215,9 @@ def axes_of(problem: Posed, axes: Sequence[str] | None = None) -> tuple[str, ...
         message = f"a grid needs two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
         fixed = [n for n in ("Fr", "v", *problem.fixed) if n in problem.fixed]
         freed = f"; write e.g. {example_of(problem.parameter_set[fixed[0]])[1]}" if fixed else ""
-        raise refusal(message + ("; fix the others" if len(free) > 3 else freed), "parameters")
+        raise input_error(message + ("; fix the others" if len(free) > 3 else freed), "parameters")
     if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free)):
-        raise refusal(f"found {axes!r}; accepted: {' and '.join(free)}", "axes")
+        raise input_error(f"found {axes!r}; accepted: {' and '.join(free)}", "axes")
     return tuple(axes or free)
 
 
@@ -227,5 +229,5 @@ def _sizes(points: Any, count: int) -> tuple[int, ...]:
     if len(sizes) != count or min(sizes) < 2 or max(sizes) > LONGEST or math.prod(sizes) > MOST:
         number = ("two", "three")[count - 2]
         accepted = f"{number} whole numbers, each from 2 to {LONGEST}, with a product of {MOST:.0e} or less"
-        raise refusal(f"found {points!r}; accepted: {accepted}", "points")
+        raise input_error(f"found {points!r}; accepted: {accepted}", "points")
     return sizes

@@ -18,7 +18,7 @@ from tmsopt.cli.outputs import check_output, saving
 from tmsopt.cli.problems import parse_number, split_names, take_nominal
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.deprecated import no_longer_needed
-from tmsopt.errors import refusal, suggest
+from tmsopt.errors import input_error, suggest
 
 if TYPE_CHECKING:
     from tmsopt.problem import Posed
@@ -131,30 +131,30 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             yield
         except OSError as error:
             message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
-            raise refusal(message, "--output") from None
+            raise input_error(message, "--output") from None
         for moved in sorted(set(folder.parent.glob("*.chart")) - before):
             click.echo(f"moved the old folder to {moved}", err=True)
 
     def _check_plot(self, axes: int) -> None:
         accepted = (*_LAYERS[:4], *self.quantity)
         if self.layer not in accepted:
-            raise refusal(f"found '{self.layer}'; {suggest(self.layer, accepted)}", "--layer")
+            raise input_error(f"found '{self.layer}'; {suggest(self.layer, accepted)}", "--layer")
         if self.plot is not None and axes == 3 and not self.slice:
             message = "three parameters are free, and a figure shows two; hold one, as in --slice lambda_s=0.4"
-            raise refusal(message, "--plot")
+            raise input_error(message, "--plot")
         if self.slice and axes == 2:
-            raise refusal("two parameters are free, so there is nothing to hold; leave it out", "--slice")
+            raise input_error("two parameters are free, so there is nothing to hold; leave it out", "--slice")
 
     def _read_slice(self, problem: "Posed") -> dict[str, float]:
         """The parameter that a figure holds, as a number in its range."""
         held = {}
         for name, text in self.slice.items():
             if name not in problem.free:
-                raise refusal(f"found '{name}'; {suggest(name, problem.free)}", "--slice")
+                raise input_error(f"found '{name}'; {suggest(name, problem.free)}", "--slice")
             low, high = problem.free[name]
             held[name] = parse_number(text, problem.parameter_set[name].unit, "--slice", name)
             if not low <= held[name] <= high:
-                raise refusal(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
+                raise input_error(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
         return held
 
     def _choose_sizes(self, axes: int) -> tuple[int, ...]:
@@ -165,7 +165,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
         sizes = sizes * axes if len(sizes) == 1 else sizes
         if self._folder is None and (designs := math.prod(sizes)) > LARGEST:
             message = f"{designs:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
-            raise refusal(message, "--points")
+            raise input_error(message, "--points")
         if self.output is not None and self.output.suffix.lower() == ".nc":
             check_netcdf()
         return sizes

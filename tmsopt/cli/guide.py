@@ -10,7 +10,7 @@ from tmsopt import guide
 from tmsopt.cli.answers import answer
 from tmsopt.cli.command import Command, OnFile, argument, option
 from tmsopt.cli.outputs import check_output, print_or_write, write_file, write_new
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.files import write_text
 
 
@@ -59,7 +59,7 @@ class ExampleCommand(WithToml):
             path = self.output or Path(f"{self.name.removesuffix('.toml')}.toml")
             write_new("--output" if self.output else "NAME", path, guide.example(self.name))
         elif self.output is not None:
-            raise refusal("found no NAME; tmsopt example lists all", "NAME")
+            raise input_error("found no NAME; tmsopt example lists all", "NAME")
         else:
             titles = guide.examples()
             width = max(map(len, titles), default=0)

@@ -12,7 +12,7 @@ import click
 from tmsopt.cli.context import WORDS
 from tmsopt.cli.ending import BAD_INPUT
 from tmsopt.cli.terminal import progress_listener, show_step
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 
 FIGURES, PAGES = ("png", "pdf", "svg"), ("html", "htm")
 """Endings of figures, and of pages to hand on."""
@@ -24,14 +24,14 @@ def check_output(option: str, path: Path | None, endings: Sequence[str], folders
         return
     ending = path.suffix.lstrip(".").lower()
     if ending not in endings:
-        raise refusal(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", option)
+        raise input_error(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", option)
     try:
         problem = "is a directory" if path.is_dir() and ending not in folders else ""
         problem = problem or ("" if path.parent.is_dir() else "is in a directory that does not exist")
     except OSError as error:  # a name longer than the file system takes
         problem = f"is no name for a file here ({error.strerror})"
     if problem:
-        raise refusal(f"'{path}' {problem}; give the path of a file to write", option)
+        raise input_error(f"'{path}' {problem}; give the path of a file to write", option)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from tmsopt.cli.answers import Reply, answer
 from tmsopt.cli.command import Command, WithPlot, argument, option
 from tmsopt.cli.outputs import FIGURES, check_output, saving, write_file
 from tmsopt.cli.terminal import progress_listener
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.files import write_atomic, write_text
 from tmsopt.progress import start_steps
 
@@ -43,7 +43,7 @@ class FigureCommand(Command):
         from tmsopt.plots.paper import GALLERY, find
 
         if not (self.name or self.list):  # no label of the paper is empty either
-            raise refusal(f"missing; accepted: {' '.join(GALLERY)} all", "NAME")
+            raise input_error(f"missing; accepted: {' '.join(GALLERY)} all", "NAME")
         every = self.list or self.name == "all"
         items = [*GALLERY.values()] if every else [find(str(self.name))]
         data = [{"name": item.name, "alias": item.alias, "caption": item.caption} for item in items]
@@ -62,7 +62,7 @@ class FigureCommand(Command):
             try:
                 folder.mkdir(parents=True, exist_ok=True)
             except OSError as error:
-                raise refusal(f"'{folder}' cannot be a directory: {error.strerror}", "--output") from None
+                raise input_error(f"'{folder}' cannot be a directory: {error.strerror}", "--output") from None
             files = [folder / name for name in names]
         for path in files:
             check_output("--output", path, (self.format,) if self.format else FIGURES)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 
 if TYPE_CHECKING:
     from tmsopt.problem import Posed
@@ -21,7 +21,7 @@ def parse_number(text: str, unit: str, *key: str) -> float:
         try:
             return with_unit(text, unit)
         except ValueError as error:
-            raise refusal(str(error), *key) from None
+            raise input_error(str(error), *key) from None
 
 
 def split_names(text: str) -> tuple[str, ...]:
@@ -39,7 +39,7 @@ def choose_plane(problem: "Posed", axes: str | None) -> tuple[str, ...]:
     names = free[:2] if axes is None else split_names(axes)
     if len(names) != 2 or len({*names}) != 2 or not {*names} <= {*free}:
         found = axes or ", ".join(names) or "none"
-        raise refusal(f"found {found}; accepted: two of the free parameters ({', '.join(free)})", "--axes")
+        raise input_error(f"found {found}; accepted: two of the free parameters ({', '.join(free)})", "--axes")
     return names
 
 

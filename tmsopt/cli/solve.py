@@ -13,7 +13,7 @@ from tmsopt.cli.command import OnFile, WithCsv, WithIpopt, WithPage, WithPlot, o
 from tmsopt.cli.ending import INFEASIBLE, INTERRUPTED, STATUSES
 from tmsopt.cli.problems import parse_number
 from tmsopt.cli.terminal import progress_listener
-from tmsopt.errors import MOST_POINTS, MOST_STARTS, refusal
+from tmsopt.errors import MOST_POINTS, MOST_STARTS, input_error
 
 _KEYS = (
     "schema title model status objective parameters units abscissa abscissa_realised stable any_stable verdict growth "
@@ -142,5 +142,5 @@ def _parse_scale(option: str, text: str | None, unit: str) -> float:
     """A positive length or mass; 1 if the option is left out."""
     value = parse_number(text or "1", unit, option)
     if not 0 < value < math.inf:
-        raise refusal(f"found {text}; accepted: a positive number of {unit}", option)
+        raise input_error(f"found {text}; accepted: a positive number of {unit}", option)
     return value

@@ -17,7 +17,7 @@ from tmsopt.cli.command import OnFile, WithPage, WithPlot, option
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, hold_signals
 from tmsopt.cli.outputs import check_output, saving
 from tmsopt.cli.terminal import progress_listener, show_step
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.files import read_text
 from tmsopt.progress import Progress
 
@@ -84,7 +84,7 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         exports = [("--export", target) for target in self.export]
         for name, path in [("--store", store), *exports, ("--plot", self.plot), ("--report", self.report)]:
             if path and (place := realpath(path)) in taken:
-                raise refusal(f"'{path}' is {taken[place]}; give another name", name)
+                raise input_error(f"'{path}' is {taken[place]}; give another name", name)
             if path:
                 taken[place] = f"what {name} writes"
 

@@ -11,7 +11,7 @@ from tmsopt.documents.blocks import ALL, Cell
 from tmsopt.dynamics.speeds import speed_of
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import GRAVITY, INERTIAS, Model, Parameter, ParameterSet, Quantity, Values, to_si
-from tmsopt.models.user_spectrum import eigenfrequencies, on_axis
+from tmsopt.models.user_spectrum import eigenfrequencies, roots_on_axis
 from tmsopt.problem.cases import Case
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, show_at, unit_at, unit_of
@@ -247,7 +247,7 @@ def _time_units(solution: Solution) -> tuple[float, Unit, Unit]:
 def _name_real(solution: Solution) -> str:
     """Which eigenfrequencies of a complex system are real."""
     model = solution.problem.model
-    met = eigenfrequencies(model, on_axis(model, solution.roots))
+    met = eigenfrequencies(model, roots_on_axis(model, solution.roots))
     real = [format_frequency(z.re, 0.0, 5, z.multiplicity, abs(model.carrier or 0.0)) for z in met]
     return f"; {' and '.join(real)} {'is' if len(real) == 1 else 'are'} real" if real else ""
 

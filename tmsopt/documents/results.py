@@ -12,9 +12,9 @@ from tmsopt.documents.blocks import Chapter, Document, Level
 from tmsopt.documents.maker import Maker
 from tmsopt.documents.text import WIDTH, to_headline, to_text
 from tmsopt.errors import Fault, InputError, short
-from tmsopt.files import path_of, write_text
+from tmsopt.files import as_path, write_text
 from tmsopt.progress import Listener, start_steps
-from tmsopt.versions import installed
+from tmsopt.versions import installed_versions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,7 +167,7 @@ def save_report(
     """
     if type(result).__name__ not in HOME:
         raise InputError([Fault(f"found {short(result)}; accepted: a result, such as a solution", ("result",))])
-    place = path_of(path, "the file to write")
+    place = as_path(path, "the file to write")
     if place.suffix.lstrip(".").lower() not in ENDINGS:
         raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
     from tmsopt.documents.html import to_page
@@ -196,7 +196,7 @@ def _origin(
     )
     seed = getattr(getattr(result, "study", None), "seed", seed)
     about = {
-        **{name: found or "" for name, found in installed(_PACKAGES).items()},
+        **{name: found or "" for name, found in installed_versions(_PACKAGES).items()},
         "Python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}".strip(),
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),

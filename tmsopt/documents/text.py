@@ -80,7 +80,11 @@ def wrap(text: str, width: int, first: str = "", rest: str = "  ") -> list[str]:
         first: before the first line.
         rest: before the others.
     """
-    tied = re.sub(r"(?<=\d) (?=[^\W\d_]|[√%])|(?<=[<>=]) (?=[-\d])|(?<=\w) (?=[<>=]{1,2} [-\d])|(?<=\bkg) (?=m)|(?<=\bN) (?=m)", _TIED, text)
+    tied = re.sub(
+        r"(?<=\d) (?=[^\W\d_]|[√%])|(?<=[<>=]) (?=[-\d])|(?<=\w) (?=[<>=]{1,2} [-\d])|(?<=\bkg) (?=m)|(?<=\bN) (?=m)",
+        _TIED,
+        text,
+    )
     lines = textwrap.wrap(
         tied, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
     )

@@ -12,7 +12,7 @@ from tmsopt.dynamics.crossings import Crossing, Crossings, Stretch, crossings, u
 from tmsopt.dynamics.modes import Mode, modes
 from tmsopt.dynamics.speeds import coefficients_over, speed_of
 from tmsopt.dynamics.system import is_bicycle
-from tmsopt.errors import InputError, is_number, refusal, short, suggest
+from tmsopt.errors import InputError, input_error, is_number, short, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
 from tmsopt.models.user_spectrum import user_root_array
 from tmsopt.problem.files import Given
@@ -120,7 +120,7 @@ def growth(
     design = solve_if_needed(design, progress)
     start_steps(progress, "following the roots")
     if not (end is None or (is_number(end) and end != 0)):
-        raise refusal(f"found {short(end)}; accepted: a number other than 0", "end")
+        raise input_error(f"found {short(end)}; accepted: a number other than 0", "end")
     of, parameters, name = _written(design, over)
     model = design.problem.model
     known = f"{name}_c" in model.quantity_names(of)
@@ -195,7 +195,7 @@ def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str
     if over in native.names:
         return native, dict(design.dimensionless), over
     accepted = dict.fromkeys((*own.names, *native.names))
-    raise refusal(f"found '{over}'; {suggest(over, accepted)}", "over")
+    raise input_error(f"found '{over}'; {suggest(over, accepted)}", "over")
 
 
 def _ends(design: Solution, name: str, end: float | None, at: float) -> Stretch:

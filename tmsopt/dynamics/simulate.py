@@ -15,7 +15,7 @@ from tmsopt.dynamics.measures import FINEST, MOST, Measure, Watched, grid, measu
 from tmsopt.dynamics.mode_shapes import ModeShape, mode_shapes
 from tmsopt.dynamics.speeds import parameters_of
 from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
-from tmsopt.errors import InputError, refusal
+from tmsopt.errors import InputError, input_error
 from tmsopt.files import write_csv
 from tmsopt.models.user_spectrum import user_structure
 from tmsopt.problem.files import Given, pose
@@ -229,12 +229,14 @@ def _watched(
         InputError: where it would grow beyond all numbers.
     """
     if not structure.roots:
-        raise refusal("the roots of this design cannot be told: one of them is at infinity, or nearly so", "parameters")
+        raise input_error(
+            "the roots of this design cannot be told: one of them is at infinity, or nearly so", "parameters"
+        )
     z = rate * np.array([complex(r.re, r.im) for r in structure.roots])
     abscissa, fastest, largest = map(float, (z.real.max(), np.abs(z.imag).max(), np.abs(z).max()))
     if seconds is not None and seconds * abscissa > _LARGEST:
         accepted = f"accepted: up to {_LARGEST / abscissa:.4g}, in which it grows by e^{_LARGEST:.0f}"
-        raise refusal(f"found {seconds:.6g} of a design that is not stable; {accepted}", "seconds")
+        raise input_error(f"found {seconds:.6g} of a design that is not stable; {accepted}", "seconds")
     size = float(np.linalg.norm(system.A[: len(system.names), : len(system.names)], 2))
     ending = _RADIANS / largest if largest > _ROUNDING * size else _ALONE / (size or 1.0)
     if not stable or -abscissa < max(_SLOW * fastest, _ROUNDING * largest):

@@ -13,7 +13,7 @@ from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.boundaries.surroundings import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, user_crossings
-from tmsopt.errors import InputError, refusal, short, suggest
+from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
@@ -135,9 +135,9 @@ def speeds(
     if name is None:
         message = f"the model '{asked.model.name}' has no parameter that is a speed; say which one varies, "
         message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(of.names)}"
-        raise refusal(message, "parameter")
+        raise input_error(message, "parameter")
     if name not in of.names:
-        raise refusal(f"unknown parameter '{name}'; {suggest(name, of.names)}", "parameter")
+        raise input_error(f"unknown parameter '{name}'; {suggest(name, of.names)}", "parameter")
     own = parameters_of(design, whole, name, progress)
     start_steps(progress, "isolating speeds")
     allowed = of[name].range
@@ -147,7 +147,7 @@ def speeds(
             raise ValueError
     except (TypeError, ValueError):
         message = f"found {short(between)}; accepted: a least value and a greater one, `--between LOW,HIGH`"
-        raise refusal(message, "between") from None
+        raise input_error(message, "between") from None
     met = user_crossings(asked.model, crossings(coefficients_over(asked, of, own, name), lower, upper))
     return Speeds(asked.problem, name, Table(own), lower, upper, **vars(met))
 
@@ -189,7 +189,7 @@ def coefficients_over(problem: Posed, of: ParameterSet, own: Mapping[str, float]
     except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # no polynomial on the way
         a = []
     if not any(x != 0 for c in a for x in c):
-        raise refusal(f"the coefficients are no polynomials in {name}, or all 0", "parameter")
+        raise input_error(f"the coefficients are no polynomials in {name}, or all 0", "parameter")
     return a
 
 

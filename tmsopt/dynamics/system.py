@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.models import Model
 from tmsopt.models.bicycles.bicycle import contact_path
 from tmsopt.problem.problem import Posed
@@ -63,7 +63,7 @@ def matrices_of(model: Model) -> Any:
     if pencil is None:
         advice = "write its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
         message = f"'{model.name}' is given by its coefficients alone, which tell roots and no motion; {advice}"
-        raise refusal(message, "model")
+        raise input_error(message, "model")
     return lambda native: [np.array(P, dtype=float) for P in pencil(native)]
 
 
@@ -94,7 +94,7 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
     if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled) > _SINGULAR:
         message = "the mass matrix of this design is singular: a root is at infinity, and there is no motion to show"
-        raise refusal(message, "parameters")
+        raise input_error(message, "parameters")
     A = -np.linalg.solve(pencil[0], pencil[-1])
     if len(pencil) == 3:
         A = np.block([[np.zeros((n, n)), np.eye(n)], [A, -np.linalg.solve(pencil[0], pencil[1])]])

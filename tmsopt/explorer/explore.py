@@ -6,10 +6,10 @@ from html import escape
 from os import PathLike
 from typing import Unpack
 
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.explorer.known import known_designs
 from tmsopt.explorer.page import html_of
-from tmsopt.files import path_of, write_text
+from tmsopt.files import as_path, write_text
 from tmsopt.problem import Given, Posed, Problem, Solution, pose
 from tmsopt.problem.toml import read_page
 from tmsopt.program.options import Asked
@@ -48,9 +48,9 @@ class Explorer:
             InputError: for a name that does not end in html or htm.
             OSError: when the file cannot be written.
         """
-        path = path_of(path, "the file to write")
+        path = as_path(path, "the file to write")
         if path.suffix.lower() not in _ENDINGS:
-            raise refusal(f"found '{path}'; accepted: a file name ending in html, htm", "path")
+            raise input_error(f"found '{path}'; accepted: a file name ending in html, htm", "path")
         write_text(path, self.html)
 
     def __repr__(self) -> str:

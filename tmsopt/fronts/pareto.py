@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import Unpack
 
-from tmsopt.errors import MOST_POINTS, InputError, count_faults, refusal
+from tmsopt.errors import MOST_POINTS, InputError, count_faults, input_error
 from tmsopt.executor import Executor, cores, here, processes
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
@@ -61,7 +61,7 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     problem = pose(problem)
     if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
-        raise refusal(message, "objective")
+        raise input_error(message, "objective")
     how = options_of(options, defaults=_DEFAULTS, fewest=0)
     faults = count_faults("points", points, 2, MOST_POINTS)
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):

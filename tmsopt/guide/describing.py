@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from tmsopt.errors import Fault, InputError, refusal, short
+from tmsopt.errors import Fault, InputError, input_error, short
 from tmsopt.guide.description import Description, Word, Words
 from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
 from tmsopt.models.built_in import controlled, gain_names
@@ -43,7 +43,7 @@ def describe(given: Given | Model) -> Description:
         return _described(posed.model, posed, {})
     if not isinstance(given, str | PathLike):
         accepted = f"the name of a model ({', '.join(MODELS)}), the path of a file, a Model, a Problem, or a Solution"
-        raise refusal(f"found {short(given)}; accepted: {accepted}", "given")
+        raise input_error(f"found {short(given)}; accepted: {accepted}", "given")
     try:
         problem, typed = _read(given)
     except InputError as error:

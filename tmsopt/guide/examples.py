@@ -8,7 +8,7 @@ from importlib import metadata
 from importlib.resources import files
 from pathlib import Path
 
-from tmsopt.errors import refusal, suggest
+from tmsopt.errors import input_error, suggest
 from tmsopt.guide.schema import schema
 
 SCHEMA_FILE = "tmsopt.schema.json"
@@ -31,7 +31,7 @@ def new_problem(model: str = "tms") -> str:
         InputError: unless `model` is one of `STARTS`.
     """
     if model not in STARTS:
-        raise refusal(f"found '{model}'; {suggest(model, STARTS)}", "model")
+        raise input_error(f"found '{model}'; {suggest(model, STARTS)}", "model")
     return (files("tmsopt.guide") / "templates" / f"{model}.toml").read_text(encoding="utf-8")
 
 
@@ -50,7 +50,7 @@ def example(name: str) -> str:
     """
     stem = name.removesuffix(".toml")
     if stem not in _files():
-        raise refusal(f"found '{name}'; {suggest(stem, _files())}", "name")
+        raise input_error(f"found '{name}'; {suggest(stem, _files())}", "name")
     return _files()[stem].read_text(encoding="utf-8")
 
 

@@ -1,9 +1,9 @@
-"""What was meant by an expression that does not read as one, written as it should be."""
+"""Corrections of expressions that do not parse."""
 
 import re
 from collections.abc import Callable, Iterable
 
-from tmsopt.models.names import MEANT
+from tmsopt.models.names import AMBIGUOUS_NAMES
 from tmsopt.models.tables import read_table
 
 _NUMBER = r"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)"
@@ -13,49 +13,47 @@ _UNITS = _WORDS["units"]
 Repair = tuple[str, str | Callable[[re.Match[str]], str]]
 
 
-def _converted(found: re.Match[str]) -> str:
+def _convert_unit(found: re.Match[str]) -> str:
     return f"{float(found[1]) * _UNITS[found[2]]:.12g}"
 
 
 _REPAIRS: tuple[Repair, ...] = (
-    *((re.escape(sign), meant) for sign, meant in _WORDS["signs"].items()),
+    *((re.escape(sign), replacement) for sign, replacement in _WORDS["signs"].items()),
     (r"(?<![<>=!])=(?!=)", "=="),
     (r"([<>])(?!=)", r"\1="),
     (r"(?<=\d),(?=\d)", "."),
     (_NUMBER + r"\s*%", lambda found: f"{float(found[1]) / 100:.12g}"),
     (_NUMBER + r"\s*(?:°|deg\b|degrees?\b)", r"\1*pi/180"),
     (_NUMBER + r"\s*rad\b", r"\1"),
-    (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", _converted),
+    (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", _convert_unit),
     (_NUMBER + r"\s*(?=(?!j\b)[A-Za-z(])", r"\1*"),
 )
-"""What others write → what is read here, one after the other."""
+"""Pattern of a foreign notation → its replacement, applied in this order."""
 
 _WITH_UNIT = re.compile(_NUMBER + rf"\s*({'|'.join(_UNITS)}|deg|°)(?!\w)")
 
 
 def call_advice(name: str, arguments: Iterable[str]) -> str:
-    """The end of a sentence that says what to write for a function that there is not; empty likewise."""
+    """The end of a message about an unknown function: what to write instead; empty if unknown."""
     functions = _WORDS["functions"]
-    meant = f"write {functions[name]}" if name in functions else MEANT["t"] if "t" in arguments else ""
-    return f"; {meant}" if meant else ""
+    advised = f"write {functions[name]}" if name in functions else AMBIGUOUS_NAMES["t"] if "t" in arguments else ""
+    return f"; {advised}" if advised else ""
 
 
-def advice(text: str, reads: Callable[[str], bool]) -> str:
-    """The end of a sentence that says what to write for a text that is refused; empty where that is not known.
+def advice(text: str, parses: Callable[[str], bool]) -> str:
+    """The end of a message about a text that does not parse: what to write instead; empty if unknown.
 
     Args:
-        reads: whether a text parses.
+        parses: whether a text parses.
     """
     if re.search(r"\d[jJ]\b", text):
-        return (
-            "; expressions are real: write real and imaginary parts as numbers of their own; a complex matrix goes in H"
-        )
+        return "; expressions are real: write real and imaginary part as two numbers; only the matrix H may be complex"
     if missing := text.count("(") - text.count(")"):
         return f"; a {'()'[missing > 0]} is missing"
     mended = text.strip()
-    for sign, meant in _REPAIRS:
-        mended = re.sub(sign, meant, mended)
-    if mended == text.strip() or not mended.isascii() or "inf" in mended or not reads(mended):
+    for pattern, replacement in _REPAIRS:
+        mended = re.sub(pattern, replacement, mended)
+    if mended == text.strip() or not mended.isascii() or "inf" in mended or not parses(mended):
         return ""
     units = " (numbers in expressions are in m, kg, s, rad and N)" if _WITH_UNIT.search(text) else ""
     return f"; write '{mended}'{units}"

@@ -1,4 +1,4 @@
-"""What a number of a problem stands for when it is taken exactly."""
+"""Exact values of the numbers of a problem."""
 
 import math
 import re
@@ -19,10 +19,10 @@ from tmsopt.models.model import Model, ParameterSet
 from tmsopt.records import Table
 
 SAME = 4e-15
-"""Relative difference of an exact value from the design's double: a few roundings, of a tangent too."""
+"""Accepted relative difference of an exact value from the double of the design: a few roundings, also of a tangent."""
 
 MOST_DIGITS = 400
-"""Of an exact number: doubles end with those of 309."""
+"""Most digits of an exact number; doubles have up to 309 before the point."""
 
 _POWER_OF_TEN = re.compile(r"[eE]([+-]?[\d_]+)")
 _DEGREES = re.compile(r"(.*?)\s*(?:deg|°)")
@@ -30,24 +30,24 @@ _DEGREES = re.compile(r"(.*?)\s*(?:deg|°)")
 
 @dataclass(frozen=True)
 class Exact:
-    """A constant of arithmetic; equal to another that is written alike.
+    """An exact constant; constants with the same text are equal.
 
     Attributes:
-        node: the number in a formula, an angle in radians.
-        text: such as ``8/3``, ``sqrt(2)`` or ``20 deg``.
+        node: the number as part of a formula, an angle in radians.
+        text: the number as written, such as ``8/3``, ``sqrt(2)`` or ``20 deg``.
     """
 
     node: Node = field(compare=False)
     text: str
 
     @classmethod
-    def of(cls, x: Fraction) -> "Exact":
-        """A fraction."""
+    def from_fraction(cls, x: Fraction) -> "Exact":
+        """The constant of a fraction."""
         return cls(node_of(x), str(x))
 
     @property
     def fraction(self) -> Fraction | None:
-        """The number as a fraction; None for degrees, and where it is irrational."""
+        """The number as a fraction; None if it is irrational or an angle in degrees."""
         return self.node.fraction
 
     def ball(self) -> Any:
@@ -57,11 +57,11 @@ class Exact:
     def times(self, factor: Fraction) -> "Exact":
         """The product with a fraction."""
         if self.fraction is not None:
-            return Exact.of(self.fraction * factor)
+            return Exact.from_fraction(self.fraction * factor)
         return self if factor == 1 else Exact(self.node * factor, f"({self.text})*{factor}")
 
-    def in_degrees(self) -> "Exact":
-        """So many degrees."""
+    def to_radians(self) -> "Exact":
+        """The number of degrees as an angle in radians."""
         return Exact(self.node * PI / 180, f"{self.text} deg") if self.fraction != 0 else self
 
     def __float__(self) -> float:
@@ -76,20 +76,20 @@ class Exact:
 
 
 def constant(text: str) -> Exact:
-    """A constant of arithmetic such as ``8/3``, ``-0.1`` or ``2*pi/3``.
+    """The constant of a text such as ``8/3``, ``-0.1`` or ``2*pi/3``.
 
     Raises:
-        ValueError: with the reason, for what is none, has no value or is beyond double precision.
+        ValueError: if the text is not a constant, has no value or is beyond double precision.
     """
     try:
-        exact = Exact.of(decimal(text))
+        exact = Exact.from_fraction(decimal(text))
     except (ValueError, ZeroDivisionError):
         expression = parse_value(text, (), "8/3")
         exact = Exact(fold(expression.formula, {}, NODES)[0], expression.text)
         with flint.ctx.workdps(DIGITS):
             found = fold(expression.formula, {}, BALLS)[0]
         if isinstance(found, flint.fmpq):
-            exact = Exact.of(Fraction(int(found.p), int(found.q)))
+            exact = Exact.from_fraction(Fraction(int(found.p), int(found.q)))
         elif not found.is_finite():
             raise ValueError(f"'{text}' has no value") from None
     if not math.isfinite(float(exact)) or (float(exact) == 0 and exact.fraction):
@@ -98,16 +98,16 @@ def constant(text: str) -> Exact:
 
 
 def number(x: float, text: str = "") -> Node:
-    """A double as the number that was typed for it, in a formula; the decimal that prints it without a text."""
-    typed = _parsed(text, angle=True) if text else None
+    """A double in a formula: the number that was typed for it, or without a text the decimal that prints it."""
+    typed = _parse(text, angle=True) if text else None
     return typed.node if typed else node_of(float(x))
 
 
 def decimal(x: Any) -> Fraction:
-    """A number as the user wrote it: a double stands for the shortest decimal that prints it, 0.1 for 1/10.
+    """A number as the user wrote it: a double stands for the shortest decimal that prints it, so 0.1 is 1/10.
 
     Raises:
-        ValueError: for what is no number, and for one of more digits than `MOST_DIGITS`.
+        ValueError: if it is not a number, or has more than 400 digits.
 
     Example:
         >>> tmsopt.models.decimal(0.1)
@@ -117,7 +117,7 @@ def decimal(x: Any) -> Fraction:
     """
     if isinstance(x, str):
         power = _POWER_OF_TEN.search(x[:MOST_DIGITS])
-        if len(x) > MOST_DIGITS or (power and abs(int(power[1])) > MOST_DIGITS):  # before it becomes a number
+        if len(x) > MOST_DIGITS or (power and abs(int(power[1])) > MOST_DIGITS):  # before a slow conversion
             raise ValueError("too many digits")
     found = Fraction(repr(float(x))) if isinstance(x, float) else Fraction(x)
     if _is_long(found):
@@ -126,7 +126,7 @@ def decimal(x: Any) -> Fraction:
 
 
 def _double(x: Fraction) -> float:
-    """The nearest double; infinite beyond them."""
+    """The nearest double, or infinity."""
     try:
         return float(x)
     except OverflowError:
@@ -138,13 +138,13 @@ def _is_long(x: Any) -> bool:
 
 
 @dataclass(frozen=True)
-class Written:
+class ExactDesign:
     """A design in exact numbers.
 
     Attributes:
-        values: every parameter but those in `tangents`.
-        tangents: angle → its tangent, where that is the number that is exact.
-        stated: those that were given exactly, as parameter or ``tan(parameter)``.
+        values: every parameter except those in `tangents`.
+        tangents: angle → its tangent, where the tangent was given exactly.
+        stated: names given exactly, a parameter or ``tan(parameter)``.
     """
 
     values: Table[Exact]
@@ -156,63 +156,65 @@ class Written:
         balls = {name: number.ball() for name, number in self.values.items()}
         return balls | {name: number.ball().atan() for name, number in self.tangents.items()}
 
-    def fractions(self, of: ParameterSet) -> dict[str, Any] | None:
-        """Parameter → fraction, an angle as a `Tilt`; None where a number or a tangent is not a fraction."""
+    def fractions(self, parameter_set: ParameterSet) -> dict[str, Any] | None:
+        """Parameter → fraction, an angle as a `Tilt`; None if a number or a tangent is not a fraction."""
         found: dict[str, Any] = {}
-        for name in of.names:
+        for name in parameter_set.names:
             number = self.tangents.get(name, self.values.get(name))
             if number is None or number.fraction is None:
                 return None
             value = rational(number.fraction)
-            if of[name].tangent and name not in self.tangents and value != 0:
+            if parameter_set[name].tangent and name not in self.tangents and value != 0:
                 return None
-            found[name] = Tilt(value) if of[name].tangent else value
+            found[name] = Tilt(value) if parameter_set[name].tangent else value
         return found
 
-    def coefficients(self, model: Model, of: ParameterSet) -> list[Any] | None:
-        """Coefficients as fractions, where these numbers make them so."""
-        numbers = self.fractions(of)
-        found = [] if numbers is None else model.coefficients(numbers, of)
+    def coefficients(self, model: Model, parameter_set: ParameterSet) -> list[Any] | None:
+        """The coefficients as fractions; None if some are irrational."""
+        numbers = self.fractions(parameter_set)
+        found = [] if numbers is None else model.coefficients(numbers, parameter_set)
         return found if found and all(isinstance(c, flint.fmpq) for c in found) else None
 
-    def matrices(self, model: Model, of: ParameterSet) -> list[list[list[Any]]] | None:
-        """The model's matrices as fractions, where these numbers make them so."""
-        numbers = self.fractions(of)
+    def matrices(self, model: Model, parameter_set: ParameterSet) -> list[list[list[Any]]] | None:
+        """The matrices of the model as fractions; None if it has none, or some entries are irrational."""
+        numbers = self.fractions(parameter_set)
         if numbers is None or model.pencil is None:
             return None
         try:
-            return [[[rational(x) for x in row] for row in P] for P in model.pencil(of.native(numbers))]
-        except (TypeError, ValueError, AttributeError):  # an angle, of which the matrices take more than the tangent
+            return [[[rational(x) for x in row] for row in P] for P in model.pencil(parameter_set.native(numbers))]
+        except (TypeError, ValueError, AttributeError):  # matrices with more of an angle than its tangent
             return None
 
     def text(self, name: str) -> tuple[str, str]:
-        """A number as it is taken: its name, which may be ``tan(name)``, and the fraction."""
+        """The name of an exact number, which may be ``tan(name)``, and its text."""
         if name in self.tangents:
             return f"tan({name})", str(self.tangents[name])
         return name, str(self.values[name])
 
 
-def written(
-    of: ParameterSet,
+def as_exact_design(
+    parameter_set: ParameterSet,
     parameters: Mapping[str, float],
     stated: Mapping[str, Any] | None = None,
     typed: Mapping[str, str] = MappingProxyType({}),
-) -> Written:
-    """A design's doubles as decimals, save those for which an exact number is given.
+) -> ExactDesign:
+    """The exact design of doubles: each is the decimal that prints it, unless an exact number is given.
 
     Args:
         stated: parameter, or ``tan(parameter)`` of an angle → int, Fraction, fmpq, a float that stands for its decimal,
             or text such as ``"-2/5"``, ``"1.02"``, ``"sqrt(2)/2"``, and for an angle ``"20 deg"``.
-        typed: parameter → such a text of the problem itself, as `Problem.typed` has it.
+        typed: parameter → such a text from the problem, as in `Problem.typed`.
 
     Raises:
-        InputError: for an unknown name, another kind of number, or one that is not the design's.
+        InputError: if a name is unknown, a value is not exact, or it differs from the double of the design.
     """
     if wrong := table_faults("exact", {} if stated is None else stated, "{'zeta_B': '-1/3'}"):
         raise InputError(wrong)
-    names = {n: n for n in of.names} | {f"tan({p.name})": p.name for p in of.parameters if p.tangent}
-    values = {n: Exact.of(decimal(float(parameters[n]))) for n in of.names}
-    values |= {n: number for n, text in typed.items() if (number := _parsed(text, angle=of[n].unit == "rad"))}
+    names = {n: n for n in parameter_set.names} | {
+        f"tan({p.name})": p.name for p in parameter_set.parameters if p.tangent
+    }
+    values = {n: Exact.from_fraction(decimal(float(parameters[n]))) for n in parameter_set.names}
+    values |= {n: number for n, text in typed.items() if (number := _parse(text, angle=parameter_set[n].unit == "rad"))}
     tangents: dict[str, Exact] = {}
     faults = []
     for key, given in (stated or {}).items():
@@ -220,10 +222,10 @@ def written(
             faults.append(Fault(f"unknown parameter '{key}'; {suggest(key, names)}", ("exact", key)))
             continue
         name = names[key]
-        angle, table = (of[name].unit == "rad", values) if key == name else (False, tangents)
-        number = _parsed(given, angle)
+        angle, table = (parameter_set[name].unit == "rad", values) if key == name else (False, tangents)
+        number = _parse(given, angle)
         if number is None:
-            faults.append(Fault(_accepted(given, angle), ("exact", key)))
+            faults.append(Fault(_not_exact(given, angle), ("exact", key)))
             continue
         stored = float(parameters[name]) if key == name else math.tan(parameters[name])
         if not math.isclose(float(number.ball()), stored, rel_tol=SAME, abs_tol=1e-300):
@@ -232,26 +234,26 @@ def written(
         table[name] = number
     if faults:
         raise InputError(faults)
-    left = Table({n: v for n, v in values.items() if n not in tangents})
-    return Written(left, Table(tangents), tuple(stated or ()))
+    others = Table({n: v for n, v in values.items() if n not in tangents})
+    return ExactDesign(others, Table(tangents), tuple(stated or ()))
 
 
-def _parsed(given: Any, angle: bool) -> Exact | None:
+def _parse(given: Any, angle: bool) -> Exact | None:
     if isinstance(given, bool):
         return None
     try:
         if isinstance(given, str):
             degrees = _DEGREES.fullmatch(given.strip()) if angle else None
-            return constant(degrees[1]).in_degrees() if degrees else constant(given)
+            return constant(degrees[1]).to_radians() if degrees else constant(given)
         if isinstance(given, flint.fmpq | flint.fmpz):
             fraction = rational(given) if isinstance(given, flint.fmpq) else flint.fmpq(given)
             given = Fraction(int(fraction.p), int(fraction.q))
-        return Exact.of(decimal(given))
+        return Exact.from_fraction(decimal(given))
     except (ValueError, TypeError, OverflowError):
         return None
 
 
-def _accepted(given: Any, angle: bool) -> str:
+def _not_exact(given: Any, angle: bool) -> str:
     angles = ", or an angle such as '20 deg'" if angle else ""
     accepted = (
         f"an int, a Fraction, a constant in quotes such as '-2/5' or 'sqrt(2)'{angles}, of up to {MOST_DIGITS} digits"

@@ -1,4 +1,4 @@
-"""Expressions of a problem file: parsed to a small checked tree, never run as Python."""
+"""Parser of the expressions in problem files; it never runs them as Python."""
 
 import ast
 import keyword
@@ -19,7 +19,7 @@ from tmsopt.algebra import kinds
 from tmsopt.algebra.formula import CONSTANT, PI, Formula, Kind, Node, constant, fold, formula, make_node, symbol
 from tmsopt.errors import short, suggest
 from tmsopt.models.advice import advice, call_advice
-from tmsopt.models.names import CONSTANTS, FUNCTIONS, OUTSIDE
+from tmsopt.models.names import CONSTANTS, FUNCTIONS, UNSUPPORTED
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
@@ -27,20 +27,20 @@ _BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.
 _STRICT = {ast.Lt: "<=", ast.Gt: ">="}
 
 _ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
-"""What left minus right may be: ends are 0 or none, which everybody relies on."""
+"""Accepted range of left minus right; callers rely on bounds that are 0 or infinite."""
 
 SIGN = re.compile("|".join(COMPARISONS.values()))
-"""A sign of comparison in a text."""
+"""Matches a comparison sign."""
 
-_LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
-_DEEPEST = 200
-_LEGIBLE = 60  # characters of a part at fault
+_LONGEST = 2000  # most characters; a longer text could exhaust the parser's stack
+_DEEPEST = 200  # most nested levels
+_LEGIBLE = 60  # most characters of a quoted part in a message
 _LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
 _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
 
 
 class ExpressionError(ValueError):
-    """An expression that cannot be used, with the reason.
+    """An expression cannot be used; the message says why.
 
     Example:
         >>> try:
@@ -54,10 +54,10 @@ class ExpressionError(ValueError):
 
 
 class UnknownName(ExpressionError):
-    """An expression with a name that is not accepted."""
+    """An expression uses a name that is not accepted."""
 
     def __init__(self, text: str, name: str, accepted: Iterable[str]) -> None:
-        self.found, self.name = f"{_quoted(text)} uses the unknown name '{name}'", name
+        self.found, self.name = f"{_quote(text)} uses the unknown name '{name}'", name
         super().__init__(f"{self.found}; {suggest(name, accepted)}")
 
 
@@ -66,8 +66,8 @@ class Expression:
     """A parsed expression.
 
     Attributes:
-        text: as written.
-        names: parameters and quantities that it uses, in order of appearance.
+        text: the text as written.
+        names: parameters and quantities in it, in order of appearance.
         comparison: ``<=``, ``>=`` or ``==`` for a constraint, empty for a plain value.
 
     Example:
@@ -83,31 +83,30 @@ class Expression:
     formula: Formula = field(default=Formula((), (), ()), repr=False, compare=False)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
-        """Value for numbers of any kind; of a comparison, left minus right.
+        """The value for numbers of any kind; for a comparison, left minus right.
 
-        A number in the text is the fraction that its digits say, and pi the number π. A ball is nan where the value
-        does not exist, or may not.
+        Numbers in the text are exact fractions, and pi is π. A ball is nan where the value may not exist.
         """
         left, *right = self.sides(values)
         return left - right[0] if right else left
 
     def sides(self, values: Mapping[str, Any]) -> tuple[Any, ...]:
-        """Both sides of a comparison; of a value, itself."""
+        """Both sides of a comparison, or the one value."""
         return tuple(float(x) if isinstance(x, np.float64) else x for x in kinds.values(self.formula, values))
 
     def difference(self, values: Mapping[str, Any], limit: Any) -> Any:
-        """Left minus right, with `limit` in place of the number on one side."""
+        """Left minus right, with `limit` in place of the constant side."""
         numbers = [self.formula.steps[k].op == CONSTANT for k in self.formula.outputs]
         left, right = (limit if is_number else x for x, is_number in zip(self.sides(values), numbers, strict=True))
         return left - right
 
     def of(self, values: Mapping[str, Any], kind: Kind) -> Any:
-        """Value in numbers of one kind; likewise."""
+        """The value, or left minus right, in numbers of one kind."""
         left, *right = fold(self.formula, values, kind)
         return kind.operations["sub"](left, right[0]) if right else left
 
     def violation(self, values: Mapping[str, Any]) -> float:
-        """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
+        """Violation of a comparison at a numeric design, relative to the size of its sides; nan if undefined."""
         left, right = self.sides(values)
         difference = left - right
         excess = float(self.excess(difference))
@@ -115,33 +114,33 @@ class Expression:
 
     @property
     def equality(self) -> bool:
-        """Whether a comparison allows one value alone, so that it takes away a degree of freedom."""
+        """True if the comparison is an equality, which removes a degree of freedom."""
         return self.comparison == "=="
 
     @property
     def allowed(self) -> tuple[float, float]:
-        """Least and greatest left minus right that a comparison allows."""
+        """Least and greatest left minus right that the comparison allows."""
         return _ALLOWED[self.comparison]
 
     @property
     def sign(self) -> float:
-        """−1 where left minus right is better the greater it is; else 1, for values and equalities too."""
+        """−1 for ``>=``, where a greater left minus right is better; else 1."""
         return -1.0 if self.comparison == ">=" else 1.0
 
     def excess(self, difference: Any) -> Any:
-        """By how much left minus right, a number or an array of them, is beyond what a comparison allows."""
+        """Distance of left minus right, a number or an array, from the allowed range."""
         return np.abs(difference) if self.equality else np.maximum(self.sign * difference, 0)
 
     def holds(self, difference: Any) -> Any:
-        """Whether a comparison allows left minus right; not where that does not exist."""
+        """True if the comparison allows left minus right; False for nan."""
         return self.excess(difference) <= 0
 
 
 def parse_value(text: str, accepted: Iterable[str] | None, example: str = "abscissa") -> Expression:
-    """Parse an expression for a value, such as an objective; in names of the author's own where none are `accepted`.
+    """Parse an expression for a value, such as an objective; any name is accepted if `accepted` is None.
 
     Raises:
-        ExpressionError: with what was found and what is accepted.
+        ExpressionError: naming the part found and what is accepted.
 
     Example:
         >>> tmsopt.models.parse_value("x_H - x_B", None).names
@@ -150,15 +149,15 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     More: docs/reference/problem_file.md
     """
     if isinstance(_parse(_text(text)), ast.Compare):
-        raise ExpressionError(f"{_quoted(text)} is a comparison; accepted: a value, such as '{example}'")
-    return _in_names(_value(text), accepted)
+        raise ExpressionError(f"{_quote(text)} is a comparison; accepted: a value, such as '{example}'")
+    return _check_names(_value(text), accepted)
 
 
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
-    """Parse a constraint, two values joined by one of ``<= >= ==``.
+    """Parse a constraint: two values joined by one of ``<= >= ==``.
 
     Raises:
-        ExpressionError: with what was found and what is accepted.
+        ExpressionError: naming the part found and what is accepted.
 
     Example:
         >>> tmsopt.models.parse_comparison("mu <= 2", ["mu"])({"mu": 6.0})  # left minus right
@@ -166,11 +165,11 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
 
     More: docs/reference/problem_file.md
     """
-    return _in_names(_comparison(_text(text)), accepted)
+    return _check_names(_comparison(_text(text)), accepted)
 
 
-def _in_names(found: Expression, accepted: Iterable[str] | None) -> Expression:
-    """An expression, which is parsed once for all lists of names, where all that it uses are accepted."""
+def _check_names(found: Expression, accepted: Iterable[str] | None) -> Expression:
+    """The expression, if all its names are accepted; the cached parser does not check them."""
     known = found.names if accepted is None else tuple(accepted)
     for name in found.names:
         if name not in known:
@@ -180,7 +179,7 @@ def _in_names(found: Expression, accepted: Iterable[str] | None) -> Expression:
 
 @lru_cache(maxsize=4096)
 def _value(text: str) -> Expression:
-    names, value = _read(_parse(text), text)
+    names, value = _parse_tree(_parse(text), text)
     return Expression(text, names, formula=formula([value], names))
 
 
@@ -188,31 +187,31 @@ def _value(text: str) -> Expression:
 def _comparison(text: str) -> Expression:
     body = _parse(text)
     if not isinstance(body, ast.Compare):
-        raise ExpressionError(f"{_quoted(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
+        raise ExpressionError(f"{_quote(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
         texts = pairwise(_source(side, text) for side in (body.left, *body.comparators))
         signs = ({**COMPARISONS, **_STRICT}.get(type(op), "==") for op in body.ops)
         each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(texts, signs, strict=True))
-        raise ExpressionError(f"{_quoted(text)} joins several comparisons; write one constraint for each, {each}")
+        raise ExpressionError(f"{_quote(text)} joins several comparisons; write one constraint for each, {each}")
     sign = COMPARISONS.get(type(body.ops[0]))
     if sign is None:
-        raise ExpressionError(f"{_quoted(text)} compares with another sign than <=, >= or =={_advice(text)}")
-    sides = [_read(side, text) for side in (body.left, *body.comparators)]
+        raise ExpressionError(f"{_quote(text)} compares with a sign other than <=, >= and =={_advice(text)}")
+    sides = [_parse_tree(side, text) for side in (body.left, *body.comparators)]
     names = tuple(dict.fromkeys(name for found, _ in sides for name in found))
     if not names:
-        raise ExpressionError(f"{_quoted(text)} uses no parameter or quantity, so nothing can satisfy or violate it")
+        raise ExpressionError(f"{_quote(text)} uses no parameter or quantity, so nothing can satisfy or violate it")
     return Expression(text, names, sign, formula([side for _, side in sides], names))
 
 
 def written_sides(text: str) -> tuple[str, str, str]:
-    """Left side, sign and right side of a comparison, as written.
+    """The texts of the left side, sign and right side of a comparison.
 
     Raises:
-        ExpressionError: for anything else.
+        ExpressionError: if the text is not one comparison.
     """
     body = _parse(text)
     if not isinstance(body, ast.Compare) or len(body.ops) > 1 or type(body.ops[0]) not in COMPARISONS:
-        raise ExpressionError(f"{_quoted(text)} is not a comparison by <=, >= or ==")
+        raise ExpressionError(f"{_quote(text)} is not a comparison by <=, >= or ==")
     return _source(body.left, text), COMPARISONS[type(body.ops[0])], _source(body.comparators[0], text)
 
 
@@ -223,7 +222,7 @@ def _text(given: object) -> str:
 
 
 _ONE_AT_A_TIME = threading.Lock()
-"""Neither ast.parse (python/cpython#106905) nor warnings.catch_warnings may run in two threads at once."""
+"""ast.parse (python/cpython#106905) and warnings.catch_warnings may not run in two threads at once."""
 
 
 @lru_cache(maxsize=4096)
@@ -231,141 +230,140 @@ def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
     if strange := _NOT_ACCEPTED.search(text.strip()):
-        found = f"{_quoted(text)} contains {strange[0]!r}{_advice(text)}"
+        found = f"{_quote(text)} contains {strange[0]!r}{_advice(text)}"
         raise ExpressionError(f"{found}; accepted: one line of {_LANGUAGE}")
     try:
         return _tree(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
-        kept = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
-        own = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else ""
-        own += f" (the tilt of a bicycle is lambda_s; of the eigenvalue: {OUTSIDE})" if kept == "lambda" else ""
-        found = f"does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}"
-        raise ExpressionError(f"{_quoted(text)} {found}") from None
+        reserved = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
+        hint = f"; '{reserved}' is a reserved word, write e.g. {reserved}_" if reserved else ""
+        if reserved == "lambda":
+            hint += f" (the tilt of a bicycle is lambda_s; if you mean the eigenvalue: {UNSUPPORTED})"
+        found = f"does not parse{column}{hint}{_advice(text)}; accepted: {_LANGUAGE}"
+        raise ExpressionError(f"{_quote(text)} {found}") from None
 
 
 def _tree(text: str) -> ast.expr:
     with _ONE_AT_A_TIME, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
+        warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which then fail
         return ast.parse(text.strip(), mode="eval").body
 
 
 def _advice(text: str) -> str:
-    """What to write instead."""
+    """The end of a message: what to write instead."""
 
-    def reads(mended: str) -> bool:
+    def parses(mended: str) -> bool:
         try:
             return not isinstance(_tree(mended), ast.Tuple)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             return False
 
-    return advice(text, reads)
+    return advice(text, parses)
 
 
 class _Part(NamedTuple):
-    """A part of a text: its number, and how large that may become."""
+    """A parsed part of a text and its degree."""
 
     node: Node
     degree: Degree
 
 
-def _joined(op: str, *parts: _Part) -> _Part:
+def _combine(op: str, *parts: _Part) -> _Part:
     return _Part(make_node(op, *(p.node for p in parts)), DEGREES.operations[op](*(p.degree for p in parts)))
 
 
-def _read(body: ast.expr, text: str) -> tuple[tuple[str, ...], Node]:
-    """Names that a value uses, and its formula; raises where it is no accepted arithmetic, or too large to compute."""
+def _parse_tree(body: ast.expr, text: str) -> tuple[tuple[str, ...], Node]:
+    """The names in a value, and its node; raises if it is not accepted arithmetic or its degree is too high."""
     parser = _Parser(text)
     try:
-        node = parser.read(body).node
+        node = parser.parse(body).node
         return tuple(parser.names), node
     except DegreeTooHigh as error:
         part = _source(error.part, text)
-        whole = "" if part == text.strip() else f"{_quoted(text)}: "
-        raise ExpressionError(f"{whole}{_quoted(part)} {error}") from None
+        prefix = "" if part == text.strip() else f"{_quote(text)}: "
+        raise ExpressionError(f"{prefix}{_quote(part)} {error}") from None
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return f"'{text}'" if len(text) <= _LEGIBLE else f"'{text[: _LEGIBLE - 1]}…'"
 
 
 class _Parser:
-    """Turns a parsed text into nodes, each name an input; discarded after one text."""
+    """Turns the syntax tree of one text into nodes, with an input for each name."""
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.names: dict[str, Node] = {}
 
-    def read(self, node: ast.expr, depth: int = 0) -> _Part:  # noqa: PLR0911, PLR0912 - one case per kind
-        """The formula of a part; raises on all but accepted arithmetic."""
+    def parse(self, node: ast.expr, depth: int = 0) -> _Part:  # noqa: PLR0911, PLR0912 - one case per kind
+        """The node of a part; raises unless it is accepted arithmetic."""
         text = self.text
         if depth > _DEEPEST:
             raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
 
         match node:
             case ast.Constant(value=bool()):
-                raise ExpressionError(f"{_quoted(text)} uses {node.value!r}; accepted: numbers and names")
+                raise ExpressionError(f"{_quote(text)} uses {node.value!r}; accepted: numbers and names")
             case ast.Constant(value=int() | float() as value):
-                digits = _checked_number(node, text)
+                digits = _read_number(node, text)
                 return _Part(constant(digits), DEGREES.constant(float(value)))
             case ast.Name(id=name) if name in CONSTANTS:
                 return _Part(PI, DEGREES.constant(math.pi))
             case ast.Name(id=name):
                 if name in FUNCTIONS:
                     raise ExpressionError(
-                        f"{_quoted(text)} names the function {name} without argument; write {name}(…)"
+                        f"{_quote(text)} names the function {name} without an argument; write {name}(…)"
                     )
                 return _Part(self.names.setdefault(name, symbol(name)), Degree())
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-                return self.read(operand, depth + 1)
+                return self.parse(operand, depth + 1)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return self.applied("neg", node, [operand], depth)
+                return self.apply("neg", node, [operand], depth)
             case ast.BinOp(left=left, op=op, right=right):
                 if type(op) not in _BINARY:
-                    raise ExpressionError(f"{_quoted(text)} uses an operator other than + - * / **{_advice(text)}")
-                return self.applied(_BINARY[type(op)], node, [left, right], depth)
+                    raise ExpressionError(f"{_quote(text)} uses an operator other than + - * / **{_advice(text)}")
+                return self.apply(_BINARY[type(op)], node, [left, right], depth)
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
                 fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
                 if not fewest <= len(args) <= most:
                     wanted = f"{fewest} to {most} arguments, {name}(a, b)" if most > 1 else "one argument"
-                    wanted += f"; of one number write {_source(args[0], text)} alone" if 0 < len(args) < fewest else ""
-                    raise ExpressionError(
-                        f"{_quoted(text)} calls {name} with {len(args)} arguments; accepted: {wanted}"
-                    )
-                return self.applied(name, node, args, depth)
+                    wanted += f"; for one number write {_source(args[0], text)} alone" if 0 < len(args) < fewest else ""
+                    raise ExpressionError(f"{_quote(text)} calls {name} with {len(args)} arguments; accepted: {wanted}")
+                return self.apply(name, node, args, depth)
             case ast.Call():
                 advised = call_advice(called := _source(node.func, text), [_source(a, text) for a in node.args])
-                raise ExpressionError(f"{_quoted(text)} calls '{called}'{advised}; accepted: {' '.join(FUNCTIONS)}")
+                raise ExpressionError(f"{_quote(text)} calls '{called}'{advised}; accepted: {' '.join(FUNCTIONS)}")
             case ast.Attribute():
                 raise ExpressionError(
-                    f"{_quoted(text)} uses the attribute '{_source(node, text)}'; accepted: plain names"
+                    f"{_quote(text)} uses the attribute '{_source(node, text)}'; accepted: plain names"
                 )
             case _:
                 found = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
-                raise ExpressionError(f"{_quoted(text)} {found}")
+                raise ExpressionError(f"{_quote(text)} {found}")
 
-    def applied(self, op: str, whole: ast.expr, operands: Sequence[ast.expr], depth: int) -> _Part:
-        """An operation on parts, of more than two one after the other."""
-        parts = [self.read(operand, depth + 1) for operand in operands]
+    def apply(self, op: str, whole: ast.expr, operands: Sequence[ast.expr], depth: int) -> _Part:
+        """An operation on parts; more than two are combined one after the other."""
+        parts = [self.parse(operand, depth + 1) for operand in operands]
         try:
-            return reduce(partial(_joined, op), parts) if len(parts) > 1 else _joined(op, *parts)
+            return reduce(partial(_combine, op), parts) if len(parts) > 1 else _combine(op, *parts)
         except DegreeTooHigh as error:
             error.part = error.part or whole
             raise
 
 
 def _source(node: ast.expr, text: str) -> str:
-    """The part of an expression that a node was parsed from."""
+    """The text from which a node was parsed."""
     return ast.get_source_segment(text.strip(), node) or text
 
 
-def _checked_number(node: ast.Constant, text: str) -> Fraction:
-    """The number that digits say; a nought may have any exponent, and 10 to that power is not to be computed."""
+def _read_number(node: ast.Constant, text: str) -> Fraction:
+    """The exact number of a literal. Zero may have any exponent, so 10 to that power is not computed."""
     value, source = node.value, _source(node, text)
     try:
         number = float(value)  # type: ignore[arg-type]
     except OverflowError:
         number = math.inf
     if not math.isfinite(number) or (number == 0 and re.match(r"[0._]*[1-9]", source)):
-        raise ExpressionError(f"{_quoted(text)} contains {source[:_LEGIBLE]}, a number beyond double precision")
+        raise ExpressionError(f"{_quote(text)} contains {source[:_LEGIBLE]}, a number beyond double precision")
     return Fraction(value) if isinstance(value, int) else Fraction(source.replace("_", "")) if number else Fraction(0)

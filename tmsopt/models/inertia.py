@@ -1,4 +1,4 @@
-"""How much rotational inertia two masses on skates bear, by the equations of Whipple's bicycle that contain them."""
+"""The rotational inertia at which a two-mass-skate bicycle loses stability, from the equations of Whipple's bicycle."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,21 +15,22 @@ from tmsopt.roots.exact import isolated_roots
 INERTIAS = {"I_Bxx": "m_B", "I_Bzz": "m_B", "I_Hxx": "m_H", "I_Hzz": "m_H"}
 """Moment of inertia about the centre of mass of its body → mass of that body."""
 
-_BITS = 400  # of tan λ_s and its secant, the only numbers that no fraction is
+_BITS = 400  # precision of tan λ_s and its secant, the only irrational numbers here
 
 
 def inertia_margin(parameters: Mapping[str, float]) -> Table[float | None] | None:
-    """The least value of each moment of inertia, the others 0, at which a design is no longer stable; in kg m².
+    """The least value in kg m² of each moment of inertia, the others 0, at which a design is no longer stable.
 
-    Without wheels, trail and inertia, Whipple's equations are those of two masses on skates. Their coefficients are
-    polynomials in one moment of inertia, and stability is lost at the least positive root of a0 aₙ Δₙ₋₁, with Δ the
-    Hurwitz determinants: a root at infinity, a root 0, or a pair on the imaginary axis. Of the stored doubles, exactly.
+    Whipple's equations without wheels, trail and inertia are those of two masses on skates. Their coefficients are
+    polynomials in one moment of inertia. Stability is lost at the least positive root of a0 aₙ Δₙ₋₁, with Δ the Hurwitz
+    determinants: a root at infinity, a root 0, or a pair on the imaginary axis. The computation is exact for the stored
+    doubles.
 
     Args:
-        parameters: of two masses on skates, in SI; gains of a controller may be among them.
+        parameters: of two masses on skates, in SI, gains of a controller included.
 
     Returns:
-        None for a moment of inertia of which any amount is borne; None for a design that is not stable without.
+        A table with None for a moment of inertia that never ends stability; None if the design itself is not stable.
 
     Example:
         >>> own = dict(w=1, v=6.9, g=9.81, lambda_s=0.4, m_B=10, x_B=1.4, z_B=-0.4, m_H=1, x_H=1, z_H=-0.2)
@@ -39,10 +40,10 @@ def inertia_margin(parameters: Mapping[str, float]) -> Table[float | None] | Non
     More: docs/how_to/inertia.md
     """
     model = controlled(whipple, parameters)
-    of = model.sets[0]
+    si = model.sets[0]
     with flint.ctx.workprec(_BITS):
-        given = {p.name: flint.arb(float(parameters.get(p.name, p.default or 0.0))) for p in of.parameters}
-        points = {name: rational(x) for name, x in model.algebraic(of.native(given)).items()}
+        given = {p.name: flint.arb(float(parameters.get(p.name, p.default or 0.0))) for p in si.parameters}
+        points = {name: rational(x) for name, x in model.algebraic(si.native(given)).items()}
         coefficients = model.polynomial(**points)
         sign = 1 if coefficients[0] > 0 else -1
         if not all(x > 0 for x in [sign * coefficients[0], *lienard_chipart([sign * c for c in coefficients])]):
@@ -52,7 +53,7 @@ def inertia_margin(parameters: Mapping[str, float]) -> Table[float | None] | Non
 
 
 def _least_root(coefficients: Sequence[Any]) -> float | None:
-    """The least positive root of a0 aₙ Δₙ₋₁, coefficients being polynomials in one unknown or numbers."""
+    """The least positive root of a0 aₙ Δₙ₋₁, with coefficients that are numbers or polynomials in one unknown."""
     *_, minor, _ = hurwitz_minors(coefficients)
     found = []
     for boundary in (coefficients[0], coefficients[-1], minor):

@@ -1,4 +1,4 @@
-"""A model as data: named parameters, derived quantities, and a characteristic polynomial in them."""
+"""Models as data: parameters, derived quantities and a characteristic polynomial."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,31 +17,31 @@ from tmsopt.algebra.formula import Formula, fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS, kind_of
 from tmsopt.records import Table
 
-_BITS = 106  # the parameters' own roundings are all that widens a ball
+_BITS = 106  # precision of balls, whose radii then come from the roundings of the parameters alone
 _EPSILON = 2.0**-53
-_NOTHING = 1e-9  # of a range
-_PAGE = 3000  # characters of a formula in LaTeX
+_NEGLIGIBLE = 1e-9  # of a range: a smaller parameter counts as 0
+_PAGE = 3000  # most characters of a formula in LaTeX
 
-Computed = Callable[[Mapping[str, Any]], Any]
-"""A number of named ones, by ``+ - * /`` and the operations of `tmsopt.algebra.kinds`: stated once, and traced."""
+NumberFunction = Callable[[Mapping[str, Any]], Any]
+"""Function of named numbers that uses ``+ - * /`` and the operations of `tmsopt.algebra.kinds`, so it can be traced."""
 
 Matrix = list[list[Any]]
-"""Rows of any numbers."""
+"""Rows of numbers of any kind."""
 
 ROOTS = ("abscissa", "damping_ratio", "angular_frequency")
-"""What quantities may say of the roots."""
+"""Quantities of the roots that formulas may use."""
 
 
 @dataclass(frozen=True)
 class Feedback:
-    """Torques that a controller adds to M q″ + D q′ + K q, q = (lean, steer), in the model's own units.
+    """Torques of a controller on M q″ + D q′ + K q, q = (lean, steer), in native units.
 
     Attributes:
         mass: M.
         gains: G of the torques −G (φ, δ, φ̇, δ̇), rows for lean and steer.
-        lag: time constant of the actuators; None for torques without delay. With it the states are those four and the
-            torque of each row that may be driven, lean before steer.
-        driven: those rows: 0 for lean, 1 for steer.
+        lag: time constant of the actuators; None for torques without delay. With a lag the torque of each row in
+            `driven` is a further state.
+        driven: rows with a torque: 0 for lean, 1 for steer.
     """
 
     mass: Matrix
@@ -52,7 +52,7 @@ class Feedback:
 
 @dataclass(frozen=True)
 class Range:
-    """An interval of physically possible values; an end that is not closed is excluded.
+    """An interval of physically possible values, which includes its ends if it is closed.
 
     Example:
         >>> positive = tmsopt.models.Range(0, closed=False)
@@ -91,15 +91,15 @@ class Parameter:
         meaning: one phrase.
         latex: symbol for figures.
         range: physically possible values.
-        default: value of a parameter that is left out, if it may be.
-        tangent: whether the coefficients are polynomial in the tangent, so that an optimiser moves that.
-        multiple_of: unit of the scale that a dimensionless parameter is a multiple of, e.g. ``m`` for wheelbases.
-        sides: names of the designs with a negative and a positive value, where these are searched separately.
-        counterpart: of one in SI, the dimensionless parameter that it gives, where that has another name.
+        default: value if the parameter is omitted; None if it is required.
+        tangent: whether the coefficients are polynomials in its tangent, which an optimiser then varies instead.
+        multiple_of: unit of the scale of a dimensionless parameter, e.g. ``m`` for multiples of the wheelbase.
+        sides: names of the designs with a negative and a positive value, if these are searched separately.
+        counterpart: the dimensionless parameter of one in SI, if its name differs.
 
     Example:
         >>> tilt = tmsopt.models.tms.sets[0]["lambda_s"]
-        >>> tilt.unit, tilt.tangent, 1.6 in tilt.range  # less than a right angle
+        >>> tilt.unit, tilt.tangent, 1.6 in tilt.range  # the range ends at a right angle
         ('rad', True, False)
 
     More: docs/reference/quantities.md
@@ -117,7 +117,7 @@ class Parameter:
     counterpart: str = ""
 
     def may_change(self, value: float) -> bool:
-        """Whether a builder may get it wrong: no constant of nature, nor something that a design does not have."""
+        """True if a builder may miss the value: not for constants of nature and parts that a design does not have."""
         return self.default is None or (self.default == 0 and value != 0)
 
 
@@ -126,15 +126,15 @@ class Quantity:
     """A number derived from the parameters.
 
     Attributes:
-        value: the quantity for given values (of parameters and other quantities); nan where it does not exist.
-        equation: an expression without division or radical, of the values and the quantity x itself, that is 0
-            exactly when x is the quantity, within `range`. An optimiser then carries x as a variable.
-        pieces: where the quantity is the greatest of several, each of these. An optimiser then carries a variable
-            above all of them, if more of the quantity is never an advantage.
-        counterpart: what a dimensionless one is in SI, derived from SI parameters.
-        aside: whether a report has it in a sentence, and not in its table.
-        share: whether it is a part of a whole, read in percent.
-        stands_for: the expression that a name is short for, in root quantities and parameters.
+        value: function of parameters and other quantities; nan where the quantity does not exist.
+        equation: function of the values and a number x, without division or radical, that is 0 exactly when x is the
+            quantity, within `range`. An optimiser then has x as a variable.
+        pieces: terms whose maximum is the quantity. An optimiser then has a variable above all of them, if more of the
+            quantity is never an advantage.
+        counterpart: the SI quantity of a dimensionless one.
+        aside: whether reports have it in a sentence instead of their table.
+        share: whether it is a fraction of a whole, shown in percent.
+        stands_for: the expression, in root quantities and parameters, that the name abbreviates.
 
     Example:
         >>> import math
@@ -149,10 +149,10 @@ class Quantity:
     unit: str
     meaning: str
     latex: str
-    value: Computed
+    value: NumberFunction
     equation: Callable[[Mapping[str, Any], Any], Any] | None = None
     range: Range = Range()
-    pieces: tuple[Computed, ...] = ()
+    pieces: tuple[NumberFunction, ...] = ()
     counterpart: "Quantity | None" = None
     aside: bool = False
     share: bool = False
@@ -160,23 +160,23 @@ class Quantity:
 
     @cached_property
     def formula(self) -> Formula:
-        """Its value."""
-        return formula([self.value(_ANY)])
+        """Formula of the value."""
+        return formula([self.value(_SYMBOLS)])
 
     @cached_property
     def left_side(self) -> Formula:
-        """Of its equation, in its own name beside others."""
+        """Formula of the equation, with the quantity as an input."""
         assert self.equation is not None
-        return formula([self.equation(_ANY, symbol(self.name))])
+        return formula([self.equation(_SYMBOLS, symbol(self.name))])
 
     @cached_property
     def each_piece(self) -> Formula:
-        """Of its pieces."""
-        return formula(piece(_ANY) for piece in self.pieces)
+        """Formula of the pieces."""
+        return formula(piece(_SYMBOLS) for piece in self.pieces)
 
 
-class _Any(Mapping[str, Any]):
-    """A number of every name, not known yet."""
+class _Symbols(Mapping[str, Any]):
+    """Maps every name to its symbol."""
 
     def __getitem__(self, name: str) -> Any:
         return symbol(name)
@@ -188,20 +188,20 @@ class _Any(Mapping[str, Any]):
         return 0
 
 
-_ANY = _Any()
+_SYMBOLS = _Symbols()
 
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """One of the ways to write down a design of a model.
+    """A set of parameters that describes a design of a model.
 
     Attributes:
-        native: the model's native parameters for given values of this set.
+        native: function from values of this set to the native parameters.
         quantities: derived quantities that only this set has.
-        rate: for values of this set, how many 1/s a rate of 1 is; None where the set has no unit of time.
-        root_unit: unit of the roots of the model's polynomial for values of this set.
-        torque: for values of this set, how many N m a torque of 1 is; None where the set has no unit of torque.
-        needs: parameter → one that must be above 0 where the first is not 0, and what is impossible otherwise.
+        rate: function from values of this set to a rate of 1 in 1/s; None if the set has no unit of time.
+        root_unit: unit of the roots of the polynomial.
+        torque: function from values of this set to a torque of 1 in N m; None if the set has no unit of torque.
+        needs: parameter → another that must be above 0 if the first is not 0, and the reason.
 
     Example:
         >>> tmsopt.models.tms.parameter_set("SI").names
@@ -214,14 +214,14 @@ class ParameterSet:
     parameters: tuple[Parameter, ...]
     native: Callable[[Mapping[str, Any]], dict[str, Any]]
     quantities: tuple[Quantity, ...] = ()
-    rate: Computed | None = None
+    rate: NumberFunction | None = None
     root_unit: str = "1"
-    torque: Computed | None = None
+    torque: NumberFunction | None = None
     needs: Mapping[str, tuple[str, str]] = field(default=Table(), hash=False)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters, in the order of the documentation."""
+        """Names of the parameters, in order."""
         return tuple(p.name for p in self.parameters)
 
     @cached_property
@@ -234,29 +234,29 @@ class ParameterSet:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A dissipative system by its characteristic polynomial; there is one of each in a process.
+    """A dissipative system with its characteristic polynomial. Each process has one object for each model.
 
     Attributes:
         sets: parameter sets; the first is the native one.
         algebraic: native parameters → the numbers in which the coefficients are polynomials.
         polynomial: algebraic parameters → coefficients, descending, by ``+ - *`` alone.
         quantities: derived quantities, besides the coefficients ``a0 …``.
-        compact: like `polynomial`, the coefficients divided by a positive number, in few products and quotients, each
-            shared by all that need it: interval arithmetic and relaxations are the tighter for it.
+        compact: like `polynomial`, but the coefficients divided by a positive number, with few operations and shared
+            terms: bounds by intervals and relaxations are tighter.
         pencil: native parameters → matrices of the matrix polynomial with these roots, in descending powers: M, D, K
             of M s² + D s + K, or I, −A.
-        feedback: native parameters → the torques of a controller, whose part in the pencil is there already.
-        natural: whether coefficients and roots are near 1 in the model's own units.
-        origin: a function and its arguments, plain data, that make this model again in another process.
-        statement: of a model that a user states, plain data that tell it from others.
-        numbers: texts of the numbers in the formulas of a stated model that are not whole.
-        words: what its users call a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
-        omits, conventions, sketch: what the model leaves out, signs, the system drawn with the symbols on it, in text.
-        absent: names that a user may look for in vain → what to write instead.
-        carrier: of a complex H, what is added to each eigenfrequency, lest a root of the polynomial, of twice
-            the degree, meets the conjugate of another; None of a real system.
-        carried: of a complex H, ranges of the native parameters → the model with a carrier for them.
-        double: of a complex H, the pencil without carrier, I and −A of (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
+        feedback: native parameters → the torques of a controller, which the pencil already includes.
+        natural: whether coefficients and roots are near 1 in native units.
+        origin: a function and its arguments, plain data, that make this model in another process.
+        statement: plain data that identify a model of the user's own.
+        numbers: texts of the numbers in a model of the user's own that are not whole.
+        words: names of the field for a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
+        omits, conventions, sketch: text on what the model leaves out and on its signs, and a drawing in characters.
+        absent: unknown names that a user may try → what to write instead.
+        carrier: number added to each eigenfrequency of a complex H, so that no root of the polynomial, which has twice
+            the degree, meets the conjugate of another; None for a real system.
+        carried: ranges of the native parameters of a complex H → the model with a carrier for them.
+        double: pencil of a complex H without carrier: I and −A of (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -293,17 +293,17 @@ class Model:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
-        """By its origin: in another process it is that process's own, no copy of this; but for a changed bicycle."""
+        """Pickle the origin, so that another process uses its own object; a changed bicycle is copied."""
         origin = self.origin
-        known = origin and (origin[0] is not resolve_name or resolve_name(*origin[1]) is self)
-        return origin if known else super().__reduce_ex__(protocol)
+        is_unchanged = origin and (origin[0] is not resolve_name or resolve_name(*origin[1]) is self)
+        return origin if is_unchanged else super().__reduce_ex__(protocol)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
-        """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""
+        """Coefficients a0 … aₙ, descending, for numbers of any kind: floats, arrays, CasADi, balls."""
         return self.computed(of or self.sets[0], parameters)[1]
 
     def computed(self, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
-        """Native parameters and coefficients for values of any kind."""
+        """Native parameters and coefficients for numbers of any kind."""
         kind, native = kind_of(*parameters.values()), self.sets[0].names
         with np.errstate(all="ignore"):
             found = fold(self.formulas[of.name], parameters, kind)
@@ -313,7 +313,7 @@ class Model:
 
     @cached_property
     def formulas(self) -> Mapping[str, Formula]:
-        """Native parameters and coefficients, by the name of the parameter set that they are formulas in."""
+        """Parameter set name → formula of the native parameters and coefficients."""
         found = {}
         for of in self.sets:
             native = of.native({n: symbol(n) for n in of.names})
@@ -322,11 +322,11 @@ class Model:
         return found
 
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
-        """The model for parameters within ranges: of a complex H with a carrier for these, any other itself."""
+        """The model for parameters within ranges: a complex H gets a carrier for them, other models stay the same."""
         return self if self.carried is None else self.carried(ranges)
 
     def _repr_latex_(self) -> str | None:
-        """The characteristic polynomial in the native parameters; None for one that fills pages."""
+        """The characteristic polynomial in the native parameters; None if it is too long."""
         from tmsopt.models.typeset import LATEX, Typeset, polynomial_text
 
         of = self.sets[0]
@@ -335,7 +335,7 @@ class Model:
         return f"$${text} = 0$$" if len(text) <= _PAGE else None
 
     def coefficient_names(self) -> tuple[str, ...]:
-        """``a0 … an``, or ``coefficient0 …`` where a parameter or quantity has one of these names."""
+        """``a0 … an``, or ``coefficient0 …`` if a parameter or quantity has one of these names."""
         return self._coefficient_names
 
     @cached_property
@@ -346,18 +346,18 @@ class Model:
         return plain if taken.isdisjoint(plain) else tuple(f"coefficient{k}" for k in range(self.degree + 1))
 
     def quantity_names(self, of: ParameterSet) -> tuple[str, ...]:
-        """Everything that an expression may use beside the parameters of a set and the root quantities."""
+        """Names that an expression may use besides the parameters of a set and the quantities of the roots."""
         native = () if of is self.sets[0] else self.sets[0].names
         derived = [q.name for q in (*self.quantities, *of.quantities)]
         return tuple([n for n in (*native, *self.coefficient_names(), *derived) if n not in of.names])
 
     def parameter_set(self, name: str) -> ParameterSet:
-        """The parameter set of that name."""
+        """The parameter set with a name."""
         return next(s for s in self.sets if s.name == name)
 
 
 def words_of(model: Model) -> Mapping[str, str]:
-    """``weave`` and ``capsize``, as data have them, → the words that the users of a model read.
+    """``weave`` and ``capsize``, the words in data → the words of a model's field.
 
     Example:
         >>> dict(tmsopt.models.words_of(tmsopt.models.from_coefficients([1, "c", "k"])))
@@ -369,7 +369,7 @@ def words_of(model: Model) -> Mapping[str, str]:
 
 
 def in_words_of(model: Model, text: str) -> str:
-    """A name such as ``infinity and weave`` in the words of a model.
+    """A name such as ``infinity and weave`` in the words of a model's field.
 
     Example:
         >>> tmsopt.models.in_words_of(tmsopt.models.from_coefficients([1, "c", "k"]), "infinity and weave")
@@ -381,13 +381,13 @@ def in_words_of(model: Model, text: str) -> str:
 
 
 class Values(Mapping[str, Any]):
-    """Parameters of a design and everything derived from them, computed when first asked for.
+    """Parameters of a design and its derived quantities, which are computed on first use.
 
     Args:
         parameters: a value for every parameter of the set `of`.
-        extra: quantities beside those of the model, e.g. of the roots.
-        lift: asked first for each quantity; returns a variable that stands for it, or None for its formula.
-        ranges: width of the range of each parameter that may move: what is far smaller stands for 0.
+        extra: quantities besides those of the model, e.g. of the roots.
+        lift: called first for each quantity; returns a variable in its place, or None to use its formula.
+        ranges: free parameter → width of its range; a value far smaller counts as 0.
 
     Example:
         >>> p = {"Fr": 1.0, "mu": 0.1, "chi_B": 1.2, "chi_H": 1.02, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.1}
@@ -428,24 +428,24 @@ class Values(Mapping[str, Any]):
         return self._found[name]
 
     def fold(self, formula: Formula, own: Mapping[str, Any] = MappingProxyType({})) -> list[Any]:
-        """The outputs of a formula in these values, and others of one's own; nan for what is not known of the roots."""
+        """Outputs of a formula in these values and those of `own`; unknown quantities of the roots are nan."""
         unknown = dict.fromkeys(ROOTS, np.nan)
         known = {n: own[n] if n in own else self[n] if n in self else unknown[n] for n in formula.inputs}
         with np.errstate(all="ignore"):
             return fold(formula, known, self.kind)
 
     def roundings(self) -> list[float]:
-        """How far each coefficient of a numeric design may be off as its parameters are rounded to doubles."""
+        """Error bound of each coefficient of a numeric design, from the rounding of its parameters to doubles."""
         (model, of, parameters), ranges = self.given, self._ranges
         sizes = {n: abs(float(x)) for n, x in parameters.items()}
-        sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NOTHING * width}
+        sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NEGLIGIBLE * width}
         with flint.ctx.workprec(_BITS):
             balls = {n: flint.arb(float(x), sizes[n] * _EPSILON) for n, x in parameters.items()}
             found = model.coefficients(balls, of)
         return [float(c.rad()) if c.is_finite() else np.inf for c in found]
 
     def with_known(self, known: Mapping[str, Any]) -> "Values":
-        """Values of the same design in which some quantities have given numbers in place of their formulas."""
+        """Values of the same design, with given numbers in place of some formulas."""
         other = copy(self)
         other._known, other._found = {**self._known, **known}, {}
         return other

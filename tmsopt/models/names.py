@@ -1,4 +1,4 @@
-"""Names and formulas of a stated model in words: which names it may use, what they look like in figures."""
+"""Names and formulas of a stated model: accepted names, their LaTeX, and formulas as text."""
 
 import keyword
 import re
@@ -12,30 +12,28 @@ from tmsopt.models.tables import read_table
 
 FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
 CONSTANTS = ("pi",)
-"""Names that mean the same in every expression."""
+"""Names with a fixed value in every expression."""
 
 TAKEN = ("abscissa", "damping_ratio", "angular_frequency", "radius", "structure", "objective", *CONSTANTS, *FUNCTIONS)
-"""Names that an expression of a problem uses for something else."""
+"""Names with a meaning of their own in expressions; no parameter may have one."""
 
 _WORDS = read_table("advice")
-OUTSIDE: str = _WORDS["outside"]
-MEANT = {name: meant.format(outside=OUTSIDE) for name, meant in _WORDS["names"].items()}
-"""Names that may stand for more than a parameter → what to do then."""
+UNSUPPORTED: str = _WORDS["outside"]
+AMBIGUOUS_NAMES = {name: meant.format(outside=UNSUPPORTED) for name, meant in _WORDS["names"].items()}
+"""Names that may be meant as more than a parameter → what to write then."""
 
-_EIGENVALUE = (
-    f"is the eigenvalue, on which no entry depends: its powers are coefficients, or go in M, D and K, and {OUTSIDE}"
-)
+_EIGENVALUE = f"is the eigenvalue, which no entry may use (its powers go in coefficients or M, D, K; {UNSUPPORTED})"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _GREEK = re.compile(
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega"
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
 )
-_LONG = 80  # characters; what is longer has a number, and is written once
+_LONG = 80  # characters; a longer part gets a number and is written once
 
 
-def unusable(name: Any, of_H: bool = False) -> str:
-    """Why no parameter or quantity may have a name; empty where one may, as s in a complex H, which has ω."""
+def name_fault(name: Any, of_H: bool = False) -> str:
+    """Why no parameter or quantity may have a name; empty if it may. With a complex H, which has ω, s is free."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         return "is no name: a letter, then letters, digits and _"
     if keyword.iskeyword(name):
@@ -46,7 +44,7 @@ def unusable(name: Any, of_H: bool = False) -> str:
 
 
 def latex(name: str) -> str:
-    """A name as a symbol: ``mu_1`` and ``mu1`` as μ with an index, ``k_max`` with an upright one.
+    """A name as LaTeX: ``mu_1`` and ``mu1`` as μ with an index, ``k_max`` with an upright index.
 
     Example:
         >>> tmsopt.models.latex("x2")
@@ -62,24 +60,24 @@ def latex(name: str) -> str:
 
 
 def _upright(word: str) -> str:
-    """A word, a letter or a number; only letters alone are slanted."""
+    """A word in upright letters; single letters and numbers unchanged."""
     return word if len(word) == 1 or word.isdigit() else rf"\mathrm{{{word}}}"
 
 
-def _called(name: str) -> Callable[..., str]:
+def _spell_call(name: str) -> Callable[..., str]:
     return lambda *operands: f"{name}({', '.join(operands)})"
 
 
 def number_text(x: Constant) -> str:
-    """A constant in full: a fraction as a decimal if it ends soon, such as 0.1; √2 as ``sqrt(2)``."""
+    """A constant with every digit: a fraction as a decimal if a double holds it, such as 0.1; √2 as ``sqrt(2)``."""
     if isinstance(x, Formula):
-        return fold(x, {}, Kind(_SPELLED, number_text))[0].removeprefix("(").removesuffix(")")  # type: ignore[no-any-return]
+        return fold(x, {}, Kind(_SPELLINGS, number_text))[0].removeprefix("(").removesuffix(")")  # type: ignore[no-any-return]
     double = repr(float(as_double(x))).removesuffix(".0")
     return double if isinstance(x, float) or Fraction(double) == x else str(x)
 
 
-_SPELLED: Mapping[str, Callable[..., str]] = {
-    **{name: _called(name) for name in FLOATS.operations},
+_SPELLINGS: Mapping[str, Callable[..., str]] = {
+    **{name: _spell_call(name) for name in FLOATS.operations},
     "add": lambda a, b: f"({a} + {b})",
     "sub": lambda a, b: f"({a} - {b})",
     "mul": lambda a, b: f"({a} * {b})",
@@ -91,10 +89,10 @@ _SPELLED: Mapping[str, Callable[..., str]] = {
 }
 
 
-def spelled(formula: Formula) -> tuple[list[str], list[str]]:
-    """The outputs of a formula as texts, every number a double in full, and the parts that they share.
+def spell_formula(formula: Formula) -> tuple[list[str], list[str]]:
+    """The outputs of a formula as texts, with every digit of its doubles, and the parts that they share.
 
-    Equal texts are equal formulas.
+    Equal texts mean equal formulas.
     """
     shared: list[str] = []
 
@@ -104,6 +102,6 @@ def spelled(formula: Formula) -> tuple[list[str], list[str]]:
         shared.append(text)
         return f"[{len(shared)}]"
 
-    operations = {name: lambda *o, spell=spell: part(spell(*o)) for name, spell in _SPELLED.items()}
+    operations = {name: lambda *o, spell=spell: part(spell(*o)) for name, spell in _SPELLINGS.items()}
     kind = Kind(operations, lambda x: repr(float(as_double(x))).removesuffix(".0"))
     return fold(formula, {name: name for name in formula.names}, kind), shared

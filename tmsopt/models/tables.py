@@ -1,4 +1,4 @@
-"""Tables of this package that are files of their own."""
+"""TOML files of this package."""
 
 import tomllib
 from functools import cache
@@ -8,5 +8,5 @@ from typing import Any
 
 @cache
 def read_table(name: str) -> dict[str, Any]:
-    """The tables of a TOML file, such as ``advice`` or ``bicycles/tms``."""
+    """The contents of a TOML file, such as ``advice`` or ``bicycles/tms``."""
     return tomllib.loads((files(__package__) / f"{name}.toml").read_text(encoding="utf-8"))

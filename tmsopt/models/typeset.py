@@ -11,18 +11,18 @@ _SUM, _PRODUCT, _POWER, _ALONE = range(4)
 
 
 class Typeset(NamedTuple):
-    """The text of a part of a formula, and how tightly it binds: a sum least, a symbol most."""
+    """LaTeX of a part of a formula, and its precedence: lowest for a sum, highest for a symbol."""
 
     text: str
-    binds: int = _ALONE
+    precedence: int = _ALONE
 
-    def within(self, least: int) -> str:
-        """The text, in parentheses unless it binds so tightly."""
-        return self.text if self.binds >= least else rf"\left({self.text}\right)"
+    def enclose(self, least: int) -> str:
+        """The LaTeX, in parentheses if its precedence is below `least`."""
+        return self.text if self.precedence >= least else rf"\left({self.text}\right)"
 
 
 def _difference(a: Typeset, b: Typeset) -> Typeset:
-    return Typeset(f"{a.text} - {b.within(_PRODUCT)}", _SUM)
+    return Typeset(f"{a.text} - {b.enclose(_PRODUCT)}", _SUM)
 
 
 def _sum(a: Typeset, b: Typeset) -> Typeset:
@@ -31,7 +31,7 @@ def _sum(a: Typeset, b: Typeset) -> Typeset:
 
 def _product(a: Typeset, b: Typeset) -> Typeset:
     dot = r" \cdot " if b.text[:1].isdigit() else r" \, "
-    return Typeset(f"{a.within(_PRODUCT)}{dot}{b.within(_PRODUCT)}", _PRODUCT)
+    return Typeset(f"{a.enclose(_PRODUCT)}{dot}{b.enclose(_PRODUCT)}", _PRODUCT)
 
 
 def _fraction(a: Typeset, b: Typeset) -> Typeset:
@@ -39,11 +39,11 @@ def _fraction(a: Typeset, b: Typeset) -> Typeset:
 
 
 def _power(a: Typeset, b: Typeset) -> Typeset:
-    return Typeset(f"{a.within(_ALONE)}^{{{b.text}}}", _POWER)
+    return Typeset(f"{a.enclose(_ALONE)}^{{{b.text}}}", _POWER)
 
 
 def _function(name: str) -> Callable[..., Typeset]:
-    return lambda *of: Typeset(rf"{name}\left({', '.join(x.text for x in of)}\right)", _POWER)
+    return lambda *operands: Typeset(rf"{name}\left({', '.join(x.text for x in operands)}\right)", _POWER)
 
 
 def _relation(sign: str) -> Callable[[Typeset, Typeset], Typeset]:
@@ -76,7 +76,7 @@ LATEX = Kind(
         "sub": _difference,
         "mul": _product,
         **dict.fromkeys(("div", "quotient", "ratio"), _fraction),
-        "neg": lambda a: Typeset(f"-{a.within(_PRODUCT)}", _SUM),
+        "neg": lambda a: Typeset(f"-{a.enclose(_PRODUCT)}", _SUM),
         "pow": _power,
         "square": lambda a: _power(a, Typeset("2")),
         "sqrt": lambda a: Typeset(rf"\sqrt{{{a.text}}}"),
@@ -86,7 +86,7 @@ LATEX = Kind(
         "equal": _relation("="),
         "both": _relation(r"\wedge"),
         "either": _relation(r"\vee"),
-        "not": lambda a: Typeset(rf"\neg {a.within(_ALONE)}", _POWER),
+        "not": lambda a: Typeset(rf"\neg {a.enclose(_ALONE)}", _POWER),
         "choose": _cases,
         "positive_part": lambda a: Typeset(rf"\max\left(0, {a.text}\right)", _POWER),
         "negligible": lambda a, size: Typeset(rf"{a.text} \approx 0", _SUM),
@@ -94,11 +94,11 @@ LATEX = Kind(
     },
     _number,
 )
-"""To be folded with a `Typeset` for each name."""
+"""Fold a formula in this kind with a `Typeset` for each name."""
 
 
 def polynomial_text(coefficients: list[Typeset], variable: str = "s") -> str:
-    """A polynomial of descending coefficients."""
+    """LaTeX of a polynomial with descending coefficients."""
     terms = []
     for k, c in zip(range(len(coefficients) - 1, -1, -1), coefficients, strict=True):
         power = Typeset(variable if k == 1 else f"{variable}^{{{k}}}", _POWER)

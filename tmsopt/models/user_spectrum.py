@@ -1,7 +1,7 @@
-"""What the polynomial of a model shows, in the words of its user: of a complex H in those of H, not of its double.
+"""Converts roots and structures of the internal polynomial to the eigenfrequencies of the user's system.
 
-The polynomial of a complex H is that of the real system of twice the size with a carrier: roots s = −i (ω + carrier)
-and their conjugates. Told are s = −i ω, each with its multiplicity.
+For a complex H the internal polynomial belongs to a real system of twice the size with a carrier. Its roots are
+s = −i (ω + carrier) and their conjugates; the user sees s = −i ω with the multiplicities of H.
 """
 
 import math
@@ -22,53 +22,53 @@ from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.roots.patterns.descriptions import describe_structure
 
 ON_AXIS = 1e-12
-"""Of the largest root of the polynomial: so far right of the imaginary axis is on it, as far as rounding tells."""
+"""Relative to the largest root: a smaller real part counts as 0, because of rounding."""
 
-_NOTHING = 1e-14  # likewise: some roundings
+_ROUNDING = 1e-14  # of the largest root: a few roundings
 
 
 def pattern_of(model: Model, name: str) -> Pattern:
-    """The pattern of a name for the polynomials of a model; of a complex H one of its eigenfrequencies.
+    """The pattern with a name, for the roots of a model or the eigenfrequencies of its complex H.
 
     Raises:
-        ValueError: for a name that is none, or a pattern of more roots than there are.
+        ValueError: if the name is unknown, or the pattern needs more roots than the model has.
     """
     return pattern(name, model.degree) if model.carrier is None else complex_pattern(name, model.degree // 2)
 
 
 def patterns_of(model: Model) -> tuple[str, ...]:
-    """Names of the patterns of a model that are not made up of others."""
+    """Names of the patterns of a model that do not combine others."""
     return pattern_names(model.degree) if model.carrier is None else complex_pattern_names(model.degree // 2)
 
 
 def full_patterns(model: Model) -> tuple[str, ...]:
-    """Names of the patterns in which one root, or one pair, is all roots; none of a single root."""
+    """Names of the patterns in which all roots coincide in one root or one pair; empty for one root."""
     if model.carrier is not None:
         return (f"EP{model.degree // 2}",) if model.degree > 2 else ()
     pairs = (f"CEP{model.degree // 2}",) if model.degree > 2 and model.degree % 2 == 0 else ()
     return (f"EP{model.degree}", *pairs) if model.degree > 1 else ()
 
 
-def public_names(model: Model, of: ParameterSet) -> tuple[str, ...]:
-    """`Model.quantity_names` without coefficients that have a carrier in them, which say nothing of H."""
+def public_names(model: Model, parameter_set: ParameterSet) -> tuple[str, ...]:
+    """`Model.quantity_names`, without the coefficients of a complex H, which depend on the carrier."""
     hidden = () if model.carrier is None else model.coefficient_names()
-    return tuple(n for n in model.quantity_names(of) if n not in hidden)
+    return tuple(n for n in model.quantity_names(parameter_set) if n not in hidden)
 
 
 def user_structure_name(model: Model, name: str) -> str:
-    """The name of a pattern or structure of the polynomial as the user reads it."""
+    """The user's name of a pattern or structure of the polynomial."""
     return name if model.carrier is None else complex_name(name)
 
 
 def user_roots(model: Model, roots: Iterable[Any]) -> tuple[Any, ...]:
-    """Roots of the polynomial as the user reads them: numbers or balls with ``re``, ``im`` and multiplicity."""
+    """The user's roots for roots of the polynomial: numbers or balls with ``re``, ``im`` and multiplicity."""
     if model.carrier is None:
         return tuple(roots)
     return tuple(replace(r, im=r.im + model.carrier) for r in roots if r.im < 0)
 
 
 def user_root_array(model: Model, roots: Any) -> Any:
-    """Likewise an array of complex numbers with all roots along its last axis, in the order of their real parts."""
+    """The user's roots for a complex array with all roots along its last axis, in the order of their real parts."""
     if model.carrier is None:
         return roots
     import numpy as np
@@ -78,49 +78,49 @@ def user_root_array(model: Model, roots: Any) -> Any:
 
 
 def user_structure(model: Model, found: Structure) -> Structure:
-    """A structure of the polynomial as the user reads it."""
+    """The user's structure for a structure of the polynomial."""
     return replace(found, name=user_structure_name(model, found.name), roots=user_roots(model, found.roots))
 
 
 def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Structure:
-    """The structure of the polynomial that a user reads so; the inverse of `user_structure`."""
+    """The structure of the polynomial for a user's name and roots; the inverse of `user_structure`."""
     if model.carrier is None:
         return Structure(name, tuple(roots), 0.0)
     lower = [replace(r, im=r.im - model.carrier) for r in roots]
     return Structure(real_form_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
 
 
-def structure_in_words(model: Model, structure: str, gain: bool = False) -> str:
-    """A structure, as it is told, in words; of a complex H by its gain where it has any."""
+def describe_user_structure(model: Model, structure: str, gain: bool = False) -> str:
+    """A user's structure in words, which for a complex H depend on whether it has `gain`."""
     if model.carrier is None:
         return describe_structure(structure, model.degree)
     return describe_complex_structure(structure, model.degree // 2, gain)
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
-    """ω = i s of roots as they are told; of a real system none."""
-    each = () if model.carrier is None else without_rounding(model, roots)
+    """ω = i s for the user's roots; empty for a real system."""
+    each = () if model.carrier is None else remove_rounding(model, roots)
     return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in each)
 
 
-def without_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
-    """Roots as they are told, with parts that are 0 but for a carrier's rounding as 0."""
+def remove_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
+    """The user's roots, with 0 for parts that only the rounding of the carrier makes nonzero."""
     each = tuple(roots)
-    nothing = 0.0 if model.carrier is None else _NOTHING * _size(model, each)
-    own = ([x if abs(x) > nothing else 0.0 for x in (r.re, r.im)] for r in each)
-    return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(own, each, strict=True))
+    rounding = 0.0 if model.carrier is None else _ROUNDING * _size(model, each)
+    parts = ([x if abs(x) > rounding else 0.0 for x in (r.re, r.im)] for r in each)
+    return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(parts, each, strict=True))
 
 
-def on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
-    """Those of roots, as they are told, that are on the imaginary axis: the real ones of the eigenfrequencies of H."""
+def roots_on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
+    """The user's roots on the imaginary axis, which are real eigenfrequencies of H."""
     each = tuple(roots)
     return tuple(r for r in each if abs(r.re) <= ON_AXIS * _size(model, each))
 
 
 def beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> float | None:
-    """How far right of the imaginary axis a root is where located patterns tie others to it; 0 on the very edge.
+    """Distance of the rightmost root beyond the imaginary axis, if a located pattern puts roots on it; 0 if none is.
 
-    None where no pattern ties a root to the axis.
+    None if no located pattern puts a root on the axis.
     """
     if not roots or all(pattern_of(model, name).rest is None for name in located):
         return None

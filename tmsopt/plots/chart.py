@@ -18,7 +18,7 @@ from matplotlib.typing import LineStyleType
 from numpy.typing import NDArray
 
 from tmsopt.charts.chart import Chart
-from tmsopt.errors import refusal, suggest
+from tmsopt.errors import input_error, suggest
 from tmsopt.models import Model, in_words_of, tms
 from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, events_of, finished, plane_over
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
@@ -108,7 +108,7 @@ def plane_of(chart: Chart) -> PlaneAxes:
     """
     if len(chart.axes) != 2:
         message = f"found {len(chart.axes)} parameters; a picture shows a plane: chart two, with the third one fixed"
-        raise refusal(message, "axes")
+        raise input_error(message, "axes")
     return plane_over(chart.problem.posed, *chart.axes)
 
 
@@ -166,7 +166,7 @@ def draw_chart(
     """
     plane = plane_of(data)
     if layer not in data.layers:
-        raise refusal(f"found '{layer}'; {suggest(layer, data.layers)}", "layer")
+        raise input_error(f"found '{layer}'; {suggest(layer, data.layers)}", "layer")
     drawn = on_axes(ax, 6.4, 5.4, data.problem.title)
     if layer == "kind":
         fill_classes(drawn, data, plane)

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 from numpy.typing import ArrayLike
 
-from tmsopt.files import path_of, write_atomic
+from tmsopt.files import as_path, write_atomic
 
 STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
 """Fills of stability and heavy damping, lines, marked points, the weave boundary (Okabe–Ito)."""
@@ -123,7 +123,7 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
 
     More: docs/reference/python.md
     """
-    path = path_of(path, "the file to write")
+    path = as_path(path, "the file to write")
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
     ending = path.suffix.lstrip(".").lower()
     with write_atomic(path) as temporary:

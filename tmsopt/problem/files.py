@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import Field, StrictInt, StrictStr
 
-from tmsopt.errors import Fault, InputError, short, suggest, visible
+from tmsopt.errors import Fault, InputError, escape_unprintable, short, suggest
 from tmsopt.models import MODELS, Model, gain_names
 from tmsopt.models.bicycle_files import read_bicycle
 from tmsopt.problem.advice.names import unknown_key
@@ -145,7 +145,7 @@ def _read(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]]) 
         own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
         message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
         raise InputError([Fault(message, file=page.file)])
-    faults, problem = problem_from_tables(_with_bicycle(page), visible(Path(page.file).stem))
+    faults, problem = problem_from_tables(_with_bicycle(page), escape_unprintable(Path(page.file).stem))
     if problem is not None and not faults:  # a misspelt [objective] asks something
         faults = [*faults, *faults_of(problem.posed)]
     if problem is None or faults:

@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from tmsopt.errors import Fault, at_first, is_number, short, suggest, text_faults
+from tmsopt.errors import Fault, is_number, limit_advice, short, suggest, text_faults
 from tmsopt.models import Model, Unfit, from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.models.model import Matrix
-from tmsopt.models.stated.texts import place, untexted
+from tmsopt.models.stated.texts import parse_entries, place
 
 _MATRICES = ("M", "D", "K", "A", "B", "C", "G", "H")
 KEYS = {
@@ -51,7 +51,7 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
         faults.append(Fault(message, ("model", *key)))
 
     given = [key for key in (*_MATRICES, "coefficients") if key in table]
-    advice = at_first(suggest)
+    advice = limit_advice(suggest)
     for key in table:
         if key not in KEYS:
             fault(f"unknown key {short(key)}; {advice(key, KEYS)}", key)
@@ -64,7 +64,7 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
         if alone in given and (beside := [key for key in given if key != alone]):
             fault(f"stands beside {beside[0]}; keep {kept}", alone)
     texts = _quantities(table.get("quantities", {}), fault)
-    entries, quantities = untexted({key: _rows(table[key], key, fault) for key in given}, texts, fault)
+    entries, quantities = parse_entries({key: _rows(table[key], key, fault) for key in given}, texts, fault)
     if faults:
         return faults, None
     try:

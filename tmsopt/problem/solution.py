@@ -16,7 +16,7 @@ from tmsopt.problem.searches import Starts
 from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.units import Reading
 from tmsopt.problem.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, joined, stability
-from tmsopt.records import Printable, Table, asked_above, plain
+from tmsopt.records import Printable, Table, call_documents, plain
 from tmsopt.roots import Root, Structure
 
 GAIN_DIGITS, SIDE_DIGITS = 6, 9
@@ -157,7 +157,7 @@ class Solution(Printable):
     @cached_property
     def analysis(self) -> Any:
         """What a report says beyond these numbers, each part computed when it is first asked for, and kept."""
-        return asked_above("analyse", self)
+        return call_documents("analyse", self)
 
     @property
     def stability(self) -> StabilityVerdict:
@@ -225,7 +225,7 @@ class Solution(Printable):
         Raises:
             InputError: for a model without matrices, or what cannot be asked of it.
         """
-        return asked_above("response", self, **asked)
+        return call_documents("response", self, **asked)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None.

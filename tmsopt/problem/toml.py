@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from tmsopt.errors import LISTED, Fault, InputError, short
-from tmsopt.files import path_of, read_text
+from tmsopt.files import as_path, read_text
 from tmsopt.problem.advice.lines import line_advice
 
 MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
@@ -64,7 +64,7 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
     Raises:
         InputError: for a file that cannot be read, or is not TOML.
     """
-    path_of(path, f"a {kind} file")
+    as_path(path, f"a {kind} file")
     file = str(path) or "."
     text = read_text(file, f"TOML {kind} file")
     scan = _scanned(text)

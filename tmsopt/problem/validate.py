@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
+from tmsopt.errors import Fault, limit_advice, short, suggest, table_faults, text_faults
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.expression import ExpressionError, UnknownName, parse_comparison, parse_value
-from tmsopt.models.names import MEANT
+from tmsopt.models.names import AMBIGUOUS_NAMES
 from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
 from tmsopt.problem.advice.names import example_of, unknown
 from tmsopt.problem.cases import Band, points_of
@@ -88,7 +88,7 @@ def faults(problem: Stated) -> Iterator[Fault]:
 
 def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
-    advice = at_first(unknown)
+    advice = limit_advice(unknown)
     tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
     for table, name in ((t, n) for t, names in tables.items() for n in names):
         if name in of.names:
@@ -107,7 +107,7 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     given = tables["parameters"].keys() | problem.scenarios
     if missing := [p.name for p in of.parameters if p.name not in given and p.default is None]:
         example = " or ".join(example_of(of[missing[0]]))
-        meant = "".join(f"; {MEANT[name]}" for name in missing if name in MEANT)
+        meant = "".join(f"; {AMBIGUOUS_NAMES[name]}" for name in missing if name in AMBIGUOUS_NAMES)
         yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{meant}", ("parameters",))
     for name in problem.start:
         if name not in problem.free:
@@ -268,7 +268,7 @@ def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fa
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     accepted = (*of.names, *public_names(problem.model, of), *root_names(problem.model))
-    advice = at_first(unknown)
+    advice = limit_advice(unknown)
 
     def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
         try:

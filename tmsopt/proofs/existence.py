@@ -8,7 +8,7 @@ import flint
 
 from tmsopt.algebra.balls import GUARD, largest_radius, upper
 from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
-from tmsopt.models.exact import Written
+from tmsopt.models.exact import ExactDesign
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.proofs.factored import Factored, factored, has_pattern, of_pattern
@@ -50,7 +50,7 @@ class Existing:
     explained: float = 0.0
 
 
-def exactly(problem: Posed, pattern: Pattern, design: Written) -> Existing | None:
+def exactly(problem: Posed, pattern: Pattern, design: ExactDesign) -> Existing | None:
     """The design itself, if its numbers are fractions and have the pattern exactly."""
     found = as_stored(problem, design)
     if found is None or found.method != EXACT or any(c.equality for c in problem.conditions.values()):
@@ -58,7 +58,7 @@ def exactly(problem: Posed, pattern: Pattern, design: Written) -> Existing | Non
     return found if has_pattern(pattern.form, found.coefficients) else None
 
 
-def as_stored(problem: Posed, design: Written) -> Existing | None:
+def as_stored(problem: Posed, design: ExactDesign) -> Existing | None:
     """The design as its numbers are, whatever its roots; None where a0 cannot be told from 0."""
     balls, of = design.balls(), problem.parameter_set
     tangents = {n: x for n, x in _numbers(problem, design).items() if of[n].tangent}
@@ -72,7 +72,7 @@ def as_stored(problem: Posed, design: Written) -> Existing | None:
     return Existing("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
 
 
-def beside(problem: Posed, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
+def beside(problem: Posed, pattern: Pattern, design: ExactDesign, stored: Mapping[str, float], digits: int) -> Existing:
     """The design with a pattern that a stored one stands for, by Krawczyk's test.
 
     Raises:
@@ -90,7 +90,7 @@ def beside(problem: Posed, pattern: Pattern, design: Written, stored: Mapping[st
     raise ProofFailed(f"the balls do not shrink to {digits} digits; ask for fewer")
 
 
-def _beside(system: Equations, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
+def _beside(system: Equations, design: ExactDesign, stored: Mapping[str, float], digits: int) -> Existing:
     problem, pattern = system.problem, system.pattern
     held = _numbers(problem, design)
     free = [n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.stated}]
@@ -237,7 +237,7 @@ def _of_quadratics(pattern: Pattern) -> bool:
     return any(u.startswith("b") for u in pattern.unknowns) and "EP" in pattern.name
 
 
-def _numbers(problem: Posed, design: Written) -> dict[str, Any]:
+def _numbers(problem: Posed, design: ExactDesign) -> dict[str, Any]:
     """Every parameter as it is taken exactly: a ball, of an angle that of its tangent."""
     of = problem.parameter_set
     numbers = {n: e.ball() for n, e in design.values.items()}

@@ -8,7 +8,7 @@ import flint
 from tmsopt.algebra.balls import rational
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.models import Values
-from tmsopt.models.exact import Written
+from tmsopt.models.exact import ExactDesign
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.proofs.existence import EXACT, Existing
@@ -38,7 +38,7 @@ BINDS = 1e-9
 """Room between the sides of an inequality up to which it binds: what a solver leaves."""
 
 
-def eigenvectors(problem: Posed, design: Written, found: Existing) -> tuple[int | None, Verdict]:
+def eigenvectors(problem: Posed, design: ExactDesign, found: Existing) -> tuple[int | None, Verdict]:
     """The most independent eigenvectors of a multiple root, and whether all multiple roots lack some.
 
     In fractions where the design is exact; else by minors in balls, which show that there are no more than one.
@@ -97,7 +97,7 @@ def heavy_damping(factored: Factored) -> Verdict:
     return Verdict(True, "all roots are real, negative and different: strictly inside heavy damping")
 
 
-def inside(problem: Posed, design: Written, found: Existing) -> Verdict:
+def inside(problem: Posed, design: ExactDesign, found: Existing) -> Verdict:
     """Whether every free parameter is certainly within its limits."""
     if not problem.free:
         return Verdict(True, "nothing is free")

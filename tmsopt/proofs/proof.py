@@ -11,7 +11,7 @@ import flint
 from tmsopt.algebra.balls import Number, ProvedRoot, fraction, number
 from tmsopt.algebra.krawczyk import ProofFailed
 from tmsopt.errors import Fault, InputError, count_faults
-from tmsopt.models.exact import Written, written
+from tmsopt.models.exact import ExactDesign, as_exact_design
 from tmsopt.models.names import number_text
 from tmsopt.models.user_spectrum import pattern_of, user_roots, user_structure_name
 from tmsopt.problem.cases import Case
@@ -209,7 +209,7 @@ def prove_design(
     began = time.perf_counter()
     varied = case.applied(parameters) if case else dict(parameters)
     typed = {n: text for n, text in problem.typed(varied).items() if n in problem.fixed}
-    design = written(problem.parameter_set, varied, exact, typed)
+    design = as_exact_design(problem.parameter_set, varied, exact, typed)
     with flint.ctx.workdps(2 * digits + _EXTRA):
         patterns = _patterns(problem, structure, roots)
         # Of one case alone: its constraints are those of the nominal design, or of every case.
@@ -220,7 +220,7 @@ def prove_design(
 
 def _proved(
     problem: Posed,
-    design: Written,
+    design: ExactDesign,
     varied: Mapping[str, float],
     structure: str,
     patterns: Sequence[Pattern],
@@ -261,7 +261,7 @@ def _patterns(problem: Posed, structure: str, roots: Sequence[Root]) -> list[Pat
     return list({p.name: p for p in [*named, *([located] if located else [])]}.values())
 
 
-def _decided(problem: Posed, design: Written) -> list[Pattern]:
+def _decided(problem: Posed, design: ExactDesign) -> list[Pattern]:
     """The pattern of all multiple roots of a design that is exact."""
     a = design.coefficients(problem.model, problem.parameter_set)
     name = multiple_roots(a) if a else ""
@@ -284,7 +284,7 @@ def _of_simple(problem: Posed, structure: str, found: Existing) -> list[str]:
 
 def _assembled(
     problem: Posed,
-    design: Written,
+    design: ExactDesign,
     name: str,
     pattern: Pattern | None,
     found: Existing,

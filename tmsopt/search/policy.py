@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tmsopt.errors import Fault, InputError, refusal, short, suggest
+from tmsopt.errors import Fault, InputError, input_error, short, suggest
 from tmsopt.program.formulate import middle
 from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
@@ -81,7 +81,7 @@ class Policy:
         """
         names = [rescue.name for rescue in self.rescues]
         if name not in names:
-            raise refusal(f"no rescue is called {short(name)}; {suggest(name, names)}", "policy", "rescues")
+            raise input_error(f"no rescue is called {short(name)}; {suggest(name, names)}", "policy", "rescues")
         return replace(self, rescues=tuple(r for r in self.rescues if r.name != name))
 
 
@@ -92,7 +92,7 @@ def check_policy(policy: Any) -> None:
         InputError: with all faults.
     """
     if not isinstance(policy, Policy):
-        raise refusal(f"found {short(policy)}; accepted: a tmsopt.Policy, such as tmsopt.POLICY", "policy")
+        raise input_error(f"found {short(policy)}; accepted: a tmsopt.Policy, such as tmsopt.POLICY", "policy")
     stages = {name: getattr(policy, name) for name in ("sample", "starts", "local", "accept", "enough")}
     wrong = {name: stage for name, stage in stages.items() if not callable(stage)}
     if wrong:

@@ -13,7 +13,7 @@ from tmsopt.evaluation.exclusion import known_bound
 from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.evaluation.stored import held, missed_note
 from tmsopt.evaluation.worst_case import cover
-from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, user_structure_name, without_rounding
+from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, remove_rounding, user_structure_name
 from tmsopt.problem.dependence import sense_notes
 from tmsopt.problem.files import Given, as_solvable
 from tmsopt.problem.freedom import degrees_of_freedom
@@ -310,7 +310,7 @@ def _assemble(
         parameters=Table(outcome.parameters),
         abscissa=numbers.abscissa,
         abscissa_realised=numbers.realised,
-        roots=without_rounding(problem.model, numbers.roots),
+        roots=remove_rounding(problem.model, numbers.roots),
         structure=name,
         active=Table(outcome.active),
         violations=checked.amounts,

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from tmsopt.errors import Fault, InputError, import_optional, refusal
-from tmsopt.files import cell, headed, netcdf_errors, write_atomic
+from tmsopt.errors import Fault, InputError, import_optional, input_error
+from tmsopt.files import format_cell, format_header, netcdf_errors, write_atomic
 from tmsopt.progress import Listener, Steps, start_steps
 from tmsopt.records import frame
 from tmsopt.studies.rows import BLOCK, PREFIXES, RowTable
@@ -52,10 +52,10 @@ def check_export(path: Path) -> None:
     """
     if _ending(path) not in FORMATS:
         accepted = ", ".join(f".{e}" for e in FORMATS)
-        raise refusal(f"found '{path}'; accepted: a file name ending in {accepted}", "export")
+        raise input_error(f"found '{path}'; accepted: a file name ending in {accepted}", "export")
     if (path.exists() and not path.is_file()) or not path.parent.is_dir():
         problem = "is no regular file" if path.exists() else "is in a folder that does not exist"
-        raise refusal(f"'{path}' {problem}; give the path of a file to write", "export")
+        raise input_error(f"'{path}' {problem}; give the path of a file to write", "export")
     for module in FORMATS[_ending(path)][1]:
         import_optional(module, "export to a .csv file")
 
@@ -76,7 +76,7 @@ def _csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps |
     units = metadata.get("units", {})
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(cell(headed(head, units.get(_bare(head), ""))) for head in rows.headers)
+        writer.writerow(format_cell(format_header(head, units.get(_bare(head), ""))) for head in rows.headers)
         for columns in _blocks(rows, steps):
             writer.writerows(map(_cell, line) for line in zip(*(c.tolist() for c in columns.values()), strict=True))
 
@@ -92,7 +92,7 @@ def _cell(value: Any) -> Any:
     """A blank for nan."""
     if isinstance(value, bool):
         return str(value).lower()
-    return None if value != value else cell(value)  # noqa: PLR0124
+    return None if value != value else format_cell(value)  # noqa: PLR0124
 
 
 def _parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:

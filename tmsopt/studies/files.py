@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr
 
-from tmsopt.errors import LISTED, Fault, InputError, count_faults, is_number, short, suggest, visible
+from tmsopt.errors import LISTED, Fault, InputError, count_faults, escape_unprintable, is_number, short, suggest
 from tmsopt.files import read_lines
 from tmsopt.problem.files import as_solvable, problem_from_tables
 from tmsopt.problem.freedom import question_faults
@@ -333,7 +333,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
         )
         raise InputError([Fault(message, file=page.file)])
     faults, written = validate_tables(page.data, _StudyFile, _shape_fault)
-    title = visible(Path(page.file).stem)
+    title = escape_unprintable(Path(page.file).stem)
     problem = _problem(page, title, faults)
     if written is None or problem is None:
         raise page.error(faults)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.errors import Fault, InputError, at_first, count_faults, is_number, short, suggest, text_faults
-from tmsopt.files import path_of
+from tmsopt.errors import Fault, InputError, count_faults, is_number, limit_advice, short, suggest, text_faults
+from tmsopt.files import as_path
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import question_faults
 from tmsopt.problem.problem import Posed, Problem
@@ -175,7 +175,7 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
     Raises:
         InputError: with the differences; where the store is none, or damaged.
     """
-    path = path_of(store, "an SQLite file")
+    path = as_path(store, "an SQLite file")
     if not isinstance(study, Sampling) or not path.exists():
         return
     with view_store(path) as opened:
@@ -195,7 +195,7 @@ def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
         accepted = "parameters and how far each may be off, such as lambda_s = 0.01"
         return [Fault(f"{found}; accepted: {accepted}", ("tolerances",))]
     names = problem.parameter_set.names
-    faults, advice = [], at_first(suggest)
+    faults, advice = [], limit_advice(suggest)
     for name, value in tolerances.items():
         key = ("tolerances", str(name))
         if name not in names:

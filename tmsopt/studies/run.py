@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.errors import Fault, InputError, call_faults, count_faults, refusal, short, suggest
-from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, processes, silent
-from tmsopt.files import path_of
+from tmsopt.errors import Fault, InputError, call_faults, count_faults, input_error, short, suggest
+from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, ignore_note, processes
+from tmsopt.files import as_path
 from tmsopt.problem.unit_system import units_of
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Printable, frame
@@ -80,7 +80,7 @@ class Results(Printable):
             InputError: for a name that no row has.
         """
         if name not in self.rows.headers:
-            raise refusal(f"no column '{name}'; {suggest(name, self.rows.headers)}", "column")
+            raise input_error(f"no column '{name}'; {suggest(name, self.rows.headers)}", "column")
         return self.rows.values(name)
 
     @property
@@ -104,7 +104,7 @@ class Results(Printable):
         """
         made: Dataset | None = gridded(self.rows)
         if made is None:
-            raise refusal(f"the {len(self.rows)} rows fill no grid; use to_frame", "study")
+            raise input_error(f"the {len(self.rows)} rows fill no grid; use to_frame", "study")
         return made
 
     def to_json(self, table: bool = True) -> dict[str, Any]:
@@ -117,7 +117,7 @@ class Results(Printable):
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
         about = dict(self.about or {"definition": definition(self.study)})
         about["units"] = units_of(self.study.problem.posed, self.study.report)
-        export(self.rows, path_of(path, "the file to write"), about, progress)
+        export(self.rows, as_path(path, "the file to write"), about, progress)
 
 
 def run_study(
@@ -128,7 +128,7 @@ def run_study(
     scheduler: str | None = None,
     fresh: bool = False,
     progress: Listener | None = None,
-    note: Note = silent,
+    note: Note = ignore_note,
 ) -> Results:
     """Solve every row of a study that its store does not have yet.
 
@@ -166,7 +166,7 @@ def run_study(
     if store is None:
         return _completed(asked, None, workers, scheduler, note, progress)
     start_steps(progress, "waiting for the store")
-    with open_store(path_of(store, "an SQLite file"), asked, fresh=fresh) as opened:
+    with open_store(as_path(store, "an SQLite file"), asked, fresh=fresh) as opened:
         for line in opened.warnings:
             note(line)
         return _completed(asked, opened, workers, scheduler, note, progress)
@@ -178,7 +178,7 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
     Raises:
         InputError: where there is no store.
     """
-    with view_store(path_of(store, "an SQLite file")) as opened:
+    with view_store(as_path(store, "an SQLite file")) as opened:
         rows = RowTable(study, _held(study, opened))
         return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError, count_faults, is_number, refusal, short, table_faults
+from tmsopt.errors import Fault, InputError, count_faults, input_error, is_number, short, table_faults
 from tmsopt.records import Array, Column
 
 MOST_ROWS = 10_000_000
@@ -65,7 +65,7 @@ def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
         numbers = column_of_numbers(values)
         if numbers is None or not numbers.size:
             message = f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]"
-            raise refusal(message, name)
+            raise input_error(message, name)
         lists.append(numbers)
     check_size([len(numbers) for numbers in lists])
     crossed = np.meshgrid(*lists, indexing="ij")
@@ -133,7 +133,7 @@ def check_size(sizes: Sequence[int]) -> None:
     """
     if math.prod(sizes) > (most := most_rows(len(sizes))):
         found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
-        raise refusal(f"found {found}; accepted: up to {most}; take fewer points", "columns")
+        raise input_error(f"found {found}; accepted: up to {most}; take fewer points", "columns")
 
 
 def span_faults(name: str, span: Span) -> Iterator[Fault]:

@@ -21,12 +21,12 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from tmsopt import files
-from tmsopt.errors import Fault, InputError, refusal
-from tmsopt.files import differences, from_json
+from tmsopt.errors import Fault, InputError, input_error
+from tmsopt.files import from_json, list_differences
 from tmsopt.studies.old_stores import about_of, columns_of, parts_of
 from tmsopt.studies.rows import BLOCK, SAVED, STATUSES, Part, column_of
 from tmsopt.studies.study import Study, definition
-from tmsopt.versions import installed, ipopt
+from tmsopt.versions import installed_versions, ipopt_version
 
 APPLICATION = 0x746D736F
 """In the header of every store, where `file` and SQLite look for it: "tmso"."""
@@ -245,7 +245,7 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
         undo.callback(_end, connection, session)
         store = Store(path, connection, undo, session)
         earlier = [then["versions"] for then in store.sessions() if then["rows"] > 0]
-        changed = [line for then in earlier for line in differences(then, today, ("in the store", "now"))]
+        changed = [line for then in earlier for line in list_differences(then, today, ("in the store", "now"))]
         store.warnings, store._ending = tuple(dict.fromkeys(changed + moved)), undo.pop_all()
         return store
 
@@ -283,7 +283,7 @@ def check_same(path: Path | str, study: Study) -> None:
             from_json(about["definition"]) | {"columns": {name: array("d", x) for name, x in columns.items()}}
             for about, columns in (there, _described(study))
         )
-        found = list(differences(known, asked, ("in the store", "in the file")))
+        found = list(list_differences(known, asked, ("in the store", "in the file")))
     if found:
         more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
         advice = "to keep it and start a new store, add --fresh, which moves this one aside; or give another --store"
@@ -304,7 +304,7 @@ def _described(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
     }
     if len(about["definition"]) > files.LARGEST_JSON:
         message = f"takes more than {files.LARGEST_JSON} characters to define; give the values in a CSV file"
-        raise refusal(message, "study")
+        raise input_error(message, "study")
     return about, kept
 
 
@@ -413,5 +413,5 @@ def _now() -> str:
 
 def _versions() -> dict[str, str]:
     """Of tmsopt, Python, the libraries that solve, and IPOPT where its file tells; nothing is imported for it."""
-    found = {"python": platform.python_version(), **installed(_PACKAGES), "ipopt": ipopt()}
+    found = {"python": platform.python_version(), **installed_versions(_PACKAGES), "ipopt": ipopt_version()}
     return {name: version or "unknown" for name, version in found.items()}

@@ -11,10 +11,10 @@ from tmsopt.errors import (
     MOST_STARTS,
     Fault,
     InputError,
-    at_first,
     count_faults,
+    input_error,
+    limit_advice,
     list_faults,
-    refusal,
     short,
     suggest,
     table_faults,
@@ -104,7 +104,7 @@ class Study:
         """
         if not 0 <= row < len(self):
             message = f"found {row}; accepted: 0 to {len(self) - 1}, for the study has {len(self)} rows"
-            raise refusal(message, "row")
+            raise input_error(message, "row")
         return Table({name: float(column[row]) for name, column in self.columns.items()})
 
     def row_problem(self, row: int) -> Problem:
@@ -249,7 +249,7 @@ def variable_names(problem: Posed) -> tuple[str, ...]:
 
 def name_faults(problem: Posed) -> Callable[[Any], str]:
     """Says why a name cannot vary, one after the other; empty where it can."""
-    accepted, advice = variable_names(problem), at_first(suggest)
+    accepted, advice = variable_names(problem), limit_advice(suggest)
 
     def wrong(name: Any) -> str:
         if name in accepted:

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
@@ -71,7 +71,7 @@ def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
     if equalities and len(rows) != len(unit) - 1:
         names = ", ".join(equalities)
         message = f"an equality of a root quantity cannot be traced along {pattern.name}; leave out {names}"
-        raise refusal(message, "constraints")
+        raise input_error(message, "constraints")
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     for k, name in enumerate(pattern.unknowns):
         if name in pattern.ends:

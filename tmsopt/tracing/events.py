@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError, is_number, list_faults, refusal, short, suggest, text_faults
+from tmsopt.errors import Fault, InputError, input_error, is_number, list_faults, short, suggest, text_faults
 from tmsopt.records import Array, Truth
 from tmsopt.roots.sign_tests import nearest_pair_mean
 from tmsopt.tracing.continuation import Curve, Walk, between
@@ -109,7 +109,7 @@ def _value(event: Event, at: Mapping[str, float]) -> float:
     except Exception as error:
         what = f"the function raises {type(error).__name__}: {error}"
     place = ", ".join(f"{name} = {at[name]:.6g}" for name in at)
-    raise refusal(f"{what} at {place}; accepted: a finite number at every point of the curve", "events", event.name)
+    raise input_error(f"{what} at {place}; accepted: a finite number at every point of the curve", "events", event.name)
 
 
 @dataclass(frozen=True)

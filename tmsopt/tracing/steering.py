@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.problem import Solution
 from tmsopt.problem.files import Given, pose
 from tmsopt.tracing.branch import BranchPoint, table_at
@@ -59,7 +59,7 @@ def continue_from(
             except ValueError:  # no regular point of a curve
                 continue
     near = "near the design" if designs else "in the box"
-    raise refusal(f"no point of {posed.locate} found {near}; give another one to begin at", "through")
+    raise input_error(f"no point of {posed.locate} found {near}; give another one to begin at", "through")
 
 
 class Continuation(Iterator[BranchPoint]):

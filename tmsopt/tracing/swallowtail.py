@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import refusal
+from tmsopt.errors import input_error
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
@@ -113,13 +113,13 @@ def swallowtail(
             f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_LEAST} or more, for a "
             "swallowtail crosses itself where two double roots stand side by side; trace EP2 and EP3 instead"
         )
-        raise refusal(message, "model")
+        raise input_error(message, "model")
     if len(plane.free) != 3:
-        raise refusal(f"a surface takes three free parameters, and {len(plane.free)} are free", "parameters")
+        raise input_error(f"a surface takes three free parameters, and {len(plane.free)} are free", "parameters")
     first, *pair = plane.free
     if not _is_affine(plane):
         message = f"the coefficients are not affine in {' and '.join(pair)}; put two in which they are last"
-        raise refusal(message, "parameters")
+        raise input_error(message, "parameters")
     cusps, crossing = (trace(plane, name, starts=starts, progress=progress) for name in ("EP3", "2EP2"))
     grid = _rows(plane, rows, (*cusps.events, *crossing.events))
     scan = np.union1d(

@@ -12,9 +12,9 @@ from tmsopt.errors import (
     InputError,
     call_faults,
     count_faults,
+    input_error,
     is_number,
     list_faults,
-    refusal,
     short,
     suggest,
     table_faults,
@@ -106,13 +106,13 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
     names = patterns_of(problem.model)
     if name is None:
         message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(names)}"
-        raise refusal(message, "objective", "locate")
+        raise input_error(message, "objective", "locate")
     try:
         name = pattern_of(problem.model, str(name)).name
     except ValueError as error:
         why = "" if str(error).endswith("is no pattern") else f": {error}"
         message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
-        raise refusal(message, "objective", "locate") from error
+        raise input_error(message, "objective", "locate") from error
     asked = problem.derive(locate=name, minimize=None, maximize=None)
     count = degrees_of_freedom(asked)
     if count.count != 1:
@@ -127,7 +127,7 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
             f"a curve of {name} takes {needed} free parameters ({conditions} and one to move along), "
             f"and {count.free} {'is' if count.free == 1 else 'are'} free ({free}); {advice}"
         )
-        raise refusal(message, "parameters")
+        raise input_error(message, "parameters")
     return asked
 
 

@@ -66,7 +66,7 @@ _REFUSED: tuple[tuple[str, str, Callable[[Answer], str], str], ...] = (
     (
         "eigenvalue as lambda",
         _file('coefficients = [1, "c", "exp(-lambda*tau)"]', f"{_C}\ntau = 1.0"),
-        _refusal("nonlinear eigenproblem", "outside"),
+        _refusal("nonlinear eigenproblem", "cannot treat"),
         "λ is the eigenvalue where there is no bicycle",
     ),
     (

@@ -1,4 +1,4 @@
-"""The bicycles in words and lines: which way is positive, and a side view with the symbols on it."""
+"""Sign conventions and labelled side views of the bicycles, as text."""
 
 CONVENTIONS = (
     "x points forward, y to the right, z down, from the contact of the rear wheel: heights are negative numbers",
@@ -6,7 +6,7 @@ CONVENTIONS = (
     "steer axis tilt lambda_s is positive as on ordinary bicycles, where the axis leans back at its top and its lower "
     "end points forward (normal rake); negative the other way (reversed rake)",
 )
-"""Signs, as in Meijaard et al. (2007) and Kirillov (2018)."""
+"""Signs as in Meijaard et al. (2007) and Kirillov (2018)."""
 
 TMS = r"""
 o--> x  (forward, with speed v)   steer axis \            :

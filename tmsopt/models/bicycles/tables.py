@@ -1,4 +1,4 @@
-"""Parameters and quantities of a bicycle, as its TOML file lists them."""
+"""Parameters and quantities of a bicycle from its TOML file."""
 
 from collections.abc import Mapping
 from math import pi
@@ -23,7 +23,7 @@ LAMBDA_S = Parameter(
 
 
 def parameters(rows: Mapping[str, Any]) -> tuple[Parameter, ...]:
-    """Parameters by name, each with the fields of `Parameter`; the symbol is the name where no other is given."""
+    """Parameters by name, each with the fields of `Parameter`; `latex` is the name by default."""
     return tuple(Parameter(name, **_fields(name, row)) if row else LAMBDA_S for name, row in rows.items())
 
 
@@ -34,11 +34,11 @@ def quantities(
 ) -> tuple[Quantity, ...]:
     """Quantities by name, each with the fields of `Quantity`; formulas are expressions in parameters and quantities.
 
-    Where it lists a `positive_part`, the quantity is that of an expression.
+    A row with `positive_part` is the positive part of an expression.
 
     Args:
-        computed: name → fields that no file can state.
-        counterparts: what some are in SI, by name.
+        computed: name → fields with functions, which a file cannot have.
+        counterparts: SI quantities by name.
     """
     found = []
     for name, row in rows.items():

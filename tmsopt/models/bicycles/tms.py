@@ -6,7 +6,7 @@ from typing import Any
 
 from tmsopt.algebra.kinds import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
-from tmsopt.models.bicycles.feedback import FEEDBACK, UNCONTROLLED, Steered, native_name, size
+from tmsopt.models.bicycles.feedback import FEEDBACK, NO_CONTROLLER, ControllableBicycle, native_name, si_scale
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
@@ -22,8 +22,8 @@ GRAVITY: float = _TABLES["parameters"]["SI"]["g"]["default"]
 """Default g in m/s²."""
 
 
-def _upright(p: Mapping[str, Any]) -> dict[str, Any]:
-    """The native parameters but the tilt."""
+def _without_tilt(p: Mapping[str, Any]) -> dict[str, Any]:
+    """The native parameters without the tilt."""
     return {name: p[name] for name in _NATIVE.names if name != "lambda_s"}
 
 
@@ -54,7 +54,7 @@ def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
 def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict[str, Any]:
     """SI values for dimensionless parameters, given wheelbase w (m), rear frame mass m_B (kg) and g (m/s²).
 
-    Gains of a controller are among them if there are any.
+    Gains of a controller are converted too.
 
     Example:
         >>> design = dict(Fr=1.0, mu=0.1, chi_B=1.2, chi_H=1.0, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.1)
@@ -75,23 +75,23 @@ def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) 
         "x_H": p["chi_H"] * w,
         "z_H": p["zeta_H"] * w,
     }
-    return {**own, **{n: p[native_name(n)] * size(n, own, _rate, _torque) for n in FEEDBACK if native_name(n) in p}}
+    return {**own, **{n: p[native_name(n)] * si_scale(n, own, _rate, _torque) for n in FEEDBACK if native_name(n) in p}}
 
 
 def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
     """M, V, P from tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
-    return matrices(**_upright(p), sine=T * cosine, cosine=cosine)
+    return matrices(**_without_tilt(p), sine=T * cosine, cosine=cosine)
 
 
 def _rate(p: Mapping[str, Any]) -> Any:
-    """√(g/w), in 1/s."""
+    """A rate of 1 in 1/s, √(g/w)."""
     return sqrt(p["g"] / p["w"])
 
 
 def _torque(p: Mapping[str, Any]) -> Any:
-    """In N m."""
+    """A torque of 1 in N m."""
     return p["m_B"] * p["g"] * p["w"]
 
 
@@ -108,8 +108,8 @@ _SI = ParameterSet(
 _IN_SI = {q.name: q for q in (*_SI_QUANTITIES, *quantities(_TABLES["quantities"]["shown"]))}
 
 _ABSENT = {
-    "trail": "skates have no trail; the front mass stands off the steer axis by nu_H, in SI by u_H: write "
-    "'nu_H >= 0.02' or 'u_H >= 0.02'; wheels and a trail, c, are those of model = \"whipple\"",
+    "trail": "skates have no trail; the distance of the front mass from the steer axis is nu_H, or u_H in SI: write "
+    "'nu_H >= 0.02' or 'u_H >= 0.02'; for wheels and a trail, c, choose model = \"whipple\"",
 }
 
 tms = Model(
@@ -117,7 +117,7 @@ tms = Model(
     title="two-mass-skate bicycle",
     degree=4,
     sets=(_NATIVE, _SI),
-    algebraic=lambda p: {**_upright(p), "T": tan(p["lambda_s"])},
+    algebraic=lambda p: {**_without_tilt(p), "T": tan(p["lambda_s"])},
     polynomial=copo,
     quantities=quantities(_TABLES["quantities"]["dimensionless"], COMPUTED, _IN_SI),
     compact=compact_copo,
@@ -128,14 +128,14 @@ tms = Model(
     omits="two point masses on skates, without wheels, rotational inertia or trail",
     conventions=CONVENTIONS,
     sketch=TMS,
-    absent=_ABSENT | UNCONTROLLED,
+    absent=_ABSENT | NO_CONTROLLER,
 )
 """The two-mass-skate bicycle."""
 
 
-def _steered(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled_matrices(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
     """M, V, P for a steer angle in units of 1/cos λ_s."""
-    return matrices(**_upright(p), sine=p["T"], cosine=1)
+    return matrices(**_without_tilt(p), sine=p["T"], cosine=1)
 
 
-STEERED = Steered(tms, _steered, unit=lambda p, h: (h, 1 + p["T"] * p["T"]), speed="Fr")
+CONTROLLABLE = ControllableBicycle(tms, _scaled_matrices, unit=lambda p, h: (h, 1 + p["T"] * p["T"]), speed="Fr")

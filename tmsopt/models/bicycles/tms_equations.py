@@ -6,12 +6,12 @@ from typing import Any
 def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
     """Coefficients a0 … a4 of the characteristic polynomial, with T = tan λ_s (equation copo).
 
-    This is det(M s² + V s + P) / (μ ν_H cos λ_s), by plain arithmetic on any numbers.
+    This is det(M s² + V s + P) / (μ ν_H cos λ_s), by plain arithmetic on numbers of any kind.
 
     Example:
         >>> a = tmsopt.models.copo(Fr=1, mu=0.1, chi_B=2**0.5, chi_H=1, zeta_B=-0.4, zeta_H=-0.2, T=1)
         >>> same = tmsopt.models.copo(Fr=1, mu=9.0, chi_B=2**0.5, chi_H=1, zeta_B=-0.4, zeta_H=-0.2, T=1)
-        >>> a == same  # at chi_H = 1 the ratio of the masses plays no part
+        >>> a == same  # at chi_H = 1 the mass ratio has no effect
         True
 
     More: docs/explanation/paper.md
@@ -44,7 +44,7 @@ def matrices(
 ) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]]]:
     """M, V and P of M q″ + V q′ + P q = 0, q = (lean, steer), from the sine and cosine of the steer axis tilt.
 
-    Equation matrices of the paper; nested lists, any numbers.
+    Equation `matrices` of the paper, as nested lists of numbers of any kind.
 
     Example:
         >>> design = (1.0, 0.1, 1.2, 1.02, -0.4, -0.2)

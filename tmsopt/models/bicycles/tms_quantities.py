@@ -1,4 +1,4 @@
-"""Quantities of the two-mass-skate bicycle that are no plain expressions; the others are in `tms.toml`."""
+"""Quantities of the two-mass-skate bicycle that are not plain expressions; the others are in `tms.toml`."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,8 +11,8 @@ from tmsopt.models.bicycles.tms_equations import matrices
 def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
     """Terms of the numerator of Fr_c², and its denominator.
 
-    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear in Fr², and ζ_B − ζ_H divides all of it. Divided
-    out, it stays regular at ζ_B = ζ_H, where the undivided one holds for any speed.
+    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear in Fr² and has the factor ζ_B − ζ_H. Without this
+    factor it stays regular at ζ_B = ζ_H, where the full condition holds at any speed.
     """
     mu, chi_B, chi_H, zeta_B, zeta_H = (v[name] for name in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H"))
     lever, moment, k = chi_B - chi_H, zeta_B * chi_H - zeta_H * chi_B, chi_H - 1
@@ -29,7 +29,7 @@ def _Fr_c(v: Mapping[str, Any]) -> Any:
     numerator, size = sum(terms), sum(map(absolute, terms))
     level = negligible(v["chi_B"] - v["chi_H"], absolute(v["chi_B"]) + absolute(v["chi_H"]))
     squared = quotient(choose(negligible(numerator, size), 0, numerator), choose(level, 0, denominator))
-    return absolute(sqrt(squared))  # without the sign of −0
+    return absolute(sqrt(squared))  # turns −0 into 0
 
 
 def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:
@@ -38,7 +38,7 @@ def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:
 
 
 def _mass_margin(v: Mapping[str, Any]) -> Any:
-    """Smaller eigenvalue of M, with det M = μ ν_H² ζ_B², in which nothing cancels."""
+    """Smaller eigenvalue of M, from det M = μ ν_H² ζ_B², in which nothing cancels."""
     T = tan(v["lambda_s"])
     h = sqrt(1 + T * T)
     native = {name: v[name] for name in ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H")}
@@ -52,4 +52,4 @@ COMPUTED: Mapping[str, dict[str, Any]] = {
     "Fr_c": {"value": _Fr_c, "equation": _Fr_c_equation},
     "mass_margin": {"value": _mass_margin},
 }
-"""What `tms.toml` cannot state of its quantities."""
+"""Functions of the quantities in `tms.toml`."""

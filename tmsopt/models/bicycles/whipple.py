@@ -1,7 +1,7 @@
 """The Carvallo–Whipple bicycle in SI (Meijaard et al. 2007): two wheels, rear frame and handlebar, with trail.
 
-What is left out is not there: without wheels, trail and moments of inertia this is the two-mass-skate bicycle, written
-in the same parameters, with the same roots per second.
+Parameters left out are 0: without wheels, trail and moments of inertia this is the two-mass-skate bicycle, with
+the same parameters and roots.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 from tmsopt.models.bicycles.bicycle import WORDS, times
-from tmsopt.models.bicycles.feedback import UNCONTROLLED, Steered
+from tmsopt.models.bicycles.feedback import NO_CONTROLLER, ControllableBicycle
 from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, tangent_matrices
@@ -34,10 +34,10 @@ _SI = ParameterSet(
 
 def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
     """M, v C1 and g K0 + v² K2."""
-    return _at_speed(*canonical(p), p["v"], p["g"])
+    return _matrices_at_speed(*canonical(p), p["v"], p["g"])
 
 
-def _at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> tuple[Matrix, Matrix, Matrix]:
+def _matrices_at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> tuple[Matrix, Matrix, Matrix]:
     D = [[v * e for e in row] for row in C1]
     return M, D, [[g * a + v * v * b for a, b in zip(*rows, strict=True)] for rows in zip(K0, K2, strict=True)]
 
@@ -54,14 +54,16 @@ whipple = Model(
     words=WORDS,
     conventions=CONVENTIONS,
     sketch=WHIPPLE,
-    absent=UNCONTROLLED,
+    absent=NO_CONTROLLER,
 )
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""
 
 
-def _steered(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled_matrices(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
     """M, v C1 and g K0 + v² K2 for a steer angle in units of w/cos λ_s."""
-    return _at_speed(*tangent_matrices(**{name: p[name] for name in ("T", *IN_MATRICES)}), p["v"], p["g"])
+    return _matrices_at_speed(*tangent_matrices(**{name: p[name] for name in ("T", *IN_MATRICES)}), p["v"], p["g"])
 
 
-STEERED = Steered(whipple, _steered, unit=lambda p, h: (p["w"] * h, p["w"] * p["w"] * (1 + p["T"] * p["T"])), speed="v")
+CONTROLLABLE = ControllableBicycle(
+    whipple, _scaled_matrices, unit=lambda p, h: (p["w"] * h, p["w"] * p["w"] * (1 + p["T"] * p["T"])), speed="v"
+)

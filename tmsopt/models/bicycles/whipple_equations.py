@@ -1,9 +1,9 @@
 """The linear Carvallo–Whipple bicycle: its matrices and its characteristic polynomial, without division.
 
-Meijaard, Papadopoulos, Ruina and Schwab (2007), appendix A, with x forward and z down from the rear contact. Two things
-are written otherwise there. The front assembly is summed over its bodies, handlebar and wheel, about the steer axis
-instead of about their common centre, which a massless one has not. And a wheel comes with its spin S = I_yy/r, its
-angular momentum at a speed of 1, beside its radius: then a wheel of no size is a number like any other.
+Meijaard, Papadopoulos, Ruina and Schwab (2007), appendix A, with x forward and z down from the rear contact, and two
+differences. The sums over handlebar and front wheel are about the steer axis, because a massless front assembly has no
+centre of mass. Each wheel has, besides its radius, a parameter for its spin S = I_yy/r, the angular momentum at a speed
+of 1, so that a wheel without size needs no special case.
 """
 
 from typing import Any
@@ -38,14 +38,14 @@ def matrices(
     cosine: Any,
     turn: Any,
 ) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    """M, C1, K0, K2 of M q″ + v C1 q′ + (g K0 + v² K2) q = 0, q = (lean, steer); nested lists, any numbers.
+    """M, C1, K0, K2 of M q″ + v C1 q′ + (g K0 + v² K2) q = 0, q = (lean, steer), from numbers of any kind.
 
     Args:
         S_R, S_F: spins I_yy/r of the wheels.
         sine, cosine: of the steer axis tilt.
         turn: cosine/w, the curvature of the path per steer angle.
 
-    A steer angle in another unit, k times as large, is `sine`, `cosine` and `turn` multiplied by k.
+    For a steer angle in a unit k times as large, multiply `sine`, `cosine` and `turn` by k.
     """
     m_T = m_R + m_B + m_H + m_F
     first_x = x_B * m_B + x_H * m_H + w * m_F
@@ -89,10 +89,10 @@ def tangent_matrices(T: Any, w: Any, **bodies: Any) -> tuple[Matrix, Matrix, Mat
 
 
 def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any, ...]:
-    """The numbers b of det(M s² + v C1 s + g K0 + v² K2): a0, a1/v, the two of a2, of a3/v and of a4.
+    """The numbers b0 … b7 in the coefficients of det(M s² + v C1 s + g K0 + v² K2).
 
-    With g and v they make a0 = b0, a1 = v b1, a2 = g b2 + v² b3, a3 = v (g b4 + v² b5), a4 = g (g b6 + v² b7): the
-    lean has neither damping nor stiffness from the speed, so no higher power appears.
+    a0 = b0, a1 = v b1, a2 = g b2 + v² b3, a3 = v (g b4 + v² b5), a4 = g (g b6 + v² b7): the
+    lean equation has neither damping nor stiffness from the speed, so no higher power appears.
     """
     return (
         M[0][0] * M[1][1] - M[0][1] * M[1][0],
@@ -106,19 +106,19 @@ def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any,
     )
 
 
-def carvallo_whipple(v: Any, g: Any, **of: Any) -> list[Any]:
+def carvallo_whipple(v: Any, g: Any, **others: Any) -> list[Any]:
     """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` alone.
 
-    The factor is that of a steer angle in units of cos λ/w, in which the equations are polynomials in T and w.
+    The factor comes from a steer angle in units of cos λ/w, in which the equations are polynomials in T and w.
 
     Args:
-        of: the other algebraic parameters, those of `tangent_matrices`.
+        others: the other algebraic parameters, those of `tangent_matrices`.
     """
-    b = powers_of_speed(*tangent_matrices(**of))
+    b = powers_of_speed(*tangent_matrices(**others))
     v2 = v * v
     return [b[0], v * b[1], g * b[2] + v2 * b[3], v * (g * b[4] + v2 * b[5]), g * (g * b[6] + v2 * b[7])]
 
 
 def _mixed(A: Matrix, B: Matrix) -> Any:
-    """The part of det(A + B) that is linear in each."""
+    """The part of det(A + B) that is linear in A and in B."""
     return A[0][0] * B[1][1] + A[1][1] * B[0][0] - A[0][1] * B[1][0] - A[1][0] * B[0][1]

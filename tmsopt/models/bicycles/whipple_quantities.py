@@ -1,4 +1,4 @@
-"""Quantities of the Carvallo–Whipple bicycle that are no plain expressions; the others are in `whipple.toml`."""
+"""Quantities of the Carvallo–Whipple bicycle that are not plain expressions; the others are in `whipple.toml`."""
 
 import math
 from collections.abc import Mapping
@@ -12,17 +12,17 @@ from tmsopt.models.model import Matrix
 
 Design = Mapping[str, Any]
 
-_ABOVE = 1e300  # any square of a speed that counts is less
+_LARGE = 1e300  # above every relevant v²/g
 
 IN_MATRICES = tuple(signature(matrices).parameters)[:-3]
-"""Algebraic parameters beside T, v and g: lengths, masses, inertias and spins."""
+"""Algebraic parameters except T, v and g: lengths, masses, inertias and spins."""
 
 
 def spin(I_yy: Any, r: Any) -> Any:
-    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia, whatever its radius.
+    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia, at any radius.
 
-    A wheel of a given kind has I_yy ≤ m r², so its spin vanishes with its radius. One without radius that has inertia
-    would turn infinitely fast: its spin is nan.
+    I_yy ≤ m r², so the spin vanishes with the radius. A wheel with inertia but without radius would turn infinitely
+    fast, so its spin is nan.
 
     Example:
         >>> print(tmsopt.models.spin(0.12, 0.3), tmsopt.models.spin(0.0, 0.0), tmsopt.models.spin(1.0, 0.0))
@@ -44,7 +44,7 @@ def _bodies(p: Design) -> dict[str, Any]:
 
 
 def canonical(p: Design) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no part in them), any numbers.
+    """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no effect), for numbers of any kind.
 
     Example:
         >>> M, C1, K0, K2 = tmsopt.models.canonical(tmsopt.load("problems/whipple_benchmark.toml").fixed)
@@ -58,7 +58,7 @@ def canonical(p: Design) -> tuple[Matrix, Matrix, Matrix, Matrix]:
 
 
 def _sine_cosine(p: Design) -> tuple[Any, Any]:
-    """By tan alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
+    """From tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s), because tilts lie in (−π/2, π/2)."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
     return T * cosine, cosine
@@ -82,28 +82,28 @@ def _v_capsize_equation(v: Design, x: Any) -> Any:
 def _v_weave(v: Design) -> Any:
     """√(g y) with the least y = v²/g > 0 that has a pair ± iω.
 
-    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is quadratic in y once v² g² is divided out. The pair of a root of
-    it is imaginary where ω² = a3/a1 = g (b4 + y b5)/b1 is positive; otherwise it is ± a real number.
+    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² divided by v² g² is quadratic in y. At a root the pair is
+    imaginary if ω² = a3/a1 = g (b4 + y b5)/b1 is positive; otherwise it is ± a real number.
     """
     b = _powers(v)
     second = b[5] * (b[1] * b[3] - b[0] * b[5])
     first = b[1] * (b[2] * b[5] + b[3] * b[4]) - 2 * b[0] * b[4] * b[5] - b[7] * b[1] * b[1]
     last = b[4] * (b[1] * b[2] - b[0] * b[4]) - b[6] * b[1] * b[1]
-    return sqrt(v["g"] * _least(*_both(second, first, last), b))
+    return sqrt(v["g"] * _least_weave(*_quadratic_roots(second, first, last), b))
 
 
-def _both(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
-    """Roots of a y² + b y + c without cancellation, each nan where it does not exist; one of them for a = 0."""
+def _quadratic_roots(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
+    """Roots of a y² + b y + c without cancellation; nan for a root that does not exist. One exists if a = 0."""
     radical = sqrt(b * b - 4 * a * c)
     far = -(b + choose(less(0, b), radical, -radical)) / 2
     return quotient(far, a), quotient(c, far)
 
 
-def _least(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
-    """The lesser of those y that are positive and have a positive ω²; nan without any."""
-    one, other = (choose(both(less(0, y), less(0, (b[4] + y * b[5]) * b[1])), y, _ABOVE) for y in (one, other))
+def _least_weave(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
+    """The least y that is positive and has a positive ω²; nan if there is none."""
+    one, other = (choose(both(less(0, y), less(0, (b[4] + y * b[5]) * b[1])), y, _LARGE) for y in (one, other))
     found = least(one, other)
-    return choose(less(found, _ABOVE), found, math.nan)
+    return choose(less(found, _LARGE), found, math.nan)
 
 
 def _fork_offset(v: Design) -> Any:
@@ -134,4 +134,4 @@ COMPUTED: Mapping[str, dict[str, Any]] = {
     "S_F": {"value": lambda v: spin(v["I_Fyy"], v["r_F"])},
     "mass_margin": {"value": _mass_margin},
 }
-"""What `whipple.toml` cannot state of its quantities."""
+"""Functions of the quantities in `whipple.toml`."""

@@ -1,4 +1,4 @@
-"""A stated system with a controller: u = −G y of y = C x, in M q″ + D q′ + K q = B u or x′ = A x + B u."""
+"""A system of the user's own with a controller: u = −G y of y = C x, in M q″ + D q′ + K q = B u or x′ = A x + B u."""
 
 from collections.abc import Mapping
 
@@ -10,29 +10,28 @@ LOOP = ("B", "C", "G")
 
 
 def check_loop(shapes: Mapping[str, tuple[int, int]]) -> None:
-    """Refuses matrices of a controller that do not fit each other, or the system.
+    """Check that the matrices of a controller fit each other and the system.
 
     Args:
-        shapes: rows and columns of every matrix that is given.
+        shapes: rows and columns of every given matrix.
 
     Raises:
-        Unfit: saying what is missing, or which size is accepted.
+        Unfit: if a matrix is missing or has another size.
     """
-    given = [key for key in LOOP if key in shapes]
-    if not given:
+    if shapes.keys().isdisjoint(LOOP):
         return
     for key in ("B", "G"):
         if key not in shapes:
-            raise Unfit(key, f"is missing beside {given[0]}; a controller is B and G, and C where not all is measured")
+            raise Unfit(key, "is missing; a controller needs B and G, and C unless every state is measured")
     system = "A" if "A" in shapes else "M"
     n = shapes[system][0]
     states = n if system == "A" else 2 * n
     rows, inputs = shapes["B"]
     if rows != n:
-        raise Unfit("B", f"has {rows} rows; accepted: {n}, those of {system}")
+        raise Unfit("B", f"has {rows} rows; accepted: {n}, as many as {system}")
     measured, columns = shapes.get("C", (states, states))
     if columns != states:
-        what = "the states" if system == "A" else "the coordinates and then their rates"
+        what = "one per state" if system == "A" else "the coordinates, then their rates"
         raise Unfit("C", f"has {columns} columns; accepted: {states}, {what}")
     if shapes["G"] != (inputs, measured):
         found = " × ".join(map(str, shapes["G"]))
@@ -43,8 +42,8 @@ def check_loop(shapes: Mapping[str, tuple[int, int]]) -> None:
         )
 
 
-def closed(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    """The matrices of the system with its controller, B G C added to K and D, or taken from A."""
+def close_loop(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
+    """The matrices with the controller: B G C is added to K and D, or subtracted from A."""
     own = {key: rows for key, rows in matrices.items() if key not in LOOP}
     if "B" not in matrices:
         return own
@@ -54,8 +53,12 @@ def closed(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
     if "A" in own:
         return {"A": _sum(own["A"], [[-x for x in row] for row in gain])}
     n = len(own["M"])
-    still = own.get("D") or [[0] * n for _ in range(n)]
-    return {"M": own["M"], "D": _sum(still, [row[n:] for row in gain]), "K": _sum(own["K"], [row[:n] for row in gain])}
+    damping = own.get("D") or [[0] * n for _ in range(n)]
+    return {
+        "M": own["M"],
+        "D": _sum(damping, [row[n:] for row in gain]),
+        "K": _sum(own["K"], [row[:n] for row in gain]),
+    }
 
 
 def _product(A: Matrix, B: Matrix) -> Matrix:

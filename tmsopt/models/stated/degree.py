@@ -1,4 +1,4 @@
-"""How large an expression may become: exact numbers grow with its degree, so this is known before they are computed."""
+"""Degrees of expressions, checked before exact numbers are computed, which grow with the degree."""
 
 import math
 import operator
@@ -12,17 +12,17 @@ from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, Kind, Ste
 from tmsopt.algebra.kinds import FLOATS, as_double
 
 LARGEST_EXPONENT = 1023
-"""Of a power: 2**1024 is no double any more."""
+"""Largest exponent of a power: 2**1024 is not a double."""
 
 LARGEST_DEGREE = 10_000
-"""Of an expression multiplied out. At a design of doubles it is then a fraction of some million bits at most."""
+"""Largest degree of an expanded expression. At a design of doubles its value has some million bits at most."""
 
 
 class DegreeTooHigh(ValueError):
-    """An expression that is not computed, with the reason.
+    """An expression is too large or not finite; the message says why.
 
     Attributes:
-        part: the part of it that is at fault, once that is known.
+        part: the part at fault, once known.
     """
 
     part: Any = None
@@ -30,14 +30,14 @@ class DegreeTooHigh(ValueError):
 
 @dataclass(frozen=True)
 class Degree:
-    """Of a quotient of two polynomials in what an expression names; `+ - * / **` as of the quotients.
+    """Degrees of an expression as a quotient of polynomials; `+ - * / **` act as on the quotients.
 
     Attributes:
-        over, under: degrees of the two, or more.
-        number: the value of what names nothing.
+        over, under: upper bounds of the degrees of numerator and denominator.
+        number: the value of a constant expression.
 
     Raises:
-        Beyond: for a number that is not finite, an exponent or a degree that is too large.
+        DegreeTooHigh: if a number is not finite, or an exponent or a degree is too large.
     """
 
     over: int = 1
@@ -50,7 +50,7 @@ class Degree:
         if max(self.over, self.under) > LARGEST_DEGREE:
             found = max(self.over, self.under)
             size = f"{found}" if found < 10**18 else f"about 1e{len(str(found)) - 1}"
-            raise DegreeTooHigh(f"has the degree {size} when it is multiplied out; accepted: up to {LARGEST_DEGREE}")
+            raise DegreeTooHigh(f"has the degree {size} when multiplied out; accepted: up to {LARGEST_DEGREE}")
 
     def __add__(self, other: "Degree") -> "Degree":
         return Degree(max(self.over + other.under, other.over + self.under), self.under + other.under)
@@ -66,9 +66,11 @@ class Degree:
     def __pow__(self, other: "Degree") -> "Degree":
         n = other.number
         if n is None:
-            return Degree()  # by logarithms, in numbers of one size
+            return Degree()  # computed by logarithms, in numbers of fixed size
         if abs(n) > LARGEST_EXPONENT:
-            accepted = f"from -{LARGEST_EXPONENT} to {LARGEST_EXPONENT}, for 2**{LARGEST_EXPONENT + 1} is no double"
+            accepted = (
+                f"from -{LARGEST_EXPONENT} to {LARGEST_EXPONENT}, because 2**{LARGEST_EXPONENT + 1} is not a double"
+            )
             raise DegreeTooHigh(f"has the exponent {n:.17g}; accepted: {accepted}")
         over, under = (self.over, self.under) if n >= 0 else (self.under, self.over)
         return Degree(math.ceil(abs(n) * over), math.ceil(abs(n) * under))
@@ -78,8 +80,8 @@ def _constant(number: Any) -> Degree:
     return Degree(0, 0, float(number))
 
 
-def _applied(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
-    """An operation on degrees that joins them, and computes with what are numbers."""
+def _operation(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
+    """An operation on degrees, which is computed if all operands are numbers."""
 
     def operation(*operands: Degree) -> Degree:
         joined = join(*operands)
@@ -92,61 +94,61 @@ def _applied(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
     return operation
 
 
-def _same(*operands: Degree) -> Degree:
-    """Of a root, a magnitude, the lesser of several."""
+def _largest(*operands: Degree) -> Degree:
+    """Degree of a square root, an absolute value, a minimum or a maximum."""
     return Degree(max(x.over for x in operands), max(x.under for x in operands))
 
 
-def _alone(*operands: Degree) -> Degree:
-    """Of a function that is not rational: its values are numbers of one size, whatever it is applied to."""
+def _transcendental(*operands: Degree) -> Degree:
+    """Degree of a function that is not rational: its values have a fixed size."""
     return Degree()
 
 
-_JOINED: Mapping[str, Callable[..., Degree]] = {
+_OPERATIONS: Mapping[str, Callable[..., Degree]] = {
     "add": operator.add,
     "sub": operator.add,
     "mul": operator.mul,
     "div": operator.truediv,
     "square": lambda a: a * a,
     "pow": operator.pow,
-    **dict.fromkeys(("neg", "sqrt", "abs", "min", "max"), _same),
-    **dict.fromkeys(("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), _alone),
+    **dict.fromkeys(("neg", "sqrt", "abs", "min", "max"), _largest),
+    **dict.fromkeys(("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), _transcendental),
 }
 
 
-def _stated(x: Constant) -> Degree:
+def _constant_degree(x: Constant) -> Degree:
     number = as_double(x)
     if not math.isfinite(number):
-        message = f"contains {number}, as of a division by 0; accepted: finite numbers, and expressions of them"
+        message = f"contains {number}, e.g. from a division by 0; accepted: finite numbers, and expressions of them"
         raise DegreeTooHigh(message)
     return _constant(number)
 
 
-DEGREES = Kind({name: _applied(join, name) for name, join in _JOINED.items()}, _stated)
+DEGREES = Kind({name: _operation(join, name) for name, join in _OPERATIONS.items()}, _constant_degree)
 
 
-def faulty(formula: Formula) -> tuple[int, str] | None:
-    """The first output that is not computed, and why; every step is looked at once.
+def first_fault(formula: Formula) -> tuple[int, str] | None:
+    """The first output that cannot be computed, and why.
 
-    Degrees are not summed up: in what a program built, such as an inverse of a matrix, most of them cancel. Those of
-    texts are known before there is a formula, see `tmsopt.models.expression`.
+    Degrees do not accumulate here, because in formulas built by a program, such as a matrix inverse, most terms cancel.
+    `tmsopt.models.expression` checks the degrees of texts.
     """
     found: list[Degree | str] = []
     for step in formula.steps:
         operands = [found[k] for k in step.operands]
         wrong = next((o for o in operands if isinstance(o, str)), None)
-        now = wrong or _stepped(step, operands)
-        found.append(now if isinstance(now, str) or now.number is not None else Degree())
+        degree = wrong or _step_degree(step, operands)
+        found.append(degree if isinstance(degree, str) or degree.number is not None else Degree())
     return next(((k, text) for k, o in enumerate(formula.outputs) if isinstance(text := found[o], str)), None)
 
 
-def _stepped(step: Step, operands: Sequence[Any]) -> Degree | str:
-    """The degree of a step, or what is wrong with it."""
+def _step_degree(step: Step, operands: Sequence[Any]) -> Degree | str:
+    """The degree of a step, or its fault."""
     if step.op == INPUT:
         return Degree()
     if step.op not in (*DEGREES.operations, CONSTANT):
-        known = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
-        return f"uses {step.op}; accepted: + - * / ** and {known}"
+        functions = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
+        return f"uses {step.op}; accepted: + - * / ** and {functions}"
     try:
         found: Degree = DEGREES.constant(step.value) if step.op == CONSTANT else DEGREES.operations[step.op](*operands)
         return found

@@ -1,4 +1,4 @@
-"""The polynomial and the matrix polynomial of a statement, whose entries are nodes."""
+"""Characteristic polynomial and matrix polynomial of a system with nodes as entries."""
 
 from collections.abc import Iterable
 from fractions import Fraction
@@ -9,16 +9,16 @@ from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
 
 IMAGINARY = "H, imaginary part"
-"""Name of the matrix of the imaginary parts of H, beside ``H`` of the real ones."""
+"""Key of the imaginary part of H; ``H`` is then the real part."""
 
 
-def whole(key: str) -> str:
-    """The matrix that a user wrote, of which this is a part."""
+def user_key(key: str) -> str:
+    """The user's key for the key of a part of a matrix."""
     return key.partition(",")[0]
 
 
-def in_order(kind: str, places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Places of entries as a user reads them: both parts of an entry of H one after the other."""
+def sort_places(kind: str, places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Places of entries in the user's order: both parts of an entry of H one after the other."""
     return sorted(places, key=lambda at: (at[0] == "quantities", at[1])) if kind == "hamiltonian" else list(places)
 
 
@@ -27,31 +27,30 @@ def polynomial(kind: str, blocks: dict[str, Matrix], carrier: float = 0.0) -> li
     if kind == "coefficients":
         return blocks["coefficients"][0]
     if kind == "hamiltonian":
-        return _doubled(blocks["H"], blocks[IMAGINARY], carrier)
+        return _real_polynomial(blocks["H"], blocks[IMAGINARY], carrier)
     if "A" in blocks:
         return characteristic_polynomial(blocks["A"])
-    M, K = blocks["M"], blocks["K"]
-    return quadratic_pencil(M, blocks.get("D") or [[0] * len(M) for _ in M], K)
+    return quadratic_pencil(*pencil(blocks))
 
 
-def _doubled(R: Matrix, J: Matrix, carrier: float) -> list[Any]:
-    """|det(s + i (H + carrier))|² for real s, of which −i (ω + carrier) and the conjugates are the roots."""
-    rows, S = range(len(R)), _carried(R, carrier)
+def _real_polynomial(R: Matrix, J: Matrix, carrier: float) -> list[Any]:
+    """|det(s + i (H + carrier))|² for real s; its roots are −i (ω + carrier) and their conjugates."""
+    rows, S = range(len(R)), _add_carrier(R, carrier)
     found = [pair(x) for x in characteristic_polynomial([[Pair(J[i][j], -S[i][j]) for j in rows] for i in rows])]
     re, im = [x.re for x in found], [x.im for x in found]
     return [a + b for a, b in zip(product(re, re), product(im, im), strict=True)]
 
 
-def _carried(R: Matrix, carrier: float) -> Matrix:
-    """The real part of H with its carrier."""
+def _add_carrier(R: Matrix, carrier: float) -> Matrix:
+    """The real part of H plus the carrier."""
     return [[x + Fraction(carrier) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(R)]
 
 
 def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> tuple[Matrix, ...]:
-    """Matrices of the matrix polynomial with these roots, in descending powers; of H those of the real double."""
+    """Matrices of the matrix polynomial with these roots, in descending powers; for H those of the real system."""
     if "H" in blocks:
         R, J = blocks["H"], blocks[IMAGINARY]
-        S = _carried(R, carrier)
+        S = _add_carrier(R, carrier)
         A = [[*j, *r] for j, r in zip(J, S, strict=True)] + [[*(-x for x in r), *j] for j, r in zip(J, S, strict=True)]
     elif "A" in blocks:
         A = blocks["A"]

@@ -1,4 +1,4 @@
-"""Complex numbers as pairs of nodes: what an entry of a complex matrix is computed in."""
+"""Complex numbers as pairs of nodes, for the entries of a complex matrix."""
 
 import operator
 import re
@@ -14,15 +14,15 @@ from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, DegreeTooHigh
 
 UNIT = "_1j"
-"""Stands for 1j in texts that are parsed; no parameter may have such a name."""
+"""Name for 1j in parsed texts; no parameter may begin with an underscore."""
 
 _LITERAL = re.compile(r"(?<![A-Za-z0-9_.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)[jJi](?![A-Za-z0-9_])")
-_STANDING = re.compile(rf"\(([^()*]+)\*{UNIT}\)")
+_REPLACED = re.compile(rf"\(([^()*]+)\*{UNIT}\)")
 
 
 @dataclass(frozen=True)
 class Pair:
-    """re + i im; what has no imaginary part has the int 0 there."""
+    """re + i im; the imaginary part of a real number is the int 0."""
 
     re: Any
     im: Any = 0
@@ -57,9 +57,9 @@ class Pair:
         n = pair(other)
         if is_real(self) and is_real(n):
             return Pair(self.re**n.re)
-        exponent = _whole(n)
+        exponent = _whole_exponent(n)
         if exponent is None:
-            raise DegreeTooHigh("is a complex number to a power; accepted: whole numbers as exponents, and exp(1j*phi)")
+            raise DegreeTooHigh("raises a complex number to a power; accepted: whole exponents, and exp(1j*phi)")
         found, power = Pair(constant(1)), self
         for bit in bin(abs(exponent))[:1:-1]:
             found, power = (found * power if bit == "1" else found), power * power
@@ -76,8 +76,8 @@ def pair(x: Any) -> Pair:
     return x if isinstance(x, Pair) else Pair(constant(x))
 
 
-def as_pair(x: Any) -> Pair:
-    """An entry of a complex matrix, numbers and expressions as they are, as a pair."""
+def entry_pair(x: Any) -> Pair:
+    """An entry of a complex matrix as a pair, its numbers and expressions unchanged."""
     if isinstance(x, tuple):
         return Pair(*x[:2])
     if isinstance(x, complex | np.complexfloating):
@@ -86,11 +86,11 @@ def as_pair(x: Any) -> Pair:
 
 
 def is_real(x: Pair) -> bool:
-    """Whether a pair has no imaginary part whatever its parameters are."""
+    """True if the imaginary part of a pair is 0 for all parameters."""
     return constant(x.im).fraction == 0
 
 
-def _whole(n: Pair) -> int | None:
+def _whole_exponent(n: Pair) -> int | None:
     if not is_real(n):
         return None
     value = constant(n.re).fraction
@@ -99,12 +99,12 @@ def _whole(n: Pair) -> int | None:
 
 
 def _real(name: str) -> Callable[..., Pair]:
-    def applied(*operands: Pair) -> Pair:
+    def operate(*operands: Pair) -> Pair:
         if not all(map(is_real, operands)):
-            raise DegreeTooHigh(f"takes {name} of a complex number; accepted: + - * / ** and exp of these")
+            raise DegreeTooHigh(f"takes {name} of a complex number; accepted for complex numbers: + - * / ** and exp")
         return Pair(make_node(name, *(x.re for x in operands)))
 
-    return applied
+    return operate
 
 
 def _exp(x: Pair) -> Pair:
@@ -124,19 +124,19 @@ PAIRS = Kind(
     pair,
 )
 
-BESIDE: Mapping[str, Any] = {UNIT: Pair(constant(0), constant(1))}
+IMAGINARY_UNIT: Mapping[str, Any] = {UNIT: Pair(constant(0), constant(1))}
 
 
-def real_text(text: str) -> str:
-    """A text in which numbers such as 2.5j are written by a name: ``(2.5*_1j)``."""
+def replace_literals(text: str) -> str:
+    """The text with a name in numbers such as 2.5j, which become ``(2.5*_1j)``."""
     return _LITERAL.sub(rf"(\1*{UNIT})", text)
 
 
 def complex_text(re: str, im: str) -> str:
-    """Two real texts as one."""
+    """The text of a complex number from the texts of its parts."""
     return re if im == "0" else f"1j*{im}" if re == "0" else f"{re} + 1j*{im}"
 
 
-def as_written(message: str) -> str:
-    """A message about such a text as about the one that was written."""
-    return _STANDING.sub(r"\1j", message)
+def restore_literals(message: str) -> str:
+    """The message with the user's notation, such as 2.5j, in place of the names."""
+    return _REPLACED.sub(r"\1j", message)

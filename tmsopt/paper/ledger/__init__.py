@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 
 import flint
 
-from tmsopt.errors import InputError, call_faults, list_faults, refusal
+from tmsopt.errors import InputError, call_faults, input_error, list_faults
 from tmsopt.paper.ledger.algebra import PRECISION
 from tmsopt.paper.ledger.claims import compute_entry, list_claims
 from tmsopt.paper.ledger.entry import VERDICTS, Entry, Ledger, judge_decimal, judge_identity, judge_statement
@@ -59,7 +59,7 @@ def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger
         raise InputError(faults)
     for pattern in map(str, only):
         if not select_claims([pattern]):
-            raise refusal(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", "--only")
+            raise input_error(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", "--only")
     chosen, steps = select_claims(only), start_steps(progress, "recomputing claims", "claim")
     entries = []
     for done, claim in enumerate(chosen, 1):

@@ -42,13 +42,13 @@ def find(name: str) -> Item:
     Raises:
         InputError: for an unknown name, with a suggestion.
     """
-    from tmsopt.errors import refusal, suggest
+    from tmsopt.errors import input_error, suggest
 
     for item in GALLERY.values():
         if name in (item.name, item.alias):
             return item
     accepted = [*GALLERY, *(item.alias for item in GALLERY.values() if item.alias)]
-    raise refusal(f"found '{name}'; {suggest(name, accepted)}", "NAME")
+    raise input_error(f"found '{name}'; {suggest(name, accepted)}", "NAME")
 
 
 _ITEMS = (

@@ -41,7 +41,7 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
             unit = of[name].multiple_of or unit  # a tolerance of 5 mm is one of 0.005 wheelbases of 1 m
         try:
             found, written, exact = (
-                read(value, unit) if isinstance(value, str) else (value, "", Exact.of(Fraction(value)))
+                read(value, unit) if isinstance(value, str) else (value, "", Exact.from_fraction(Fraction(value)))
             )
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)

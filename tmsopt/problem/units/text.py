@@ -85,7 +85,7 @@ def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0
     if abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
         value = float(found) * one
         if one == USUAL["rad"]["deg"]:
-            exact = found.in_degrees()
+            exact = found.to_radians()
     else:
         exact = found.times(share)
         value = float(exact)  # the nearest to what is written: 70 cm is 0.7 m
