@@ -272,7 +272,7 @@ def test_points_over_a_band_are_proved_as_a_solution_is():
     front = tmsopt.pareto(asked, points=3)
     assert len(front.points) >= 3
     for p in front.points:
-        assert p.solution.cover == worst_case.cover(
+        assert p.solution.cover == worst_case.prove_worst_case(
             p.solution.problem.posed, p.solution.parameters, p.solution.abscissa
         )
         assert p.solution.cover.proven

@@ -14,7 +14,7 @@ from tmsopt.models.exact import number
 from tmsopt.models.expression import Expression, parse_comparison, parse_value
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.cases import Case, Scenario, first_cases
-from tmsopt.problem.normalise import normalise, settle
+from tmsopt.problem.normalise import complete_fields, normalise
 from tmsopt.problem.quantities import (
     NO_RADIUS,
     RADIUS,
@@ -106,7 +106,7 @@ class Problem:
     @cached_property
     def posed(self) -> "Posed":
         """The problem as it is solved, found once."""
-        found = Posed(**_stated(self))
+        found = Posed(**_field_values(self))
         vars(found).update(problem=self)
         return found
 
@@ -117,7 +117,7 @@ class Problem:
             return read_from_posed(self, name)
 
     def __getstate__(self) -> dict[str, Any]:
-        return _stated(self)
+        return _field_values(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,19 +145,19 @@ class Posed:
 
         `dataclasses.replace` is not for this class: it leaves out what follows from the fields.
         """
-        return Posed(**settle(**_stated(self) | changes))
+        return Posed(**complete_fields(**_field_values(self) | changes))
 
     @cached_property
     def problem(self) -> Problem:
         """The problem as a user would state it."""
         found = object.__new__(Problem)
-        vars(found).update(_stated(self), posed=self)
+        vars(found).update(_field_values(self), posed=self)
         return found
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The cases that a search starts with; none for a problem that asks about one design alone."""
-        far = weighted(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
+        far = radius_parameters(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
         return first_cases(self.scenarios, self.tolerances, far)
 
     @property
@@ -180,7 +180,7 @@ class Posed:
         return any(name in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
 
     def __getstate__(self) -> dict[str, Any]:
-        return _stated(self)
+        return _field_values(self)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
@@ -276,12 +276,12 @@ class Posed:
         return {name: complete[name] for name in self.parameter_set.names}
 
 
-def _stated(record: Problem | Posed) -> dict[str, Any]:
+def _field_values(record: Problem | Posed) -> dict[str, Any]:
     """What was stated: what follows from it is found anew, and cannot always be pickled."""
     return {f.name: getattr(record, f.name) for f in fields(record)}
 
 
-def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:
+def radius_parameters(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:
     """Parameters that the robustness radius lets change: by default all but constants of nature and what is not there.
 
     Args:

@@ -30,7 +30,7 @@ _LARGEST = 1e50
 """Of a root: products of a few larger ones are no doubles."""
 
 
-def _beyond(a: Array) -> Any:
+def _may_have_huge_roots(a: Array) -> Any:
     """Whether the leading coefficient is 0, or so small that a root may be too large for doubles."""
     ends = np.abs(a[..., 0]) * _LARGEST <= np.abs(a).max(axis=-1)
     if ends.any():
@@ -43,12 +43,12 @@ def _beyond(a: Array) -> Any:
 def _structure(values: Mapping[str, Any]) -> Structure:
     assert isinstance(values, Values)
     a = [float(c) for c in values.coefficients]
-    if not all(map(math.isfinite, a)) or _beyond(np.array(a)):
+    if not all(map(math.isfinite, a)) or _may_have_huge_roots(np.array(a)):
         return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
     off = values.roundings()
     if abs(a[0]) <= off[0] < math.inf:
         return Structure("undecided", (), math.inf)  # rounding alone keeps it from 0; where all are such, all fits
-    found = _known_structure(tuple(a), tuple(map(float, off)))
+    found = _cached_structure(tuple(a), tuple(map(float, off)))
     simple = found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots)
     if simple and _scatter(np.array(a), found) > _SCATTER:  # numeric roots are not to be trusted
         found = replace(found, roots=roots_at(*values.given) or found.roots)
@@ -63,7 +63,7 @@ def _scatter(a: Array, found: Structure) -> float:
 
 
 @lru_cache(maxsize=_KEPT)
-def _known_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure:
+def _cached_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure:
     return structure(a, STRUCTURE_TOLERANCE, off)
 
 
@@ -137,7 +137,7 @@ def expand_names(text: str, of: ParameterSet) -> str:
     )
 
 
-def regular(coefficients: Array) -> Array:
+def regularise(coefficients: Array) -> Array:
     """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root is far away.
 
     Those of a design at which one does not exist are those of sⁿ, so that a search may start there.
@@ -145,7 +145,7 @@ def regular(coefficients: Array) -> Array:
     exist = np.all(np.isfinite(coefficients), axis=-1, keepdims=True)
     a = np.where(exist, coefficients, np.eye(coefficients.shape[-1])[0])
     size = np.abs(a).max(axis=-1, initial=0.0) + 1e-300
-    return np.concatenate([np.where(_beyond(a), 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
+    return np.concatenate([np.where(_may_have_huge_roots(a), 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
 
 
 def lifted_quantities(

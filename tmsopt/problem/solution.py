@@ -7,7 +7,7 @@ from typing import Any
 
 from tmsopt.models import inertia_margin
 from tmsopt.models.user_spectrum import beyond_axis, eigenfrequencies, polynomial_structure
-from tmsopt.problem.advice.remedies import Need, Relaxation
+from tmsopt.problem.advice.remedies import Relaxation, RequiredValue
 from tmsopt.problem.cases import Case, Cover
 from tmsopt.problem.freedom import Freedom
 from tmsopt.problem.problem import Problem
@@ -15,7 +15,7 @@ from tmsopt.problem.quantities import ROOT_NAMES
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.units import Reading
-from tmsopt.problem.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, joined, stability
+from tmsopt.problem.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, roots_to_json, stability
 from tmsopt.records import Printable, Table, asked_above, plain
 from tmsopt.roots import Root, Structure
 
@@ -144,7 +144,7 @@ class Solution(Printable):
     cover: Cover | None = None
     sides: Table[float] = Table()
     relaxation: Relaxation | None = None
-    need: Need | None = None
+    need: RequiredValue | None = None
     stable_elsewhere: bool | None = None
     interrupted: bool = False
     meetings: tuple[MultipleRoot, ...] = ()
@@ -256,7 +256,7 @@ class Solution(Printable):
             **self.stability.to_json(),
             **({"verdict_is_exact": self.edge_is_exact} if self.stability.on_edge else {}),
             **({"multiplicity_is_exact": False} if self.multiple_as_rounded else {}),
-            **joined(self),
+            **roots_to_json(self),
             **plain(self, "structure"),
             "active": plain(self.active, digits=GAIN_DIGITS),
             "violations": plain(self.violations, digits=GAIN_DIGITS),

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, V
 
 from tmsopt.errors import LISTED, Fault, InputError, short
 from tmsopt.files import path_of, read_text
-from tmsopt.problem.advice.lines import line_advice
+from tmsopt.problem.advice.lines import suggest_line
 
 MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
 """Parts of a dotted key; lists and tables one in another; characters of a number, or of a name without quotes."""
@@ -67,7 +67,7 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
     path_of(path, f"a {kind} file")
     file = str(path) or "."
     text = read_text(file, f"TOML {kind} file")
-    scan = _scanned(text)
+    scan = _scan_lines(text)
     if scan.fault:
         raise InputError([scan.fault.at(file, scan.fault.line)])
     try:
@@ -76,7 +76,7 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
         place = re.search(r"line (\d+)", str(error))
         line = scan.unclosed or (int(place[1]) if place else text.count("\n") + 1)
         written = "".join(text.split("\n")[line - 1 : line])  # none where the end of the file is at fault
-        raise InputError([Fault(f"not TOML: {error}{line_advice(written)}").at(file, line)]) from None
+        raise InputError([Fault(f"not TOML: {error}{suggest_line(written)}").at(file, line)]) from None
     return Page(file, data, scan.lines)
 
 
@@ -104,16 +104,16 @@ def validate_tables(
             for fault in found:
                 if len(fault.key) == deepest[fault.key[:2]]:
                     faults.setdefault(fault.key, fault)
-        pruned = _without(pruned, {key[:2] for key in faults})
+        pruned = _drop_keys(pruned, {key[:2] for key in faults})
     return list(faults.values()), None
 
 
-def within(section: str, faults: Iterable[Fault]) -> list[Fault]:
+def prefix_keys(section: str, faults: Iterable[Fault]) -> list[Fault]:
     """Faults of a table that is itself in a section."""
     return [replace(f, key=(section, *f.key)) for f in faults]
 
 
-def _without(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:
+def _drop_keys(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:
     inner = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in data.items() if isinstance(t, dict)}
     plain = {n for n, *rest in keys if not rest or n not in inner}
     return {n: inner.get(n, value) for n, value in data.items() if n not in plain}
@@ -144,7 +144,7 @@ class _Scan:
     fault: Fault | None = None
 
 
-def _scanned(text: str) -> _Scan:
+def _scan_lines(text: str) -> _Scan:
     """Where sections and keys are; stops at what would take the parser more time or memory than files need."""
     found = _Scan()
     section: Key = ()
@@ -172,7 +172,7 @@ def _scanned(text: str) -> _Scan:
             run = run + 1 if after == "." else 1
             if head is not None:
                 head.append(token.strip("\"'"))
-        if wrong := _beyond(token, run, depth):
+        if wrong := _size_problem(token, run, depth):
             found.fault = Fault(wrong, line=line)
             break
         line += token.count("\n")
@@ -181,7 +181,7 @@ def _scanned(text: str) -> _Scan:
     return found
 
 
-def _beyond(token: str, parts: int, depth: int) -> str:
+def _size_problem(token: str, parts: int, depth: int) -> str:
     """What is larger than files need; empty where nothing is."""
     if parts > MOST_PARTS:
         return f"found a key of more than {MOST_PARTS} parts; accepted: up to {MOST_PARTS}"

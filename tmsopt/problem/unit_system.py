@@ -12,7 +12,7 @@ from tmsopt.models.expression import SIGN, Expression, parse_comparison, parse_v
 from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.units import Dimension, dimension, factor
+from tmsopt.problem.units import Dimension, dimension, unit_factor
 from tmsopt.problem.validate import SMALLEST
 
 _PER_SECOND = "1/s"
@@ -60,14 +60,14 @@ def unit_of(problem: Posed, text: str) -> Unit:
     units = si_units(problem)
     name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
     if name in problem.parameter_set.names:
-        return _typed(problem.units.get(name, ""), units[name])
+        return _make_unit(problem.units.get(name, ""), units[name])
     if units.get(_FREQUENCY) == _HERTZ and set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name))) == {
         _FREQUENCY
     }:
         return Unit(_HERTZ)
     if name in units:
-        return _of_kind(problem, Dimension.of(units[name]))
-    return _of_kind(problem, dimension_of(problem, text, units))
+        return _usual_unit(problem, Dimension.of(units[name]))
+    return _usual_unit(problem, dimension_of(problem, text, units))
 
 
 def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
@@ -87,16 +87,16 @@ def unit_at(problem: Posed, text: str, parameters: Mapping[str, float]) -> Unit:
     return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
 
 
-def unit_of_all(problem: Posed, text: str, held: Mapping[str, float] | None = None) -> Unit:
+def common_unit(problem: Posed, text: str, common: Mapping[str, float] | None = None) -> Unit:
     """The same where a second is one for all designs of a problem, for bounds and differences; else its own unit.
 
     Args:
-        held: what these designs have in common; by default what is fixed, and nowhere varied.
+        common: what these designs have in common; by default what is fixed, and nowhere varied.
     """
-    if held is None:
-        held = {n: x for n, x in problem.fixed.items() if n not in {*problem.scenarios, *problem.tolerances}}
+    if common is None:
+        common = {n: x for n, x in problem.fixed.items() if n not in {*problem.scenarios, *problem.tolerances}}
     try:
-        return unit_at(problem, text, held)
+        return unit_at(problem, text, common)
     except KeyError:
         return unit_of(problem, text)
 
@@ -135,7 +135,7 @@ def limit_text(problem: Posed, name: str) -> str:
         )
     text, unit = problem.constraints[name], unit_of(problem, name)
     limit = split_limit(text)
-    return limit.written(unit.show(limit.value, 9)) if limit and unit.text else text
+    return limit.replace_number(unit.show(limit.value, 9)) if limit and unit.text else text
 
 
 def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
@@ -162,14 +162,14 @@ def dimension_of(problem: Posed, text: str, units: Mapping[str, str] | None = No
         return Dimension()
 
 
-def _of_kind(problem: Posed, dimension: Dimension) -> Unit:
+def _usual_unit(problem: Posed, dimension: Dimension) -> Unit:
     """The unit most parameters of a dimension were typed in."""
     of, unit = problem.parameter_set, dimension.unit
     typed = Counter(problem.units[n] for n in of.names if n in problem.units and Dimension.of(of[n].unit) == dimension)
-    return _typed(typed.most_common(1)[0][0] if typed else "", unit)
+    return _make_unit(typed.most_common(1)[0][0] if typed else "", unit)
 
 
-def _typed(written: str, unit: str) -> Unit:
+def _make_unit(written: str, unit: str) -> Unit:
     if unit == "1":
         return Unit()
-    return Unit(written, factor(written, unit)) if written else Unit(unit)
+    return Unit(written, unit_factor(written, unit)) if written else Unit(unit)

@@ -9,7 +9,7 @@ from tmsopt.models import Model, ParameterSet
 from tmsopt.models.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.models.names import MEANT
 from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
-from tmsopt.problem.advice.names import example_of, unknown
+from tmsopt.problem.advice.names import example_of, suggest_name
 from tmsopt.problem.cases import Band, points_of
 from tmsopt.problem.quantities import expand_names, root_names
 
@@ -23,7 +23,7 @@ MOST_TOLERANCES = 8
 """Parameters with a tolerance: a box has two corners for one, 256 for eight."""
 
 
-MOST = {"constraints": 1000, "scenarios": 100}
+MOST_ENTRIES = {"constraints": 1000, "scenarios": 100}
 """Constraints of a problem, and values of a scenario."""
 
 _LONGEST = 200  # characters of the name of a pattern
@@ -69,11 +69,11 @@ def shape_faults(problem: Stated) -> Iterator[Fault]:
 
 
 def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
-    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > MOST[what]:
-        yield Fault(f"found {len(values)}; accepted: up to {MOST[what]}", key)
+    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > MOST_ENTRIES[what]:
+        yield Fault(f"found {len(values)}; accepted: up to {MOST_ENTRIES[what]}", key)
 
 
-def faults(problem: Stated) -> Iterator[Fault]:
+def find_faults(problem: Stated) -> Iterator[Fault]:
     """What is wrong with a problem, everything at once."""
     names = {**problem.fixed, **problem.free, **problem.scenarios}
     of = guess_parameter_set(problem.model, names)
@@ -88,7 +88,7 @@ def faults(problem: Stated) -> Iterator[Fault]:
 
 def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
-    advice = at_first(unknown)
+    advice = at_first(suggest_name)
     tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
     for table, name in ((t, n) for t, names in tables.items() for n in names):
         if name in of.names:
@@ -143,12 +143,12 @@ def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Faul
 def _need_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     """Parameters that may differ from 0 where one that they need may be 0."""
     for name, (needed, otherwise) in of.needs.items():
-        if min(_reached(problem, of, needed), default=1.0) <= 0 and any(_reached(problem, of, name)):
+        if min(_possible_values(problem, of, needed), default=1.0) <= 0 and any(_possible_values(problem, of, name)):
             message = f"{needed} may be 0 while {name} is not: {otherwise}; keep {needed} above 0, or leave {name} out"
             yield Fault(message, ("parameters", needed))
 
 
-def _reached(problem: Stated, of: ParameterSet, name: str) -> list[float]:
+def _possible_values(problem: Stated, of: ParameterSet, name: str) -> list[float]:
     """The ends of what a parameter may be; none where they are no numbers, which is reported as a value."""
     try:
         given = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
@@ -165,11 +165,11 @@ def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
         for name, value in getattr(problem, table).items():
             if name not in of.names:
                 continue
-            if not _is_square(size := _number(value)) or size < 0 or (size == 0 and table == "tolerances"):
+            if not _has_usable_size(size := _number(value)) or size < 0 or (size == 0 and table == "tolerances"):
                 sizes = f"a number {needed}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
                 yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
             elif table == "tolerances":
-                yield from _room_faults(problem, of, name, size)
+                yield from _tolerance_faults(problem, of, name, size)
     if len(problem.tolerances) > MOST_TOLERANCES:
         message = f"{len(problem.tolerances)} tolerances; accepted: {MOST_TOLERANCES}, those that matter most"
         yield Fault(message, ("tolerances",))
@@ -193,9 +193,9 @@ def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any
             yield from _number_faults(of, name, value, key)
 
 
-def _room_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
+def _tolerance_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
     """Faults of a tolerance that takes a parameter out of its physical range."""
-    ends = _reached(problem, of, name)
+    ends = _possible_values(problem, of, name)
     for value in (min(ends) - tolerance, max(ends) + tolerance) if ends else ():
         if value not in of[name].range:
             message = (
@@ -213,7 +213,7 @@ def _number(value: Any) -> float:
         return math.nan
 
 
-def _is_square(number: float) -> bool:
+def _has_usable_size(number: float) -> bool:
     """Whether a number is 0 or of a size whose products with a few others are doubles."""
     return number == 0 or SMALLEST <= abs(number) <= 1 / SMALLEST
 
@@ -224,7 +224,7 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
     number = _number(value)
     if not math.isfinite(number):
         yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
-    elif not _is_square(number):
+    elif not _has_usable_size(number):
         yield Fault(f"found {number:g}; accepted: 0, or a size from {SMALLEST:g} to {1 / SMALLEST:g}{unit}", key)
     elif number not in parameter.range:
         degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
@@ -268,9 +268,9 @@ def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fa
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     accepted = (*of.names, *public_names(problem.model, of), *root_names(problem.model))
-    advice = at_first(unknown)
+    advice = at_first(suggest_name)
 
-    def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
+    def parse_faults(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
         try:
             parse(text, accepted)
             parse(expand_names(text, of), accepted)  # which may be too long where the text is not
@@ -283,6 +283,6 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     for sense, texts in (("minimize", [problem.minimize]), ("maximize", [problem.maximize]), ("pareto", pareto)):
         for text in texts:
             if text is not None or sense == "pareto":
-                yield from parsed(parse_value, text, "objective", sense)
+                yield from parse_faults(parse_value, text, "objective", sense)
     for name, text in problem.constraints.items():
-        yield from parsed(parse_comparison, text, "constraints", name)
+        yield from parse_faults(parse_comparison, text, "constraints", name)

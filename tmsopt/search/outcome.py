@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tmsopt.evaluation.bound import bounded, instant_bound
+from tmsopt.evaluation.bound import instant_bound, minimizes_abscissa
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.evaluation.worst_case import Worst, worst_cases
+from tmsopt.evaluation.worst_case import Worst, find_worst_cases
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
 from tmsopt.problem.freedom import degrees_of_freedom
@@ -83,7 +83,7 @@ def found(state: SearchState, starts: Starts, cases: Sequence[Case] | None = Non
         return None
     notes = _doubts(problem, trial, checked)
     ended = has_converged(trial) and not notes
-    if not (ended or notes or checked.violations) and bounded(problem):  # a flat stretch has no gradient
+    if not (ended or notes or checked.violations) and minimizes_abscissa(problem):  # a flat stretch has no gradient
         ended = instant_bound(problem, checked.objective).proven
     status = "optimal" if ended and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
@@ -286,7 +286,7 @@ def _held_off(problem: Posed, outcome: Outcome) -> bool:
 
 def evaluated_cases(problem: Posed, parameters: Mapping[str, float]) -> tuple[Case, ...]:
     """The listed cases of a design and the worst ones between them."""
-    return listed_cases(problem, worst_cases(problem, parameters) if problem.cases else {})
+    return listed_cases(problem, find_worst_cases(problem, parameters) if problem.cases else {})
 
 
 def listed_cases(problem: Posed, worst: Mapping[str, Worst]) -> tuple[Case, ...]:

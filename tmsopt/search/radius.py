@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.boundaries.nearest import Nearest, Robustness, robustness_at
 from tmsopt.problem.cases import Case, weight_of
-from tmsopt.problem.problem import Posed, weighted
+from tmsopt.problem.problem import Posed, radius_parameters
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.formulate import formulate, middle
 from tmsopt.records import Array, Table
@@ -40,7 +40,7 @@ def climb(state: SearchState, start: Start) -> LocalEnd:
         trial = check_end(state, end)
         if trial.checked.violations:
             break
-        claimed, around = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.around
+        claimed, around = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.robustness
         if around is not None and around.radius >= claimed * (1 - state.tuning.exact_radius):
             return end
         design = {n: trial.parameters[n] for n in problem.free}
@@ -95,7 +95,7 @@ def _joined(problem: Posed, points: list[Case], around: Robustness, tuning: Tuni
 
 def _boundary_point(problem: Posed, nearest: Nearest) -> Case:
     """In all that the radius lets change: what is 0 in a design, such as a gain, has no part in its own direction."""
-    names = weighted(problem.parameter_set, problem.weights, problem.fixed)
+    names = radius_parameters(problem.parameter_set, problem.weights, problem.fixed)
     return Case(direction=Table({n: nearest.direction.get(n, 0.0) for n in names}), edge=nearest.kind)
 
 
@@ -114,7 +114,7 @@ def _moved(case: Case, k: int, trial: CheckedEnd) -> Case:
 def estimate_radii(problem: Posed, columns: Mapping[str, Array], seed: int) -> Array:
     """Radii up to which designs, columns of free parameters, stay stable in some directions; too large, if anything."""
     of, nominal = problem.parameter_set, {n: np.asarray(x, dtype=float) for n, x in problem.ordered(columns).items()}
-    names, steps = list(weighted(of, problem.weights, problem.fixed)), np.geomspace(5e-3, 1.5, 20)
+    names, steps = list(radius_parameters(of, problem.weights, problem.fixed)), np.geomspace(5e-3, 1.5, 20)
     random = stream(seed, "rays").standard_normal((24, len(names)))
     rays = np.concatenate([np.eye(len(names)), random / np.linalg.norm(random, axis=1, keepdims=True)])
     moves = (np.concatenate([rays, -rays])[:, None] * steps[:, None]).reshape(-1, len(names))  # (moves, names)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.evaluation.worst_case import Worst, worst_cases
+from tmsopt.evaluation.worst_case import Worst, find_worst_cases
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
@@ -35,7 +35,7 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
             return None
         if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
             break  # not even the cases at hand are met
-        worst = worst_cases(problem, trial.parameters)
+        worst = find_worst_cases(problem, trial.parameters)
         more = [*_uncovered(problem, trial, worst), *_nearer(trial, tuning.nearer)]
         if not more:
             break
@@ -53,7 +53,7 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
     if state.best is None:
         return None
     cases = state.best.end.nlp.cases
-    listed = listed_cases(problem, worst or worst_cases(problem, state.best.parameters))
+    listed = listed_cases(problem, worst or find_worst_cases(problem, state.best.parameters))
     return found(state, starts, (*cases, *(c for c in listed if c not in cases)))
 
 
@@ -93,7 +93,7 @@ def _uncovered(problem: Posed, trial: CheckedEnd, found: Mapping[str, Worst]) ->
 
 def _nearer(trial: CheckedEnd, least: float) -> list[Case]:
     """The direction in which stability is lost before the radius that the design claims."""
-    around, nlp = trial.checked.around, trial.end.nlp
+    around, nlp = trial.checked.robustness, trial.end.nlp
     if around is None or RADIUS not in nlp.variables:
         return []
     claimed = float(trial.point.x[nlp.variables.index(RADIUS)])

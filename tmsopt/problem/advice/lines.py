@@ -8,7 +8,7 @@ _PAIRS = {"[": "]", "{": "}"}
 _LONGEST = 1000  # characters of a line; how one is read takes time by the square of them
 
 
-def line_advice(line: str) -> str:  # noqa: PLR0911 - one per case
+def suggest_line(line: str) -> str:  # noqa: PLR0911 - one per case
     """The end of a sentence that says what to write for a line that is refused; empty where that is not known."""
     if len(line) > _LONGEST:
         return ""

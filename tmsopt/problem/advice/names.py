@@ -19,7 +19,7 @@ def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity
     """Every name that an expression may use, in the order of the documentation."""
     native = () if of is model.sets[0] else model.sets[0].parameters
     known: dict[str, Parameter | Quantity] = {
-        n: Quantity(n, "", _power(model.degree - k), f"a_{{{k}}}", itemgetter(n))
+        n: Quantity(n, "", _coefficient_meaning(model.degree - k), f"a_{{{k}}}", itemgetter(n))
         for k, n in enumerate(model.coefficient_names())
     }
     derived = (*model.quantities, *of.quantities, *ROOT_QUANTITIES, NO_RADIUS)
@@ -29,18 +29,18 @@ def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity
     return {name: known[name] for name in (*of.names, *public_names(model, of), *root_names(model))}
 
 
-def _power(k: int) -> str:
+def _coefficient_meaning(k: int) -> str:
     what = "constant coefficient" if k == 0 else f"coefficient of s^{k}" if k > 1 else "coefficient of s"
     return f"{what} in the characteristic polynomial"
 
 
-def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:
+def suggest_name(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:
     """What to write for a name that is none: the nearest by spelling, or the one that means it."""
     if name in model.absent:
         return model.absent[name]
     if name == "s" and accepted is None:
         return f"s is the eigenvalue: write abscissa for the largest Re s, {ANGULAR_FREQUENCY} for the largest |Im s|"
-    if meaning := _elsewhere(name, model):
+    if meaning := _suggest_model(name, model):
         return meaning
     known = vocabulary(model, of)
     names = list(known if accepted is None else accepted)
@@ -53,7 +53,7 @@ def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] |
     return suggest(name, names)
 
 
-def _elsewhere(name: str, model: Model) -> str:
+def _suggest_model(name: str, model: Model) -> str:
     """What to write for a name that another bicycle knows."""
     for other in MODELS.values() if model.name in MODELS else ():
         known = {p.name: p.meaning for s in other.sets for p in s.parameters}
@@ -69,7 +69,7 @@ def example_of(parameter: Parameter) -> tuple[str, str]:
     return f"{parameter.name} = {value}", f"{parameter.name} = {{ min = {low:g}, max = {high:g} }}"
 
 
-def unknown_key(key: str, accepted: Mapping[str, object], section: str = "file") -> str:
+def suggest_key(key: str, accepted: Mapping[str, object], section: str = "file") -> str:
     """What to write for a key that a section, or the file itself, does not have."""
     meant = read_table("advice")["keys"][section].get(key.lower())
     written = f"write {f'[{meant}]' if section == 'file' else meant}; " if meant else ""

@@ -45,7 +45,7 @@ class Relaxation:
 
 
 @dataclass(frozen=True)
-class Need:
+class RequiredValue:
     """What a parameter that is fixed, or held below or above it, would have to be for a design that meets all else.
 
     Attributes:
@@ -74,7 +74,7 @@ class Need:
         return plain(self, "parameter value shown most looked design")
 
 
-def rounded_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
+def round_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
     """A number rounded up, or down, to significant digits; 0 for what is no number."""
     if not x or not math.isfinite(x):
         return 0.0
@@ -82,16 +82,16 @@ def rounded_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
     return (math.ceil if up else math.floor)(round(x / step, 6)) * step
 
 
-def moved_limits(problem: Posed, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
+def move_limits(problem: Posed, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
     """Limits moved by amounts, as a file would write them, rounded so that they suffice.
 
     Of an end of a range, such as ``v.max``, the number with its unit; of a constraint its whole text, in which numbers
     have no units.
     """
-    return {name: _moved(problem, name, amount, digits) for name, amount in amounts.items()}
+    return {name: _move_limit(problem, name, amount, digits) for name, amount in amounts.items()}
 
 
-def with_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
+def replace_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
     """The problem with limits as they are written.
 
     Raises:
@@ -107,18 +107,20 @@ def with_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
     return replace(problem.problem, constraints=kept, free=ends, start={}).posed
 
 
-def _moved(problem: Posed, name: str, amount: float, digits: int) -> str:
+def _move_limit(problem: Posed, name: str, amount: float, digits: int) -> str:
     if name not in problem.constraints:
         parameter, _, end = name.rpartition(".")
         up, unit = end == "max", unit_of(problem, name)
-        new = rounded_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
+        new = round_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
         return f"{new:.{DIGITS}g} {unit.text}".rstrip()
     text = problem.constraints[name]
     left, sign, right = written_sides(text)
     limit = split_limit(text)
     if limit is None:
-        more = rounded_outwards(abs(amount), True, digits)
+        more = round_outwards(abs(amount), True, digits)
         return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {more:.{DIGITS}g}"
     change = -amount if (sign == ">=") == bool(limit.before) else amount
     new, left_of_it = limit.value + change, _LEFT * abs(limit.value)
-    return limit.written(f"{rounded_outwards(new, change > 0, digits) if abs(new) > left_of_it else 0.0:.{DIGITS}g}")
+    return limit.replace_number(
+        f"{round_outwards(new, change > 0, digits) if abs(new) > left_of_it else 0.0:.{DIGITS}g}"
+    )

@@ -31,18 +31,18 @@ class Dimension:
         """That of a unit, such as ``kg m^2`` or ``1/s``."""
         parts = zip((1, -1), (_DERIVED.get(unit, unit) + "/").split("/"), strict=False)
         each = [(one, sign) for sign, part in parts for one in _POWERS.finditer(part) if one["name"] != "1"]
-        return _product(*((cls(((one["name"], Fraction(1)),)), sign * int(one["power"] or 1)) for one, sign in each))
+        return _multiply(*((cls(((one["name"], Fraction(1)),)), sign * int(one["power"] or 1)) for one, sign in each))
 
     @property
     def unit(self) -> str:
         """As text; ``1`` for none."""
-        above = " ".join(_power(n, p) for n, p in self.powers if p > 0)
-        below = " ".join(_power(n, -p) for n, p in self.powers if p < 0)
+        above = " ".join(_power_text(n, p) for n, p in self.powers if p > 0)
+        below = " ".join(_power_text(n, -p) for n, p in self.powers if p < 0)
         text = f"{above or '1'}/{below}" if below else above or "1"
         return _NAMED.get(text, text)
 
 
-def _product(*factors: tuple[Dimension, Fraction | int]) -> Dimension:
+def _multiply(*factors: tuple[Dimension, Fraction | int]) -> Dimension:
     """Of dimensions, each to a power."""
     if any(factor.mixed for factor, _ in factors):
         return Dimension(mixed=True)
@@ -53,14 +53,14 @@ def _product(*factors: tuple[Dimension, Fraction | int]) -> Dimension:
     return Dimension(tuple(sorted((n, p) for n, p in found.items() if p)))
 
 
-def _raised(base: Dimension, exponent: Dimension) -> Dimension:
+def _raise_power(base: Dimension, exponent: Dimension) -> Dimension:
     """A power; by an exponent that is no number, none."""
     if not math.isfinite(exponent.number):
         return Dimension()
-    return _product((base, Fraction(exponent.number).limit_denominator(12)))
+    return _multiply((base, Fraction(exponent.number).limit_denominator(12)))
 
 
-def _sum(*terms: Dimension) -> Dimension:
+def _add(*terms: Dimension) -> Dimension:
     known = {term.powers for term in terms if term.powers}
     mixed = len(known) > 1 or any(term.mixed for term in terms)
     return Dimension(() if mixed or not known else known.pop(), mixed)
@@ -68,12 +68,12 @@ def _sum(*terms: Dimension) -> Dimension:
 
 UNITS = Kind(
     {
-        **dict.fromkeys(("add", "sub", "neg", "abs", "min", "max"), _sum),
-        "mul": lambda a, b: _product((a, 1), (b, 1)),
-        "div": lambda a, b: _product((a, 1), (b, -1)),
-        "square": lambda a: _product((a, 2)),
-        "sqrt": lambda a: _product((a, Fraction(1, 2))),
-        "pow": _raised,
+        **dict.fromkeys(("add", "sub", "neg", "abs", "min", "max"), _add),
+        "mul": lambda a, b: _multiply((a, 1), (b, 1)),
+        "div": lambda a, b: _multiply((a, 1), (b, -1)),
+        "square": lambda a: _multiply((a, 2)),
+        "sqrt": lambda a: _multiply((a, Fraction(1, 2))),
+        "pow": _raise_power,
         **dict.fromkeys(("sin", "cos", "tan", "exp", "log"), lambda a: Dimension()),
         **dict.fromkeys(("asin", "acos", "atan"), lambda a: Dimension.of("rad")),
     },
@@ -82,7 +82,7 @@ UNITS = Kind(
 """What operations make of dimensions."""
 
 
-def _power(name: str, p: Fraction) -> str:
+def _power_text(name: str, p: Fraction) -> str:
     return name if p == 1 else f"{name}^{p}" if p.denominator == 1 else f"{name}^({p})"
 
 

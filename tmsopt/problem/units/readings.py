@@ -20,7 +20,7 @@ READ_DIGITS = 15
 """Digits of a reading in another unit: what was written as 15 km/h reads 15 again, not what roundings made of it."""
 
 
-def read_in(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
+def convert_exactly(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
     """A number in SI as a builder reads it: in mm, km/h and degrees, others as they are.
 
     Returns:
@@ -32,9 +32,9 @@ def read_in(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
     return value * factor / {"mm": 1, "km/h": 5, "deg": pi}[name], name, READ_DIGITS
 
 
-def reading(value: float, unit: str) -> tuple[float, str]:
+def convert_to_reading(value: float, unit: str) -> tuple[float, str]:
     """A number in SI as a builder reads it, with its unit, to 15 digits where it is converted."""
-    value, unit, digits = read_in(value, unit)
+    value, unit, digits = convert_exactly(value, unit)
     return float(f"{value:.{digits}g}") if digits else value, unit
 
 
@@ -80,5 +80,5 @@ def readings(
     units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities if q.name not in _TIMES}
     for name in (n for n, unit in units.items() if unit != "1"):
         value = parameters[name] if name in parameters else quantities[name]
-        read, unit, digits = read_in(value, units[name], pi)
+        read, unit, digits = convert_exactly(value, units[name], pi)
         yield f"{name}_{''.join(filter(str.isalnum, unit))}", read, digits

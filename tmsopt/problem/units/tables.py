@@ -9,7 +9,7 @@ from typing import Any
 from tmsopt.errors import Fault
 from tmsopt.models import ParameterSet, decimal
 from tmsopt.models.exact import Exact
-from tmsopt.problem.units.text import LONGEST, read
+from tmsopt.problem.units.text import LONGEST, parse_exact_quantity
 
 TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
 """Tables of a problem that hold numbers; a unit that is typed first stands."""
@@ -19,7 +19,9 @@ Typed = dict[str, dict[float, str]]
 """Parameter → double → the exact number that was typed for it, where the double's own decimal is another."""
 
 
-def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
+def read_numbers(
+    tables: Mapping[str, Any], of: ParameterSet
+) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
     """The tables of a problem with texts such as "25 cm" as numbers.
 
     Args:
@@ -41,14 +43,14 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
             unit = of[name].multiple_of or unit  # a tolerance of 5 mm is one of 0.005 wheelbases of 1 m
         try:
             found, written, exact = (
-                read(value, unit) if isinstance(value, str) else (value, "", Exact.of(Fraction(value)))
+                parse_exact_quantity(value, unit) if isinstance(value, str) else (value, "", Exact.of(Fraction(value)))
             )
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)
         except OverflowError:  # a whole number that is no double
             return value
         except ValueError as error:
-            faults.append(Fault(f"{error}{_meant(value)}", (table, name, *end)))
+            faults.append(Fault(f"{error}{_suggest_text(value)}", (table, name, *end)))
             return value
         if written and not sizes:
             units.setdefault(name, written)
@@ -71,7 +73,7 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
     return found, units, typed, faults
 
 
-def _meant(text: object) -> str:
+def _suggest_text(text: object) -> str:
     """The end of a sentence that says what to write for a text that is refused; empty where that is not known."""
     if not isinstance(text, str) or len(text) > LONGEST:
         return ""

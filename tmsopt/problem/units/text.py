@@ -29,13 +29,13 @@ USUAL: Mapping[str, Mapping[str, float]] = _UNITS["usual"]
 """By unit, how many of it one of another is: those that are written every day, for which pint need not be loaded."""
 
 
-def with_unit(text: str, unit: str) -> float:
+def parse_quantity(text: str, unit: str) -> float:
     """The number that a text with a unit stands for, in `unit`.
 
     Raises:
         ValueError: saying what was found and what is accepted.
     """
-    return read(text, unit)[0]
+    return parse_exact_quantity(text, unit)[0]
 
 
 def _is_complex(text: str) -> bool:
@@ -45,7 +45,7 @@ def _is_complex(text: str) -> bool:
         return False
 
 
-def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0912 - one for each fault
+def parse_exact_quantity(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0912 - one for each fault
     """The same, with the unit as written and the exact number, None where no exact factor between the units is known.
 
     Raises:
@@ -78,7 +78,7 @@ def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0
     written = " ".join(written.replace("²", "^2").replace("³", "^3").replace("·", "*").split())
     if not _UNIT.fullmatch(written):
         raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
-    one = _factor(written.replace("°", "deg"), unit)
+    one = _known_factor(written.replace("°", "deg"), unit)
     if one is None:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
     share, exact = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR), None
@@ -94,21 +94,21 @@ def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0
     return value, written, exact
 
 
-def factor(written: str, unit: str) -> float:
+def unit_factor(written: str, unit: str) -> float:
     """How many `unit` one of a unit is that was read before; of what is kept as a fraction, the nearest double."""
-    found = _factor(written.replace("°", "deg"), unit)
+    found = _known_factor(written.replace("°", "deg"), unit)
     assert found is not None, written
     share = Fraction(found).limit_denominator(_LARGEST_DENOMINATOR)
     return found if abs(share - Fraction(found)) > _ROUNDED * share else float(share)
 
 
 @cache
-def _factor(written: str, unit: str) -> float | None:
+def _known_factor(written: str, unit: str) -> float | None:
     """How many `unit` one written unit is, or None where it is not one."""
-    return USUAL.get(unit, {}).get(written) or by_pint(written, unit)
+    return USUAL.get(unit, {}).get(written) or pint_factor(written, unit)
 
 
-def by_pint(written: str, unit: str) -> float | None:
+def pint_factor(written: str, unit: str) -> float | None:
     """The same, of any unit that pint knows."""
     registry = _registry()
     try:

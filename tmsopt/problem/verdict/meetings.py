@@ -20,7 +20,7 @@ _REACH = 3e-5  # of the box: how far from a design its crossing may be, which co
 _STEP, _STEPS = 1e-6, 6  # of the box, for differences; of Gauss and Newton
 _MET = 1e-12  # of the terms of the matrices: what is left of a block that vanishes
 _NEAR = 1e-6  # of their size: a located root and one shown are the same
-_UNIT = 1e-3  # of the largest root: the unit in which matrices are weighed at a smaller one
+_UNIT = 1e-3  # of the largest root: the unit in which matrices are scaled_matrix at a smaller one
 
 
 def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
@@ -29,8 +29,8 @@ def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Ro
     of_H = problem.model.carrier is not None
     for root in roots:
         if root.multiplicity > 1 and (root.im < 0 if of_H else root.im >= 0):
-            (told,) = user_roots(problem.model, [root])
-            meeting = _meeting(problem, parameters, root, told, roots)
+            (user_root,) = user_roots(problem.model, [root])
+            meeting = _find_eigenvectors(problem, parameters, root, user_root, roots)
             found += [meeting] if of_H or not root.im else [meeting, replace(meeting, im=-root.im)]
     return tuple(sorted(found, key=lambda m: (-m.re, -m.im)))
 
@@ -44,10 +44,10 @@ def located_meetings(problem: Posed, pattern: Pattern, parameters: Mapping[str, 
     """The multiple roots that ``EP`` in the name of a pattern asks for; none without matrices."""
     if problem.model.pencil is None or "EP" not in pattern.name:
         return ()
-    return meetings(problem, parameters, _located(problem, pattern, parameters))
+    return meetings(problem, parameters, _located_roots(problem, pattern, parameters))
 
 
-def _located(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
+def _located_roots(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
     """The multiple roots of the nearest polynomial of a pattern."""
     values = problem.values(parameters)
     try:
@@ -70,12 +70,12 @@ def every_meeting(
     shown, pattern = meetings(problem, parameters, roots), problem.pattern
     lost = any(name in violated for name in problem.located)
     located = located_meetings(problem, pattern, parameters) if pattern is not None and not lost else ()
-    ours = [m for m in shown if any(_beside(m, other) for other in located)]
-    rest = [m for m in located if not any(_beside(m, other) for other in shown)]
+    ours = [m for m in shown if any(_is_near(m, other) for other in located)]
+    rest = [m for m in located if not any(_is_near(m, other) for other in shown)]
     return (*ours, *rest, *(m for m in shown if m not in ours))
 
 
-def _beside(one: MultipleRoot, other: MultipleRoot) -> bool:
+def _is_near(one: MultipleRoot, other: MultipleRoot) -> bool:
     a, b = _number(one), _number(other)
     return abs(a - b) <= _NEAR * (abs(a) + abs(b) or 1.0)
 
@@ -86,33 +86,33 @@ def _number(root: Root | MultipleRoot) -> complex:
 
 def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
     """The parameters at which located roots cross beside a design: sharper than coefficients see them."""
-    roots = _located(problem, pattern, parameters)
+    roots = _located_roots(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
-    found, _ = _crossed(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
+    found, _ = _find_crossing(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
     return {n: min(max(found[n], low), high) for n, (low, high) in problem.free.items()}
 
 
-def _meeting(
-    problem: Posed, parameters: Mapping[str, float], root: Root, told: Root, roots: Sequence[Root]
+def _find_eigenvectors(
+    problem: Posed, parameters: Mapping[str, float], root: Root, user_root: Root, roots: Sequence[Root]
 ) -> MultipleRoot:
     k, pencil = root.multiplicity, problem.model.pencil
     if pencil is None:
-        return MultipleRoot(told.re, told.im, k, None, k)
+        return MultipleRoot(user_root.re, user_root.im, k, None, k)
     of = problem.parameter_set
     unit = _unit(root, roots)
-    at, s = _crossed(problem, parameters, _number(root), k, unit)
+    at, s = _find_crossing(problem, parameters, _number(root), k, unit)
     matrices = pencil(of.native({n: flint.arb(x) for n, x in at.items()}))
     found = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK, unit)
     partial = found.partial or (k - found.geometric + 1,)
-    return MultipleRoot(told.re, told.im, k, found.geometric, partial[0])
+    return MultipleRoot(user_root.re, user_root.im, k, found.geometric, partial[0])
 
 
 def _unit(root: Root, roots: Sequence[Root]) -> float:
-    """The size of a root in which matrices are weighed."""
+    """The size of a root in which matrices are scaled_matrix."""
     return max(abs(_number(root)), _UNIT * max(abs(_number(r)) for r in roots)) or 1.0
 
 
-def _crossed(
+def _find_crossing(
     problem: Posed, parameters: Mapping[str, float], s: complex, k: int, unit: float
 ) -> tuple[Mapping[str, float], complex]:
     """The crossing beside a design, and its root: the design itself where there is none so near.
@@ -125,23 +125,23 @@ def _crossed(
     size, scale = equilibrated(_matrices(problem, parameters), unit)
     scale = scale / np.linalg.norm(size * scale, 2)  # held, lest it jumps as entries change
 
-    def moved(x: Array) -> dict[str, float]:
+    def design_at(x: Array) -> dict[str, float]:
         return {**parameters, **dict(zip(free, x.tolist(), strict=True))}
 
-    def weighed(x: Array, z: complex) -> Complex:
-        matrices = _matrices(problem, moved(x))
+    def scaled_matrix(x: Array, z: complex) -> Complex:
+        matrices = _matrices(problem, design_at(x))
         whole = sum(P * z ** (len(matrices) - 1 - j) for j, P in enumerate(matrices))
         return np.asarray(scale * whole, dtype=complex)
 
     for count in range(k, 1, -1):
         x, z = np.array([float(parameters[n]) for n in free]), s
         for _ in range(_STEPS):
-            left, values, right = np.linalg.svd(weighed(x, z))
+            left, values, right = np.linalg.svd(scaled_matrix(x, z))
             if count > len(values) or values[-count] > _CLOSE:
                 break
             if values[-count] <= _MET:
-                return moved(x), z
-            step = _step(weighed, x, widths, z, unit, left[:, -count:], right[-count:])
+                return design_at(x), z
+            step = _newton_step(scaled_matrix, x, widths, z, unit, left[:, -count:], right[-count:])
             x, z = x + widths * step[:-2], z + unit * complex(*step[-2:])
             if (np.abs(x - [parameters[n] for n in free]) > _REACH * widths).any():
                 break
@@ -154,8 +154,8 @@ def _matrices(problem: Posed, parameters: Mapping[str, float]) -> list[Array]:
     return [np.array(P, dtype=float) for P in found]
 
 
-def _step(
-    weighed: Callable[[Array, complex], Complex],
+def _newton_step(
+    scaled_matrix: Callable[[Array, complex], Complex],
     x: Array,
     widths: Array,
     z: complex,
@@ -166,7 +166,7 @@ def _step(
     """Gauss and Newton for a block of L that shall vanish, in shares of the box and of the unit of the root."""
 
     def block(at: Array, root: complex) -> Array:
-        B = (left.conj().T @ weighed(at, root) @ right.conj().T).ravel()
+        B = (left.conj().T @ scaled_matrix(at, root) @ right.conj().T).ravel()
         return np.concatenate([B.real, B.imag])
 
     base = block(x, z)

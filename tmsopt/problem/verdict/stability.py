@@ -63,7 +63,7 @@ def power_of_t(longest: int) -> str:
     return "" if longest < 2 else "t" if longest == 2 else f"t^{longest - 1}"
 
 
-def longest_on_line(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int | None:
+def longest_chain_on_line(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int | None:
     """Length of the longest Jordan chain on the rightmost line; None where no root on it is multiple."""
     return max((m.longest for m in meetings if m.re >= abscissa - _LINE * largest), default=None)
 
@@ -103,14 +103,14 @@ def stability(
     """
     if not all(map(math.isfinite, ends)):
         return StabilityVerdict("")
-    told = min(_TIMES * abs(ends[0] - ends[1]), _FAINT * largest)
-    if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > told:
+    rounding = min(_TIMES * abs(ends[0] - ends[1]), _FAINT * largest)
+    if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > rounding:
         return StabilityVerdict(STABLE if max(ends) < 0 else UNSTABLE)
-    growth = power_of_t(longest_on_line(meetings, ends[0], largest) or 1)
+    growth = power_of_t(longest_chain_on_line(meetings, ends[0], largest) or 1)
     return StabilityVerdict(GROWING if growth else EDGE if "infinity" in edges else MARGINAL, growth)
 
 
-def joined(solution: Any) -> dict[str, Any]:
+def roots_to_json(solution: Any) -> dict[str, Any]:
     """What JSON says of the multiple roots: beside the solution of the first, and on the entry of each root.
 
     Args:
@@ -121,20 +121,20 @@ def joined(solution: Any) -> dict[str, Any]:
     top = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
     near = _LINE * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
 
-    def of(m: MultipleRoot) -> dict[str, Any]:
+    def chain_facts(m: MultipleRoot) -> dict[str, Any]:
         grows = {"growth": power_of_t(m.longest)} if growing and m.re == top and m.longest > 1 else {}
         return {"defective": m.defective, "geometric_multiplicity": m.geometric, **grows}
 
     for name, each in plain(solution, "roots eigenfrequencies").items():
         for entry, root in zip(each, solution.roots, strict=True) if each else ():
             for meeting in (m for m in solution.meetings if math.hypot(m.re - root.re, m.im - root.im) <= near):
-                entry.update(of(meeting))
+                entry.update(chain_facts(meeting))
         found |= {name: each} if each or name == "roots" else {}
-    first = {n: x for n, x in of(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}
+    first = {n: x for n, x in chain_facts(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}
     return first | found
 
 
-def stability_in_words(found: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
+def describe_stability(found: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
     """A verdict as a headline says it.
 
     Args:
@@ -145,11 +145,11 @@ def stability_in_words(found: StabilityVerdict, *, exact: bool, of_matrices: boo
         return found.verdict
     root = "real eigenfrequency" if of_H else "root on the imaginary axis"
     why = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
-    said = f"growing as {found.growth}, {why}" if found.growth else found.verdict
-    return said if exact else f"{said}{ROUNDED}"
+    words = f"growing as {found.growth}, {why}" if found.growth else found.verdict
+    return words if exact else f"{words}{ROUNDED}"
 
 
-def crossing_in_words(meeting: MultipleRoot) -> str:
+def describe_crossing(meeting: MultipleRoot) -> str:
     """What a multiple root with more than one eigenvector is called."""
     if meeting.defective:
         return f"{meeting.geometric} Jordan chains, not an EP{meeting.multiplicity}"

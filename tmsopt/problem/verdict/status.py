@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from tmsopt.problem.unit_system import amounts_text
-from tmsopt.problem.verdict.stability import UNSTABLE, stability_in_words
+from tmsopt.problem.verdict.stability import UNSTABLE, describe_stability
 
 if TYPE_CHECKING:
     from tmsopt.problem.problem import Posed
@@ -15,7 +15,7 @@ def status_text(problem: "Posed", status: str) -> str:
     return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
 
 
-def status_in_words(solution: "Solution") -> str:
+def describe_status(solution: "Solution") -> str:
     """How a search ended, as a headline says it."""
     problem, bound, status = solution.problem, solution.bound, solution.status
     if solution.interrupted and status != "optimal":
@@ -33,7 +33,7 @@ def status_in_words(solution: "Solution") -> str:
     return ", ".join(["optimal", *(["proved"] if bound.proven else [*solution.starts.sureness, unproved])])
 
 
-def verdict_in_words(solution: "Solution") -> str:
+def describe_verdict(solution: "Solution") -> str:
     """Whether a solution is stable; for one that is not though that was sought, whether any is."""
     problem, known, found = solution.problem, solution.any_stable, solution.stability
     located_none = problem.posed.sense == "locate" and solution.status == "not_converged"
@@ -45,7 +45,7 @@ def verdict_in_words(solution: "Solution") -> str:
     sought = solution.stability_sought and not known
     if found.verdict != UNSTABLE:
         model = problem.model
-        words = stability_in_words(
+        words = describe_stability(
             found, exact=solution.edge_is_exact, of_matrices=model.pencil is not None, of_H=model.carrier is not None
         )
         return f"{words}; {others}" if found.on_edge and sought and others else words

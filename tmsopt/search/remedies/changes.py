@@ -10,8 +10,8 @@ import numpy as np
 
 from tmsopt.errors import InputError
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.problem.advice.remedies import DIGITS, Relaxation, moved_limits, with_limits
-from tmsopt.problem.dependence import STABLE, stability_wanted
+from tmsopt.problem.advice.remedies import DIGITS, Relaxation, move_limits, replace_limits
+from tmsopt.problem.dependence import STABLE, stability_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.program.options import Options
 from tmsopt.records import Table
@@ -79,7 +79,7 @@ def _tried(
     Where the relaxed design is not stable though that is wanted, so is none of the few that are left beside it.
     """
     remedies, enough = dict[Table[str], None](), dict[str, float]()
-    wanted = stability_wanted(problem)
+    wanted = stability_limit(problem)
     stable = problem.derive(constraints=wanted, **_NO_GOAL)
     box = wide.derive(constraints={**wide.constraints, **wanted})
     joint = [] if recheck(stable, relaxation.parameters).violations else [relaxation.amounts]
@@ -133,9 +133,9 @@ def _written(
     """
     tried = list[dict[str, str]]()
     for more, digits in rooms if amounts and all(map(np.isfinite, amounts.values())) else ():
-        text = moved_limits(problem, {n: more * amount for n, amount in amounts.items()}, digits)
+        text = move_limits(problem, {n: more * amount for n, amount in amounts.items()}, digits)
         with suppress(InputError):  # no end of a range is beyond what is physical
-            moved = with_limits(problem, text)
+            moved = replace_limits(problem, text)
             fresh = text not in tried and not _unsettled(problem, moved, text)
             design = answered(moved, options) if fresh else None
             if design:
@@ -150,7 +150,7 @@ def _unsettled(problem: Posed, moved: Posed, names: Collection[str]) -> bool:
     """Whether a limit that kept designs stable no longer does."""
 
     def settles(text: str) -> bool:
-        return bool(stability_wanted(problem.derive(constraints={"limit": text}, **_NO_GOAL)))
+        return bool(stability_limit(problem.derive(constraints={"limit": text}, **_NO_GOAL)))
 
     about = [name for name in names if name in problem.asked_of_roots]
     return any(settles(problem.constraints[n]) and not settles(moved.constraints[n]) for n in about)
@@ -162,7 +162,7 @@ def _steadied(problem: Posed, options: Options, wide: Posed, answered: Answered)
     Args:
         wide: in whose box no relaxation of the problem was answered.
     """
-    stable = stability_wanted(problem)
+    stable = stability_limit(problem)
     limits = {**problem.constraints, **stable}
     asked = problem.derive(constraints=limits, **_NO_GOAL)
     *_, (box, movable) = stages(asked)

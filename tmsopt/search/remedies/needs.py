@@ -7,9 +7,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.evaluation.worst_case import worst_cases
-from tmsopt.problem.advice.remedies import DIGITS, Need, Relaxation, rounded_outwards
-from tmsopt.problem.dependence import STABLE, stability_wanted
+from tmsopt.evaluation.worst_case import find_worst_cases
+from tmsopt.problem.advice.remedies import DIGITS, Relaxation, RequiredValue, round_outwards
+from tmsopt.problem.dependence import STABLE, stability_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
@@ -69,13 +69,13 @@ def add_required_speed(
             with suppress(Spent):
                 for shown in _shown(problem.posed, name, design[name], not most):
                     if answered(_freed(problem.posed, name, (shown, shown)), short):
-                        need = Need(name, design[name], most, ends, Table(design), shown)
+                        need = RequiredValue(name, design[name], most, ends, Table(design), shown)
                         return replace(solution, need=need), None
             return solution, None
         if time.perf_counter() - began > _SECONDS:
             break
     beyond = (min(looked), max(looked)) if looked else None
-    return (replace(solution, need=Need(name, math.nan, False, beyond)) if beyond else solution), None
+    return (replace(solution, need=RequiredValue(name, math.nan, False, beyond)) if beyond else solution), None
 
 
 def _freed(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
@@ -88,7 +88,7 @@ def _freed(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
 def _shown(problem: Posed, name: str, value: float, up: bool) -> Iterator[float]:
     """A value as it is shown, to fewer and fewer digits, rounded to where a design is."""
     one = unit_of(problem, name).one
-    yield from dict.fromkeys(rounded_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
+    yield from dict.fromkeys(round_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
 
 
 def irreducible(
@@ -194,7 +194,7 @@ def _beyond(problem: Posed, wide: Posed, names: Sequence[str]) -> dict[str, tupl
 
 def steady(problem: Posed, asked: Posed) -> Posed:
     """The limits of a problem, and that of stability where the one that was asked wants that."""
-    limits = {**problem.constraints, **stability_wanted(asked, _LEAST_DECAY)}
+    limits = {**problem.constraints, **stability_limit(asked, _LEAST_DECAY)}
     return problem.derive(constraints=limits, minimize=None, maximize=None)
 
 
@@ -222,7 +222,7 @@ def _holds(problem: Posed, design: Mapping[str, float]) -> bool:
     """Whether a design meets all that is asked, between the cases too."""
     if recheck(problem, design).violations:
         return False
-    between = [w.case for w in worst_cases(problem, design).values()] if problem.cases else []
+    between = [w.case for w in find_worst_cases(problem, design).values()] if problem.cases else []
     return not between or not recheck(problem, design, (*problem.cases, *between)).violations
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from tmsopt.evaluation.bound import bounded
+from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
@@ -92,7 +92,7 @@ def _settle(state: SearchState, stable: Posed, thorough: bool) -> Outcome | None
         or runs_away(outcome.checked.structure.roots, state.tuning.runaway)
     ):
         return None
-    agreed = not thorough and bounded(state.part) and one
+    agreed = not thorough and minimizes_abscissa(state.part) and one
     return outcome if agreed or _meets(stable, outcome) else None
 
 
