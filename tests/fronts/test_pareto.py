@@ -361,8 +361,8 @@ def test_a_front_is_frozen_data(front):
         ({"pareto": ["Fr", 1]}, "in quotes"),
         ({"pareto": ["Fr", "speed"]}, "unknown name 'speed'"),
         ({"pareto": ["Fr", "mu <= 1"]}, "is a comparison"),
-        ({"minimize": "abscissa"}, "beside minimize or maximize"),
-        ({"maximize": "Fr"}, "beside minimize or maximize"),
+        ({"minimize": "abscissa"}, "pareto and minimize"),
+        ({"maximize": "Fr"}, "pareto and maximize"),
     ],
 )
 def test_faults_are_named(changes, words):

@@ -151,7 +151,7 @@ def test_a_chain_of_quantities_as_long_as_is_read():
         ("5 ym^9/Ym^8", "beyond double precision"),
         ("5 m" + "  m" * 25 + " ?", "does not read as a unit"),
         ("5 " + "m *" * 25, "does not read as a unit"),
-        ("5 m" + "  m" * 100_000 + " ?", "300005 characters, and a number has up to 80"),
+        ("5 m" + "  m" * 100_000 + " ?", "300005 characters; write up to 80"),
         ("1" * 100_000 + "%", "100001 characters"),
         ("1," + "1" * 100_000, "100002 characters"),
     ],

@@ -286,7 +286,7 @@ def _collect_tables(written: _File) -> dict[str, Any]:
     free = {n: v for n, v in written.parameters.items() if isinstance(v, _FreeParameter)}
 
     def scenario(s: Any) -> Any:
-        return Band(s.min, s.max, s.points) if isinstance(s, _Band) else s
+        return s if isinstance(s, list) else Band(s.min, s.max, s.points)
 
     return {
         "fixed": {n: v for n, v in written.parameters.items() if n not in free},

@@ -1,4 +1,4 @@
-"""From a problem as it is stated to one that can be solved: numbers in rad and SI, tables complete, faults at once."""
+"""Turns a problem as stated into one that can be solved: numbers in rad and SI, complete tables, all faults at once."""
 
 from collections.abc import Mapping
 from types import SimpleNamespace
@@ -11,14 +11,14 @@ from tmsopt.problem.units import TABLES, read_numbers
 from tmsopt.problem.validate import find_faults, guess_parameter_set, shape_faults
 
 _POINT = 1e-12
-"""Relative width below which a range is a number: a few roundings leave nothing to move in."""
+"""A range narrower than this, relative to its ends, is a single value."""
 
 
 def normalise(**stated: Any) -> dict[str, Any]:
-    """The fields of a problem, from what its author wrote, which may be of any type.
+    """The fields of a problem from stated values of any type.
 
     Raises:
-        InputError: listing everything that is wrong.
+        InputError: listing every fault.
     """
     problem = SimpleNamespace(**stated)
     if found := list(shape_faults(problem)):
@@ -53,9 +53,9 @@ def complete_fields(
     start: Mapping[str, float],
     **others: Any,
 ) -> dict[str, Any]:
-    """The fields of a problem from valid numbers and texts, with what follows from them.
+    """The fields of a problem from valid numbers and texts.
 
-    A range of one value becomes a fixed parameter, a start is kept for free parameters alone, and a complex H gets a
+    A range of one value becomes a fixed parameter, starts are kept for free parameters only, and a complex H gets a
     carrier for the ranges.
     """
     pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
@@ -72,7 +72,7 @@ def _extreme_values(
     scenarios: Mapping[str, Scenario],
     tolerances: Mapping[str, float],
 ) -> dict[str, tuple[float, float]]:
-    """Least and greatest value of every parameter, in all cases."""
+    """Least and greatest value of every parameter over all cases."""
     ends = {n: (x, x) for n, x in fixed.items()} | dict(free)
     for name, scenario in scenarios.items():
         points = [*points_of(scenario), fixed[name]]

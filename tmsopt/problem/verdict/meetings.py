@@ -1,4 +1,4 @@
-"""Where roots meet, whether eigenvectors meet too: ranks of the model's matrices at its multiple roots."""
+"""Finds the eigenvectors of multiple roots, by ranks of the model's matrices."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
@@ -15,16 +15,16 @@ from tmsopt.roots.jordan import equilibrated
 from tmsopt.roots.patterns.structure import nearest_unknowns
 
 _RANK = 1e-10  # relative singular value that counts as 0
-_CLOSE = 1e-3  # singular values that may vanish beside the design: those of a double root are off by √1e-10 and less
-_REACH = 3e-5  # of the box: how far from a design its crossing may be, which coefficients see to their square root
-_STEP, _STEPS = 1e-6, 6  # of the box, for differences; of Gauss and Newton
-_MET = 1e-12  # of the terms of the matrices: what is left of a block that vanishes
-_NEAR = 1e-6  # of their size: a located root and one shown are the same
-_UNIT = 1e-3  # of the largest root: the unit in which matrices are scaled_matrix at a smaller one
+_CLOSE = 1e-3  # singular values that may vanish near the design; those of a double root are at most about √1e-10
+_REACH = 3e-5  # greatest distance of a crossing from the design, as a share of the box
+_STEP, _STEPS = 1e-6, 6  # difference step as a share of the box; number of Gauss–Newton steps
+_VANISHED = 1e-12  # a block this small, relative to the terms of the matrices, vanishes
+_NEAR = 1e-6  # relative distance within which two roots are the same
+_UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of the largest root
 
 
 def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
-    """The multiple ones among roots of the polynomial of a design, rightmost first, as users read them."""
+    """The multiple roots among the roots of a design's polynomial, rightmost first, as users read them."""
     found: list[MultipleRoot] = []
     of_H = problem.model.carrier is not None
     for root in roots:
@@ -36,12 +36,12 @@ def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Ro
 
 
 def is_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> bool:
-    """Whether a located multiple root has more than one eigenvector, so that it is no exceptional point."""
+    """Whether a located multiple root has several eigenvectors, so that it is no exceptional point."""
     return any(not m.exceptional for m in located_meetings(problem, pattern, parameters))
 
 
 def located_meetings(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> tuple[MultipleRoot, ...]:
-    """The multiple roots that ``EP`` in the name of a pattern asks for; none without matrices."""
+    """The multiple roots of a pattern with ``EP`` in its name; none without matrices."""
     if problem.model.pencil is None or "EP" not in pattern.name:
         return ()
     return meetings(problem, parameters, _located_roots(problem, pattern, parameters))
@@ -66,7 +66,7 @@ def _located_roots(problem: Posed, pattern: Pattern, parameters: Mapping[str, fl
 def every_meeting(
     problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root], violated: Collection[str]
 ) -> tuple[MultipleRoot, ...]:
-    """The multiple roots of a solution: first those of its pattern, unless that is violated, then the others."""
+    """The multiple roots of a solution: first those of its pattern, unless it is violated, then the others."""
     shown, pattern = meetings(problem, parameters, roots), problem.pattern
     lost = any(name in violated for name in problem.located)
     located = located_meetings(problem, pattern, parameters) if pattern is not None and not lost else ()
@@ -85,7 +85,7 @@ def _number(root: Root | MultipleRoot) -> complex:
 
 
 def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
-    """The parameters at which located roots cross beside a design: sharper than coefficients see them."""
+    """The parameters near a design where its located roots cross, more accurate than from coefficients."""
     roots = _located_roots(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
     found, _ = _find_crossing(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
@@ -108,22 +108,22 @@ def _find_eigenvectors(
 
 
 def _unit(root: Root, roots: Sequence[Root]) -> float:
-    """The size of a root in which matrices are scaled_matrix."""
+    """The unit of a root for scaling the matrices."""
     return max(abs(_number(root)), _UNIT * max(abs(_number(r)) for r in roots)) or 1.0
 
 
 def _find_crossing(
     problem: Posed, parameters: Mapping[str, float], s: complex, k: int, unit: float
 ) -> tuple[Mapping[str, float], complex]:
-    """The crossing beside a design, and its root: the design itself where there is none so near.
+    """The crossing near a design and its root; the design itself if there is none nearby.
 
-    Coefficients see a crossing to the square root of their digits alone, so a design may be 1e-5 away from it. There
-    the block of L(s) that belongs to the least singular values vanishes, which is regular in the parameters.
+    Coefficients determine a crossing to half of their digits only, so the design may be 1e-5 away from it. At the
+    crossing the block of L(s) of the least singular values vanishes, which is a regular equation in the parameters.
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
     widths = np.array([problem.free[n][1] - problem.free[n][0] for n in free])
     size, scale = equilibrated(_matrices(problem, parameters), unit)
-    scale = scale / np.linalg.norm(size * scale, 2)  # held, lest it jumps as entries change
+    scale = scale / np.linalg.norm(size * scale, 2)  # constant, so that it does not jump with the entries
 
     def design_at(x: Array) -> dict[str, float]:
         return {**parameters, **dict(zip(free, x.tolist(), strict=True))}
@@ -139,7 +139,7 @@ def _find_crossing(
             left, values, right = np.linalg.svd(scaled_matrix(x, z))
             if count > len(values) or values[-count] > _CLOSE:
                 break
-            if values[-count] <= _MET:
+            if values[-count] <= _VANISHED:
                 return design_at(x), z
             step = _newton_step(scaled_matrix, x, widths, z, unit, left[:, -count:], right[-count:])
             x, z = x + widths * step[:-2], z + unit * complex(*step[-2:])
@@ -163,7 +163,7 @@ def _newton_step(
     left: Complex,
     right: Complex,
 ) -> Array:
-    """Gauss and Newton for a block of L that shall vanish, in shares of the box and of the unit of the root."""
+    """A Gauss–Newton step towards a vanishing block of L, in shares of the box and of the unit of the root."""
 
     def block(at: Array, root: complex) -> Array:
         B = (left.conj().T @ scaled_matrix(at, root) @ right.conj().T).ravel()

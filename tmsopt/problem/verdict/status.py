@@ -1,4 +1,4 @@
-"""How a search ended: the words for each status, and the exception that carries a solution that is none."""
+"""Describes status and verdict of a solution, and defines the exception for problems without one."""
 
 from typing import TYPE_CHECKING
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 
 def status_text(problem: "Posed", status: str) -> str:
-    """A status in words; where nothing is free, a design is judged: it is not optimal but feasible."""
+    """A status in words; with nothing free, an optimal design is called feasible."""
     return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
 
 
 def describe_status(solution: "Solution") -> str:
-    """How a search ended, as a headline says it."""
+    """The status of a solution for a headline."""
     problem, bound, status = solution.problem, solution.bound, solution.status
     if solution.interrupted and status != "optimal":
         return "stopped before the end, the best design so far"
@@ -34,7 +34,7 @@ def describe_status(solution: "Solution") -> str:
 
 
 def describe_verdict(solution: "Solution") -> str:
-    """Whether a solution is stable; for one that is not though that was sought, whether any is."""
+    """The stability of a solution; if an unstable one was to be stable, also whether any design is."""
     problem, known, found = solution.problem, solution.any_stable, solution.stability
     located_none = problem.posed.sense == "locate" and solution.status == "not_converged"
     if located_none or (solution.status == "infeasible" and known is not False):
@@ -55,7 +55,7 @@ def describe_verdict(solution: "Solution") -> str:
 
 
 class NotSolved(RuntimeError):
-    """Raised by `solve` when there is no optimal design; `solution` holds the best point found.
+    """Raised by `solve` if it finds no optimal design; `solution` holds the best point found.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # no abscissa below -1
