@@ -482,7 +482,7 @@ def test_the_command_writes_json(file):
         (('pareto = ["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', 'minimize = "chi_B"'), ["--csv", "f.csv"], 2, "--csv: "),
         (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', '"chi_B"'), [], 2, "wave.toml:12: objective.pareto: found 'chi_B'"),
         (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', '["Fr", 2]'), [], 2, "wave.toml:12: objective.pareto: found 2"),
-        (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', "[]"), [], 2, "nothing is asked"),
+        (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', "[]"), [], 2, "no objective"),
         (("[objective]", "[constraints]\nx = 'chi_B >= 5'\n[objective]"), [], 3, ""),
     ],
 )

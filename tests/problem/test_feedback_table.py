@@ -151,7 +151,7 @@ def test_an_empty_table_is_no_controller(tmp_path):
             "k_phi =",
             "kappa_phi =",
             "kappa_phi",
-            "feedback.kappa_phi: dimensionless parameter 'kappa_phi' beside",
+            "feedback.kappa_phi: dimensionless parameter 'kappa_phi' among",
         ),
         (PLAIN, "kappa_phi =", "k_phi =", "k_phi", "feedback.k_phi: SI parameter 'k_phi' among dimensionless ones"),
         (OWN, "k_phi", "k_phi", "[feedback]", "feedback: is for the bicycles tms and whipple"),

@@ -316,7 +316,7 @@ def test_column_cannot_be_changed():
             ["'chi_H': 2} for 4 rows", "last axis fastest"],
         ),
         ({"problem": "least_speed.toml"}, ["a Problem"]),
-        ({"problem": replace(PROBLEM, minimize=None)}, ["nothing is asked"]),
+        ({"problem": replace(PROBLEM, minimize=None)}, ["no objective"]),
         ({"problem": replace(PROBLEM, minimize=None, pareto=["Fr", "abscissa"])}, ["asks for a front"]),
         ({"problem": replace(PROBLEM, scenarios={"mu": [0.1, 0.2]})}, ["mu has a scenario"]),
     ],
