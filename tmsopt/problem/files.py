@@ -104,7 +104,7 @@ def load(path: str | PathLike[str]) -> Problem:
 
     More: docs/reference/problem_file.md
     """
-    return _load_problem(path, lambda problem: [])
+    return _load_problem(path)
 
 
 def pose(given: object) -> Posed:
@@ -113,7 +113,7 @@ def pose(given: object) -> Posed:
     Raises:
         InputError: for a file with faults, or for anything else.
     """
-    return _pose(given, lambda problem: [])
+    return _pose(given)
 
 
 def as_solvable(given: object, front: bool = False) -> Posed:
@@ -125,7 +125,7 @@ def as_solvable(given: object, front: bool = False) -> Posed:
     return _pose(given, lambda problem: [] if front and problem.pareto else find_question_faults(problem))
 
 
-def _pose(given: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
+def _pose(given: object, faults_of: Callable[[Posed], list[Fault]] = lambda problem: []) -> Posed:
     if isinstance(given, str | PathLike):
         return _load_problem(given, faults_of).posed
     if not isinstance(given, Problem | Posed | Solution):
@@ -138,7 +138,7 @@ def _pose(given: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
     return posed
 
 
-def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]]) -> Problem:
+def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]] = lambda problem: []) -> Problem:
     page = read_page(path, "problem")
     if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
         written = page.data.get("problem")

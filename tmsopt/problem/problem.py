@@ -29,8 +29,32 @@ from tmsopt.roots import Pattern
 from tmsopt.versions import SCHEMA
 
 
+@dataclass(frozen=True, eq=False)
+class _Fields:
+    """The fields of a problem, as stated and as solved."""
+
+    model: Model
+    fixed: Mapping[str, float]
+    free: Mapping[str, tuple[float, float]]
+    constraints: Mapping[str, str]
+    minimize: str | None
+    maximize: str | None
+    locate: str | None
+    start: Mapping[str, float]
+    title: str
+    scenarios: Mapping[str, Scenario]
+    tolerances: Mapping[str, float]
+    weights: Mapping[str, float]
+    pareto: Sequence[str]
+    units: Mapping[str, str] = field(compare=False)
+    written: Mapping[str, Mapping[float, str]] = field(compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return _field_values(self)
+
+
 @dataclass(frozen=True, init=False)
-class Problem:
+class Problem(_Fields):
     """A design problem; see `load` for its file form.
 
     Args:
@@ -64,22 +88,6 @@ class Problem:
 
     More: docs/reference/problem_file.md
     """
-
-    model: Model
-    fixed: Mapping[str, float]
-    free: Mapping[str, tuple[float, float]]
-    constraints: Mapping[str, str]
-    minimize: str | None
-    maximize: str | None
-    locate: str | None
-    start: Mapping[str, float]
-    title: str
-    scenarios: Mapping[str, Scenario]
-    tolerances: Mapping[str, float]
-    weights: Mapping[str, float]
-    pareto: Sequence[str]
-    units: Mapping[str, str] = field(compare=False)
-    written: Mapping[str, Mapping[float, str]] = field(compare=False)
 
     def __init__(
         self,
@@ -115,29 +123,10 @@ class Problem:
             """An attribute of a problem in version 1.1 that belongs to its `posed` now."""
             return read_from_posed(self, name)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return _field_values(self)
-
 
 @dataclass(frozen=True, eq=False)
-class Posed:
+class Posed(_Fields):
     """A problem as it is solved: numbers, parsed expressions, cases. Compared by identity, so caches can use it."""
-
-    model: Model
-    fixed: Mapping[str, float]
-    free: Mapping[str, tuple[float, float]]
-    constraints: Mapping[str, str]
-    minimize: str | None
-    maximize: str | None
-    locate: str | None
-    start: Mapping[str, float]
-    title: str
-    scenarios: Mapping[str, Scenario]
-    tolerances: Mapping[str, float]
-    weights: Mapping[str, float]
-    pareto: Sequence[str]
-    units: Mapping[str, str] = field(compare=False)
-    written: Mapping[str, Mapping[float, str]] = field(compare=False)
 
     def derive(self, **changes: Any) -> "Posed":
         """The problem with some fields replaced by numbers in rad and SI and valid texts, without checks.
@@ -177,9 +166,6 @@ class Posed:
     def asks(self, name: str) -> bool:
         """Whether an objective or a constraint names a quantity."""
         return any(name in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return _field_values(self)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
@@ -275,7 +261,7 @@ class Posed:
         return {name: complete[name] for name in self.parameter_set.names}
 
 
-def _field_values(record: Problem | Posed) -> dict[str, Any]:
+def _field_values(record: _Fields) -> dict[str, Any]:
     """The fields of a record, without cached properties, some of which cannot be pickled."""
     return {f.name: getattr(record, f.name) for f in fields(record)}
 

@@ -78,14 +78,14 @@ def parse_exact_quantity(text: str, unit: str) -> tuple[float, str, Exact | None
     one = _known_factor(written.replace("°", "deg"), unit)
     if one is None:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
-    share, exact = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR), None
-    if abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
+    share, exact = _exact_factor(one), None
+    if share is not None:
+        exact = found.times(share)
+        value = float(exact)  # correctly rounded: 70 cm is 0.7 m
+    else:  # an angle
         value = float(found) * one
         if one == USUAL["rad"]["deg"]:
             exact = found.in_degrees()
-    else:
-        exact = found.times(share)
-        value = float(exact)  # correctly rounded: 70 cm is 0.7 m
     if not math.isfinite(value) or (value == 0) != (float(found) == 0):
         raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
     return value, written, exact
@@ -95,8 +95,13 @@ def unit_factor(written: str, unit: str) -> float:
     """The factor from a valid unit to `unit`; the nearest double if it is a fraction."""
     found = _known_factor(written.replace("°", "deg"), unit)
     assert found is not None, written
-    share = Fraction(found).limit_denominator(_LARGEST_DENOMINATOR)
-    return found if abs(share - Fraction(found)) > _ROUNDED * share else float(share)
+    return float(_exact_factor(found) or found)
+
+
+def _exact_factor(one: float) -> Fraction | None:
+    """The fraction that a factor is, up to rounding; None for an irrational one."""
+    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
+    return None if abs(share - Fraction(one)) > _ROUNDED * share else share
 
 
 @cache
