@@ -271,8 +271,8 @@ def _nearest_combinations(rows: Array, off: Array) -> Iterator[list[int]]:
     for i in range(n)[::-1]:
         nearest[i] = -round(float(q[:, i] @ rest / r[i, i]))
         rest = rest + nearest[i] * basis[i]
-    beside = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
-    ranked = sorted(beside, key=lambda more: float(np.abs(rest + more @ basis[: len(more)]).max()))
+    neighbours = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
+    ranked = sorted(neighbours, key=lambda more: float(np.abs(rest + more @ basis[: len(more)]).max()))
     for more in ranked[:_TRIALS]:
         by = [a + b for a, b in itertools.zip_longest(nearest, more, fillvalue=0)]
         yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
