@@ -10,7 +10,7 @@ import pytest
 import tmsopt
 from tmsopt import Problem, models
 from tmsopt.analysis import rounded, rounded_designs
-from tmsopt.evaluation import realised_abscissa, recheck, worst_cases
+from tmsopt.evaluation import find_worst_cases, realised_abscissa, recheck
 from tmsopt.problem import unit_of
 from tmsopt.roots import exact_roots
 
@@ -75,7 +75,7 @@ def one_by_one(solution, row):
         design = exact(solution, row.written)
         plain = {n: float(x) for n, x in design.items()}
         listed = [case for case in problem.cases if not case.direction]
-        cases = [*listed, solution.worst, *(w.case for w in worst_cases(problem, plain).values())]
+        cases = [*listed, solution.worst, *(w.case for w in find_worst_cases(problem, plain).values())]
         each = [case.applied(design) for case in cases] if listed else [design]
         motion = [roots_of(problem, one) for one in each]
         realised = max(realised_abscissa(problem, one) for one in each)

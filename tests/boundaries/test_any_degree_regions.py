@@ -16,7 +16,7 @@ from helpers.oracles import certified_roots, routh_exact
 from tmsopt.boundaries import nearest, robustness
 from tmsopt.charts import chart
 from tmsopt.dynamics import growth
-from tmsopt.evaluation import cover, omega0_bound
+from tmsopt.evaluation import omega0_bound, prove_worst_case
 from tmsopt.models import Model, Parameter, ParameterSet, from_coefficients
 from tmsopt.plots import chart_figure, growth_figure
 from tmsopt.problem import Problem
@@ -200,8 +200,8 @@ def test_a_band_of_a_chain_is_proved_stable():
     problem = Problem(model=of, fixed=fixed, tolerances={"k1": 0.05})
     k = np.linspace(0.95, 1.05, 2001)
     least = float(roots(stacked(of, fixed | {"k1": k})).real.max())
-    assert cover(problem.posed, fixed, least).proven
-    assert not cover(problem.posed, fixed, least - 1e-3, boxes=50).proven
+    assert prove_worst_case(problem.posed, fixed, least).proven
+    assert not prove_worst_case(problem.posed, fixed, least - 1e-3, boxes=50).proven
 
 
 def scatter(z, multiple, others):

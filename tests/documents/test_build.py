@@ -18,7 +18,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.models import Values, matrices, tms
-from tmsopt.problem.units import reading, with_unit
+from tmsopt.problem.units import convert_to_reading, parse_quantity
 
 NATIVE, SI = tms.sets
 EPS = np.finfo(float).eps
@@ -248,14 +248,14 @@ def test_a_builders_limits_hold_by_statics(tmp_path, limits):
     ],
 )
 def test_readings_by_the_definitions_of_the_units(value, unit, expected):
-    assert reading(value, unit) == expected
+    assert convert_to_reading(value, unit) == expected
 
 
 @pytest.mark.parametrize(("name", "unit"), [("km/h", "m/s"), ("mm", "m"), ("deg", "rad")])
 def test_what_was_written_with_a_unit_reads_the_same(name, unit):
     """Exactly, although SI lies in between: tenths from 0.1 to 100."""
     for tenths in range(1, 1001):
-        assert reading(with_unit(f"{tenths / 10} {name}", unit), unit) == (tenths / 10, name)
+        assert convert_to_reading(parse_quantity(f"{tenths / 10} {name}", unit), unit) == (tenths / 10, name)
 
 
 def test_si_of_the_benchmark_is_the_motion_in_seconds():

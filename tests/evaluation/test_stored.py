@@ -11,7 +11,7 @@ import tmsopt
 from tmsopt.evaluation import recheck
 from tmsopt.models import from_coefficients
 
-held = import_module("tmsopt.evaluation.stored").held
+held = import_module("tmsopt.evaluation.stored").find_storable_design
 KEPT = 1e-9  # relative to the greater of 1 and the limit
 
 

@@ -272,7 +272,7 @@ def test_points_over_a_band_are_proved_as_a_solution_is():
     front = tmsopt.pareto(asked, points=3)
     assert len(front.points) >= 3
     for p in front.points:
-        assert p.solution.cover == worst_case.cover(
+        assert p.solution.cover == worst_case.prove_worst_case(
             p.solution.problem.posed, p.solution.parameters, p.solution.abscissa
         )
         assert p.solution.cover.proven
@@ -361,8 +361,8 @@ def test_a_front_is_frozen_data(front):
         ({"pareto": ["Fr", 1]}, "in quotes"),
         ({"pareto": ["Fr", "speed"]}, "unknown name 'speed'"),
         ({"pareto": ["Fr", "mu <= 1"]}, "is a comparison"),
-        ({"minimize": "abscissa"}, "beside minimize or maximize"),
-        ({"maximize": "Fr"}, "beside minimize or maximize"),
+        ({"minimize": "abscissa"}, "pareto and minimize"),
+        ({"maximize": "Fr"}, "pareto and maximize"),
     ],
 )
 def test_faults_are_named(changes, words):
@@ -482,7 +482,7 @@ def test_the_command_writes_json(file):
         (('pareto = ["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', 'minimize = "chi_B"'), ["--csv", "f.csv"], 2, "--csv: "),
         (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', '"chi_B"'), [], 2, "wave.toml:12: objective.pareto: found 'chi_B'"),
         (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', '["Fr", 2]'), [], 2, "wave.toml:12: objective.pareto: found 2"),
-        (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', "[]"), [], 2, "nothing is asked"),
+        (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', "[]"), [], 2, "no objective"),
         (("[objective]", "[constraints]\nx = 'chi_B >= 5'\n[objective]"), [], 3, ""),
     ],
 )

@@ -169,7 +169,7 @@ def test_what_is_refused_is_told(H, words):
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ('H = [["w"]]\nA = [["w"]]', "stands beside A; keep H, a complex system"),
+        ('H = [["w"]]\nA = [["w"]]', "together with A; keep H, a complex system"),
         ('H = [["1j*w", 1]]', "found rows of 2 entries"),
         ('H = [["w - 2j*"]]', "'w - 2j*' does not parse"),
         ('H = "w"', "accepted: rows in brackets"),

@@ -128,7 +128,7 @@ def test_an_empty_table_is_no_controller(tmp_path):
     [
         (WHEELS, PHI, "k_fi = 3", "k_fi", "feedback.k_fi: unknown gain 'k_fi'; did you mean 'k_phi'?"),
         (WHEELS, PHI, "kappa_phi = 3", "kappa_phi", "feedback.kappa_phi: unknown gain 'kappa_phi'"),
-        (WHEELS, "v = 1.7", "v = 1.7\nk_phi = 3", "k_phi = {", "feedback.k_phi: 'k_phi' stands in [parameters] too"),
+        (WHEELS, "v = 1.7", "v = 1.7\nk_phi = 3", "k_phi = {", "feedback.k_phi: 'k_phi' is in [parameters] too"),
         (WHEELS, PHI, "k_phi = { min = 9, max = 1 }", "k_phi", "feedback.k_phi: min = 9 is greater than max = 1"),
         (WHEELS, PHI, "k_phi = nan", "k_phi", "feedback.k_phi: found nan; accepted: a finite number in N m/rad"),
         (WHEELS, PHI, "k_phi = { min = -inf, max = 1 }", "k_phi", "feedback.k_phi.min: found -inf"),
@@ -151,9 +151,9 @@ def test_an_empty_table_is_no_controller(tmp_path):
             "k_phi =",
             "kappa_phi =",
             "kappa_phi",
-            "feedback.kappa_phi: dimensionless parameter 'kappa_phi' beside",
+            "feedback.kappa_phi: dimensionless parameter 'kappa_phi' among",
         ),
-        (PLAIN, "kappa_phi =", "k_phi =", "k_phi", "feedback.k_phi: SI parameter 'k_phi' beside dimensionless ones"),
+        (PLAIN, "kappa_phi =", "k_phi =", "k_phi", "feedback.k_phi: SI parameter 'k_phi' among dimensionless ones"),
         (OWN, "k_phi", "k_phi", "[feedback]", "feedback: is for the bicycles tms and whipple"),
         (
             WHEELS,

@@ -101,7 +101,7 @@ BAD = {
     "infinity": (replaced("max = 5", "max = inf"), 9, ["inf", "finite"]),
     "boolean": (replaced("mu = 0.1", "mu = true"), 8, ["True", "number"]),
     "list": (replaced("mu = 0.1", "mu = [1]"), 8, ["[1]", "number"]),
-    "mixed sets": (replaced("mu = 0.1", "mu = 0.1\nm_B = 10"), 9, ["m_B", "SI", "not mixed"]),
+    "mixed sets": (replaced("mu = 0.1", "mu = 0.1\nm_B = 10"), 9, ["m_B", "SI", "do not mix"]),
     "both objectives": (replaced('"abscissa"', '"abscissa"\nmaximize = "Fr"'), 13, ["minimize and maximize"]),
     "no objective": (replaced('minimize = "abscissa"\n', ""), 13, ["minimize, maximize or locate"]),
     "unknown pattern": (replaced('minimize = "abscissa"', 'locate = "EP5"'), 14, ["EP5", "EP4"]),

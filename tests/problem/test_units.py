@@ -18,7 +18,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.problem import parse_value
-from tmsopt.problem.units import USUAL, by_pint, dimension, factor, read, with_unit
+from tmsopt.problem.units import USUAL, dimension, parse_exact_quantity, parse_quantity, pint_factor, unit_factor
 
 AT_ONCE = 1.0
 """Seconds; pint needs a third of one to start."""
@@ -48,7 +48,7 @@ def at_once():
 
 @pytest.fixture(autouse=True, scope="module")
 def _pint_is_warm():
-    by_pint("m", "m")
+    pint_factor("m", "m")
 
 
 @pytest.mark.parametrize(
@@ -85,23 +85,23 @@ def _pint_is_warm():
 )
 def test_units_by_their_definitions(text, unit, value):
     """A factor and a product: two roundings, and two more in the factor of a quotient."""
-    assert with_unit(text, unit) == pytest.approx(value, rel=4 * sys.float_info.epsilon)
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=4 * sys.float_info.epsilon)
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300))
 def test_the_parameters_own_unit_changes_nothing(number):
     for unit in ("m", "kg", "m/s", "m/s^2", "rad"):
-        assert with_unit(f"{number!r} {unit}", unit) == number
+        assert parse_quantity(f"{number!r} {unit}", unit) == number
 
 
 @pytest.mark.parametrize(("written", "unit"), [(written, unit) for unit, table in USUAL.items() for written in table])
 def test_usual_units_are_as_pint_has_them(written, unit, monkeypatch):
     """To the last bit of what is read and shown, for every one of the table that spares loading pint."""
     texts = [f"{number} {written}" for number in ("1", "-0.7", "3.1e5", "12.345678", "1e-9", "0")]
-    own = [read(text, unit) for text in texts], factor(written, unit)
-    monkeypatch.setattr("tmsopt.problem.units.text._factor", by_pint)
-    assert own == ([read(text, unit) for text in texts], factor(written, unit))
+    own = [parse_exact_quantity(text, unit) for text in texts], unit_factor(written, unit)
+    monkeypatch.setattr("tmsopt.problem.units.text._known_factor", pint_factor)
+    assert own == ([parse_exact_quantity(text, unit) for text in texts], unit_factor(written, unit))
 
 
 CONSTANTS = {
@@ -123,7 +123,7 @@ def test_a_constant_is_kept_as_it_is_written(text, unit):
     """The double is near, and the exact number is the true one, to 50 digits by mpmath."""
     with mp.workdps(60), flint.ctx.workdps(70):
         truth = CONSTANTS[text, unit]()
-        number, _, exact = read(text, unit)
+        number, _, exact = parse_exact_quantity(text, unit)
         assert exact is not None
         assert number == pytest.approx(float(truth), rel=3e-16)
         assert abs(mp.mpf(exact.ball().str(60, radius=False)) - truth) < 1e-50
@@ -214,7 +214,7 @@ REFUSED = {
 )
 def test_everything_else_is_refused(kind, text, unit):
     with at_once(), pytest.raises(ValueError, match="found"):
-        with_unit(text, unit)
+        parse_quantity(text, unit)
 
 
 HOSTILE = {
@@ -241,13 +241,13 @@ HOSTILE = {
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_text_is_refused_at_once(kind):
     with at_once(), pytest.raises(ValueError, match="found"):
-        with_unit(HOSTILE[kind], "m")
+        parse_quantity(HOSTILE[kind], "m")
 
 
 def test_products_and_powers_are_read():
     for text in ("5 m*m/m", "5 m^2/m", "5 m**2 / m", "5 m² m^-1", "5 m s / s"):
         with at_once():
-            assert with_unit(text, "m") == 5
+            assert parse_quantity(text, "m") == 5
 
 
 def test_a_sum_of_unlike_units_has_none_whatever_is_added():
@@ -273,7 +273,7 @@ def test_a_sum_of_unlike_units_has_none_whatever_is_added():
 def test_random_text_gives_a_finite_number_or_a_value_error(text, unit):
     try:
         with at_once():
-            value = with_unit(text, unit)
+            value = parse_quantity(text, unit)
     except ValueError:
         return
     assert math.isfinite(value)

@@ -5,7 +5,7 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
-from tmsopt.problem.verdict import MultipleRoot, crossing_in_words, located_meetings, stability
+from tmsopt.problem.verdict import MultipleRoot, describe_crossing, located_meetings, stability
 from tmsopt.roots import exact_longest, exact_nullity, has_one_eigenvector
 
 
@@ -32,8 +32,8 @@ def test_the_longest_chain_on_the_rightmost_line_grows():
 
 
 def test_what_is_no_exceptional_point_has_a_name():
-    assert crossing_in_words(MultipleRoot(0, 0, 2, 2, 1)) == "diabolic point (semisimple), not an EP"
-    assert "not an EP4" in crossing_in_words(MultipleRoot(0, 0, 4, 2, 2))
+    assert describe_crossing(MultipleRoot(0, 0, 2, 2, 1)) == "diabolic point (semisimple), not an EP"
+    assert "not an EP4" in describe_crossing(MultipleRoot(0, 0, 4, 2, 2))
     assert MultipleRoot(0, 0, 2, None, 2).exceptional  # coefficients cannot tell
     assert MultipleRoot(0, 0, 2, None, 2).defective is None
 

@@ -65,7 +65,7 @@ def test_the_recheck_says_the_same_of_each_design(asked):
     for k, design in enumerate(drawn):
         parameters = stated.ordered({n: design[n] for n in stated.free})
         checked = recheck(stated, parameters, stated.cases)
-        amounts = rechecking.excesses(stated, parameters, stated.cases)
+        amounts = rechecking.measure_excesses(stated, parameters, stated.cases)
         assert found.worth[k] == pytest.approx(stated.sign * checked.objective, rel=SIMPLE, abs=SIMPLE)
         for name, own in zip(names, found.excess[:, k], strict=True):
             # Where a root is real and positive the ratio is -1, whatever the design: the abscissa tells designs apart.

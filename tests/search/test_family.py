@@ -11,7 +11,7 @@ import pytest
 from tmsopt import laws
 from tmsopt.algebra import FLOATS
 from tmsopt.models import from_coefficients, tms
-from tmsopt.problem import Problem, load, with_limit
+from tmsopt.problem import Problem, load, replace_limit
 from tmsopt.program import forget, formulate
 from tmsopt.search import solve
 
@@ -30,7 +30,7 @@ def with_fixed(problem, **values):
 
 
 def limited(problem, name, value):
-    return replace(problem, constraints={**problem.constraints, name: with_limit(problem.constraints[name], value)})
+    return replace(problem, constraints={**problem.constraints, name: replace_limit(problem.constraints[name], value)})
 
 
 def test_every_member_obeys_the_laws_of_ep4():

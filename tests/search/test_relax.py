@@ -13,7 +13,7 @@ from helpers.hunt import abscissa
 import tmsopt
 from tmsopt import laws
 from tmsopt.analysis import infeasible_sentences
-from tmsopt.problem import moved_limits, with_limits
+from tmsopt.problem import move_limits, replace_limits
 from tmsopt.records import Table
 
 TMS = tmsopt.models.tms
@@ -205,7 +205,7 @@ def test_a_change_asks_no_more_than_what_the_nearest_design_misses(tmp_path):
     asked = written(tmp_path, DAMPED)
     (change,) = tmsopt.solve(asked, throw=False).relaxation.remedies
     assert dict(change) == {"decay": "abscissa <= -0.1118", "zeta": "damping_ratio >= 0.1147"}
-    assert tmsopt.solve(with_limits(asked.posed, change)).status == "optimal"
+    assert tmsopt.solve(replace_limits(asked.posed, change)).status == "optimal"
 
 
 @pytest.mark.slow
@@ -217,7 +217,7 @@ def test_no_limit_is_moved_for_nothing_nor_farther_than_a_known_design_needs(tmp
     asked = written(tmp_path, SLOW_ROBOT)
     changes = [tmsopt.solve(asked, throw=False, seed=seed).relaxation.remedies for seed in range(4)]
     change, _ = [found[0] for found in changes if len(found) == 1 and not set(found[0]) & set(asked.constraints)][:2]
-    moved = with_limits(asked.posed, change)
+    moved = replace_limits(asked.posed, change)
     design = tmsopt.solve(moved)
     assert design.stable
     known = {**asked.free, "v": (1 / 3.6, 11.861 / 3.6), "x_B": (0.2, 0.61)}
@@ -342,7 +342,7 @@ def test_a_limit_that_must_go_down_to_nothing_is_shown_as_0():
     """0.02 moved by 0.02 and what rounding adds to it."""
     asked = problem(constraints={"arm": "abs(nu_H) >= 0.02"})
     amounts, design = Table({"arm": 0.0200000000000183}), replace(failed("two bounds"), problem=asked)
-    written = (Table(moved_limits(asked, amounts)),)
+    written = (Table(move_limits(asked, amounts)),)
     moved = replace(design.relaxation, amounts=amounts, conflict=("arm",), remedies=written)
     design = replace(design, relaxation=moved)
     assert infeasible_sentences(design)[-1] == "smallest change found: abs(nu_H) >= 0 instead of 0.02 (arm)"

@@ -7,7 +7,7 @@ import pytest
 import tmsopt
 from tmsopt.analysis import infeasible_sentences
 from tmsopt.models import from_coefficients
-from tmsopt.problem import moved_limits
+from tmsopt.problem import move_limits
 
 DAMPED = tmsopt.Problem(
     from_coefficients([1, "c", 1]), free={"c": (0.1, 1.5)}, minimize="c", constraints={"decay": "abscissa <= -0.8"}
@@ -50,7 +50,7 @@ def test_an_end_moves_where_no_limit_makes_a_design_stable():
 def test_a_limit_is_written_so_that_it_suffices(text, amount, digits, written):
     """Moved to where it forbids less; of an equality the signed amount is added to the right-hand side."""
     asked = replace(DAMPED, constraints={"limit": text})
-    assert moved_limits(asked, {"limit": amount}, digits) == {"limit": written}
+    assert move_limits(asked, {"limit": amount}, digits) == {"limit": written}
 
 
 def test_limits_that_exclude_each_other_are_proved_to():

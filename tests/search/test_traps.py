@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tmsopt
-from tmsopt.evaluation import worst_cases
+from tmsopt.evaluation import find_worst_cases
 
 TMS = tmsopt.models.tms
 HEIGHTS = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
@@ -46,7 +46,9 @@ def test_a_worst_case_along_an_edge_of_many_tolerances(n, width):
     peak = f"exp(-(({units[0]} - 0.43)/{width})**2) + {' + '.join(units[1:])} <= 0"
     tolerances = dict.fromkeys(list(at)[:n], 0.01)
     problem = tmsopt.Problem(TMS, fixed=at, tolerances=tolerances, constraints={"peak": peak})
-    assert worst_cases(problem.posed, problem.posed.ordered({}))["constraint peak"].value == pytest.approx(n, abs=1e-8)
+    assert find_worst_cases(problem.posed, problem.posed.ordered({}))["constraint peak"].value == pytest.approx(
+        n, abs=1e-8
+    )
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from helpers.rows import assert_same
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
 from tmsopt.documents import describe_row
 from tmsopt.errors import InputError
-from tmsopt.evaluation import LAWS, law_rows, verdicts
+from tmsopt.evaluation import LAWS, evaluate_columns, law_rows
 from tmsopt.plots import draw_histogram
 from tmsopt.studies import RowTable, Solver, open_store, part_of, solve_row, summary, view_store
 
@@ -110,7 +110,7 @@ def test_what_is_searched_or_listed_is_not_judged_at_once():
         replace(study.problem, minimize=None, maximize="radius"),
     ):
         assert not judge.applies(Study(problem, {"Fr": [2.0, 2.1]}))
-    assert verdicts(study.problem.posed, {"Fr": np.array([2.0])}) is not None
+    assert evaluate_columns(study.problem.posed, {"Fr": np.array([2.0])}) is not None
 
 
 def test_columns_and_summary_are_those_of_the_rows():

@@ -11,7 +11,7 @@ import numpy as np
 
 from tmsopt.analysis.conditions import Conditions, curved
 from tmsopt.analysis.program import LocalProgram
-from tmsopt.evaluation.bound import bounded
+from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import design_of
@@ -40,14 +40,14 @@ class Better:
 def better(program: LocalProgram, found: Conditions, solution: Solution) -> Better | None:
     """The design after the longest step downhill that improves; None where none does."""
     problem, order = program.problem, 2 if curved(found.curvature) < 0 else 1
-    judged = solution.abscissa if bounded(problem) else solution.value
+    judged = solution.abscissa if minimizes_abscissa(problem) else solution.value
     for x in _along(program, found, both=order == 2):
         at = dict(zip(program.variables, x.tolist(), strict=True))
         moved = design_of(problem, [at.get(n, 0.0) for n in problem.free])
         moved |= {n: solution.parameters[n] for n in problem.free if n not in at}
         checked = recheck(problem, parameters := problem.ordered(moved))
         value = (
-            max(checked.objective, checked.realised) if bounded(problem) else checked.objective
+            max(checked.objective, checked.realised) if minimizes_abscissa(problem) else checked.objective
         )  # true as stored, too
         if not checked.violations and problem.sign * (judged - value) > _BETTER * (1 + abs(judged)):
             return Better(Table(parameters), value, order)

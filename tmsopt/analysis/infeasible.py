@@ -3,10 +3,10 @@
 import math
 from collections.abc import Collection
 
-from tmsopt.evaluation.exclusion import known_bound
+from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.models.expression import SIGN
-from tmsopt.problem import limit_of, unit_of
-from tmsopt.problem.advice.remedies import Need, Relaxation
+from tmsopt.problem import limit_value, unit_of
+from tmsopt.problem.advice.remedies import Relaxation, RequiredValue
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import dimension_of, limit_text
@@ -77,10 +77,10 @@ def _proved(solution: Solution, names: Collection[str]) -> bool:
     problem = solution.problem.posed
     kept = {name: text for name, text in problem.constraints.items() if name in names}
     some = kept.keys() < problem.constraints.keys()
-    return solution.bound.proven and not (some and not known_bound(problem.derive(constraints=kept)).proven)
+    return solution.bound.proven and not (some and not bound_without_search(problem.derive(constraints=kept)).proven)
 
 
-def _speed(solution: Solution, need: Need) -> str:
+def _speed(solution: Solution, need: RequiredValue) -> str:
     """Nothing at this speed, and where there is something."""
     problem, name = solution.problem.posed, need.parameter
     unit = unit_of(problem, name)
@@ -137,7 +137,7 @@ def _changed(problem: Posed, name: str, new: str) -> str:
         parameter, end = name.rsplit(".", 1)
         old = unit_of(problem, name).number(problem.free[parameter][end == "max"], _AS_WRITTEN)
         return f"{parameter} {'up' if end == 'max' else 'down'} to {new} instead of {old}"
-    limit = limit_of(problem.constraints[name])
+    limit = limit_value(problem.constraints[name])
     return f"{new}{'' if limit is None else f' instead of {limit:.{_AS_WRITTEN}g}'} ({_in_unit(problem, name)})"
 
 

@@ -14,7 +14,7 @@ from tmsopt.models.expression import written_sides
 from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
-from tmsopt.problem.unit_system import Unit, dimension_of, limit_text, unit_of, unit_of_all
+from tmsopt.problem.unit_system import Unit, common_unit, dimension_of, limit_text, unit_of
 from tmsopt.program.options import DEFAULTS
 from tmsopt.progress import Counts
 from tmsopt.records import plain
@@ -120,7 +120,7 @@ def moved(problem: Posed, name: str, step: float) -> Posed:
         text = problem.constraints[name]
         limit = split_limit(text)
         if limit and not limit.behind:  # the number on the right
-            text = limit.written(repr(limit.value + step))
+            text = limit.replace_number(repr(limit.value + step))
         else:
             left, sign, right = written_sides(text)
             text = f"({left}) {sign} ({right}) {'+' if step > 0 else '-'} {abs(step)!r}"
@@ -134,7 +134,7 @@ def moved(problem: Posed, name: str, step: float) -> Posed:
 def _unresolved(solution: Solution, name: str) -> Lever:
     """The lever of a bound or a constraint, to first order."""
     problem = solution.problem.posed
-    gained, worth = unit_of_all(problem, problem.goal) if problem.goal else Unit(), solution.active[name]
+    gained, worth = common_unit(problem, problem.goal) if problem.goal else Unit(), solution.active[name]
     if name in problem.constraints:
         condition, shown = problem.conditions[name], limit_text(problem, name)
         sides = [abs(float(side)) for side in condition.sides(problem.values(solution.parameters))]

@@ -10,8 +10,8 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.evaluation.recheck import FEASIBLE, judged_exactly
-from tmsopt.evaluation.worst_case import worst_cases
+from tmsopt.evaluation.recheck import FEASIBLE, recheck_exactly
+from tmsopt.evaluation.worst_case import find_worst_cases
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
@@ -75,7 +75,7 @@ def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) ->
             units = {n: unit_of(problem, n) for n in names}
             written = {n: _decimal(solution, n, unit, digits) for n, unit in units.items()}
             design = {**solution.parameters, **{n: _exact(text, units[n]) for n, text in written.items()}}
-            values, violated = judged_exactly(problem, design, _cases(solution, design))
+            values, violated = recheck_exactly(problem, design, _cases(solution, design))
             abscissa, roots = float(values["abscissa"]), values["structure"].roots
             has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
             row = Rounded(
@@ -96,7 +96,7 @@ def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
     problem = solution.problem.posed
     cases = [*problem.cases, *filter(None, [solution.worst])]
     if problem.scenarios or problem.tolerances:
-        cases += [w.case for w in worst_cases(problem, {n: float(x) for n, x in design.items()}).values()]
+        cases += [w.case for w in find_worst_cases(problem, {n: float(x) for n, x in design.items()}).values()]
     return cases
 
 

@@ -8,8 +8,8 @@ from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.problem.solution import Bound, Solution
-from tmsopt.problem.unit_system import Unit, unit_of_all
-from tmsopt.problem.verdict.stability import MultipleRoot, crossing_in_words
+from tmsopt.problem.unit_system import Unit, common_unit
+from tmsopt.problem.verdict.stability import MultipleRoot, describe_crossing
 
 _DIGITS = 12
 _UNJUDGED = {ANGULAR_FREQUENCY: "frequencies", RADIUS: "the robustness radius"}
@@ -24,7 +24,7 @@ def structure_line(problem: Posed, structure: str, abscissa: float, known: Seque
     words = describe_user_structure(problem.model, structure, abscissa > 0)
     about = known if problem.pattern is not None else [m for m in known if m.re == known[0].re]
     if crossing := next((m for m in about if not m.exceptional), None):
-        return f"{words}: {crossing_in_words(crossing)}"
+        return f"{words}: {describe_crossing(crossing)}"
     blind = problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}"
     return f"{words}; coefficients cannot tell whether it is defective" if blind and known else words
 
@@ -51,7 +51,7 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         followed = ", which tmsopt trace follows" if left == 1 else ""
         more = f"; it is one of {among} of such designs{followed}" if left > 0 else ""
         return f"tmsopt prove FILE proves, or refutes, that this design exists{more}"
-    unit = unit_of_all(problem, text)
+    unit = common_unit(problem, text)
     side = "above" if problem.sense == "maximize" else "below"
     if bound.proven:
         by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""

@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.models.exact import ExactDesign, as_exact_design
 from tmsopt.models.user_spectrum import beyond_axis
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.verdict.stability import MultipleRoot, longest_on_line
+from tmsopt.problem.verdict.stability import MultipleRoot, longest_chain_on_line
 from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure, exact_longest, lienard_chipart, rebuilt, structure
 from tmsopt.roots.exact import isolated_roots
@@ -58,7 +58,7 @@ def stands_on(
     if beyond or (abs(structure.abscissa) > _FAR * largest and largest):
         return (), False
     edges = edges_at(problem, parameters) or (("weave",) if beyond == 0 else ())
-    longest = longest_on_line(meetings, abscissa, largest)
+    longest = longest_chain_on_line(meetings, abscissa, largest)
     tied = beyond == 0 and longest is None
     return edges, tied or (bool(edges) and longest_on_axis(problem, parameters) == (longest or 1))
 

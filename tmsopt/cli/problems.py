@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 def parse_number(text: str, unit: str, *key: str) -> float:
     """A number of the command line, plain or with a unit."""
-    from tmsopt.problem.units import with_unit
+    from tmsopt.problem.units import parse_quantity
 
     try:
         return float(text)
     except ValueError:
         try:
-            return with_unit(text, unit)
+            return parse_quantity(text, unit)
         except ValueError as error:
             raise input_error(str(error), *key) from None
 

@@ -14,7 +14,7 @@ from tmsopt.documents.curves import describe_domain, tabulate_corners
 from tmsopt.documents.maker import Maker, remove_titles
 from tmsopt.documents.tables import MOST, format_value, write_question
 from tmsopt.models import in_words_of
-from tmsopt.problem.unit_system import unit_of, unit_of_all
+from tmsopt.problem.unit_system import common_unit, unit_of
 from tmsopt.roots import CLASSES
 
 _POINTS = 800 * 800  # of a chart that a picture shows
@@ -38,7 +38,7 @@ def write_chart(chart: Chart, level: Level) -> Iterator[Chapter]:
     yield Chapter("classes", tuple(_write_classes(chart, data, plane)))
     if best := data["least_abscissa"]:
         where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in chart.axes)
-        value = unit_of_all(problem, "abscissa").show(best["value"], 6)
+        value = common_unit(problem, "abscissa").show(best["value"], 6)
         yield Chapter("best", (Sentence(f"{value} at {where}", "least abscissa on the grid", "answer"),))
     if chart.domain is not None and plane:
         corners = (tabulate_corners(chart.domain, problem),) if chart.domain.corners else ()

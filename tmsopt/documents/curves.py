@@ -11,7 +11,7 @@ from tmsopt.documents.tables import format_value, thin_rows, write_question
 from tmsopt.models import Model, in_words_of
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.unit_system import Unit, unit_of, unit_of_all
+from tmsopt.problem.unit_system import Unit, unit_of, common_unit
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail
@@ -38,7 +38,7 @@ def write_trace(trace: Trace, level: Level) -> Iterator[Chapter]:
 
         caption = f"Branches of {in_words_of(model, trace.pattern)}"
         yield Chapter("picture", (Figure(lambda: plots.draw_trace(remove_titles(trace)), caption),), "Branches")
-    units = {n: unit_of_all(problem, n) for n in (*trace.problem.free, "abscissa")}
+    units = {n: common_unit(problem, n) for n in (*trace.problem.free, "abscissa")}
     for number, branch in enumerate(trace.branches, start=1):
         events = TableBlock(list_events(branch, units, model), f"Events along branch {number}, to all digits")
         blocks = (Sentence(_describe_branch(branch, trace), f"branch {number}"), events)

@@ -41,11 +41,11 @@ from tmsopt.documents.speeds import describe_range
 from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.guide import describe
 from tmsopt.models import tms
-from tmsopt.problem import NO_RADIUS, Case, Unit, amounts_text, show_at, status_text, unit_of, unit_of_all
+from tmsopt.problem import NO_RADIUS, Case, Unit, amounts_text, common_unit, show_at, status_text, unit_of
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import limit_text
 from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
-from tmsopt.problem.verdict.status import status_in_words, verdict_in_words
+from tmsopt.problem.verdict.status import describe_status, describe_verdict
 
 _DIGITS = 5
 _FOLD, _FIXED = 5, 14  # rows of free parameters below each other, and fixed ones named, of a brief report
@@ -150,7 +150,7 @@ def write_headline(solution: Solution) -> tuple[Sentence, Sentence]:
     located = f"locate {problem.locate}" if problem.locate else ""
     sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
-    ended = ": ".join(part for part in (status_in_words(solution), verdict_in_words(solution)) if part)
+    ended = ": ".join(part for part in (describe_status(solution), describe_verdict(solution)) if part)
     structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
     structure += ROUNDED if solution.multiple_as_rounded else ""
     found = "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
@@ -248,7 +248,7 @@ def _write_cases(solution: Solution) -> Blocks:
         yield Sentence(text, "fastest case")
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
-        unit = unit_of_all(of.posed, "abscissa")
+        unit = common_unit(of.posed, "abscissa")
         yield Sentence(f"abscissa at most {Cell(cover.limit, unit, named=True)}, {means}", "every case")
 
 

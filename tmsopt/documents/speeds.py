@@ -12,7 +12,7 @@ from tmsopt.dynamics.growth import Growth
 from tmsopt.dynamics.speeds import Speeds, speed_of
 from tmsopt.models import in_words_of
 from tmsopt.problem.solution import Solution
-from tmsopt.problem.unit_system import Unit, unit_of, unit_of_all
+from tmsopt.problem.unit_system import Unit, common_unit, unit_of
 
 _DIGITS = 15
 
@@ -52,7 +52,7 @@ def _tabulate_crossings(found: Speeds, unit: Unit, real: bool) -> Block:
         others = f"besides what holds for every {found.parameter}, " if found.always else ""
         return Sentence(f"{others}no {root} meets another or the {axis} axis")
     held = {n: x for n, x in found.parameters.items() if n != found.parameter}
-    per = unit_of_all(found.problem.posed, "abscissa", held)
+    per = common_unit(found.problem.posed, "abscissa", held)
     roots = f"root {per.text}".rstrip() if real else "eigenfrequency"
     rows: list[Sequence[Cell | str]] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
     for c in found.found:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.dynamics.system import ANGLES, System
 from tmsopt.errors import Fault, InputError, count_faults, is_number, short, suggest, table_faults
-from tmsopt.problem.units import with_unit
+from tmsopt.problem.units import parse_quantity
 from tmsopt.records import Array, Table, plain
 
 MOST_POINTS = 1_000_000
@@ -98,7 +98,7 @@ def _angles(system: System, given: Mapping[str, Any]) -> tuple[dict[str, float],
             faults.append(Fault(message, (word,)))
         elif word in _ANGLED and isinstance(value, str):
             try:
-                start[_ANGLED[word]] = with_unit(value, "rad")
+                start[_ANGLED[word]] = parse_quantity(value, "rad")
             except ValueError as error:
                 said = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
                 faults.append(Fault(said, (word,)))

@@ -1,7 +1,7 @@
-"""What a design is, from its parameters alone: no solver's word is taken.
+"""Evaluates a design from its parameters alone, without trusting a solver.
 
-In: a problem and a design. Out: its objective and violations, its worst case, bounds that need no search, proofs over
-bands, certified digits, the laws it obeys. Open `recheck` first.
+In: a problem and a design. Out: objective and violations, worst case, bounds that need no search, proofs over bands,
+certified digits, the laws that the design obeys. Open `recheck` first.
 """
 
 import lazy_loader

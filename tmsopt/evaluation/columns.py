@@ -1,7 +1,7 @@
-"""Many designs of one problem at once, in which nothing is free: what `recheck` and `certified` say of each, by arrays.
+"""Evaluates many designs of a problem without free parameters at once, in arrays of doubles with error bounds.
 
-Double precision with bounds of its error. What these leave in doubt is left to them: a nearly multiple root, a limit
-missed by no more than tolerance, a coefficient that does not exist.
+The results equal those of `recheck` and `certified_numbers`. Designs in doubt are left to these: a nearly multiple
+root, a limit missed by little more than the tolerance, a coefficient that does not exist.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 
 from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.algebra.rounding import Bounded, as_bounded
-from tmsopt.evaluation.bound import PROVEN, ROUNDING, bounded, is_rational
+from tmsopt.evaluation.bound import PROVEN, ROUNDING, is_rational, minimizes_abscissa
 from tmsopt.evaluation.law_rows import speed_laws
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import tms
@@ -25,26 +25,26 @@ from tmsopt.records import Array, Truth
 from tmsopt.roots.discs import Motions, enclose_motions
 
 BLOCK = 8192
-"""Designs at once: their numbers stay in the cache. No bit of an answer depends on it."""
+"""Designs per block, so that their numbers stay in the cache. Results do not depend on it."""
 
 KNOWN = 5e-10
-"""Share of its size within which a number is known, or its design is left to the recheck: numbers are equal to 1e-9."""
+"""Relative error above which a design is left to the recheck, so that numbers agree to 1e-9."""
 
 _UNIT = 2.0**-53  # relative rounding of a parameter
-_DOUBT = 2.0  # tolerances within which a limit is left to the recheck
+_DOUBT = 2.0  # a limit within so many tolerances is left to the recheck
 
 
 @dataclass(frozen=True)
-class Verdicts:
-    """Designs as columns, one value for each.
+class Columns:
+    """Results as columns with one value per design.
 
     Attributes:
-        certain: whether the other values are known; of the others they mean nothing.
-        objective, abscissa, damping_ratio: as in `Solution`; the abscissa is also that of the parameters as stored.
-        oscillates: whether the structure is ``pair``; else it is ``real``.
-        violations: name of a constraint → by how much it is violated, nan where it is not.
-        bound, gap: of the feasible ones; no gap is closed.
-        by_relation: whether the bound is one by relations of the coefficients.
+        certain: whether the other values are valid for this design.
+        objective, abscissa, damping_ratio: as in `Solution`; the abscissa as stored is the same.
+        oscillates: whether the structure is ``pair``; otherwise it is ``real``.
+        violations: name of a constraint → amount of the violation, nan if it is met.
+        bound, gap: for feasible designs; no gap is closed.
+        by_relation: whether the bound comes from relations of the coefficients.
         laws: label → relative residual, nan where the law does not apply.
         reports: expression → its value.
     """
@@ -62,54 +62,59 @@ class Verdicts:
     reports: Mapping[str, Array]
 
 
-def judgeable(problem: Posed) -> bool:
-    """Whether designs of a problem may be judged at once: nothing is free, listed, located or searched for, and roots
-    are told as they are."""
+def can_evaluate_columns(problem: Posed) -> bool:
+    """Whether `evaluate_columns` handles a problem.
+
+    The problem has no free parameters, cases or pattern, a real model, and names neither the robustness radius nor the
+    angular frequency.
+    """
     listed = problem.free or problem.scenarios or problem.tolerances or problem.model.carrier is not None
     return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 
-def verdicts(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Verdicts | None:
-    """The designs that differ from a problem's in some of its fixed parameters; None where formulas take no arrays.
+def evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Columns | None:
+    """Evaluate designs that differ from a problem's in some fixed parameters; None if a formula takes no arrays.
 
     Args:
-        columns: parameter → its value in every design, at least one.
-        reports: expressions.
+        columns: parameter → its values, one per design, at least one.
+        reports: expressions to evaluate in addition.
     """
     try:
         with np.errstate(all="ignore"):
-            return _judged(problem, columns, reports)
-    except UnsupportedOperation:  # of a formula that does not take bounds of errors
+            return _evaluate_columns(problem, columns, reports)
+    except UnsupportedOperation:  # a formula that takes no error bounds
         return None
 
 
-def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
+def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]) -> Columns:
     fixed = {n: np.float64(x) for n, x in problem.ordered({}).items()}  # whose comparisons are arrays' too
     given = fixed | dict(columns)
     m = len(next(iter(columns.values())))
     wide = {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()}
-    coefficients = [_spread(c, m) for c in coefficients_of(problem, wide)]
+    coefficients = [_broadcast(c, m) for c in coefficients_of(problem, wide)]
     found = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
-    certain = found.simple & _possible(problem, given)
+    certain = found.simple & _is_possible(problem, given)
 
-    def settled(number: Any) -> Array:
+    def round_or_doubt(number: Any) -> Array:
         nonlocal certain
-        spread = _spread(number, m)
+        spread = _broadcast(number, m)
         certain = certain & (spread.is_known_within(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
         return np.asarray(spread.value)
 
     wide |= {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
-    objective = settled(*evaluate(problem, [problem.objective], wide)) if problem.objective else np.full(m, np.nan)
-    doubles = {name: settled(wide[name]) for name in ("abscissa", "damping_ratio")}
+    objective = (
+        round_or_doubt(*evaluate(problem, [problem.objective], wide)) if problem.objective else np.full(m, np.nan)
+    )
+    doubles = {name: round_or_doubt(wide[name]) for name in ("abscissa", "damping_ratio")}
     plain = given | doubles | {ANGULAR_FREQUENCY: found.frequency}
-    violations, doubt = _violations(problem, plain, found)
+    violations, doubt = _find_violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
     feasible = np.all(np.isnan([np.full(m, np.nan), *violations.values()]), axis=0)
-    bound, related = _bounds(problem, coefficients, settled)
+    bound, related = _find_bounds(problem, coefficients, round_or_doubt)
     bound = np.where(feasible, bound, -np.inf)
     certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
-    said = _laws(problem, wide, coefficients, feasible, settled) if problem.model is tms else {}
-    return Verdicts(
+    residuals = _law_residuals(problem, wide, coefficients, feasible, round_or_doubt) if problem.model is tms else {}
+    return Columns(
         certain,
         objective,
         doubles["abscissa"],
@@ -119,19 +124,19 @@ def _judged(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]
         bound,
         np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf),
         related,
-        said,
-        {text: _spread(x, m).value for text, x in zip(reports, evaluate(problem, reports, plain), strict=True)},
+        residuals,
+        {text: _broadcast(x, m).value for text, x in zip(reports, evaluate(problem, reports, plain), strict=True)},
     )
 
 
-def _spread(number: Any, m: int) -> Bounded:
-    """One number of each design."""
+def _broadcast(number: Any, m: int) -> Bounded:
+    """A number as a column with one value per design."""
     wide = as_bounded(number)
     return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.value, wide.error)))
 
 
-def _possible(problem: Posed, given: Mapping[str, Any]) -> Truth:
-    """Whether a design may be posed: parameters within their ranges, no angle 0, which rational bounds ask for."""
+def _is_possible(problem: Posed, given: Mapping[str, Any]) -> Truth:
+    """Whether a design is valid: parameters are in their ranges, and no angle is 0, as rational bounds require."""
     of, possible = problem.parameter_set, np.True_
     for p in of.parameters:
         x, inside = given[p.name], p.range
@@ -144,37 +149,39 @@ def _possible(problem: Posed, given: Mapping[str, Any]) -> Truth:
     return np.asarray(possible)
 
 
-def _violations(problem: Posed, given: Mapping[str, Any], found: Motions) -> tuple[dict[str, Array], Truth]:
-    """By how much each constraint is violated, and which designs are too close to a limit to be told here."""
+def _find_violations(problem: Posed, given: Mapping[str, Any], found: Motions) -> tuple[dict[str, Array], Truth]:
+    """The violation of each constraint, and which designs are too close to a limit to decide here."""
     m = len(found.simple)
     amounts, doubt = {}, np.zeros(m, dtype=bool)
     names = list(dict.fromkeys(n for c in problem.conditions.values() for n in c.names))
     values = dict(zip(names, evaluate(problem, names, given), strict=True))
     for name, condition in problem.conditions.items():
-        left, right = (_spread(side, m).value for side in condition.sides(values))
+        left, right = (_broadcast(side, m).value for side in condition.sides(values))
         difference = left - right
         excess, size = condition.excess(difference), np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
         relative = excess / size
         doubt |= ~np.isfinite(difference) | ((relative > 0) & (relative <= _DOUBT * FEASIBLE))
-        if set(condition.names) & set(ROOT_NAMES):  # of numeric roots in the recheck
+        if set(condition.names) & set(ROOT_NAMES):  # the recheck uses numeric roots
             doubt |= np.abs(difference) <= (_DOUBT * FEASIBLE + found.scatter) * size
         amounts[name] = np.where(relative > FEASIBLE, excess, np.nan)
     return amounts, doubt
 
 
-def _bounds(problem: Posed, coefficients: Sequence[Bounded], settled: Callable[[Any], Array]) -> tuple[Array, Truth]:
-    """The bound of `instant_bound` on the abscissa of each design, if any, and where it is one by relations.
+def _find_bounds(
+    problem: Posed, coefficients: Sequence[Bounded], round_or_doubt: Callable[[Any], Array]
+) -> tuple[Array, Truth]:
+    """The `instant_bound` of each design, and whether it comes from relations.
 
-    Coefficients that do not vary have relations of two: with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and with aₙ.
+    Fixed coefficients satisfy relations in pairs: aⱼ with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and aⱼ with aₙ.
 
     Args:
-        settled: rounds numbers to doubles, and notes where that is not certain.
+        round_or_doubt: rounds numbers to doubles and marks the designs where this is uncertain.
     """
     model, of, n = problem.model, problem.parameter_set, problem.model.degree
     known = np.full(len(coefficients[0].value), -np.inf)
-    if bounded(problem):
-        known = -(settled(abs(coefficients[-1] / coefficients[0])) ** (1 / n)) * (1 + ROUNDING)
-    if not bounded(problem) or any(p.tangent for p in of.parameters) or not is_rational(model, of):
+    if minimizes_abscissa(problem):
+        known = -(round_or_doubt(abs(coefficients[-1] / coefficients[0])) ** (1 / n)) * (1 + ROUNDING)
+    if not minimizes_abscissa(problem) or any(p.tangent for p in of.parameters) or not is_rational(model, of):
         return known, np.zeros(len(known), dtype=bool)
     least = np.full(len(known), np.inf)
     for j in range(n + 1):
@@ -182,29 +189,31 @@ def _bounds(problem: Posed, coefficients: Sequence[Bounded], settled: Callable[[
         for power, ratio, linear in ((j, up, j == 1), (n - j, down * math.comb(n, j), n == 1)):
             if power:
                 root = ratio.root(power)
-                zero = settled(root) + root.error
-                least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is one of a derivative
+                zero = round_or_doubt(root) + root.error
+                least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is a zero of a derivative
     other = np.nextafter(-least, -np.inf)
     return np.maximum(other, known), other > known
 
 
-def _laws(
+def _law_residuals(
     problem: Posed,
     wide: Mapping[str, Any],
     coefficients: Sequence[Bounded],
     feasible: Truth,
-    settled: Callable[[Any], Array],
+    round_or_doubt: Callable[[Any], Array],
 ) -> dict[str, Array]:
-    """Relative residual of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
+    """Relative residuals of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
     m = len(feasible)
     names = problem.model.sets[0].names
-    *native, number = (_spread(x, m) for x in evaluate(problem, [*names, "Fr_c"], wide))
-    p = {n: settled(x) for n, x in zip(names, native, strict=True)}
+    *native, number = (_broadcast(x, m) for x in evaluate(problem, [*names, "Fr_c"], wide))
+    p = {n: round_or_doubt(x) for n, x in zip(names, native, strict=True)}
     exists = np.isfinite(number.value)
-    critical = np.where(exists, settled(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)
+    critical = np.where(exists, round_or_doubt(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)
     found = {}
-    for label, (numeric, law, applies) in speed_laws(p, critical, np.stack([*map(settled, coefficients)], -1)).items():
+    for label, (numeric, law, applies) in speed_laws(
+        p, critical, np.stack([*map(round_or_doubt, coefficients)], -1)
+    ).items():
         residual = (numeric - law) / np.where(law == 0, 1.0, np.abs(law))
-        settled(np.where(feasible & applies, residual, 0.0))  # a law without a value
+        round_or_doubt(np.where(feasible & applies, residual, 0.0))  # a law without a value
         found[label] = np.where(feasible & applies, residual, np.nan)
     return found

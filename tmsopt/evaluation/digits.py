@@ -1,7 +1,7 @@
-"""The numbers of a design, each the double nearest to its true value: ball arithmetic on the parameters as stored.
+"""Computes correctly rounded numbers of a design by ball arithmetic on the parameters as stored.
 
-The parameters are doubles, so exact binary numbers, and a case adds its offset to them exactly. Every quantity is then
-a definite real number, enclosed in a ball that is narrowed until only one double is nearest to it.
+The parameters are doubles, hence exact binary numbers, and a case adds its offsets exactly. So every quantity is a
+definite real number; its ball is narrowed until one double is certainly the nearest.
 """
 
 import math
@@ -24,24 +24,18 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIM
 from tmsopt.problem.units import Reading, frequencies, readings
 from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.patterns.root_enclosures import (
-    EnclosedRoot,
-    enclosed_roots,
-    nearest_decimal,
-    nearest_double,
-    nearest_roots,
-)
+from tmsopt.roots.patterns.root_enclosures import EnclosedRoot, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
 
 _PRECISIONS = (212, 424, 848, 1696)
-"""Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
+"""Bits to try in turn; the first are 64 digits, half of which a fit may lose."""
 
-_Key = tuple[str, str]  # a field of `Certified`, and in a table a name
+_Key = tuple[str, str]  # a field of `Certified`, and a name if it is a table
 _Several = tuple[EnclosedRoot, ...]
 
 
 @dataclass(frozen=True)
 class Certified:
-    """The numbers of a design that follow from its parameters alone; see `Solution` for each."""
+    """The numbers that follow from the parameters alone; `Solution` describes each."""
 
     value: float
     abscissa: float
@@ -55,19 +49,19 @@ class Certified:
 def certified_numbers(
     problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case] = ()
 ) -> Certified:
-    """The numbers of a design, correctly rounded.
+    """Round the numbers of a design correctly.
 
-    Which cases are the worst and which structure the roots have is taken from the recheck. A number that the balls
-    cannot settle, such as one that only happens to be 0, stays what the recheck found.
+    The recheck supplies the worst cases and the structure of the roots. A number that balls cannot decide, such as one
+    that happens to be 0, keeps the value of the recheck.
 
     Args:
-        cases: those that the design was checked in; an objective that differs between them is the worst of all.
+        cases: the cases of the recheck; the objective is the worst over those between which it differs.
     """
     structures = {checked.worst: checked.structure}
     for case in {checked.least_damped, checked.fastest} - {checked.worst}:
         structures[case] = problem.values(case.applied(parameters))["structure"]
     listed = [case for case in cases if not case.direction]
-    design = _Design(problem, _exact(parameters), checked, listed, structures)
+    design = _Design(problem, _exact_numbers(parameters), checked, listed, structures)
     before: dict[_Key, float] = {("value", ""): checked.objective, ("realised", ""): checked.realised}
     before["abscissa", ""] = checked.structure.abscissa
     before |= {("quantities", name): x for name, x in checked.quantities.items()}
@@ -79,8 +73,7 @@ def certified_numbers(
             balls = [] if roots is None else [each for each in design.balls(*roots) if each[0] not in numbers]
             for key, ball, digits in balls:
                 number = _nearest(ball, digits)
-                # At the very end of where a quantity exists, as Fr_c = 0, rounding of the parameters alone may carry
-                # it beyond.
+                # Rounded parameters may lie just outside the domain of a quantity, as near Fr_c = 0.
                 if number is not None and not (math.isfinite(before.get(key, math.nan)) and math.isnan(number)):
                     numbers[key] = number
         if roots is not None and numbers.keys() >= {key for key, *_ in balls}:
@@ -101,7 +94,7 @@ def certified_numbers(
 
 
 def _nearest(ball: Any, digits: int) -> Any:
-    """What a ball, a root, or each of several rounds to; None where that is not certain."""
+    """The rounded value of a ball, a root or a tuple of these; None if it is uncertain."""
     if isinstance(ball, tuple):
         each = tuple(_nearest(one, digits) for one in ball)
         return None if None in each else each
@@ -113,11 +106,11 @@ def _nearest(ball: Any, digits: int) -> Any:
 
 @dataclass(frozen=True)
 class _Design:
-    """A design with all that its numbers depend on.
+    """A design with everything that its numbers depend on.
 
     Attributes:
-        exact: its parameters.
-        structures: of the roots in the cases with the largest abscissa, the least damping ratio and the fastest motion.
+        exact: the exact parameters.
+        structures: case → structure of the roots, for the rightmost, least damped and fastest cases.
     """
 
     problem: Posed
@@ -127,7 +120,7 @@ class _Design:
     structures: Mapping[Case, Structure]
 
     def balls(self, stored: _Several, ideal: Mapping[Case, _Several]) -> Iterator[tuple[_Key, Any, int]]:
-        """Every number as a ball at the working precision, with the decimal digits to round it to, 0 for a double."""
+        """Every number as a ball at the working precision, with the decimal digits to round to; 0 means a double."""
         model, of, checked, known = self.problem.model, self.problem.parameter_set, self.checked, dict[str, Any]()
         worst, damped, fastest = (ideal[c] for c in (checked.worst, checked.least_damped, checked.fastest))
         if stored:
@@ -139,9 +132,9 @@ class _Design:
         if worst:
             known["abscissa"] = _rightmost(worst)
             yield ("abscissa", ""), known["abscissa"], 0
-            yield ("roots", ""), _shown(model, worst), 0
-        if checked.around and math.isfinite(checked.around.radius):
-            known[RADIUS] = exact(checked.around.radius)
+            yield ("roots", ""), _to_user_roots(model, worst), 0
+        if checked.robustness and math.isfinite(checked.robustness.radius):
+            known[RADIUS] = exact(checked.robustness.radius)
         nominal, abscissa, pi = self.values(Case()), known.get("abscissa", math.nan), flint.arb.pi()
         if of.rate is not None:
             rates = frequencies(fastest, of.rate(self.exact), pi)
@@ -159,15 +152,15 @@ class _Design:
             yield ("value", ""), reduce(lesser if self.problem.sense == "maximize" else greater, each), 0
 
     def roots(self, last: bool) -> tuple[_Several, Mapping[Case, _Several]] | None:
-        """The roots as stored in the worst case, and in each case those of the nearest polynomial of its structure.
+        """The roots as stored in the worst case, and per case the roots of the nearest polynomial of its structure.
 
-        None where they are not decided, the `last` time what the recheck found.
+        Returns None if they are undecided, or, at the `last` precision, the roots of the recheck.
         """
         stored = enclosed_roots(self.values(self.checked.worst).coefficients)
         ideal: dict[Case, _Several] = {}
         for case, structure in self.structures.items():
             coefficients = self.values(case).coefficients
-            found: _Several | None = ()  # with a root at infinity
+            found: _Several | None = ()  # for a root at infinity
             if structure.roots and structure.name in SIMPLE and all(root.multiplicity == 1 for root in structure.roots):
                 found = (stored if case == self.checked.worst else None) or enclosed_roots(coefficients)
             elif structure.roots:
@@ -179,12 +172,12 @@ class _Design:
         return stored or (), ideal
 
     def values(self, case: Case) -> Values:
-        """Everything derived from the exact parameters in a case, root quantities excluded."""
-        varied = Case(Table(_exact(case.at)), Table(_exact(case.offset))).applied(self.exact)
+        """Everything derived from the exact parameters in a case, without root quantities."""
+        varied = Case(Table(_exact_numbers(case.at)), Table(_exact_numbers(case.offset))).applied(self.exact)
         return Values(self.problem.model, self.problem.parameter_set, varied)
 
 
-def _exact(table: Numbers) -> dict[str, Any]:
+def _exact_numbers(table: Numbers) -> dict[str, Any]:
     return {name: exact(value) for name, value in table.items()}
 
 
@@ -197,8 +190,8 @@ def _ratio(root: EnclosedRoot) -> Any:
     return flint.arb(0) if root.re == 0 and root.im == 0 else -root.re / root.modulus
 
 
-def _shown(model: Model, roots: _Several) -> _Several:
-    """The roots as the user reads them; an eigenfrequency that is the carrier's own to 60 digits is 0."""
+def _to_user_roots(model: Model, roots: _Several) -> _Several:
+    """The roots as users read them; an eigenfrequency within 2⁻²¹² of the carrier reads 0."""
     found: _Several = user_roots(model, roots)
     if model.carrier is None:
         return found

@@ -1,4 +1,4 @@
-"""The closed-form laws of the paper beside a design, one row each."""
+"""Compares a design with the closed-form laws of the paper, one row per law."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -34,19 +34,19 @@ LAWS = (
 """Names of all laws, in the order of `law_rows`."""
 
 SAME_LAW = 1e-9
-"""Relative difference up to which number and law count as agreeing; coefficients are matched to 1e-10."""
+"""Number and law agree up to this relative difference; coefficients are matched to 1e-10."""
 
 
 @dataclass(frozen=True)
 class LawRow:
-    """One law beside the design.
+    """One law compared with a design.
 
     Attributes:
         label: equation label in the paper.
-        subject: what the numbers are.
-        numeric: the number of the design, found without the law.
-        law: the number that the law gives.
-        reason: why the law says nothing about this design; empty where it applies.
+        subject: the quantity compared.
+        numeric: its value for the design, computed without the law.
+        law: its value by the law.
+        reason: why the law does not apply to this design; empty if it does.
     """
 
     label: str
@@ -57,7 +57,7 @@ class LawRow:
 
     @property
     def name(self) -> str:
-        """The label, with what it is about where that is of several; without commas, for tables."""
+        """The label without commas, followed by the subject if the equation gives several parameters."""
         return f"{self.label} {self.subject.split(',')[0]}".replace(",", "") if self.label == _CLOSED else self.label
 
     @property
@@ -72,12 +72,12 @@ class LawRow:
 
     @property
     def relative(self) -> float:
-        """Residual relative to the law, or to 1 where the law says 0."""
+        """Residual relative to the law, or to 1 if the law gives 0."""
         return self.residual / (abs(self.law) or 1.0)
 
     @property
     def agrees(self) -> bool | None:
-        """Whether number and law agree; None where the law does not apply."""
+        """Whether number and law agree; None if the law does not apply."""
         return abs(self.relative) <= SAME_LAW if self.applies else None
 
     def to_json(self) -> dict[str, Any]:
@@ -87,7 +87,7 @@ class LawRow:
 
 
 def law_rows(design: Solution) -> Iterator[LawRow]:
-    """Every law, with the reason where its conditions do not hold."""
+    """Every law, with the reason if it does not apply."""
     p = {name: float(value) for name, value in design.dimensionless.items()}
     heights, tilted = _heights(p), _heights(p, "lambda_s")
     not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_why_not_ep4(design)}"
@@ -108,7 +108,9 @@ def law_rows(design: Solution) -> Iterator[LawRow]:
 
     general = not_ep4 or ("" if not_one else "at chi_H = 1 the mass ratio is free; see the laws for chi_H = 1")
     branches = laws.ep4(r, **heights, chi_H=p["chi_H"])
-    branch = min(branches, key=lambda b: abs(float(b.tan_lambda_s) - T) + abs(float(b.Fr) - p["Fr"]))  # it is on this
+    branch = min(
+        branches, key=lambda b: abs(float(b.tan_lambda_s) - T) + abs(float(b.Fr) - p["Fr"])
+    )  # nearest to the design
     closed = (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s))
     for subject, numeric, law in closed:
         yield row(_CLOSED, f"{subject}, closed form for any chi_H", numeric, law, general)
@@ -141,7 +143,7 @@ def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[s
     """Laws of stability and of the critical Froude number: label → number of the design, law, whether it applies.
 
     Args:
-        p: dimensionless parameters, numbers or arrays of these.
+        p: dimensionless parameters, numbers or arrays.
         coefficients: shape (…, 5).
     """
     heights, tilted, shape = (_heights(p, *more) for more in ((), ("lambda_s",), ("lambda_s", "mu", "chi_B", "chi_H")))
@@ -159,7 +161,7 @@ def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[s
 
 
 def _heights(p: Mapping[str, Any], *more: str) -> dict[str, Any]:
-    """The heights among parameters, and more of these."""
+    """The parameters zeta_B and zeta_H, and more by name."""
     return {n: p[n] for n in ("zeta_B", "zeta_H", *more)}
 
 

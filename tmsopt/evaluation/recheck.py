@@ -1,4 +1,4 @@
-"""What a design really is, computed from its parameters alone and without the NLP that produced it."""
+"""Evaluates a design from its parameters alone, independently of the program that produced it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,26 +24,26 @@ from tmsopt.records import Numbers, Table
 from tmsopt.roots import Structure, pattern_distance
 
 FEASIBLE = 1e-9
-"""Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
+"""A constraint counts as met up to this violation, relative to the size of its two sides or 1."""
 
 MATCHED = 1e-10
-"""Relative change of a coefficient up to which a pattern counts as located."""
+"""A pattern counts as located up to this relative change of a coefficient."""
 
-_SCATTER = 2e-3  # of the largest root: five times what numeric roots beside a 4-fold one are off
+_SCATTER = 2e-3  # relative: five times the error of numeric roots next to a 4-fold root
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A design's roots, objective and violations: in its worst case, where it has several.
+    """A design's roots, objective and violations, in its worst case if it has several.
 
     Attributes:
-        violations: name → violation relative to the size of the two sides, where beyond tolerance.
-        amounts: the same in the units of the sides.
-        worst: the case with the largest abscissa, of those looked at.
+        violations: name → violation relative to the size of the two sides, if above tolerance.
+        amounts: name → violation in the units of the sides.
+        worst: the evaluated case with the largest abscissa.
         least_damped: the case with the least damping ratio.
-        fastest: the case with the greatest angular frequency, where the problem asks for that.
-        around: the boundaries nearest to the design, where the problem asks for the robustness radius.
-        crossing: whether the pattern is violated by eigenvectors alone: roots meet, and no Jordan chain is so long.
+        fastest: the case with the greatest angular frequency, if the problem uses it.
+        robustness: the boundaries nearest to the design, if the problem uses the robustness radius.
+        crossing: whether only the eigenvectors violate the pattern: the roots are equal, the Jordan chains too short.
     """
 
     structure: Structure
@@ -56,7 +56,7 @@ class Evaluation:
     worst: Case
     least_damped: Case
     fastest: Case
-    around: Robustness | None
+    robustness: Robustness | None
     crossing: bool
 
 
@@ -64,20 +64,20 @@ def recheck(
     problem: Posed,
     parameters: Numbers,
     cases: Sequence[Case] | None = None,
-    around: Robustness | None = None,
+    robustness: Robustness | None = None,
 ) -> Evaluation:
-    """Evaluate a design independently of any solver: constraints, pattern, roots and objective, in the given cases.
+    """Evaluate constraints, pattern, roots and objective of a design in the given cases, independently of any solver.
 
     Args:
-        around: the boundaries nearest to this design, where they are known already.
+        robustness: the boundaries nearest to this design, if they are known.
     """
-    looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
-    violations, amounts = looked.violations(problem.conditions)
-    nominal, top, crossing = looked.nominal, looked.worst["abscissa"], False
-    structure = looked.each[top]["structure"]
+    evaluated = _evaluate_cases(problem, parameters, problem.cases if cases is None else cases, robustness)
+    violations, amounts = evaluated.violations(problem.conditions)
+    nominal, top, crossing = evaluated.nominal, evaluated.worst["abscissa"], False
+    structure = evaluated.each[top]["structure"]
     if not math.isfinite(structure.abscissa):
-        exist = all(math.isfinite(float(c)) for c in looked.each[top].coefficients)
-        violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or none
+        exist = all(math.isfinite(float(c)) for c in evaluated.each[top].coefficients)
+        violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or undefined
     if problem.pattern is not None:
         a = [float(c) for c in nominal.coefficients]
         distance = pattern_distance(problem.pattern, a, nominal.roundings(), MATCHED)
@@ -86,67 +86,67 @@ def recheck(
             violations[problem.pattern.name] = 1.0 if crossing else distance
     of = problem.parameter_set
     names = [n for n in (*public_names(problem.model, of), "damping_ratio") if n not in problem.model.sets[0].names]
-    names += [RADIUS] if looked.around is not None else []
+    names += [RADIUS] if evaluated.robustness is not None else []
     names += [ANGULAR_FREQUENCY] if problem.asks(ANGULAR_FREQUENCY) else []
-    if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
+    if of.rate is not None and structure.roots:  # times and frequencies belong to the worst case
         nominal = nominal.with_known({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
-        realised=realised_abscissa(problem, looked.cases[top].applied(parameters)),
-        objective=looked.objective,
+        realised=realised_abscissa(problem, evaluated.cases[top].applied(parameters)),
+        objective=evaluated.objective,
         violations=Table(violations),
         amounts=Table(violations | amounts),
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
-        worst=looked.cases[top],
-        least_damped=looked.cases[looked.worst["damping_ratio"]],
-        fastest=looked.cases[looked.worst.get(ANGULAR_FREQUENCY, top)],
-        around=looked.around,
+        worst=evaluated.cases[top],
+        least_damped=evaluated.cases[evaluated.worst["damping_ratio"]],
+        fastest=evaluated.cases[evaluated.worst.get(ANGULAR_FREQUENCY, top)],
+        robustness=evaluated.robustness,
         crossing=crossing,
     )
 
 
-def missed(
-    problem: Posed, parameters: Numbers, cases: Sequence[Case], around: Robustness | None = None
+def find_missed_limits(
+    problem: Posed, parameters: Numbers, cases: Sequence[Case], robustness: Robustness | None = None
 ) -> dict[str, float]:
-    """Limits on the roots that the exact roots of the parameters as stored miss → by how much, in their own units.
+    """Limits that the exact roots of the parameters as stored miss → the amount, in units of the limit.
 
     Args:
-        around: as for `recheck`.
+        robustness: as for `recheck`.
     """
     asked = {n: problem.conditions[n] for n in problem.asked_of_roots if RADIUS not in problem.conditions[n].names}
     if not asked:
         return {}
-    looked = _look(problem, parameters, cases, around)
-    near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(c))}
-    exactly = _look(problem, parameters, cases, looked.around, parameters) if near else looked
+    evaluated = _evaluate_cases(problem, parameters, cases, robustness)
+    near = {n: c for n, c in asked.items() if any(_may_be_missed(c, v) for v in evaluated.relevant_cases(c))}
+    exactly = _evaluate_cases(problem, parameters, cases, evaluated.robustness, parameters) if near else evaluated
     return exactly.violations(near)[1]
 
 
-def judged_exactly(
+def recheck_exactly(
     problem: Posed, parameters: Mapping[str, Any], cases: Sequence[Case]
 ) -> tuple[Values, dict[str, float]]:
-    """Quantities of a design of exact numbers, and what it violates beyond tolerance, in the units of the sides.
+    """Quantities of a design of exact numbers, and its violations above tolerance in the units of the sides.
 
-    Those of the roots are the worst over the cases, by exact roots; the robustness radius plays no part.
+    Root quantities come from exact roots and are the worst over the cases. The robustness radius is ignored.
     """
-    looked = _look(problem, {n: float(x) for n, x in parameters.items()}, cases, stored=parameters)
+    evaluated = _evaluate_cases(problem, {n: float(x) for n, x in parameters.items()}, cases, stored=parameters)
     conditions = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
-    return looked.nominal, looked.violations(conditions)[1]
+    return evaluated.nominal, evaluated.violations(conditions)[1]
 
 
-def _is_near(condition: Expression, values: Values) -> bool:
-    """Whether numeric roots leave it open that a condition is missed."""
+def _may_be_missed(condition: Expression, values: Values) -> bool:
+    """Whether errors of numeric roots may hide that a condition is missed."""
     left, right = condition.sides(values)
     slack = -condition.sign * float(condition(values))
     return condition.equality or not slack > _SCATTER * max(1.0, abs(left), abs(right))
 
 
-def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
-    """Whether no design within `FEASIBLE` of another meets a condition, so that a small excess is none of rounding.
+def _is_out_of_reach(problem: Posed, condition: Expression, values: Values) -> bool:
+    """Whether no design within a relative distance `FEASIBLE` meets a condition, so that its excess is no rounding.
 
-    Parameters move by so much of their size or of their range, root quantities of theirs; (Fr - 1.7)**4 <= 0 is missed
-    by 1e-16 at Fr = 1.6999, and by 1e-4 of the speed. By intervals: of the condition, and of its slopes.
+    (Fr - 1.7)**4 <= 0 is missed by only 1e-16 at Fr = 1.6999, but Fr is 1e-4 away. Parameters vary relative to their
+    size or range, root quantities relative to their size or 1. Interval arithmetic bounds the condition and its slopes.
     """
     of = problem.parameter_set
     names = (*of.names, *(n for n in ROOT_NAMES if n in condition.names))
@@ -154,40 +154,40 @@ def _beyond(problem: Posed, condition: Expression, values: Values) -> bool:
     ends = np.array([problem.free.get(n, (0.0, 0.0)) for n in names])
     reach = FEASIBLE * np.maximum(np.abs(at), np.where(np.arange(len(at)) < len(of.names), np.ptp(ends, axis=1), 1.0))
     try:
-        function = _sloped(problem.model, of.name, condition, names)
+        function = _condition_with_slopes(problem.model, of.name, condition, names)
         centre, around = (ranges(function, list(zip(at - r, at + r, strict=True))) for r in (0 * reach, reach))
     except UnsupportedOperation:
         return False
-    with np.errstate(invalid="ignore"):  # a slope may be without bound
+    with np.errstate(invalid="ignore"):  # a slope may be unbounded
         slack = float(np.abs(around[1:]).max(axis=1) @ reach)
     signs = (1.0, -1.0) if condition.equality else (condition.sign,)
     return any(min(s * e for e in centre[0]) > slack or min(s * e for e in around[0]) > 0 for s in signs)
 
 
 @lru_cache(maxsize=256)
-def _sloped(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
-    """A condition and its slopes, as a function of parameters and root quantities."""
+def _condition_with_slopes(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
+    """A condition and its gradient as a function of parameters and root quantities."""
     symbols, of = {name: symbol(name) for name in names}, model.parameter_set(set_name)
     difference = condition(Values(model, of, {n: symbols[n] for n in of.names}).with_known(symbols))
     return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
-def excesses(problem: Posed, parameters: Numbers, cases: Sequence[Case]) -> dict[str, float]:
-    """Amount by which each constraint's limit must be moved for a design: 0 or more, signed for an equality."""
-    looked, found = _look(problem, parameters, cases), {}
+def measure_excesses(problem: Posed, parameters: Numbers, cases: Sequence[Case]) -> dict[str, float]:
+    """How far each limit must move until a design meets it: 0 or more, signed for an equality."""
+    evaluated, found = _evaluate_cases(problem, parameters, cases), {}
     for name, condition in problem.conditions.items():
-        differences = [float(condition(v)) for v in looked.at(condition)]
-        beyond = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
+        differences = [float(condition(v)) for v in evaluated.relevant_cases(condition)]
+        beyond = max(0.0, *(_nan_as_infinite(condition.sign * d) for d in differences))
         found[name] = differences[0] if condition.equality else beyond
     return found
 
 
 @dataclass(frozen=True)
-class _Look:
-    """A design in its cases, with root quantities the worst over them.
+class _CaseValues:
+    """The values of a design in its cases; root quantities are the worst over them.
 
     Attributes:
-        worst: root quantity → number of the case in which it is the worst; the angular frequency where it is asked for.
+        worst: root quantity → index of its worst case; the angular frequency only if the problem uses it.
     """
 
     problem: Posed
@@ -195,40 +195,44 @@ class _Look:
     nominal: Values
     each: list[Values]
     worst: Mapping[str, int]
-    around: Robustness | None
+    robustness: Robustness | None
 
-    def at(self, expression: Expression) -> list[Values]:
-        """The cases in which a condition must hold, or an objective is the worst."""
+    def relevant_cases(self, expression: Expression) -> list[Values]:
+        """Values in the cases where a condition must hold, or over which an objective is the worst."""
         return self.each if depends_on_case(self.problem, expression, self.cases) else [self.nominal]
 
     @property
     def objective(self) -> float:
-        """The objective, the worst over the cases where it differs between them; nan without one."""
+        """The objective, the worst over the cases if it depends on them; nan without one."""
         objective, sign = self.problem.objective, self.problem.sign
         if objective is None:
             return math.nan
-        return sign * max((sign * float(objective(values)) for values in self.at(objective)), key=_or_infinite)
+        return sign * max(
+            (sign * float(objective(values)) for values in self.relevant_cases(objective)), key=_nan_as_infinite
+        )
 
     def violations(self, conditions: Mapping[str, Expression]) -> tuple[dict[str, float], dict[str, float]]:
-        """Violations of conditions beyond tolerance, relative and in the units of the sides."""
+        """Violations above tolerance, relative and in the units of the sides."""
         violations, amounts = {}, {}
         for name, condition in conditions.items():
-            at = self.at(condition)
-            violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
-            if not violation <= FEASIBLE or (violation > 0 and _beyond(self.problem, condition, worst)):
+            at = self.relevant_cases(condition)
+            violation, worst = max(
+                ((condition.violation(v), v) for v in at), key=lambda pair: _nan_as_infinite(pair[0])
+            )
+            if not violation <= FEASIBLE or (violation > 0 and _is_out_of_reach(self.problem, condition, worst)):
                 violations[name] = violation
                 amounts[name] = float(condition.excess(float(condition(worst))))
         return violations, amounts
 
 
-def _look(
+def _evaluate_cases(
     problem: Posed,
     parameters: Numbers,
     cases: Sequence[Case],
-    around: Robustness | None = None,
+    robustness: Robustness | None = None,
     stored: Mapping[str, Any] | None = None,
-) -> _Look:
-    """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
+) -> _CaseValues:
+    """Evaluate a design in its cases, with roots of its structure or exact roots of the `stored` parameters."""
     listed = [case for case in cases if not case.direction] or [Case()]
 
     @cache
@@ -241,21 +245,20 @@ def _look(
 
     nominal, *each = map(values, (Case(), *listed))
     worst = {
-        name: max(range(len(each)), key=lambda k: _or_infinite(sign * each[k][name]))
+        name: max(range(len(each)), key=lambda k: _nan_as_infinite(sign * each[k][name]))
         for name, sign in WORSE_DIRECTION.items()
         if name != ANGULAR_FREQUENCY or problem.asks(ANGULAR_FREQUENCY)
     }
     shared = {name: each[k][name] for name, k in worst.items()}
-    if around is None and problem.asks_radius and stored is None:
-        around = robustness_at(problem, parameters)
-    if around is not None:
-        shared[RADIUS] = around.radius
+    if robustness is None and problem.asks_radius and stored is None:
+        robustness = robustness_at(problem, parameters)
+    if robustness is not None:
+        shared[RADIUS] = robustness.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **shared}) for v in (nominal, *each))
-    return _Look(problem, listed, nominal, each, worst, around)
+    return _CaseValues(problem, listed, nominal, each, worst, robustness)
 
 
-def _or_infinite(value: float) -> float:
-    """A number for comparison in which one that does not exist is the worst."""
+def _nan_as_infinite(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 

@@ -1,14 +1,14 @@
-"""A design near another that meets limits on the roots exactly as stored, where the doubles of the other miss them.
+"""Finds a design in doubles that meets limits on the roots exactly as stored, near an ideal design that misses them.
 
-Beside an m-fold root s₀ a change ε of a coefficient moves roots by ε^(1/m), so the doubles nearest to an ideal design
-miss a limit by 1e-8 at a double root, by 4e-4 at a 4-fold one. With u the direction along the limit, s = s₀ + u t, and
-∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m, roots that are spread evenly over −h ≤ t ≤ h stay within d of their line while cₖ
-is within h^(k−1) d / 2 of its aim across the limit, and within hᵏ / 8 along it (k ≥ 2). The line may stand inside the
-limit by some h²; that and the spread cost h² each.
+A change ε of a coefficient moves an m-fold root s₀ by ε^(1/m), so the doubles nearest to an ideal design miss a limit
+by 1e-8 at a double root and by 4e-4 at a 4-fold one. The remedy is to spread the roots along the limit. Let u be its
+direction, s = s₀ + u t, and ∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m. Roots spread evenly over −h ≤ t ≤ h stay within d of
+their line if cₖ is within h^(k−1) d / 2 of its target across the limit and within hᵏ / 8 along it (k ≥ 2). The line may
+lie inside the limit by about h²; that and the spread each cost h².
 
-Doubles near such a design are a lattice. Its point that comes closest, in these units, is found by a reduced basis
-(Lenstra, Lenstra and Lovász 1982) and the nearest plane (Babai 1986), and judged by its exact roots. h grows until one
-keeps every limit.
+Doubles near such a design form a lattice. A reduced basis (Lenstra, Lenstra and Lovász 1982) and the nearest plane
+(Babai 1986) give its closest point in these units, which is then checked by exact roots. h grows until a point meets
+every limit.
 """
 
 import itertools
@@ -22,7 +22,7 @@ import flint
 import numpy as np
 
 from tmsopt.algebra.balls import as_ball
-from tmsopt.evaluation.recheck import FEASIBLE, Evaluation, missed, recheck
+from tmsopt.evaluation.recheck import FEASIBLE, Evaluation, find_missed_limits, recheck
 from tmsopt.models import Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
@@ -35,18 +35,18 @@ from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.root_enclosures import nearest_roots
 
 _DIGITS = 150  # slopes are differences over 2⁻¹⁰⁰ of a parameter
-_SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from what a structure tolerates up to 5e-7
-_LINE = 1e-6  # relative distance from the worst root up to which another is on the limit too
-_STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # of Newton's method; designs judged; basis vectors added to the nearest point
-_RANK = 1e-9  # of the steepest direction, below which one moves nothing
-_MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
-_LEAST = 1e-3  # of its range: natural size of a parameter near 0
-_FINEST = 1e-20  # relative: steps of a parameter that is 0
-_BITS = 60  # behind the point, of the coordinates of the lattice
+_SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from the tolerance of a structure up to 5e-7
+_LINE = 1e-6  # relative distance from the worst root within which another one is on the limit too
+_STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # Newton steps; lattice points checked; basis vectors varied near the closest
+_RANK = 1e-9  # relative singular value below which a direction moves nothing
+_MOVE = 3e-12  # relative size of moves on the lattice, small enough for constant slopes
+_LEAST = 1e-3  # natural size of a parameter near 0, as a share of its range
+_FINEST = 1e-20  # relative step of a parameter that is 0
+_BITS = 60  # fractional bits of the lattice coordinates
 _NOTHING = 1e-14  # of the size of roots: less is rounding
-_APART, _SHOWN = 1e-6, 7  # relative difference of two abscissae from which both are shown; digits, which show it
-_ROUNDINGS = (1, -1, 4, -4, 16, -16, 64, -64, 256, -256)
-_AT_END = 1e-9  # of a range: a parameter so close to an end stays there
+_APART, _SHOWN = 1e-6, 7  # relative difference from which both abscissae are shown; digits that show it
+_ROUNDINGS = (1, -1, 4, -4, 16, -16, 64, -64, 256, -256)  # units in the last place to try
+_AT_END = 1e-9  # of a range: a parameter this close to an end stays there
 
 
 @dataclass(frozen=True)
@@ -54,40 +54,41 @@ class _Cluster:
     """A multiple root on a limit.
 
     Attributes:
-        case: in which it is there.
-        root: of the ideal design, on or above the real axis.
-        along: unit vector along the limit, the inside of which is on its left.
+        case: the case that has it.
+        root: the root of the ideal design, on or above the real axis.
+        along: unit vector along the limit; the feasible side is on its left.
         exactly: whether the limit is an equality.
     """
 
     case: Case
     root: Root
     along: complex
-    exactly: bool
+    equality: bool
 
     @property
     def place(self) -> complex:
-        """The root as a number."""
         return complex(self.root.re, self.root.im)
 
-    def parts(self) -> Iterator[tuple[int, bool]]:
-        """Order k of each cₖ, and whether it is its real part; without those that are 0 or free to move."""
+    def components(self) -> Iterator[tuple[int, bool]]:
+        """(k, whether the real part) for each part of each cₖ that is neither 0 by symmetry nor free to move."""
         for k in range(1, self.root.multiplicity + 1):
             for real in (True, False):
                 if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.along.imag == 0)):
                     yield k, real
 
 
-def held(
+def find_storable_design(
     problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case]
 ) -> tuple[Numbers, Evaluation, Numbers]:
-    """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
+    """Move a feasible design as little as needed to meet limits on its roots exactly as stored.
 
-    It is moved, too, where its objective does not exist as stored: beside the end of a square root. The structure
-    remains that of the ideal design. Where no such design is found, the one that is given, and what it misses → by how
-    much.
+    It also moves if its objective is undefined as stored, as next to the end of a square root.
+
+    Returns:
+        The design; its recheck, with the structure of the ideal design; and nothing missed. If none is found: the given
+        design, its recheck, and limit → amount that it misses.
     """
-    amounts = {} if checked.violations else missed(problem, parameters, cases, checked.around)
+    amounts = {} if checked.violations else find_missed_limits(problem, parameters, cases, checked.robustness)
     if checked.violations or (not amounts and _has_objective(problem, parameters)):
         return parameters, checked, {}
     if amounts:
@@ -99,7 +100,7 @@ def held(
             _SpreadRoots(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist())
         )
         others: Iterator[dict[str, float]] = (design for way in ways for design in way.designs())
-    else:  # some roundings of one free parameter off, inside the box
+    else:  # move one free parameter by a few units in the last place
         near = (
             {**parameters, name: x}
             for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items())
@@ -107,15 +108,15 @@ def held(
         )
         others = (design for design in near if _has_objective(problem, design))
     for design in others:
-        if not missed(problem, design, cases, checked.around):
-            again = recheck(problem, design, cases, checked.around)
+        if not find_missed_limits(problem, design, cases, checked.robustness):
+            again = recheck(problem, design, cases, checked.robustness)
             if set(again.violations) <= set(problem.asked_of_roots):
-                return design, _structured(problem, design, checked, again), {}
+                return design, _keep_structure(problem, design, checked, again), {}
     return parameters, checked, amounts
 
 
 def _has_objective(problem: Posed, parameters: Numbers) -> bool:
-    """Whether the objective exists at the parameters exactly as stored; one of the roots always does."""
+    """Whether the objective is defined at the parameters exactly as stored; root quantities always are."""
     asked = problem.objective
     if asked is None or set(asked.names) & set(ROOT_NAMES):
         return True
@@ -125,9 +126,9 @@ def _has_objective(problem: Posed, parameters: Numbers) -> bool:
 
 
 def abscissa_as_stored(solution: Solution) -> str:
-    """The abscissa of the parameters as stored in words, with the ideal one unless that is the objective.
+    """The abscissa as stored in words, after the ideal one unless that is the objective.
 
-    Empty where the two differ by no more than a millionth.
+    Empty if the two differ by at most a millionth.
     """
     ideal, realised = solution.abscissa, solution.abscissa_realised
     size = max((r.size for r in solution.of_polynomial.roots), default=0.0)
@@ -142,7 +143,7 @@ def abscissa_as_stored(solution: Solution) -> str:
 
 
 def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
-    """What parameters miss as they are stored, as a sentence for the reader."""
+    """A sentence on the limits that the parameters miss as stored; none if they miss none."""
     why = "no doubles nearby that meet every limit were found" if problem.free else "the ideal design does not"
     return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
 
@@ -154,7 +155,7 @@ def _clusters(
     cases: Sequence[Case],
     names: Sequence[str],
 ) -> list[_Cluster]:
-    """The multiple roots that stand on the limits of these names."""
+    """The multiple roots that lie on the named limits."""
     asked = {name for limit in names for name in problem.conditions[limit].names}
     exactly = any(problem.conditions[limit].equality for limit in names)
     found = []
@@ -175,10 +176,10 @@ def _clusters(
 
 @dataclass(frozen=True)
 class _SpreadRoots:
-    """A design whose clusters are to be spread along their limits.
+    """A design whose multiple roots are to be spread along their limits.
 
     Attributes:
-        names: parameters that may be moved.
+        names: parameters that may move.
         spread: h² over s₀² C(m, 2).
     """
 
@@ -190,15 +191,15 @@ class _SpreadRoots:
 
     @cached_property
     def aims(self) -> Array:
-        """Of each part of each cₖ: what it is in the spread, how far it may be off, and its natural size."""
+        """Rows of target, tolerance and natural size, one column for each part of each cₖ."""
         aims = []
         for cluster in self.clusters:
             m, size = cluster.root.multiplicity, abs(cluster.place)
             h = size * math.sqrt(self.spread * math.comb(m, 2))
-            inside = 0.0 if cluster.exactly else size * self.spread
+            inside = 0.0 if cluster.equality else size * self.spread
             c = np.poly(h * np.linspace(-1, 1, m) + 1j * inside)
             across = (FEASIBLE * size + inside) / 2
-            for k, real in cluster.parts():
+            for k, real in cluster.components():
                 leeway = h**k / 8 if real else h ** (k - 1) * across
                 aims.append((c[k].real if real else c[k].imag, leeway, size**k))
         return np.array(aims).T
@@ -213,28 +214,28 @@ class _SpreadRoots:
         """Doubles in the box that are close to the design with spread clusters, the most promising first."""
         leeway, moves = self.aims[1], _MOVE * self.widths
         with flint.ctx.workdps(_DIGITS):
-            at, _, slope = self.solved()
+            at, _, slope = self.solve_ideal()
             start = {n: float(at[n]) for n in self.names}
-            off = [float(x) for x in self.off({**at, **{n: flint.arb(x) for n, x in start.items()}})]
+            off = [float(x) for x in self.deviations({**at, **{n: flint.arb(x) for n, x in start.items()}})]
             aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
         if not np.all(np.isfinite([*off, *start.values(), *slope.ravel()])):
             return
         units = np.maximum([math.ulp(x) for x in start.values()], _FINEST * self.widths)
         rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / moves)])
-        for counts in _rounded(rows, np.array([*(off / leeway), *(aside / moves)])):
+        for counts in _nearest_combinations(rows, np.array([*(off / leeway), *(aside / moves)])):
             steps = zip(start.items(), counts, units.tolist(), strict=True)
             design = {**self.parameters, **{n: x + count * unit for (n, x), count, unit in steps}}
             if all(lo <= design[n] <= hi for n, (lo, hi) in self.problem.free.items()):
                 yield design
 
-    def solved(self) -> tuple[dict[str, Any], list[Any], Array]:
-        """The design after some steps of Newton's method with the first slopes, what is off there, and those slopes."""
+    def solve_ideal(self) -> tuple[dict[str, Any], list[Any], Array]:
+        """The design after Newton steps with the first slopes, its deviations, and those slopes."""
         size, widths = self.aims[2], self.widths
         at = {n: flint.arb(x) for n, x in self.parameters.items()}
-        off, slopes = self.off(at), []
+        off, slopes = self.deviations(at), []
         for n, width in zip(self.names, widths.tolist(), strict=True):
             step = flint.arb(width) * flint.arb(2) ** -100
-            moved = self.off({**at, n: at[n] + step})
+            moved = self.deviations({**at, n: at[n] + step})
             slopes.append([float((b - a) / step) for a, b in zip(off, moved, strict=True)])
         slope = np.array(slopes)
         if np.all(np.isfinite(slope)):
@@ -242,11 +243,11 @@ class _SpreadRoots:
             for _ in range(_STEPS):
                 steps = widths * (inverse @ (np.array([float(x) for x in off]) / size))
                 at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(self.names, steps.tolist(), strict=True)}
-                off = self.off(at)
+                off = self.deviations(at)
         return at, off, slope
 
-    def off(self, at: Mapping[str, Any]) -> list[Any]:
-        """Each part of each cₖ of an exact design, minus what is aimed at."""
+    def deviations(self, at: Mapping[str, Any]) -> list[Any]:
+        """Each part of each cₖ of an exact design, minus its target."""
         found, target = [], self.aims[0].tolist()
         for cluster in self.clusters:
             a = self.problem.model.coefficients(cluster.case.applied(at), self.problem.parameter_set)
@@ -255,12 +256,12 @@ class _SpreadRoots:
             place, along = flint.acb(cluster.place), flint.acb(cluster.along)
             z = sorted((z for z, m in isolated_roots(a) for _ in range(m)), key=lambda z: float(abs(z - place)))
             c = product(*([flint.acb(1), (place - root) / along] for root in z[: cluster.root.multiplicity]))
-            found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]
+            found += [c[k].real if real else c[k].imag for k, real in cluster.components()]
         return [(x - t).mid() for x, t in zip(found, target, strict=True)]
 
 
-def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
-    """Integer combinations of rows that cancel best what is off, the best first."""
+def _nearest_combinations(rows: Array, off: Array) -> Iterator[list[int]]:
+    """Integer combinations of rows that cancel `off` best, the best first."""
     whole = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
     reduced, transform = flint.fmpz_mat(whole).lll(True)
     n = len(rows)
@@ -270,15 +271,15 @@ def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
     for i in range(n)[::-1]:
         nearest[i] = -round(float(q[:, i] @ rest / r[i, i]))
         rest = rest + nearest[i] * basis[i]
-    beside = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
-    ranked = sorted(beside, key=lambda more: float(np.abs(rest + more @ basis[: len(more)]).max()))
+    neighbours = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
+    ranked = sorted(neighbours, key=lambda more: float(np.abs(rest + more @ basis[: len(more)]).max()))
     for more in ranked[:_TRIALS]:
         by = [a + b for a, b in itertools.zip_longest(nearest, more, fillvalue=0)]
         yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
 
 
-def _structured(problem: Posed, design: Numbers, checked: Evaluation, again: Evaluation) -> Evaluation:
-    """The recheck of a design, with the structure of the ideal one that it was moved from."""
+def _keep_structure(problem: Posed, design: Numbers, checked: Evaluation, again: Evaluation) -> Evaluation:
+    """The recheck of a moved design, with the structure of the ideal one."""
     structure = again.structure
     if structure.name != checked.structure.name:
         with flint.ctx.workdps(_DIGITS):

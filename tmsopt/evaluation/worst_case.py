@@ -1,4 +1,4 @@
-"""Where, within its scenarios and tolerances, a design does worst, and the proof that it does no worse anywhere."""
+"""Finds the worst case of a design within its scenarios and tolerances, and proves that no case is worse."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -21,39 +21,39 @@ from tmsopt.records import Array, Numbers, Table
 from tmsopt.roots import lienard_chipart, shift
 
 SLACK = 1e-6
-"""Above the worst abscissa found, relative to 1 + |abscissa|: a bound that is met with equality cannot be proved."""
+"""Margin of the proof above the worst abscissa found, relative to 1 + |abscissa|; equality cannot be proved."""
 
 BOXES = 4000
-"""Boxes looked at before the proof is given up, a second or so; from degree 5 on ever fewer, for each takes longer."""
+"""Boxes before a proof gives up, about a second; fewer from degree 5 on, where each takes longer."""
 
-_LINE = 1025  # points looked at along a band when nothing else varies
-_PLANE = 2048  # points, besides the corners, where more varies
+_LINE = 1025  # points along a band if nothing else varies
+_PLANE = 2048  # points inside a box of several dimensions
 _EDGES = 8192  # points on the edges of the box, where most worst cases lie
-_PEAKS = 4  # worst points that are looked at closely
-_AROUND = 48  # points of each closer look
-_SHRINK = 0.25
-_LOOKS = 14  # times that the look closes in: at a smooth maximum the value is then exact
+_PEAKS = 4  # worst points to refine
+_AROUND = 48  # points around each peak in each round
+_SHRINK = 0.25  # of the neighbourhood, per round
+_LOOKS = 14  # rounds: the value at a smooth maximum is then exact
 _FEWEST = 32  # boxes of a proof
 _DIGITS = 30
 
 
 @dataclass(frozen=True)
 class Worst:
-    """The worst case for one thing that is asked of a design.
+    """The worst case of one root quantity, objective or constraint.
 
     Attributes:
-        value: of a root quantity, objective or left minus right of a constraint, in the case.
+        value: its value in the case; for a constraint left minus right.
     """
 
     case: Case
     value: float
 
 
-def worst_cases(problem: Posed, parameters: Numbers) -> dict[str, Worst]:
-    """The worst case of everything that differs between cases, over whole bands and tolerance boxes.
+def find_worst_cases(problem: Posed, parameters: Numbers) -> dict[str, Worst]:
+    """Find the worst case of everything that depends on the case, over whole bands and tolerance boxes.
 
-    A grid with a closer look at its worst points; the value in the case found is exact, with multiple roots
-    recognised, but a peak narrower than the grid can escape: `prove` excludes that.
+    Searches a grid and refines its worst points. The value in the case found is exact, with multiple roots recognised.
+    A peak narrower than the grid can escape; `prove_worst_case` excludes that.
     """
     asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
     targets: dict[str, tuple[float, Expression | str]] = {"abscissa": (1.0, "abscissa")}  # with the sign of the worst
@@ -75,19 +75,19 @@ def worst_cases(problem: Posed, parameters: Numbers) -> dict[str, Worst]:
 
 
 def _peaks(problem: Posed, parameters: Numbers, sign: float, what: Expression | str, shared: Numbers) -> Iterator[Case]:
-    """For every choice of separate scenario values, the worst few points of a grid, moved to where it is worst."""
+    """The refined worst points of a grid, for every choice of separate scenario values."""
     bands = {n: s for n, s in problem.scenarios.items() if isinstance(s, Band)}
     separate = {n: s for n, s in problem.scenarios.items() if not isinstance(s, Band)}
     size = len(bands) + len(problem.tolerances)
 
-    def varied(u: Array) -> Case:
-        """The case, or the cases as arrays, at points of the unit cube."""
+    def case_at(u: Array) -> Case:
+        """The case at a point of the unit cube, or the cases as arrays at several."""
         columns = list(u.T) if u.ndim > 1 else u.tolist()
         at = {n: band.min + (band.max - band.min) * columns.pop(0) for n, band in bands.items()}
         return Case({**fixed, **at}, {n: t * (2 * columns.pop(0) - 1) for n, t in problem.tolerances.items()})
 
     def badness(u: Array) -> Array:
-        [values] = evaluate(problem, [what], {**varied(u).applied(parameters), **shared})
+        [values] = evaluate(problem, [what], {**case_at(u).applied(parameters), **shared})
         return np.where(np.isfinite(values), sign * values, np.inf) * np.ones(len(u))
 
     for chosen in product(*separate.values()):
@@ -95,13 +95,13 @@ def _peaks(problem: Posed, parameters: Numbers, sign: float, what: Expression | 
         if size == 0:
             yield Case(Table(fixed))
             continue
-        u = _grid(size)
+        u = _start_points(size)
         high = badness(u)
         step = 1 / (_LINE - 1) if size == 1 else 0.5 * len(u) ** (-1 / size)
-        rows = _apart(u, high, 4 * step)
+        rows = _separate_peaks(u, high, 4 * step)
         best, value, every = u[rows], high[rows], np.arange(len(rows))
-        moves = _moves(len(rows), size)
-        for look in range(_LOOKS):  # all peaks at once: calls cost more than points
+        moves = _random_steps(len(rows), size)
+        for look in range(_LOOKS):  # all peaks at once, since calls cost more than points
             reach = step * (_SHRINK if size == 1 else _SHRINK ** (1 / 2)) ** look
             around = np.clip(best[:, None] + reach * moves[:, look], 0, 1)
             trial = badness(around.reshape(-1, size)).reshape(len(rows), _AROUND)
@@ -109,12 +109,12 @@ def _peaks(problem: Posed, parameters: Numbers, sign: float, what: Expression | 
             higher = trial[every, top] > value
             best = np.where(higher[:, None], around[every, top], best)
             value = np.where(higher, trial[every, top], value)
-        for case in map(varied, best):
+        for case in map(case_at, best):
             yield Case(Table(case.at), Table(case.offset))
 
 
-def _grid(size: int) -> Array:
-    """Points of the unit cube, corners included: even along a line, else corners and a quasi-random sequence."""
+def _start_points(size: int) -> Array:
+    """Points of the unit cube: evenly along a line, or corners, edges, midpoints and a quasi-random sequence."""
     if size == 1:
         return np.linspace(0, 1, _LINE)[:, None]
     corners = np.array(list(product((0.0, 1.0), repeat=size)))
@@ -130,8 +130,8 @@ def _grid(size: int) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _moves(peaks: int, size: int) -> Array:
-    """Steps about each of some points in look after look, every other one along one side: edges stay."""
+def _random_steps(peaks: int, size: int) -> Array:
+    """Random steps around each peak in each round; every other one is along one axis, so that edges are kept."""
     rng = np.random.default_rng(0)
     every = np.empty((peaks, _LOOKS, _AROUND, size))
     for moves in every.reshape(-1, _AROUND, size):
@@ -141,8 +141,8 @@ def _moves(peaks: int, size: int) -> Array:
     return every
 
 
-def _apart(u: Array, high: Array, distance: float) -> list[int]:
-    """The highest points that are a distance from one another."""
+def _separate_peaks(u: Array, high: Array, distance: float) -> list[int]:
+    """Indices of the highest points at least a distance apart."""
     chosen: list[int] = []
     for k in np.argsort(-high, kind="stable"):
         if all(np.abs(u[k] - u[c]).max() > distance for c in chosen):
@@ -153,13 +153,13 @@ def _apart(u: Array, high: Array, distance: float) -> list[int]:
 
 
 _Box = dict[tuple[bool, str], Interval]
-"""(Whether it is added to the stored number, parameter) → interval; the side that was halved last is the last."""
+"""(whether it is an offset, parameter) → interval; the side halved last comes last."""
 
 
-def cover(problem: Posed, parameters: Numbers, worst: float, boxes: int | None = None) -> Cover:
-    """Prove that no case has a root right of `worst` plus SLACK: Liénard–Chipart signs of p(t + limit) in balls.
+def prove_worst_case(problem: Posed, parameters: Numbers, worst: float, boxes: int | None = None) -> Cover:
+    """Prove that no case has a root right of `worst` plus SLACK, by Liénard–Chipart signs of p(t + limit) in balls.
 
-    Boxes whose signs are undecided are halved, widest first, until none is left.
+    Boxes with undecided signs are halved, the side halved longest ago first, until none is left.
     """
     if boxes is None:
         boxes = max(BOXES >> max(problem.model.degree - 4, 0), _FEWEST)
@@ -174,7 +174,7 @@ def cover(problem: Posed, parameters: Numbers, worst: float, boxes: int | None =
         while waiting and done < boxes:
             box = waiting.popleft()
             done += 1
-            if not _left_of(problem, parameters, box, flint.arb(limit)):
+            if not _is_left_of(problem, parameters, box, flint.arb(limit)):
                 side = next((side for side, (lower, upper) in box.items() if lower < (lower + upper) / 2 < upper), None)
                 if side is None:
                     return Cover(limit, False, done)
@@ -184,18 +184,18 @@ def cover(problem: Posed, parameters: Numbers, worst: float, boxes: int | None =
     return Cover(limit, not waiting, done)
 
 
-def _left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> bool:
-    """Whether every design of a box certainly has all roots left of a vertical line."""
+def _is_left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> bool:
+    """Whether every design in a box certainly has all roots left of the line Re s = γ."""
 
     def tests(box: _Box, moving: str = "") -> list[Any]:
-        """Positive exactly when every root is left of the line; a0 first, by its sign. `moving` is a series."""
+        """Numbers that are all positive exactly if every root is left of the line; `moving` becomes a series."""
         at: dict[str, Any] = {n: flint.arb(x) for n, x in parameters.items()}
-        for (added, n), ends in sorted(box.items()):  # a parameter may have both: the scenario comes first
+        for (added, n), ends in sorted(box.items()):  # a parameter may have both; the scenario comes first
             at[n] = ball(ends) + (at[n] if added else 0)
         if moving:
             at[moving] = flint.arb_series([at[moving], 1], prec=2)
         a = problem.model.coefficients(at, problem.parameter_set)
-        sign = -1 if _term(a[0], 0) < 0 else 1
+        sign = -1 if _series_term(a[0], 0) < 0 else 1
         shifted = [sign * c for c in shift(a, gamma)]
         return [shifted[0], *lienard_chipart(shifted)]
 
@@ -205,15 +205,15 @@ def _left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> bool
     at_middle = tests(middle)
     if not all(test > 0 for test in at_middle):
         return False
-    # The mean value form, f(m) + Σ ∂f/∂x (x − m), is off by the square of the width, the plain one by the width.
+    # The mean value form f(m) + Σ ∂f/∂x (x − m) has an error of the width squared; plain evaluation has the width.
     for side, ends in box.items():
         if ends[0] < ends[1]:
             move = ball(ends) - middle[side][0]
-            slopes = (_term(test, 1) for test in tests(box, side[1]))
+            slopes = (_series_term(test, 1) for test in tests(box, side[1]))
             at_middle = [test + slope * move for test, slope in zip(at_middle, slopes, strict=True)]
     return all(test > 0 for test in at_middle)
 
 
-def _term(test: Any, order: int) -> Any:
-    """The value (0) or the slope (1) of a series; a ball has no slope."""
+def _series_term(test: Any, order: int) -> Any:
+    """The value (order 0) or slope (order 1) of a series; the slope of a ball is 0."""
     return test[order] if isinstance(test, flint.arb_series) else flint.arb(0) if order else test

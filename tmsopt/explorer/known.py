@@ -13,7 +13,7 @@ from tmsopt.problem import Posed, Solution, degrees_of_freedom
 from tmsopt.problem.files import problem_from_tables
 from tmsopt.problem.verdict.meetings import meetings
 from tmsopt.problem.verdict.stability import MultipleRoot
-from tmsopt.problem.verdict.status import status_in_words, verdict_in_words
+from tmsopt.problem.verdict.status import describe_status, describe_verdict
 from tmsopt.roots import Structure
 from tmsopt.search import solve
 
@@ -71,7 +71,7 @@ def _of_solution(solution: Solution) -> Known:
     """What was found, with how good it is known to be."""
     problem = solution.problem.posed
     names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
-    words = status_in_words(solution), verdict_in_words(solution)
+    words = describe_status(solution), describe_verdict(solution)
     facts, proof = [": ".join(filter(None, words)), *solution.notes], f"proof: {proof_line(solution)}"
     proved = proof if solution.bound.proven else ""
     if problem.nominal is problem:

@@ -14,7 +14,7 @@ from tmsopt.explorer.known import Known
 from tmsopt.guide import exact_value
 from tmsopt.models import Parameter, words_of
 from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
-from tmsopt.problem import Posed, degrees_of_freedom, limit_of, unit_of
+from tmsopt.problem import Posed, degrees_of_freedom, limit_value, unit_of
 from tmsopt.problem.validate import SMALLEST
 from tmsopt.records import Array
 from tmsopt.roots import Structure
@@ -117,7 +117,7 @@ def _reach(parameter: Parameter, value: float) -> tuple[float, float]:
 
 def _constraint(problem: Posed, name: str) -> dict[str, Any]:
     condition = problem.conditions[name]
-    size = max(1.0, abs(limit_of(problem.constraints[name]) or 0.0))  # of the sides where they are equal
+    size = max(1.0, abs(limit_value(problem.constraints[name]) or 0.0))  # of the sides where they are equal
     return {
         "name": name,
         "text": problem.constraints[name],

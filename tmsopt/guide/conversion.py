@@ -9,7 +9,7 @@ from tmsopt.guide.problem_text import toml_problem
 from tmsopt.models import CONSTANTS, FUNCTIONS, controlled, whipple
 from tmsopt.problem import Posed, Problem
 from tmsopt.problem.files import Given, pose
-from tmsopt.problem.units import with_unit
+from tmsopt.problem.units import parse_quantity
 
 INERTIAS = ("boxes", "none")
 """What a body becomes: a solid box about its centre of mass, or the point mass that it was."""
@@ -213,7 +213,7 @@ def _size(given: str | Size) -> Size:
     accepted = 'accepted: length, width and height, such as "40x20x30 cm"'
     parts = _SIZE.fullmatch(given) if isinstance(given, str) else None
     try:
-        a, b, c = (with_unit(f"{x} {parts[4]}", "m") for x in parts.groups()[:3]) if parts else map(float, given)
+        a, b, c = (parse_quantity(f"{x} {parts[4]}", "m") for x in parts.groups()[:3]) if parts else map(float, given)
     except (TypeError, ValueError):
         raise ValueError(f"found {short(given)}; {accepted}") from None
     if not all(0 < x < float("inf") for x in (a, b, c)):

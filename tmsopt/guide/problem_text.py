@@ -11,8 +11,8 @@ from typing import Any
 from tmsopt.models import Parameter, gain_names
 from tmsopt.problem import Band, Posed
 from tmsopt.problem.cases import middle_of
-from tmsopt.problem.units import factor, with_unit
-from tmsopt.problem.units.text import read
+from tmsopt.problem.units import parse_quantity, unit_factor
+from tmsopt.problem.units.text import parse_exact_quantity
 
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
 _PLACES = 22  # of a decimal that only one double is nearest to, in any unit
@@ -60,14 +60,14 @@ def exact_value(value: float, written: str, own: str) -> str:
     """
     if not written:
         return repr(value)
-    one = factor(written, own)
+    one = unit_factor(written, own)
     share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
     with localcontext(prec=_PLACES):
         long = str(Decimal(repr(value)) * share.denominator / share.numerator)
     near = value / one
     beside = (repr(near + k * math.ulp(near)).removesuffix(".0") for k in (0, 1, -1, 2, -2))
     texts = (f"{number} {written}" for number in (*beside, long))
-    return next((toml_text(text) for text in texts if with_unit(text, own) == value), repr(value))
+    return next((toml_text(text) for text in texts if parse_quantity(text, own) == value), repr(value))
 
 
 def _is_written(problem: Posed, parameter: Parameter) -> bool:
@@ -104,7 +104,7 @@ def _number(problem: Posed, name: str, value: float) -> str:
     """As it was typed, where it is exactly that number; in the unit of the file if it reads back so."""
     kept, typed = problem.parameter_set[name].unit, problem.typed({name: value}).get(name, "")
     text = exact_value(value, problem.units.get(name, ""), kept)
-    if typed and (text[0] != '"' or str(read(text[1:-1], kept)[2]) != typed):
+    if typed and (text[0] != '"' or str(parse_exact_quantity(text[1:-1], kept)[2]) != typed):
         return toml_text(typed if kept in ("1", "rad") else f"{typed} {kept}")
     return text
 

@@ -1,4 +1,4 @@
-"""Cases: the variations of one design that it must stand up to, over a band, within tolerances, at a distance."""
+"""Cases: the variations of a design that a problem considers, by scenarios, tolerances and the robustness radius."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -10,15 +10,15 @@ import numpy as np
 from tmsopt.records import Table
 
 POINTS = 7
-"""Points of a band where a problem starts; more are added until the worst case between them is covered."""
+"""Points of a band in the first search; more are added where the worst case lies between them."""
 
 LARGEST = 16
-"""Cases that a search starts with where there are tolerances; corners beyond are left to the check of the worst."""
+"""Cases of the first search with tolerances; the worst-case check covers the other corners."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """Every value of a parameter from `min` to `max`, looked at first in `points` even steps.
+    """Every value of a parameter from `min` to `max`; the first search uses `points` evenly spaced values.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # s² + c s + k: the softest spring decides, at c = 2
@@ -40,7 +40,7 @@ class Band:
 
 
 Scenario = Band | tuple[float, ...]
-"""A band, or separate values between which nothing is asked."""
+"""A band, or separate values."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,11 @@ class Case:
     """One variation of a nominal design.
 
     Attributes:
-        at: parameter → value in place of the nominal one, from a scenario.
-        offset: parameter → what is added, from a tolerance.
+        at: parameter → value instead of the nominal one, from a scenario.
+        offset: parameter → amount added, from a tolerance.
         direction: parameter → change per unit of the robustness radius, in units of its weight.
-        edge: the boundary of stability whose nearest point is meant, sought from `direction` as it is.
+        edge: the boundary of stability whose nearest point this case is, searched from `direction`; its change does not
+            scale with the radius.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -81,12 +82,12 @@ class Case:
 
 
 def weight_of(name: str, value: Any, weights: Mapping[str, float]) -> Any:
-    """Weight of a parameter: the given one, else its own size, or 1 where it is fixed at 0."""
+    """Weight of a parameter: the given one, else its size, or 1 if it is 0."""
     if name in weights:
         return weights[name]
     if isinstance(value, float | int) and value == 0:
         return 1.0
-    return value.fabs() if hasattr(value, "fabs") else abs(value)  # expressions know abs from CasADi 3.7 on
+    return value.fabs() if hasattr(value, "fabs") else abs(value)  # CasADi expressions have abs from 3.7 on
 
 
 def points_of(scenario: Scenario) -> tuple[float, ...]:
@@ -96,12 +97,12 @@ def points_of(scenario: Scenario) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Cover:
-    """What is known of every case together.
+    """A bound on the roots over all cases.
 
     Attributes:
         limit: no root of any case is right of it, if `proven`.
-        proven: by interval arithmetic over all the boxes; else by a search for the worst case alone.
-        boxes: parts that bands and tolerances were divided into.
+        proven: whether interval arithmetic over all boxes proved it; otherwise only a search found no worse case.
+        boxes: number of boxes that bands and tolerances were divided into.
     """
 
     limit: float
@@ -109,8 +110,8 @@ class Cover:
     boxes: int
 
 
-def as_scenario(stated: Any) -> Any:
-    """A scenario as stated: a band, a mapping with its min, max and points, or separate values."""
+def parse_scenario(stated: Any) -> Any:
+    """A scenario from a band, a mapping with its min, max and points, or a list of values."""
     if isinstance(stated, Mapping) and {"min", "max"} <= set(stated) <= {"min", "max", "points"}:
         return Band(**stated)
     return tuple(stated) if isinstance(stated, list) else stated
@@ -125,7 +126,7 @@ def middle_of(scenario: Scenario) -> float:
 def first_cases(
     scenarios: Mapping[str, Scenario], tolerances: Mapping[str, float], directions: Sequence[str] = ()
 ) -> tuple[Case, ...]:
-    """Scenario points with the corners of the tolerance box, and a step either way in each of the directions."""
+    """Scenario points combined with corners of the tolerance box, and a step either way in each direction."""
     points = itertools.product(*(points_of(s) for s in scenarios.values()))
     grid = [Table(dict(zip(scenarios, point, strict=True))) for point in points]
     corners = [
@@ -133,7 +134,7 @@ def first_cases(
         for signs in itertools.product((-1.0, 1.0), repeat=len(tolerances))
     ]
     pairs = [tuple(corners)] * len(grid)
-    if len(grid) * len(corners) > LARGEST:  # two opposite corners for each scenario in turn
+    if len(grid) * len(corners) > LARGEST:  # two opposite corners per scenario, in turn
         pairs = [(corners[k % len(corners)], corners[-1 - k % len(corners)]) for k in range(len(grid))]
     cases = tuple(Case(at, corner) for at, pair in zip(grid, pairs, strict=True) for corner in pair)
     steps = tuple(Case(direction=Table({name: sign})) for name in directions for sign in (-1.0, 1.0))

@@ -1,4 +1,4 @@
-"""What an expression depends on: the case of a problem, and root quantities in which direction."""
+"""Finds whether expressions depend on the case, and in which direction root quantities improve them."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -15,54 +15,54 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
 
 WORSE_DIRECTION = {"abscissa": 1.0, "damping_ratio": -1.0, ANGULAR_FREQUENCY: 1.0}
-"""Direction in which a root quantity gets worse; its factors bound it from that side alone."""
+"""Direction in which a root quantity gets worse; the factors of the program bound it from that side only."""
 
-_EXTREME = {"abscissa": 1.0, "damping_ratio": -1.0, RADIUS: -1.0}
-"""The same of which there cannot be too much of the one and too little of the other."""
+_LESS_STABLE = {"abscissa": 1.0, "damping_ratio": -1.0, RADIUS: -1.0}
+"""Direction in which a quantity means less stability."""
 
 STABLE = "every root left of the axis"
-"""The name of a constraint that a problem does not state."""
+"""Name of a stability constraint that the problem itself does not state."""
 
-_STEADY = 0.01  # of the roots' mean size: decay of a design that is stable beyond doubt
-_DESIGNS = 32  # designs at which the direction of a root quantity is looked at
-_DECADES = 3.0  # from 1, up and down, over which values of a root quantity are drawn
+_STEADY = 0.01  # least decay of a clearly stable design, relative to the mean size of the roots
+_DESIGNS = 32  # random designs for the direction of a root quantity
+_DECADES = 3.0  # random values of a root quantity range over so many decades on either side of 1
 _STEP = 1e-3
 
 
 def depends_on_case(problem: Posed, expression: Expression, cases: Sequence[Case]) -> bool:
-    """Whether the value of an expression depends on what differs between cases, its root quantities aside.
+    """Whether an expression depends on parameters that differ between cases, apart from its root quantities.
 
-    Those are shared by all cases, as the worst of them. An equality is one of the nominal design, for it cannot hold
-    at two corners of a box.
+    Root quantities are the worst over the cases, hence equal in all. An equality holds at the nominal design only,
+    since it cannot hold at two corners of a box.
     """
     varied = {name for case in cases for table in (case.at, case.offset) for name in table}
     if not varied or expression.equality:
         return False
-    return bool(varied & _dependencies(problem.model, problem.parameter_set.name, expression))
+    return bool(varied & _find_dependencies(problem.model, problem.parameter_set.name, expression))
 
 
 def needs_two_sided_bounds(problem: Posed) -> bool:
-    """Whether a bound on a root quantity, in place of the quantity, would make a problem easier than it is.
+    """Whether one-sided bounds on root quantities would make the problem easier than it is.
 
-    The factors bound the abscissa and the angular frequency from above and the damping ratio from below; that is exact
-    where the objective and the constraints get no better as those grow or the ratio falls.
+    The factors bound the abscissa and the angular frequency from above and the damping ratio from below. That is exact
+    if objective and constraints do not improve as these grow or the ratio falls.
     """
     return any(rewards_change_of(problem, name, worse) for name, worse in WORSE_DIRECTION.items())
 
 
 def rewards_change_of(problem: Posed, name: str, worse: float = 1.0) -> bool:
-    """Whether objective or constraints get better, at some design, as a quantity moves up (or down: `worse` −1)."""
+    """Whether the objective or a constraint improves at some design as a quantity grows (falls if `worse` is −1)."""
     asked = [(problem.sign, problem.objective), *((c.sign, c) for c in problem.conditions.values())]
-    return any(e is not None and _falls(problem, sign, e, name, worse) for sign, e in asked)
+    return any(e is not None and _can_fall(problem, sign, e, name, worse) for sign, e in asked)
 
 
-def stability_wanted(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
-    """A limit that keeps designs stable, by its name; none where limits and objective do not want that.
+def stability_limit(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
+    """Name → a constraint that keeps designs stable; empty if neither limits nor objective require stability.
 
-    Limits that are met on the edge of stability are content with it.
+    It allows the edge of stability if the limits do and the objective does not depend on the roots.
 
     Args:
-        steady: decay at least, of the roots' mean size.
+        steady: least decay relative to the mean size of the roots.
     """
     roots = {"abscissa", "damping_ratio", RADIUS}
     if problem.pattern or not any(name in roots and problem.asks(name) for name in roots):
@@ -71,40 +71,42 @@ def stability_wanted(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
     a = [float(c) for c in values.coefficients]
     size = abs(a[-1] / a[0]) ** (1 / problem.model.degree) if a[0] else 1.0
 
-    def refused(abscissa: float, ratio: float) -> bool:
-        """Whether a limit excludes such roots."""
+    def is_excluded(abscissa: float, ratio: float) -> bool:
+        """Whether a limit excludes roots with these values."""
         found = {"abscissa": abscissa, "damping_ratio": ratio, RADIUS: 0.0, ANGULAR_FREQUENCY: size}
         asked = (c for c in problem.conditions.values() if roots & set(c.names))
         return any(not c.holds(float(c(values.with_known(found)))) for c in asked)
 
     goal = problem.objective is not None and bool(roots & set(problem.objective.names))
-    if not goal and not refused(1e-6 * size, -1e-6):
+    if not goal and not is_excluded(1e-6 * size, -1e-6):
         return {}
-    edge = not goal and not refused(0.0, 0.0)
+    edge = not goal and not is_excluded(0.0, 0.0)
     least = 0.0 if edge or not 0 < size < np.inf else steady * size
     return {STABLE: f"abscissa <= {0.0 - least!r}"}
 
 
 def _only_worsens(problem: Posed, name: str, worse: float) -> bool:
-    """Whether the objective gets better as a quantity gets worse, and at no design as it gets better."""
+    """Whether the objective improves only as a quantity gets worse."""
     goal = problem.objective
     if goal is None or name not in goal.names:
         return False
-    return _falls(problem, problem.sign, goal, name, worse) and not _falls(problem, problem.sign, goal, name, -worse)
+    return _can_fall(problem, problem.sign, goal, name, worse) and not _can_fall(
+        problem, problem.sign, goal, name, -worse
+    )
 
 
 def sense_notes(problem: Posed) -> tuple[str, ...]:
-    """That an objective gets better only as stability gets worse, and what asks for the opposite."""
+    """A note if the objective improves only as stability gets worse."""
     text = (problem.minimize or problem.maximize or "").strip()
-    if not problem.free or not any(_only_worsens(problem, name, worse) for name, worse in _EXTREME.items()):
+    if not problem.free or not any(_only_worsens(problem, name, worse) for name, worse in _LESS_STABLE.items()):
         return ()
     opposite = {"minimize": "maximize", "maximize": "minimize"}[problem.sense]
     other = f'{opposite} = "{text}"'
-    return (f"{problem.sense} {text} asks for the least stable design; {other} asks for the most stable one",)
+    return (f"{problem.sense} {text} asks for the least stable design; write {other} for the most stable one",)
 
 
 def demands_heavy_damping(problem: Posed) -> bool:
-    """Whether a constraint on the damping ratio alone leaves nothing but 1: all roots real and negative."""
+    """Whether a constraint on the damping ratio allows only 1: all roots real and negative."""
     for condition in problem.conditions.values():
         if condition.names == ("damping_ratio",):
             below, at = (float(condition({"damping_ratio": ratio})) for ratio in (1 - 1e-9, 1.0))
@@ -113,11 +115,11 @@ def demands_heavy_damping(problem: Posed) -> bool:
     return False
 
 
-def _falls(problem: Posed, sign: float, expression: Expression, name: str, worse: float) -> bool:
-    """Whether an expression, the smaller the better, falls as a quantity changes; an equality, if it does anything."""
+def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, worse: float) -> bool:
+    """Whether `sign` times an expression falls at some design as a quantity gets worse; an equality must not change."""
     if name in ROOT_NAMES and name not in expression.names:
         return False
-    if expression.text.strip() == name:  # the commonest question needs no numbers
+    if expression.text.strip() == name:  # the most common case
         return sign * worse < 0
     if side := limit_side(expression.text, name):
         return expression.equality or sign * worse * side < 0
@@ -142,13 +144,13 @@ def _falls(problem: Posed, sign: float, expression: Expression, name: str, worse
 
 
 @lru_cache(maxsize=4096)
-def _dependencies(model: Model, set_name: str, expression: Expression) -> frozenset[str]:
-    """Parameters that an expression depends on, directly or through quantities other than those of the roots."""
+def _find_dependencies(model: Model, set_name: str, expression: Expression) -> frozenset[str]:
+    """Parameters that an expression depends on, directly or through quantities, but not through root quantities."""
     of = model.parameter_set(set_name)
     extra = (*ROOT_QUANTITIES, NO_RADIUS)
 
     def stand_in(quantity: Quantity, values: Values) -> Any:
-        """In place of a quantity of the roots, itself."""
+        """A root quantity as a symbol of its own."""
         return symbol(quantity.name) if quantity.name in ROOT_NAMES else None
 
     values = Values(model, of, {name: symbol(name) for name in of.names}, extra=extra, lift=stand_in)

@@ -1,7 +1,7 @@
-"""Many designs at once: what charts, samples, worst cases, Monte Carlo and studies know of them, by arrays of doubles.
+"""Evaluates expressions for many designs at once, in arrays of doubles.
 
-A formula for each set of expressions, folded over the columns; columns with bounds of their errors (`Bounded`) give
-values with such bounds.
+Each set of expressions becomes one formula, evaluated on the columns. Columns with error bounds (`Bounded`) give values
+with error bounds.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -18,7 +18,7 @@ from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression, ExpressionError
 from tmsopt.models.model import ROOTS
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regular
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regularise
 from tmsopt.roots import find_motion, roots
 
 
@@ -27,8 +27,8 @@ class ArrayFunction:
     """Expressions as a function of arrays of parameters.
 
     Attributes:
-        formula: of the parameters and the root quantities, an output for each expression.
-        names: of the expressions.
+        formula: function of the parameters and root quantities with one output per expression.
+        names: names of the expressions.
     """
 
     problem: Posed
@@ -36,14 +36,14 @@ class ArrayFunction:
     names: tuple[str, ...]
 
     def __call__(self, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """Values of the expressions, of a comparison left minus right; nan where one does not exist.
+        """Values of the expressions, left minus right for a comparison; nan if undefined.
 
         Args:
-            columns: every parameter, and root quantities where they are known already, as numbers
-                or arrays whose shapes broadcast. Axes of a grid are best given in shapes (1, n) and (m, 1).
+            columns: every parameter, and any known root quantities, as numbers or arrays that broadcast. Use shapes
+                (1, n) and (m, 1) for the axes of a grid.
 
         Returns:
-            Name → value, of the shape that the expression depends on, which broadcasts to that of the grid.
+            Name → value, in the shape of the columns that the expression depends on.
         """
         missing = {n for n in self.formula.inputs if n not in columns}
         known = roots_of(coefficients_of(self.problem, columns), missing) if missing else {}
@@ -51,8 +51,8 @@ class ArrayFunction:
 
 
 def evaluate(problem: Posed, expressions: Iterable[str | Expression], columns: Mapping[str, Any]) -> list[Any]:
-    """Values of expressions, in their order, as those of an `ArrayFunction`, which is made once."""
-    return list(_made(problem, tuple(expressions))(columns).values())
+    """Values of expressions in their order, by an `ArrayFunction` from a cache."""
+    return list(_cached_function(problem, tuple(expressions))(columns).values())
 
 
 def array_function(problem: Posed, expressions: Mapping[str, str | Expression]) -> ArrayFunction:
@@ -69,28 +69,28 @@ def array_function(problem: Posed, expressions: Mapping[str, str | Expression]) 
 
 
 @lru_cache(maxsize=64)
-def _made(problem: Posed, expressions: tuple[str | Expression, ...]) -> ArrayFunction:
+def _cached_function(problem: Posed, expressions: tuple[str | Expression, ...]) -> ArrayFunction:
     return array_function(problem, {f"{k}": e for k, e in enumerate(expressions)})
 
 
 def coefficients_of(problem: Posed, columns: Mapping[str, Any]) -> list[Any]:
-    """Coefficients of designs, each of the shape that it depends on."""
+    """Coefficients of designs, each in the shape of the columns that it depends on."""
     return evaluate_on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
 
 
 @lru_cache(maxsize=64)
 def coefficient_formula(model: Model, set_name: str) -> Formula:
-    """The coefficients of a model in the parameters of a set."""
+    """The coefficients of a model as a formula in the parameters of a set."""
     whole = model.formulas[set_name]
     return whole.extract(whole.outputs[len(model.sets[0].names) :])
 
 
 def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> dict[str, Any]:
-    """Quantities of the roots, by numeric ones, so beside multiple roots a hint; nan where a coefficient is none."""
+    """Root quantities from numeric roots, inaccurate near multiple roots; nan if a coefficient is not finite."""
     if not set(ROOTS) & set(names):
         return {}
     a = np.stack(np.broadcast_arrays(*coefficients), axis=-1)
-    exist, a, found = np.isfinite(a).all(axis=-1), regular(a), {}
+    exist, a, found = np.isfinite(a).all(axis=-1), regularise(a), {}
     if ANGULAR_FREQUENCY in names:
         found[ANGULAR_FREQUENCY] = roots(a).imag.max(axis=-1)
     if {"abscissa", "damping_ratio"} & set(names):
@@ -100,7 +100,7 @@ def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> d
 
 
 def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dict[str, Any]:
-    """Expressions as nodes in the parameters and the root quantities; of comparisons left minus right."""
+    """Expressions as nodes in the parameters and root quantities; left minus right for comparisons."""
     of = problem.parameter_set
     values = Values(problem.model, of, {n: symbol(n) for n in of.names}, extra=(NO_RADIUS,))
     values = values.with_known({n: symbol(n) for n in ROOTS})
@@ -108,10 +108,10 @@ def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dic
 
 
 def parse_all(problem: Posed, expressions: Mapping[str, str | Expression]) -> dict[str, Expression]:
-    """Expressions in the vocabulary of a problem; what is parsed already stays as it is.
+    """Parse the expressions that are texts, in the vocabulary of a problem.
 
     Raises:
-        InputError: for every text that is no expression of this problem.
+        InputError: listing every text that is no expression of this problem.
     """
     found: dict[str, Expression] = {}
     faults: list[Fault] = []

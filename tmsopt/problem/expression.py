@@ -1,4 +1,4 @@
-"""The language of expressions as the face of this package hands it on; systems stated in text are written in it too."""
+"""The language of expressions, as this package offers it."""
 
 from tmsopt.models.expression import Expression, ExpressionError, parse_comparison, parse_value
 

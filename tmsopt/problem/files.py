@@ -1,4 +1,4 @@
-"""Problem files: TOML to a Problem, with every fault placed at its line."""
+"""Reads problem files: TOML to a `Problem`, with every fault at its line."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -9,12 +9,12 @@ from typing import Any
 
 from pydantic import Field, StrictInt, StrictStr
 
-from tmsopt.errors import Fault, InputError, escape_unprintable, short, suggest
+from tmsopt.errors import Fault, InputError, short, suggest, escape_unprintable
 from tmsopt.models import MODELS, Model, gain_names
 from tmsopt.models.bicycle_files import read_bicycle
-from tmsopt.problem.advice.names import unknown_key
+from tmsopt.problem.advice.names import suggest_key
 from tmsopt.problem.cases import POINTS, Band
-from tmsopt.problem.freedom import question_faults
+from tmsopt.problem.freedom import find_question_faults
 from tmsopt.problem.model_table import stated_model
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -36,23 +36,23 @@ class _FreeParameter(Section):
 
 
 class _Band(Section):
-    """Every value between two, at all of which the design must do."""
+    """Every value from min to max; the constraints must hold at all of them."""
 
     min: Number
     """The least value."""
     max: Number
     """The greatest value."""
     points: StrictInt = POINTS
-    """How many values are looked at first, 2 to 99."""
+    """Number of values in the first search, 2 to 99."""
 
 
 class _Objective(Section):
-    """What is asked: minimize or maximize an expression, locate a pattern of roots, both, or a front of several."""
+    """The objective: minimize or maximize an expression, locate a pattern of roots, both, or a Pareto front."""
 
     minimize: StrictStr | None = None
-    """An expression to make small, such as "abscissa", the largest real part of the roots."""
+    """An expression to minimise, such as "abscissa", the largest real part of the roots."""
     maximize: StrictStr | None = None
-    """An expression to make large, such as "damping_ratio"."""
+    """An expression to maximise, such as "damping_ratio"."""
     pareto: list[StrictStr] | None = None
     """Two or three expressions to minimise, such as ["abscissa", "-lambda_s"]."""
     locate: StrictStr | None = None
@@ -60,39 +60,39 @@ class _Objective(Section):
 
 
 class _File(Section):
-    """A design problem: which parameters are fixed, which are free, and what is asked of them."""
+    """A design problem: fixed and free parameters, objective and constraints."""
 
     title: StrictStr = ""
     """One line for reports."""
     model: StrictStr | dict[str, Any] = "tms"
     """The system: a name in quotes, or a table [model] with matrices or coefficients of your own."""
     bicycle: StrictStr | None = None
-    """A parameter file of BicycleParameters beside this one; [parameters] go before it."""
+    """A parameter file of BicycleParameters, relative to this file; [parameters] override it."""
     parameters: dict[str, _FreeParameter | Number]
-    """A number fixes, a table { min = …, max = … } frees; texts have units, such as "40 cm"."""
+    """A number fixes a parameter, a table { min = …, max = … } frees it; texts have units, such as "40 cm"."""
     feedback: dict[str, _FreeParameter | Number] = Field(default_factory=dict)
-    """Gains of a controller, such as k_phidot against the lean rate, each as in [parameters]."""
+    """Gains of a controller, such as k_phidot for the lean rate, each as in [parameters]."""
     objective: _Objective = Field(default_factory=_Objective)
-    """What is asked; a chart and a trace need nothing."""
+    """What to optimise; chart and trace need none."""
     constraints: dict[str, StrictStr] = Field(default_factory=dict)
     """Limits such as arm = "u_H >= 0.02", with <=, >= or ==; numbers in m, kg, s, rad and N."""
     scenarios: dict[str, _Band | list[Number]] = Field(default_factory=dict)
-    """Values at each of which the design must do: { min = …, max = … } or a list."""
+    """Values of a parameter that the design must cope with: { min = …, max = … } or a list."""
     tolerances: dict[str, Number] = Field(default_factory=dict)
-    """How far a parameter may be off either way; the worst product counts."""
+    """How far a parameter may deviate either way; the worst combination counts."""
     weights: dict[str, Number] = Field(default_factory=dict)
     """Size of a change that counts as 1 in radius, the robustness radius."""
 
 
 SHAPE: type[Section] = _File
-"""The shape of a problem file, for editors."""
+"""The schema of a problem file, for editors."""
 
 Given = Problem | Posed | Solution | str | PathLike[str]
-"""What every verb takes: a problem, the path of its file, or a solution, which has its problem."""
+"""A problem, the path of its file, or a solution, which contains its problem."""
 
 
 def load(path: str | PathLike[str]) -> Problem:
-    """Read a problem file, whether it asks something or not: what must be asked is the verb's business.
+    """Read a problem file. An objective is optional here; each function decides whether it needs one.
 
     Raises:
         InputError: listing every fault with file, line, key, what was found and what is accepted.
@@ -104,30 +104,30 @@ def load(path: str | PathLike[str]) -> Problem:
 
     More: docs/reference/problem_file.md
     """
-    return _read(path, lambda problem: [])
+    return _load_problem(path)
 
 
 def pose(given: object) -> Posed:
-    """What a verb is given as it is solved: a problem, the one in a file, or the one that a solution is of.
+    """The posed problem of a problem, of a problem file, or of a solution.
 
     Raises:
-        InputError: for a file with faults, and for anything else.
+        InputError: for a file with faults, or for anything else.
     """
-    return _pose(given, lambda problem: [])
+    return _pose(given)
 
 
 def as_solvable(given: object, front: bool = False) -> Posed:
-    """The same, which must ask for one design, or may ask for a `front` as well.
+    """The posed problem as for `pose`, which must ask for one design, or for a Pareto front if `front` is set.
 
     Raises:
-        InputError: also where parameters are free and nothing is asked of them; of a file, at its line.
+        InputError: as for `pose`, and if parameters are free but there is no objective.
     """
-    return _pose(given, lambda problem: [] if front and problem.pareto else question_faults(problem))
+    return _pose(given, lambda problem: [] if front and problem.pareto else find_question_faults(problem))
 
 
-def _pose(given: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
+def _pose(given: object, faults_of: Callable[[Posed], list[Fault]] = lambda problem: []) -> Posed:
     if isinstance(given, str | PathLike):
-        return _read(given, faults_of).posed
+        return _load_problem(given, faults_of).posed
     if not isinstance(given, Problem | Posed | Solution):
         message = f"found {short(given)}; accepted: a Problem, the path of a problem file, or a Solution"
         raise InputError([Fault(message, ("problem",))])
@@ -138,23 +138,23 @@ def _pose(given: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
     return posed
 
 
-def _read(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]]) -> Problem:
+def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]] = lambda problem: []) -> Problem:
     page = read_page(path, "problem")
     if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
         written = page.data.get("problem")
         own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
-        message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
+        message = f"is a study of many designs, not a problem; run tmsopt study {page.file}, or give {own}"
         raise InputError([Fault(message, file=page.file)])
-    faults, problem = problem_from_tables(_with_bicycle(page), escape_unprintable(Path(page.file).stem))
-    if problem is not None and not faults:  # a misspelt [objective] asks something
+    faults, problem = problem_from_tables(_add_bicycle_parameters(page), escape_unprintable(Path(page.file).stem))
+    if problem is not None and not faults:  # a misspelt [objective] is no missing one
         faults = [*faults, *faults_of(problem.posed)]
     if problem is None or faults:
         raise page.error(faults)
     return problem
 
 
-def _with_bicycle(page: Page) -> Mapping[str, Any]:
-    """The tables with the parameters of the bicycle that they name, which those of the file itself go before."""
+def _add_bicycle_parameters(page: Page) -> Mapping[str, Any]:
+    """The tables with the parameters of their `bicycle` file; the file's own parameters take precedence."""
     data = page.data
     named = data.get("bicycle")
     if not isinstance(named, str) or not isinstance(given := data.get("parameters", {}), dict):
@@ -172,23 +172,23 @@ def _with_bicycle(page: Page) -> Mapping[str, Any]:
 
 
 def problem_from_tables(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | None]:
-    """The problem of a problem file's tables, and what is wrong with them.
+    """The faults of a problem file's tables, and the problem.
 
     Args:
-        title: of a problem that has none.
+        title: used if the file has none.
     """
-    gains_faults, gains, data = _with_gains(data)
-    shape_faults, parsed = validate_tables(data, _File, _shape_fault)
+    gains_faults, gains, data = _split_gains(data)
+    shape_faults, parsed = validate_tables(data, _File, _explain_shape)
     if any(hint in f.message for f in shape_faults for hint in ("did you mean 'parameters'", "write [parameters]")):
-        shape_faults = [f for f in shape_faults if f.message != _NO_PARAMETERS]  # they are there, under another name
-    model_faults, model = _model(data.get("model", "tms"))
+        shape_faults = [f for f in shape_faults if f.message != _NO_PARAMETERS]  # present under a misspelt name
+    model_faults, model = _find_model(data.get("model", "tms"))
     shape_faults += model_faults
     faults, problem = shape_faults, None
     if model is not None and parsed is not None:
-        tables = _tables(parsed)
+        tables = _collect_tables(parsed)
         for fault in shape_faults:
             if fault.key[:1] in (("parameters",), ("scenarios",)) and len(fault.key) > 1:
-                tables["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
+                tables["fixed"][fault.key[1]] = math.nan  # given, and its fault already reported
         try:
             problem = Problem(
                 model=model,
@@ -205,15 +205,15 @@ def problem_from_tables(data: Mapping[str, Any], title: str) -> tuple[list[Fault
     return gains_faults + typed, problem
 
 
-def _with_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping[str, Any]]:
-    """What is wrong with [feedback] itself, its names, and the tables with these among the parameters."""
+def _split_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping[str, Any]]:
+    """Faults of [feedback], its valid names, and the tables with the gains among the parameters."""
     gains, parameters, model = data.get("feedback", {}), data.get("parameters", {}), data.get("model", "tms")
     if not isinstance(gains, dict) or not isinstance(parameters, dict):
         return [], set(), data
     known = gain_names(model) if isinstance(model, str) and gains else ()
     if gains and not known:
-        message = "is for the bicycles tms and whipple; your own system takes B, C and G in [model]"
-        misspelt = isinstance(model, str) and model not in MODELS  # of which something else is said
+        message = "is for the bicycles tms and whipple; write B, C and G in [model] for your own system"
+        misspelt = isinstance(model, str) and model not in MODELS  # reported elsewhere
         found = [] if misspelt else [Fault(message, ("feedback",))]
         return found, set(), {k: v for k, v in data.items() if k != "feedback"}
     faults = []
@@ -221,18 +221,18 @@ def _with_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping
         if name not in known:
             faults.append(Fault(f"unknown gain {short(name)}; {suggest(name, known)}", ("feedback", name)))
         elif name in parameters:
-            faults.append(Fault(f"'{name}' stands in [parameters] too; keep one", ("feedback", name)))
+            faults.append(Fault(f"'{name}' is in [parameters] too; keep one", ("feedback", name)))
     own = {n: v for n, v in gains.items() if n in known}
     others = {k: v for k, v in data.items() if k != "feedback"}
     return faults, set(own), {**others, "parameters": {**parameters, **own}} if own else others
 
 
-def _model(written: Any) -> tuple[list[Fault], Model | None]:
-    """The model of that name, or of a table that states one."""
+def _find_model(written: Any) -> tuple[list[Fault], Model | None]:
+    """The model with this name, or stated by this table, after the faults."""
     if isinstance(written, dict):
         return stated_model(written)
     if not isinstance(written, str):
-        return [], None  # a fault of shape
+        return [], None  # reported with the shape of the file
     model = MODELS.get(written)
     unknown = f"unknown model {short(written)}; {suggest(written, MODELS)}; your own goes in a table [model]"
     return ([Fault(unknown, ("model",))] if model is None else []), model
@@ -242,7 +242,7 @@ _ENTRIES: Mapping[str, tuple[type[Section], str]] = {
     "parameters": (_FreeParameter, "{ min = …, max = … }"),
     "scenarios": (_Band, "{ min = …, max = …, points = 7 }"),
 }
-"""Table → shape of its entries that are tables, and one of them."""
+"""Table → schema of an entry that is a table, and an example."""
 
 _ACCEPTED = {
     "model": "the name of a model in quotes, or a table [model]",
@@ -253,18 +253,18 @@ _ACCEPTED = {
     "pareto": "two or three texts, such as ['abscissa', 'Fr']",
     "constraints": "a comparison in quotes, such as 'nu_H >= 0.02'",
 }
-"""Table or key → what it takes."""
+"""Table or key → accepted values."""
 
 
-def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
-    """One pydantic complaint in the words of the problem file."""
+def _explain_shape(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
+    """A pydantic complaint in the words of the problem file."""
     tags = ("_FreeParameter", "_Band", "float", "int", "str", "dict[str,any]")
     key = tuple(str(k) for k in where if k not in tags)
     match key:
         case (section,) if kind == "extra_forbidden":
-            return Fault(f"unknown key {short(section)}; {unknown_key(section, _File.model_fields)}", key)
+            return Fault(f"unknown key {short(section)}; {suggest_key(section, _File.model_fields)}", key)
         case ("objective", sense, *_) if kind == "extra_forbidden":
-            return Fault(f"unknown key {short(sense)}; {unknown_key(sense, _Objective.model_fields, 'objective')}", key)
+            return Fault(f"unknown key {short(sense)}; {suggest_key(sense, _Objective.model_fields, 'objective')}", key)
         case ("parameters",) if kind == "missing":
             return Fault(_NO_PARAMETERS, key)
         case ("parameters" | "scenarios" as table, name, end, *_) if kind == "extra_forbidden":
@@ -281,18 +281,18 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
     )
 
 
-def _tables(written: _File) -> dict[str, Any]:
-    """Tables of a problem, numbers as typed."""
+def _collect_tables(written: _File) -> dict[str, Any]:
+    """The tables of a problem, numbers as typed."""
     free = {n: v for n, v in written.parameters.items() if isinstance(v, _FreeParameter)}
 
-    def ends(band: _Band) -> tuple[Any, Any]:
-        return band.min, band.max
+    def scenario(s: Any) -> Any:
+        return s if isinstance(s, list) else Band(s.min, s.max, s.points)
 
     return {
         "fixed": {n: v for n, v in written.parameters.items() if n not in free},
         "free": {n: (v.min, v.max) for n, v in free.items()},
         "start": {n: v.start for n, v in free.items() if v.start is not None},
-        "scenarios": {n: Band(*ends(s), s.points) if isinstance(s, _Band) else s for n, s in written.scenarios.items()},
+        "scenarios": {n: scenario(s) for n, s in written.scenarios.items()},
         "tolerances": written.tolerances,
         "weights": written.weights,
     }

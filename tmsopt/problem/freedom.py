@@ -1,4 +1,4 @@
-"""What a problem must ask before it is solved, and the counting of what is free against what is asked."""
+"""Checks that a problem can be solved for one design, and counts its degrees of freedom."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,8 @@ from tmsopt.errors import Fault
 from tmsopt.problem.problem import Posed
 
 
-def question_faults(problem: Posed) -> list[Fault]:
-    """What is wrong with solving a problem that has not one question; a chart needs none."""
+def find_question_faults(problem: Posed) -> list[Fault]:
+    """Faults of a problem that does not ask for one design."""
     if problem.pareto:
         advice = "use tmsopt.pareto, or write minimize with one of the expressions"
         message = f"asks for a front, not for one design; {advice}"
@@ -15,7 +15,7 @@ def question_faults(problem: Posed) -> list[Fault]:
     if not problem.free or problem.sense != "evaluate":
         return []
     message = (
-        "parameters are free, but nothing is asked of them; write minimize, maximize or locate, "
+        "parameters are free, but there is no objective; write minimize, maximize or locate, "
         "or pareto for a front (chart and trace need none)"
     )
     return [Fault(message, ("objective",))]
@@ -23,7 +23,7 @@ def question_faults(problem: Posed) -> list[Fault]:
 
 @dataclass(frozen=True)
 class Freedom:
-    """Counting of a pattern problem before it is solved.
+    """Degrees of freedom of a problem before it is solved.
 
     Attributes:
         free: free parameters.
@@ -35,7 +35,7 @@ class Freedom:
 
     @property
     def count(self) -> int:
-        """Degrees of freedom left; negative when there are more conditions than parameters."""
+        """Degrees of freedom; negative if there are more conditions than parameters."""
         return self.free - self.conditions
 
     @property
@@ -45,6 +45,6 @@ class Freedom:
 
 
 def degrees_of_freedom(problem: Posed) -> Freedom:
-    """Degrees of freedom of a problem: free parameters against pattern conditions and equality constraints."""
+    """Count free parameters, pattern conditions and equality constraints of a problem."""
     equalities = sum(c.equality for c in problem.conditions.values())
     return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)

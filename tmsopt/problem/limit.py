@@ -9,59 +9,59 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class WrittenLimit(NamedTuple):
-    """A number on one side of a comparison, and the text before and behind it."""
+    """A number on one side of a comparison, with the text before and after it."""
 
     before: str
     value: float
     behind: str
 
-    def written(self, number: str) -> str:
-        """The same comparison with another number."""
+    def replace_number(self, number: str) -> str:
+        """The comparison with another number."""
         return f"{self.before}{number}{self.behind}"
 
 
 def split_limit(text: str) -> WrittenLimit | None:
-    """The number on one side of a comparison; None where neither side is a number and nothing else.
+    """Split a comparison at the number on one side; None if neither side is just a number.
 
     Raises:
         ExpressionError: for a text that does not parse.
     """
     left, sign, right = written_sides(text)
     for before, side, behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
-        if _NUMBER.fullmatch(_close(side)):
-            return WrittenLimit(before, float(_close(side)), behind)
+        if _NUMBER.fullmatch(_remove_blanks(side)):
+            return WrittenLimit(before, float(_remove_blanks(side)), behind)
     return None
 
 
-def limit_of(text: str) -> float | None:
-    """That number alone."""
+def limit_value(text: str) -> float | None:
+    """The number on one side of a comparison; None without one."""
     limit = split_limit(text)
     return None if limit is None else limit.value
 
 
 def limit_side(text: str, name: str) -> int:
-    """What a comparison of nothing but a quantity with a number makes of it: 1 where it stands left, −1 right; else 0.
+    """1 if a comparison has just the named quantity left and a number right, −1 if the reverse, else 0.
 
-    Its parts alone are read: ``(abscissa) <= -0.3``.
+    Parentheses are ignored, as in ``(abscissa) <= -0.3``.
     """
-    sides = [_close(side).strip("()") for side in SIGN.split(text)]
+    sides = [_remove_blanks(side).strip("()") for side in SIGN.split(text)]
     if len(sides) != 2 or name not in sides:
         return 0
     left = sides[0] == name
     return (1 if left else -1) if _NUMBER.fullmatch(sides[left]) else 0
 
 
-def with_limit(text: str, value: float) -> str:
-    """The same comparison with another number, to the last bit.
+def replace_limit(text: str, value: float) -> str:
+    """A comparison with another number, exact to the last bit.
 
     Raises:
-        ValueError: where neither side is a number.
+        ValueError: if neither side is a number.
     """
     limit = split_limit(text)
     if limit is None:
         raise ValueError(f"'{text}' compares two expressions; accepted: a number on one side")
-    return limit.written(repr(float(value)))
+    return limit.replace_number(repr(float(value)))
 
 
-def _close(side: str) -> str:
+def _remove_blanks(side: str) -> str:
     return "".join(side.split())

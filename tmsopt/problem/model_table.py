@@ -1,4 +1,4 @@
-"""The [model] table of a problem file: the user's own system, by matrices or coefficients written as expressions."""
+"""Reads the [model] table of a problem file: the user's own system as matrices or coefficients of expressions."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -13,23 +13,23 @@ _MATRICES = ("M", "D", "K", "A", "B", "C", "G", "H")
 KEYS = {
     "name": "One line for reports.",
     "M": "Rows of the mass matrix of M q″ + D q′ + K q = 0, numbers or expressions.",
-    "D": "Rows of its damping matrix; left out, it is 0.",
-    "K": "Rows of its stiffness matrix.",
-    "A": "Rows of the matrix of x′ = A x, in place of M, D and K.",
-    "B": "Rows of the matrix of a controller's inputs u, of M q″ + D q′ + K q = B u or x′ = A x + B u.",
-    "C": "Rows of what it measures, y = C x of the states, or of q and then q′; left out, all of them.",
-    "G": "Rows of its gains, u = −G y.",
-    "H": "Rows of the complex matrix of i psi' = H psi, such as 'w - 1j*g', in place of M, D, K and A.",
-    "coefficients": "Of the characteristic polynomial, descending, in place of matrices.",
-    "quantities": "Names for more expressions, to be used in objectives and constraints.",
+    "D": "Rows of the damping matrix; 0 if left out.",
+    "K": "Rows of the stiffness matrix.",
+    "A": "Rows of the matrix of x′ = A x, instead of M, D and K.",
+    "B": "Rows of the input matrix of a controller, M q″ + D q′ + K q = B u or x′ = A x + B u.",
+    "C": "Rows of the measurement matrix, y = C x, with x = (q, q′) for M, D, K; the identity if left out.",
+    "G": "Rows of the gain matrix, u = −G y.",
+    "H": "Rows of the complex matrix of i psi' = H psi, such as 'w - 1j*g', instead of M, D, K and A.",
+    "coefficients": "Coefficients of the characteristic polynomial, descending, instead of matrices.",
+    "quantities": "Named expressions to use in objectives and constraints.",
 }
-"""Keys of the table → meaning."""
+"""Key of the table → meaning."""
 
 _ALONE = {
     "coefficients": "coefficients, or the matrices",
     "H": "H, a complex system, or the matrices of a real one",
 }
-"""Keys that state a system without others."""
+"""Keys that must be the only ones to state a system."""
 
 _DESCENDING = "accepted: expressions in brackets, by descending powers of s, such as ['1', 'c', 'k']"
 
@@ -40,10 +40,10 @@ _EXAMPLE = (
 
 
 def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
-    """The model of a [model] table, and what is wrong with it.
+    """The faults of a [model] table, and its model.
 
-    An entry is a number or an expression; each name in one is a parameter, unless it is one of ``[model.quantities]``,
-    which may use one another.
+    An entry is a number or an expression. Each name in it is a parameter, or one of ``[model.quantities]``, which may
+    use one another.
     """
     faults: list[Fault] = []
 
@@ -61,8 +61,8 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
     if not given:
         fault(f"states no system; {_EXAMPLE}")
     for alone, kept in _ALONE.items():
-        if alone in given and (beside := [key for key in given if key != alone]):
-            fault(f"stands beside {beside[0]}; keep {kept}", alone)
+        if alone in given and (others := [key for key in given if key != alone]):
+            fault(f"found together with {others[0]}; keep {kept}", alone)
     texts = _quantities(table.get("quantities", {}), fault)
     entries, quantities = parse_entries({key: _rows(table[key], key, fault) for key in given}, texts, fault)
     if faults:
@@ -81,7 +81,7 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
 
 
 def _square(entries: Any) -> str:
-    """What to write for a list of n² entries; empty for anything else."""
+    """The advice for a flat list of n² entries; empty for anything else."""
     n = math.isqrt(len(entries)) if isinstance(entries, list) else 0
     if not n or n * n != len(entries) or any(isinstance(x, list) for x in entries):
         return ""
@@ -99,7 +99,7 @@ def _quantities(written: Any, fault: Callable[..., None]) -> dict[str, str]:
 
 
 def _rows(written: Any, key: str, fault: Callable[..., None]) -> Matrix:
-    """Rows of numbers and texts, 0 for an entry that is neither; the coefficients are one."""
+    """Rows of numbers and texts, with 0 for a faulty entry; coefficients form one row."""
     rows = [written] if key == "coefficients" else written
     if not isinstance(rows, list) or not rows or (rows is written and not all(isinstance(row, list) for row in rows)):
         accepted = "accepted: rows in brackets, such as [['m', 0], [0, 'm']], each expression in quotes of its own"

@@ -1,4 +1,4 @@
-"""From a problem as it is stated to one that can be solved: numbers in rad and SI, tables complete, faults at once."""
+"""Turns a problem as stated into one that can be solved: numbers in rad and SI, complete tables, all faults at once."""
 
 from collections.abc import Mapping
 from types import SimpleNamespace
@@ -6,31 +6,31 @@ from typing import Any
 
 from tmsopt.errors import InputError
 from tmsopt.models import Model, controlled
-from tmsopt.problem.cases import Scenario, as_scenario, middle_of, points_of
-from tmsopt.problem.units import TABLES, numbers
-from tmsopt.problem.validate import faults, guess_parameter_set, shape_faults
+from tmsopt.problem.cases import Scenario, middle_of, parse_scenario, points_of
+from tmsopt.problem.units import TABLES, read_numbers
+from tmsopt.problem.validate import find_faults, guess_parameter_set, shape_faults
 
 _POINT = 1e-12
-"""Relative width below which a range is a number: a few roundings leave nothing to move in."""
+"""A range narrower than this, relative to its ends, is a single value."""
 
 
 def normalise(**stated: Any) -> dict[str, Any]:
-    """The fields of a problem, from what its author wrote, which may be of any type.
+    """The fields of a problem from stated values of any type.
 
     Raises:
-        InputError: listing everything that is wrong.
+        InputError: listing every fault.
     """
     problem = SimpleNamespace(**stated)
     if found := list(shape_faults(problem)):
         raise InputError(found)
-    problem.scenarios = {n: as_scenario(s) for n, s in problem.scenarios.items()}
+    problem.scenarios = {n: parse_scenario(s) for n, s in problem.scenarios.items()}
     names = {**problem.fixed, **problem.free, **problem.scenarios}
     problem.model = controlled(problem.model, names)
     of = guess_parameter_set(problem.model, names)
-    read, units, typed, unreadable = numbers({table: getattr(problem, table) for table in TABLES}, of)
+    read, units, typed, unreadable = read_numbers({table: getattr(problem, table) for table in TABLES}, of)
     vars(problem).update(read)
     places = {f.key[:2] for f in unreadable}
-    if found := [*unreadable, *(f for f in faults(problem) if f.key[:2] not in places)]:
+    if found := [*unreadable, *(f for f in find_faults(problem) if f.key[:2] not in places)]:
         raise InputError(found)
     problem.units = {**units, **problem.units}
     problem.written = {n: {**typed.get(n, {}), **problem.written.get(n, {})} for n in (*problem.written, *typed)}
@@ -43,36 +43,36 @@ def normalise(**stated: Any) -> dict[str, Any]:
         setattr(problem, sense, (text := getattr(problem, sense)) and text.strip())
     problem.constraints = {n: text.strip() for n, text in problem.constraints.items()}
     problem.pareto = tuple(text.strip() for text in problem.pareto)  # reports show it on one line
-    return settle(**vars(problem))
+    return complete_fields(**vars(problem))
 
 
-def settle(
+def complete_fields(
     model: Model,
     fixed: Mapping[str, float],
     free: Mapping[str, tuple[float, float]],
     start: Mapping[str, float],
     **others: Any,
 ) -> dict[str, Any]:
-    """The fields of a problem from valid numbers and texts, with what follows from them.
+    """The fields of a problem from valid numbers and texts.
 
-    A range of one value becomes a fixed parameter, a start is kept for free parameters alone, and a complex H gets a
+    A range of one value becomes a fixed parameter, starts are kept for free parameters only, and a complex H gets a
     carrier for the ranges.
     """
     pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
     ends = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
     values = {n: float(v) for n, v in {**fixed, **pinned}.items()}
     first = {n: float(v) for n, v in start.items() if n in ends}
-    within = model.within(_reach(values, ends, others["scenarios"], others["tolerances"]))
+    within = model.within(_extreme_values(values, ends, others["scenarios"], others["tolerances"]))
     return {"model": within, "fixed": values, "free": ends, "start": first, **others}
 
 
-def _reach(
+def _extreme_values(
     fixed: Mapping[str, float],
     free: Mapping[str, tuple[float, float]],
     scenarios: Mapping[str, Scenario],
     tolerances: Mapping[str, float],
 ) -> dict[str, tuple[float, float]]:
-    """Least and greatest value of every parameter, in all cases."""
+    """Least and greatest value of every parameter over all cases."""
     ends = {n: (x, x) for n, x in fixed.items()} | dict(free)
     for name, scenario in scenarios.items():
         points = [*points_of(scenario), fixed[name]]

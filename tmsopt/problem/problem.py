@@ -1,4 +1,4 @@
-"""A design problem as data: what its author states, and the same as it is solved."""
+"""A problem as data: `Problem` as stated, and `Posed` as solved."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from tmsopt.models.exact import number
 from tmsopt.models.expression import Expression, parse_comparison, parse_value
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.cases import Case, Scenario, first_cases
-from tmsopt.problem.normalise import normalise, settle
+from tmsopt.problem.normalise import complete_fields, normalise
 from tmsopt.problem.quantities import (
     NO_RADIUS,
     RADIUS,
@@ -29,42 +29,9 @@ from tmsopt.roots import Pattern
 from tmsopt.versions import SCHEMA
 
 
-@dataclass(frozen=True, init=False)
-class Problem:
-    """A design problem; see `load` for its file form.
-
-    Args:
-        model: e.g. ``tmsopt.models.tms``.
-        fixed: value per fixed parameter (radians, SI units).
-        free: (least, greatest) value per free parameter.
-        constraints: name → comparison of expressions, e.g. ``{"trail": "nu_H >= 0.02"}``.
-        minimize, maximize: an expression; at most one of the two.
-        pareto: two or three expressions to minimise at once, instead of one; a minus sign maximises, ``"-lambda_s"``.
-        locate: name of a root pattern to realise, e.g. ``"EP4"``.
-        start: values to start from, for any of the free parameters.
-        title: one line for reports.
-        scenarios: parameter → a `Band` or a list of values at which the design must do: root quantities are the worst
-            over them, inequalities hold at each. Its value in `fixed`, or else its middle, is the nominal one.
-        tolerances: parameter → how far it may be off either way; likewise.
-        weights: parameter → size of a change that counts as 1 in the robustness radius; by default relative changes
-            of every parameter.
-        units: parameter → unit in which it was typed, for reports; by default those of numbers given as texts. Any
-            number may be given as a text with a unit, such as ``free={"w": ("25 cm", "60 cm")}``, as a constant such as
-            ``"8/3"`` or ``"sqrt(2)/2 m"``, or as a Fraction.
-        written: parameter → number → the exact one that was typed for it, where its own decimal is another.
-
-    Raises:
-        InputError: listing everything that is wrong, each with the accepted values.
-
-    Example:
-        >>> K = [["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]  # a mass on a spring with an absorber of mass mu
-        >>> system = tmsopt.models.from_matrices(M=[[1, 0], [0, "mu"]], D=[["c", "-c"], ["-c", "c"]], K=K)
-        >>> tuned = tmsopt.Problem(system, fixed={"mu": 0.1}, free={"c": (0, 1), "w": (0.1, 3)}, minimize="abscissa")
-        >>> f"{tmsopt.solve(tuned).parameters['w']:.6f}"  # 1/(1 + mu)
-        '0.909091'
-
-    More: docs/reference/problem_file.md
-    """
+@dataclass(frozen=True, eq=False)
+class _Fields:
+    """The fields of a problem, as stated and as solved."""
 
     model: Model
     fixed: Mapping[str, float]
@@ -81,6 +48,46 @@ class Problem:
     pareto: Sequence[str]
     units: Mapping[str, str] = field(compare=False)
     written: Mapping[str, Mapping[float, str]] = field(compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return _field_values(self)
+
+
+@dataclass(frozen=True, init=False)
+class Problem(_Fields):
+    """A design problem; see `load` for its file form.
+
+    Args:
+        model: e.g. ``tmsopt.models.tms``.
+        fixed: value per fixed parameter (radians, SI units).
+        free: (least, greatest) value per free parameter.
+        constraints: name → comparison of expressions, e.g. ``{"trail": "nu_H >= 0.02"}``.
+        minimize, maximize: an expression; at most one of the two.
+        pareto: two or three expressions to minimise at once; a minus sign maximises, ``"-lambda_s"``.
+        locate: name of a root pattern to realise, e.g. ``"EP4"``.
+        start: start values for any of the free parameters.
+        title: one line for reports.
+        scenarios: parameter → a `Band` or a list of values. Root quantities are the worst over them, and inequalities
+            hold at each. The nominal value is the one in `fixed`, or else the middle.
+        tolerances: parameter → how far it may deviate either way, with the same effect.
+        weights: parameter → size of a change that counts as 1 in the robustness radius; by default each parameter's
+            own size.
+        units: parameter → unit for reports; by default the unit of its text. Any number may be a text with a unit, such
+            as ``free={"w": ("25 cm", "60 cm")}``, a constant such as ``"8/3"`` or ``"sqrt(2)/2 m"``, or a Fraction.
+        written: parameter → number → the exact number that was typed, if the number's decimal differs.
+
+    Raises:
+        InputError: listing every fault with the accepted values.
+
+    Example:
+        >>> K = [["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]  # a mass on a spring with an absorber of mass mu
+        >>> system = tmsopt.models.from_matrices(M=[[1, 0], [0, "mu"]], D=[["c", "-c"], ["-c", "c"]], K=K)
+        >>> tuned = tmsopt.Problem(system, fixed={"mu": 0.1}, free={"c": (0, 1), "w": (0.1, 3)}, minimize="abscissa")
+        >>> f"{tmsopt.solve(tuned).parameters['w']:.6f}"  # 1/(1 + mu)
+        '0.909091'
+
+    More: docs/reference/problem_file.md
+    """
 
     def __init__(
         self,
@@ -105,86 +112,64 @@ class Problem:
 
     @cached_property
     def posed(self) -> "Posed":
-        """The problem as it is solved, found once."""
-        found = Posed(**_stated(self))
+        """The problem as it is solved."""
+        found = Posed(**_field_values(self))
         vars(found).update(problem=self)
         return found
 
-    if not TYPE_CHECKING:  # which tells names that are wrong
+    if not TYPE_CHECKING:  # type checkers still report wrong names
 
         def __getattr__(self, name: str) -> Any:
-            """An attribute that a problem had in version 1.1, and that its `posed` has now."""
+            """An attribute of a problem in version 1.1 that belongs to its `posed` now."""
             return read_from_posed(self, name)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return _stated(self)
 
 
 @dataclass(frozen=True, eq=False)
-class Posed:
-    """A problem as it is solved: the numbers of a `Problem`, its texts as formulas, its cases; a key of caches."""
-
-    model: Model
-    fixed: Mapping[str, float]
-    free: Mapping[str, tuple[float, float]]
-    constraints: Mapping[str, str]
-    minimize: str | None
-    maximize: str | None
-    locate: str | None
-    start: Mapping[str, float]
-    title: str
-    scenarios: Mapping[str, Scenario]
-    tolerances: Mapping[str, float]
-    weights: Mapping[str, float]
-    pareto: Sequence[str]
-    units: Mapping[str, str] = field(compare=False)
-    written: Mapping[str, Mapping[float, str]] = field(compare=False)
+class Posed(_Fields):
+    """A problem as it is solved: numbers, parsed expressions, cases. Compared by identity, so caches can use it."""
 
     def derive(self, **changes: Any) -> "Posed":
-        """The problem with some fields replaced, by numbers in rad and SI and by valid texts: nothing is checked.
+        """The problem with some fields replaced by numbers in rad and SI and valid texts, without checks.
 
-        `dataclasses.replace` is not for this class: it leaves out what follows from the fields.
+        Do not use `dataclasses.replace`: it does not complete the fields.
         """
-        return Posed(**settle(**_stated(self) | changes))
+        return Posed(**complete_fields(**_field_values(self) | changes))
 
     @cached_property
     def problem(self) -> Problem:
-        """The problem as a user would state it."""
+        """The problem as stated."""
         found = object.__new__(Problem)
-        vars(found).update(_stated(self), posed=self)
+        vars(found).update(_field_values(self), posed=self)
         return found
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
-        """The cases that a search starts with; none for a problem that asks about one design alone."""
-        far = weighted(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
+        """The cases of the first search; none without scenarios, tolerances or robustness radius."""
+        far = radius_parameters(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
         return first_cases(self.scenarios, self.tolerances, far)
 
     @property
     def nominal(self) -> "Posed":
-        """The same question about one design at its nominal values: no scenarios, no tolerances."""
+        """The problem at its nominal values, without scenarios and tolerances."""
         return self.derive(scenarios={}, tolerances={}) if self.scenarios or self.tolerances else self
 
     @property
     def heading(self) -> dict[str, Any]:
-        """What the JSON of every result begins with."""
+        """The first keys of the JSON of every result."""
         return {"schema": SCHEMA, "title": self.title, "model": self.model.name}
 
     @property
     def asks_radius(self) -> bool:
-        """Whether the objective or a constraint names the robustness radius."""
+        """Whether an objective or a constraint names the robustness radius."""
         return self.asks(RADIUS)
 
     def asks(self, name: str) -> bool:
-        """Whether the objective or a constraint names a quantity."""
+        """Whether an objective or a constraint names a quantity."""
         return any(name in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return _stated(self)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
-        """The set in which the parameters are written, e.g. dimensionless or SI."""
+        """The set that the parameters belong to, e.g. dimensionless or SI."""
         return next(s for s in self.model.sets if set(s.names) == {*self.fixed, *self.free})
 
     @property
@@ -194,12 +179,12 @@ class Posed:
 
     @property
     def located(self) -> tuple[str, ...]:
-        """The names of that pattern: as typed, and its own, as ``2EP2`` of ``EP2+EP2``."""
+        """The names of the located pattern: as typed, such as ``EP2+EP2``, and its own, ``2EP2``."""
         return (str(self.locate), self.pattern.name) if self.pattern else ()
 
     @property
     def sense(self) -> str:
-        """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` when nothing is asked."""
+        """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` without an objective."""
         asked = (n for n in ("minimize", "maximize", "pareto", "locate") if getattr(self, n) not in (None, "", ()))
         return next(asked, "evaluate")
 
@@ -210,18 +195,18 @@ class Posed:
 
     @property
     def sign(self) -> float:
-        """1, or −1 where the objective is maximised: times this, the less of it the better."""
+        """−1 if the objective is maximised, else 1: sign times objective is minimised."""
         return 1.0 if self.maximize is None else -1.0
 
     @cached_property
     def objective(self) -> Expression | None:
-        """The expression to optimise, if there is one."""
+        """The expression to optimise; None without one."""
         text = self.minimize if self.minimize is not None else self.maximize
         return None if text is None else self.read(text)
 
     @cached_property
     def objectives(self) -> tuple[Expression, ...]:
-        """The expressions of a front, each to be minimised."""
+        """The expressions of a Pareto front, each to be minimised."""
         return tuple(self.read(text) for text in self.pareto)
 
     @cached_property
@@ -232,16 +217,16 @@ class Posed:
         return {name: parse_comparison(text, self.vocabulary) for name, text in texts.items()}
 
     def read(self, text: str) -> Expression:
-        """An expression in the vocabulary, names that are short for others spelled out.
+        """Parse an expression in the vocabulary, with short names expanded.
 
         Raises:
-            ExpressionError: for what is none.
+            ExpressionError: if it is no expression.
         """
         return parse_value(expand_names(text, self.parameter_set), self.vocabulary)
 
     @property
     def asked_of_roots(self) -> tuple[str, ...]:
-        """Names of the constraints that name a quantity of the roots."""
+        """Names of the constraints that use a root quantity."""
         return tuple(n for n, c in self.conditions.items() if set(c.names) & set(ROOT_NAMES))
 
     @property
@@ -251,41 +236,41 @@ class Posed:
         return (*of.names, *self.model.quantity_names(of), *root_names(self.model))
 
     def values(self, parameters: Mapping[str, float]) -> Values:
-        """Everything derived from a numeric design, root quantities included."""
+        """Everything derived from a numeric design, including root quantities."""
         ranges = {n: hi - lo for n, (lo, hi) in self.free.items()}
         extra = (*ROOT_QUANTITIES, NO_RADIUS, STRUCTURE)
         return Values(self.model, self.parameter_set, parameters, extra=extra, ranges=ranges)
 
     def typed(self, parameters: Mapping[str, float]) -> dict[str, str]:
-        """The exact numbers that were typed for some of a design's doubles, such as ``8/3`` or ``20 deg``."""
+        """Parameter → exact number as typed, such as ``8/3`` or ``20 deg``, if its double differs."""
         exact = {n: self.written.get(n, {}).get(x) for n, x in parameters.items()}
         return {n: text for n, text in exact.items() if text}
 
     def as_nodes(self, parameters: Mapping[str, float]) -> dict[str, Node]:
-        """Numbers of the file as they were typed, in formulas."""
+        """Parameters exactly as typed, as nodes of formulas."""
         typed = self.typed(parameters)
         return {n: number(x, typed.get(n, "")) for n, x in parameters.items()}
 
     def exactly(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """Numbers of the file as they were typed, as fractions or as balls of the working precision."""
+        """Parameters exactly as typed, as fractions or balls of the working precision."""
         return {n: fold(formula([x]), {}, BALLS)[0] for n, x in self.as_nodes(parameters).items()}
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
+        """Every parameter in the model's order: the given values and the fixed ones."""
         complete = {**self.fixed, **values}
         return {name: complete[name] for name in self.parameter_set.names}
 
 
-def _stated(record: Problem | Posed) -> dict[str, Any]:
-    """What was stated: what follows from it is found anew, and cannot always be pickled."""
+def _field_values(record: _Fields) -> dict[str, Any]:
+    """The fields of a record, without cached properties, some of which cannot be pickled."""
     return {f.name: getattr(record, f.name) for f in fields(record)}
 
 
-def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:
-    """Parameters that the robustness radius lets change: by default all but constants of nature and what is not there.
+def radius_parameters(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:
+    """Parameters that change in the robustness radius; by default all that `Parameter.may_change` allows.
 
     Args:
-        fixed: values of those that are not free.
+        fixed: values of the parameters that are not free.
     """
     if weights:
         return tuple(n for n, w in weights.items() if w > 0)

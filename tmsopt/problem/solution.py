@@ -1,4 +1,4 @@
-"""The solution of a design problem as data."""
+"""The solution of a problem as data."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 
 from tmsopt.models import inertia_margin
 from tmsopt.models.user_spectrum import beyond_axis, eigenfrequencies, polynomial_structure
-from tmsopt.problem.advice.remedies import Need, Relaxation
+from tmsopt.problem.advice.remedies import Relaxation, RequiredValue
 from tmsopt.problem.cases import Case, Cover
 from tmsopt.problem.freedom import Freedom
 from tmsopt.problem.problem import Problem
@@ -15,7 +15,7 @@ from tmsopt.problem.quantities import ROOT_NAMES
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.units import Reading
-from tmsopt.problem.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, joined, stability
+from tmsopt.problem.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, roots_to_json, stability
 from tmsopt.records import Printable, Table, call_documents, plain
 from tmsopt.roots import Root, Structure
 
@@ -27,15 +27,15 @@ class Bound:
     """A value that no design in the box can beat.
 
     Attributes:
-        value: the bound, −inf where there is none.
+        value: the bound; −inf without one.
         gap: objective minus bound.
-        proven: whether the gap is closed, so that the design is globally optimal: up to rounding, by ``scip`` up to
-            1e-4 of the objective; of an infeasible problem, whether it is certain that no design is feasible.
+        proven: whether the gap is closed, so that the design is globally optimal: up to rounding, or by ``scip`` up to
+            1e-4 of the objective. For an infeasible problem, whether infeasibility is proved.
         method: how the bound was found: ``omega0``, ``relation`` (of the coefficients), ``scip``, …; ``none``.
-        seconds: that branch and bound took.
-        nodes: that it needed.
-        tolerance: its feasibility tolerance; it is a proof in floating-point arithmetic.
-        solver: who searched, such as ``SCIP``, whoever's bound it is; empty without a search.
+        seconds: time of branch and bound.
+        nodes: nodes of branch and bound.
+        tolerance: feasibility tolerance of branch and bound, a proof in floating-point arithmetic.
+        solver: the solver that searched, such as ``SCIP``, even if the bound comes from elsewhere; empty without one.
 
     Example:
         >>> bound = tmsopt.solve("problems/ep4.toml").bound  # no abscissa is below -(a4/a0)^(1/4), which an EP4 attains
@@ -62,7 +62,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class OtherBranch:
-    """Another solution of a square system, and the limits that exclude it."""
+    """Another solution of a square system, with the limits that exclude it."""
 
     parameters: Table[float]
     excluded_by: tuple[str, ...]
@@ -70,44 +70,44 @@ class OtherBranch:
 
 @dataclass(frozen=True, repr=False)
 class Solution(Printable):
-    """What `solve` found.
+    """The answer of `solve`.
 
     Attributes:
         status: ``optimal``, ``infeasible`` or ``not_converged``; always decided by an independent recheck.
-        value: value of the objective expression; nan where there is none.
-        parameters: every parameter of the set the problem is written in (rad, SI units).
+        value: value of the objective expression; nan without one.
+        parameters: every parameter of the set that the problem is written in (rad, SI units).
         abscissa: largest real part of the roots of the ideal design, dimensionless (per √(w/g)).
-        abscissa_realised: the same for the parameters exactly as stored in double precision.
-        roots: roots of the ideal design with multiplicities: of the polynomial nearest to the design's own that has
-            the structure, as `roots.enclosed.nearest` defines it; for simple roots of the design's own.
-        structure: which roots stand on the rightmost line, e.g. ``EP4``.
-        active: constraint or bound (``Fr.max``) → gain of the objective per unit that the limit is relaxed.
-        violations: name → by how much it is violated, in its own units (rad, SI), where beyond tolerance; of a pattern,
-            relative to the coefficients.
-        missed: limit on the roots that the ideal design meets → by how much the parameters as stored miss it, in its
-            own units; empty wherever doubles near the ideal design meet all limits, for those are stored then.
-        quantities: derived quantities; nan where one does not exist.
+        abscissa_realised: the abscissa of the parameters exactly as stored in double precision.
+        roots: roots of the ideal design with multiplicities. They belong to the nearest polynomial with the structure,
+            as `roots.enclosed.nearest` defines it; if all are simple, to the design's own polynomial.
+        structure: the roots on the rightmost line, e.g. ``EP4``.
+        active: constraint or bound (``Fr.max``) → gain of the objective per unit of relaxation.
+        violations: name → violation above tolerance, in the limit's units (rad, SI); for a pattern, relative to the
+            coefficients.
+        missed: limit on the roots that the ideal design meets → amount by which the stored parameters miss it, in the
+            limit's units. Empty if doubles near the ideal design meet all limits, since these are stored then.
+        quantities: derived quantities; nan if undefined.
         dimensionless: the native parameters.
         formulation: ``abscissa``, ``matching`` or ``none``.
-        freedom: parameters against conditions, before solving.
+        freedom: count of parameters and conditions before solving.
         branches: other solutions of a square system.
         notes: sentences for the reader.
-        worst: with scenarios or tolerances, the case with the largest abscissa, which is the one reported.
-        least_damped: likewise, the case with the least damping ratio.
-        fastest: likewise, the case with the greatest angular frequency, where the problem asks for that.
-        cover: what is known of every case together, proven or not.
-        sides: part of the box, such as ``normal rake`` → its best objective, nan where it has no feasible design.
-        relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
-        need: of a problem without an answer, or of a design that is not stable though that was looked for, the speed
-            that it takes; None where the speed plays no part.
-        stable_elsewhere: of a design that is not stable, whether branch and bound found one that is: False where it
-            proved that there is none, None where it was not asked or did not decide.
-        interrupted: whether the user ended the work before it was done.
-        meetings: what meets in each multiple root: the located ones, then the others, rightmost first.
-        edges: boundaries of stability that it stands on: ``weave``, ``capsize``, ``infinity``; `edge_is_exact` where
-            that and its growth are certain, and not only as far as rounding tells.
-        multiple_as_rounded: where nothing is free, whether roots are multiple only as far as rounding tells.
-        without_best: whether designs get better without an end, as towards a singular mass matrix: none is the best.
+        worst: with scenarios or tolerances, the case with the largest abscissa, which is reported.
+        least_damped: with scenarios or tolerances, the case with the least damping ratio.
+        fastest: with scenarios or tolerances, the case with the greatest angular frequency, if the problem uses it.
+        cover: a bound on the roots over all cases, proven or not.
+        sides: part of the box, such as ``normal rake`` → its best objective; nan without a feasible design.
+        relaxation: the smallest relaxation of the limits that makes an infeasible problem feasible.
+        need: the required speed, for an infeasible problem or an unstable design where stability was sought; None if
+            the speed plays no part.
+        stable_elsewhere: for an unstable design, whether branch and bound found a stable one: False if it proved that
+            there is none, None if it did not run or did not decide.
+        interrupted: whether the user stopped the work early.
+        meetings: the multiple roots with their eigenvectors: the located ones, then the others, rightmost first.
+        edges: boundaries of stability that contain the design: ``weave``, ``capsize``, ``infinity``.
+        edge_is_exact: whether `edges` and the growth there are certain, not only up to rounding.
+        multiple_as_rounded: with nothing free, whether roots are multiple only up to rounding.
+        without_best: whether designs improve without end, as towards a singular mass matrix, so that none is the best.
         si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
 
     Example:
@@ -144,7 +144,7 @@ class Solution(Printable):
     cover: Cover | None = None
     sides: Table[float] = Table()
     relaxation: Relaxation | None = None
-    need: Need | None = None
+    need: RequiredValue | None = None
     stable_elsewhere: bool | None = None
     interrupted: bool = False
     meetings: tuple[MultipleRoot, ...] = ()
@@ -156,30 +156,30 @@ class Solution(Printable):
 
     @cached_property
     def analysis(self) -> Any:
-        """What a report says beyond these numbers, each part computed when it is first asked for, and kept."""
+        """The further parts of a report, each computed on first use and kept."""
         return call_documents("analyse", self)
 
     @property
     def stability(self) -> StabilityVerdict:
-        """The verdict, and the power of t by which the motion grows, in the worst case."""
+        """The verdict in the worst case, with the power of t by which the motion grows."""
         largest = max((r.size for r in self.of_polynomial.roots), default=0.0)
         return stability((self.abscissa, self.abscissa_realised), self.edges, self.meetings, largest)
 
     @property
     def stable(self) -> bool | None:
-        """Whether all roots lie left of the axis: ideal and as stored, in the worst case; None where there are none."""
+        """Whether all roots are left of the axis, ideal and as stored, in the worst case; None with one at infinity."""
         verdict = self.stability.verdict
         return verdict == STABLE if verdict else None
 
     @property
     def beyond_axis(self) -> float | None:
-        """The abscissa where the located pattern ties roots to the axis, 0 on the edge of stability; else None."""
+        """Distance of the rightmost root right of the axis, if a located pattern ties others to it; else None."""
         located = self.problem.posed.located if self.status == "optimal" else ()
         return beyond_axis(self.problem.model, located, self.roots)
 
     @property
     def stability_sought(self) -> bool:
-        """Whether parameters are free for what a limit that is violated, or else the objective, says of the roots."""
+        """Whether stability was sought: parameters are free, and a violated limit or the objective uses the roots."""
         problem = self.problem.posed
         objective = () if problem.objective is None else problem.objective.names
         limits = set(self.violations) & set(problem.asked_of_roots)
@@ -187,7 +187,7 @@ class Solution(Printable):
 
     @property
     def any_stable(self) -> bool | None:
-        """Whether any design in the box is stable, limits on the roots aside: True, False where proved, or None."""
+        """Whether any design in the box is stable, ignoring limits on the roots; False if disproved, else None."""
         if self.stable:
             return True
         problem = self.problem.posed
@@ -197,44 +197,44 @@ class Solution(Printable):
 
     @property
     def units(self) -> dict[str, str]:
-        """The unit of each number that has one, as they are kept and as JSON has them: rad and SI."""
+        """Name → unit of a number as stored and in JSON (rad and SI), if it has one."""
         return units_of(self.problem.posed, filter(None, [self.problem.minimize or self.problem.maximize]))
 
     @property
     def eigenfrequencies(self) -> tuple[Root, ...]:
-        """ω = i s of a complex system, in the order of the roots, each with its multiplicity; none of a real one."""
+        """ω = i s of a complex system in the order of the roots, with multiplicities; empty for a real system."""
         return eigenfrequencies(self.problem.model, self.roots)
 
     @property
     def inertia_margin(self) -> Table[float | None] | None:
-        """Of a stable design of point masses in SI, by `models.inertia_margin` at its nominal values; else None."""
+        """`models.inertia_margin` of a stable point-mass design in SI at its nominal values; else None."""
         in_si = self.problem.model.name == "tms" and self.problem.posed.parameter_set.rate is not None
         return inertia_margin(self.parameters) if in_si and self.stable else None
 
     @property
     def of_polynomial(self) -> Structure:
-        """Structure and roots of the model's polynomial: of a complex system, of the real one of twice the size."""
+        """Structure and roots of the model's polynomial; for a complex system, of the real one of twice the size."""
         return polynomial_structure(self.problem.model, self.structure, self.roots)
 
     def response(self, **asked: Any) -> Any:
-        """The motion of this design after a lean or a push, a `tmsopt.Simulation`: what `tmsopt.simulate` gives.
+        """The motion of this design after a lean or a push, as a `tmsopt.Simulation`.
 
         Args:
-            asked: as there: ``lean=5`` (degrees), ``push=10`` (N m s), ``seconds=3``, ``noise=1`` …
+            asked: the arguments of `tmsopt.simulate`: ``lean=5`` (degrees), ``push=10`` (N m s), ``seconds=3``,
+                ``noise=1`` …
 
         Raises:
-            InputError: for a model without matrices, or what cannot be asked of it.
+            InputError: for a model without matrices, or an argument that it does not accept.
         """
         return call_documents("response", self, **asked)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; numbers that do not exist are None.
+        """Plain data for ``json.dumps``; undefined numbers are None.
 
-        Objective, abscissae, roots, quantities, dimensionless parameters and readings follow from the parameters
-        alone and are the doubles nearest to their true values (readings in mm, km/h and degrees: to 15 digits).
-        ``active`` comes from the optimisation and has the 6 digits that the first-order conditions, solved
-        independently at 60 digits, confirm; so have ``violations``. ``sides`` are objectives of designs that are not
-        shown, to 9 digits.
+        Objective, abscissae, roots, quantities, dimensionless parameters and readings follow from the parameters alone
+        and are correctly rounded doubles (readings in mm, km/h and degrees: 15 digits). ``active`` comes from the
+        optimisation and has 6 digits, confirmed by the first-order conditions solved independently at 60 digits;
+        ``violations`` have 6 digits, and ``sides``, the objectives of designs that are not listed, 9.
         """
         problem = self.problem.posed
         text = problem.minimize or problem.maximize or problem.locate or "abscissa"
@@ -256,7 +256,7 @@ class Solution(Printable):
             **self.stability.to_json(),
             **({"verdict_is_exact": self.edge_is_exact} if self.stability.on_edge else {}),
             **({"multiplicity_is_exact": False} if self.multiple_as_rounded else {}),
-            **joined(self),
+            **roots_to_json(self),
             **plain(self, "structure"),
             "active": plain(self.active, digits=GAIN_DIGITS),
             "violations": plain(self.violations, digits=GAIN_DIGITS),

@@ -1,4 +1,4 @@
-"""A TOML file that knows at which line each of its keys is, so that every fault can be placed."""
+"""Reads a TOML file with the line of each key, so that every fault has its line."""
 
 import re
 import tomllib
@@ -11,19 +11,19 @@ from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, V
 
 from tmsopt.errors import LISTED, Fault, InputError, short
 from tmsopt.files import as_path, read_text
-from tmsopt.problem.advice.lines import line_advice
+from tmsopt.problem.advice.lines import suggest_line
 
 MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
-"""Parts of a dotted key; lists and tables one in another; characters of a number, or of a name without quotes."""
+"""Parts of a dotted key; depth of nested lists and tables; characters of a number or of a name without quotes."""
 
-_EXPLAINED = 10 * LISTED  # complaints, of which a key may have several
+_EXPLAINED = 10 * LISTED  # complaints explained; a key may have several
 
 Number = StrictFloat | StrictInt | StrictStr
 """A number, or a text with a unit."""
 
 
 class Section(BaseModel):
-    """A table of a file, in which no other key may stand; what stands under a field says what it is for."""
+    """A table of a file without other keys; the docstring of a field describes its key."""
 
     model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
@@ -38,7 +38,7 @@ class Page:
 
     Attributes:
         data: its tables.
-        lines: section or key that begins a line → number of that line.
+        lines: section or key → number of its line.
     """
 
     file: str
@@ -46,12 +46,12 @@ class Page:
     lines: Mapping[Key, int]
 
     def error(self, faults: Iterable[Fault]) -> InputError:
-        """The faults, each at its line of this file unless it is placed already, in the order of the lines."""
+        """The faults in the order of their lines; a fault without a file is located in this one."""
         placed = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
         return InputError(sorted(placed, key=lambda f: f.line))
 
     def _line_of(self, key: Key) -> int:
-        """Line of the longest part of a key path that the file has; 1 for something missing altogether."""
+        """Line of the longest prefix of a key path that the file has; 1 if it has none."""
         for end in range(len(key), 0, -1):
             if key[:end] in self.lines:
                 return self.lines[key[:end]]
@@ -59,15 +59,15 @@ class Page:
 
 
 def read_page(path: str | PathLike[str], kind: str) -> Page:
-    """Read a TOML file of some kind, such as ``problem``.
+    """Read a TOML file of a kind such as ``problem``.
 
     Raises:
-        InputError: for a file that cannot be read, or is not TOML.
+        InputError: if the file cannot be read or is not TOML.
     """
     as_path(path, f"a {kind} file")
     file = str(path) or "."
     text = read_text(file, f"TOML {kind} file")
-    scan = _scanned(text)
+    scan = _scan_lines(text)
     if scan.fault:
         raise InputError([scan.fault.at(file, scan.fault.line)])
     try:
@@ -75,18 +75,18 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"line (\d+)", str(error))
         line = scan.unclosed or (int(place[1]) if place else text.count("\n") + 1)
-        written = "".join(text.split("\n")[line - 1 : line])  # none where the end of the file is at fault
-        raise InputError([Fault(f"not TOML: {error}{line_advice(written)}").at(file, line)]) from None
+        written = "".join(text.split("\n")[line - 1 : line])  # empty at the end of the file
+        raise InputError([Fault(f"not TOML: {error}{suggest_line(written)}").at(file, line)]) from None
     return Page(file, data, scan.lines)
 
 
 def validate_tables(
     data: Mapping[str, Any], schema: type[S], explain: Callable[[tuple[int | str, ...], str, Any], Fault]
 ) -> tuple[list[Fault], S | None]:
-    """Faults of shape, and what is left of the data without the faulty keys.
+    """Faults of shape, and the data without the faulty keys.
 
     Args:
-        explain: place, kind and found value of a complaint → the fault in the words of the file.
+        explain: turns the place, kind and value of a complaint into a fault in the words of the file.
     """
     faults: dict[Key, Fault] = {}
     pruned: dict[str, Any] = dict(data)
@@ -97,23 +97,23 @@ def validate_tables(
             complaints = error.errors(include_url=False, include_context=False)
             found = [explain(d["loc"], d["type"], d["input"]) for d in complaints[:_EXPLAINED]]
             rest = dict.fromkeys(tuple(map(str, d["loc"][:2])) for d in complaints[_EXPLAINED:])
-            found += [Fault("accepted: what the other faults say", key) for key in rest]
+            found += [Fault("accepted: see the other faults", key) for key in rest]
             deepest: dict[Key, int] = {}
             for fault in found:
                 deepest[fault.key[:2]] = max(len(fault.key), deepest.get(fault.key[:2], 0))
             for fault in found:
                 if len(fault.key) == deepest[fault.key[:2]]:
                     faults.setdefault(fault.key, fault)
-        pruned = _without(pruned, {key[:2] for key in faults})
+        pruned = _drop_keys(pruned, {key[:2] for key in faults})
     return list(faults.values()), None
 
 
-def within(section: str, faults: Iterable[Fault]) -> list[Fault]:
-    """Faults of a table that is itself in a section."""
+def prefix_keys(section: str, faults: Iterable[Fault]) -> list[Fault]:
+    """Faults of a table inside a section, with the section in their keys."""
     return [replace(f, key=(section, *f.key)) for f in faults]
 
 
-def _without(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:
+def _drop_keys(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:
     inner = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in data.items() if isinstance(t, dict)}
     plain = {n for n, *rest in keys if not rest or n not in inner}
     return {n: inner.get(n, value) for n, value in data.items() if n not in plain}
@@ -124,7 +124,7 @@ _TOKEN = re.compile(
     r"""|\"(?:[^"\\\n]++|\\[^\n])*+"?|'[^'\n]*+'?|\#[^\n]*+|[\w+:-]++|[^ \t\r]""",
     re.DOTALL,
 )
-"""Every character of a text is looked at once, whatever it holds: a text that is not closed ends with the file."""
+"""Possessive quantifiers: linear time for any text. A string that is not closed ends with the file."""
 
 _MARKS = frozenset("[]{}=.,")
 _STATEMENT = re.compile(r"[ \t]*+(?:[\w.\-\"' \t]++=|\[[A-Za-z_][\w.]*+\][ \t]*+(?:\#[^\n]*+)?$)", re.MULTILINE)
@@ -132,10 +132,10 @@ _STATEMENT = re.compile(r"[ \t]*+(?:[\w.\-\"' \t]++=|\[[A-Za-z_][\w.]*+\][ \t]*+
 
 @dataclass
 class _Scan:
-    """What a file says of its lines before it is read, and why it is not to be read at all.
+    """The lines of a file before parsing, and a fault if it must not be parsed.
 
     Attributes:
-        lines: section or key that begins a line → number of that line, but for lines in a list or a text of several.
+        lines: section or key → number of its line, except inside lists and multi-line strings.
         unclosed: line of a list that is still open where another key or section begins; 0 for none.
     """
 
@@ -144,13 +144,13 @@ class _Scan:
     fault: Fault | None = None
 
 
-def _scanned(text: str) -> _Scan:
-    """Where sections and keys are; stops at what would take the parser more time or memory than files need."""
+def _scan_lines(text: str) -> _Scan:
+    """Find the lines of sections and keys; stop at text that would cost the parser too much time or memory."""
     found = _Scan()
     section: Key = ()
     line, begun, depth, run = 1, 1, 0, 0
-    head: list[str] | None = []  # parts of the section or key that is being read; None in a value
-    end = after = "="  # of the head, "]" for a section; the token before this one
+    head: list[str] | None = []  # parts of the current section or key; None inside a value
+    end = previous = "="  # end of the head, "]" for a section; the previous token
     for match in _TOKEN.finditer(text):
         token = match[0]
         if token == "\n":
@@ -169,20 +169,20 @@ def _scanned(text: str) -> _Scan:
                 found.lines.setdefault(key, line)
                 head = None
         elif token[0] != "#":
-            run = run + 1 if after == "." else 1
+            run = run + 1 if previous == "." else 1
             if head is not None:
                 head.append(token.strip("\"'"))
-        if wrong := _beyond(token, run, depth):
+        if wrong := _size_problem(token, run, depth):
             found.fault = Fault(wrong, line=line)
             break
         line += token.count("\n")
-        after = token
+        previous = token
     found.unclosed = found.unclosed or (begun if depth else 0)
     return found
 
 
-def _beyond(token: str, parts: int, depth: int) -> str:
-    """What is larger than files need; empty where nothing is."""
+def _size_problem(token: str, parts: int, depth: int) -> str:
+    """The message for a size above the limits; empty if it is within them."""
     if parts > MOST_PARTS:
         return f"found a key of more than {MOST_PARTS} parts; accepted: up to {MOST_PARTS}"
     if depth > MOST_DEEP:

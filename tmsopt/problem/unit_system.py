@@ -1,4 +1,4 @@
-"""The units in which a problem was written: of parameters, of quantities, and of any expression in them."""
+"""Finds the units of a problem's parameters, quantities and expressions, as its author wrote them."""
 
 import math
 import re
@@ -12,31 +12,31 @@ from tmsopt.models.expression import SIGN, Expression, parse_comparison, parse_v
 from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.units import Dimension, dimension, factor
+from tmsopt.problem.units import Dimension, dimension, unit_factor
 from tmsopt.problem.validate import SMALLEST
 
 _PER_SECOND = "1/s"
-_FREQUENCY, _HERTZ = "frequency", "Hz"  # which is a rate, and no 1/s to a reader
+_FREQUENCY, _HERTZ = "frequency", "Hz"  # shown in Hz, not in 1/s
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit that a problem was written in.
+    """A unit for display.
 
     Attributes:
-        text: such as ``km/h``; empty without one.
-        one: what one of it is in the unit that the number is kept in (SI, rad).
+        text: its name, such as ``km/h``; empty without one.
+        one: its size in the unit of the stored number (SI, rad).
     """
 
     text: str = ""
     one: float = 1.0
 
     def number(self, value: float, digits: int = 5, error: float = 0.0) -> str:
-        """A number in this unit, without its name; ``none`` where it does not exist, and no −0.
+        """A number in this unit as text, without the unit; ``none`` if it is not finite.
 
         Args:
-            digits: at most.
-            error: of the value: fewer digits where no more hold, and 0 for what is 0 within it.
+            digits: greatest number of digits.
+            error: error of the value: digits that it makes uncertain are dropped, and values within it are 0.
         """
         if not math.isfinite(value):
             return "none"
@@ -47,33 +47,34 @@ class Unit:
         return f"{value / self.one + 0.0:.{digits}g}"
 
     def show(self, value: float, digits: int = 5) -> str:
-        """A number in this unit, with its name."""
+        """A number with this unit as text."""
         return f"{self.number(value, digits)}{f' {self.text}' if self.text and math.isfinite(value) else ''}"
 
 
 def unit_of(problem: Posed, text: str) -> Unit:
-    """The unit in which a problem has a parameter, a bound such as ``v.max``, a constraint or any expression.
+    """The unit of a parameter, a bound such as ``v.max``, a constraint or any expression of a problem.
 
-    What was typed with a unit has that one; a quantity has the one in which most parameters of its kind were typed; a
-    plain number the model's own.
+    A parameter has the unit that was typed for it, else the model's. Another expression has the unit that most
+    parameters of its dimension were typed in, else the model's.
     """
     units = si_units(problem)
     name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
     if name in problem.parameter_set.names:
-        return _typed(problem.units.get(name, ""), units[name])
+        return _make_unit(problem.units.get(name, ""), units[name])
     if units.get(_FREQUENCY) == _HERTZ and set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name))) == {
         _FREQUENCY
     }:
         return Unit(_HERTZ)
     if name in units:
-        return _of_kind(problem, Dimension.of(units[name]))
-    return _of_kind(problem, dimension_of(problem, text, units))
+        return _usual_unit(problem, Dimension.of(units[name]))
+    return _usual_unit(problem, dimension_of(problem, text, units))
 
 
 def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
-    """How many 1/s one unit of an expression is at a design, where it is per √(g/w) and a second is known; else None.
+    """The factor from √(g/w) to 1/s for an expression with that unit; None for other units or without seconds.
 
-    Of numbers and of arrays.
+    Args:
+        parameters: a design, or arrays of designs.
     """
     of = problem.parameter_set
     if of.rate is None or of.root_unit == _PER_SECOND or unit_of(problem, text).text != of.root_unit:
@@ -82,67 +83,65 @@ def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
 
 
 def unit_at(problem: Posed, text: str, parameters: Mapping[str, float]) -> Unit:
-    """The unit in which a reader has an expression at a design: rates in 1/s where there are seconds."""
+    """The unit to show an expression in at a design: rates in 1/s if the parameters define seconds."""
     rate = rate_of(problem, text, parameters)
     return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
 
 
-def unit_of_all(problem: Posed, text: str, held: Mapping[str, float] | None = None) -> Unit:
-    """The same where a second is one for all designs of a problem, for bounds and differences; else its own unit.
+def common_unit(problem: Posed, text: str, common: Mapping[str, float] | None = None) -> Unit:
+    """The unit of `unit_at` if it is the same at all designs, for bounds and differences; else that of `unit_of`.
 
     Args:
-        held: what these designs have in common; by default what is fixed, and nowhere varied.
+        common: parameters that these designs share; by default the fixed ones without scenario or tolerance.
     """
-    if held is None:
-        held = {n: x for n, x in problem.fixed.items() if n not in {*problem.scenarios, *problem.tolerances}}
+    if common is None:
+        common = {n: x for n, x in problem.fixed.items() if n not in {*problem.scenarios, *problem.tolerances}}
     try:
-        return unit_at(problem, text, held)
+        return unit_at(problem, text, common)
     except KeyError:
         return unit_of(problem, text)
 
 
 def show_at(problem: Posed, text: str, parameters: Mapping[str, float], value: float, digits: int = 5) -> str:
-    """A number in the unit of `unit_at`, and where that is another in its own behind."""
+    """A number in the unit of `unit_at`, followed by its own unit in parentheses if that differs."""
     shown, own = unit_at(problem, text, parameters), unit_of(problem, text)
     behind = f" ({own.show(value, digits)})" if shown != own and math.isfinite(value) else ""
     return f"{shown.show(value, digits)}{behind}"
 
 
 def si_units(problem: Posed) -> dict[str, str]:
-    """The unit in which each parameter, quantity and root quantity of a problem is computed; ``1`` without one."""
+    """Name → unit in which a parameter, quantity or root quantity is computed; ``1`` without one."""
     of = problem.parameter_set
     listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
     rates = {"abscissa": of.root_unit, ANGULAR_FREQUENCY: of.root_unit}
-    if of.rate is not None:  # else there are no seconds
+    if of.rate is not None:  # the parameters define seconds
         rates |= {"decay_rate": _PER_SECOND, "decay_time": "s", _FREQUENCY: _HERTZ}
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 
 
 def amounts_text(problem: Posed, amounts: Mapping[str, float]) -> str:
-    """By how much each limit is violated, in the units in which the problem was written."""
+    """The violation of each limit, in the units of the problem."""
     return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in amounts.items())
 
 
 def limit_text(problem: Posed, name: str) -> str:
-    """A limit with its number in the unit in which the problem was written; empty for what is none."""
-    parameter, _, end = name.rpartition(".")
+    """A limit with its number in the unit of the problem; empty if there is no such limit."""
+    unit = unit_of(problem, name)
     if name not in problem.constraints:
-        known = parameter in problem.free and end in ("min", "max")
-        return (
-            f"{'>=' if end == 'min' else '<='} {unit_of(problem, name).show(problem.free[parameter][end == 'max'], 6)}"
-            if known
-            else ""
-        )
-    text, unit = problem.constraints[name], unit_of(problem, name)
+        parameter, _, end = name.rpartition(".")
+        if parameter not in problem.free or end not in ("min", "max"):
+            return ""
+        return f"{'>=' if end == 'min' else '<='} {unit.show(problem.free[parameter][end == 'max'], 6)}"
+    text = problem.constraints[name]
     limit = split_limit(text)
-    return limit.written(unit.show(limit.value, 9)) if limit and unit.text else text
+    return limit.replace_number(unit.show(limit.value, 9)) if limit and unit.text else text
 
 
 def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
-    """The unit of each number that has one, as it is kept, computed and written as data: rad and SI.
+    """Name → unit in which a number is stored and written as data (rad and SI), if it has one.
 
     Args:
-        texts: expressions beside parameters, quantities and constraints.
+        texts: further expressions, in addition to parameters, quantities and constraints.
     """
     units = si_units(problem)
     asked = {
@@ -153,23 +152,23 @@ def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
 
 
 def dimension_of(problem: Posed, text: str, units: Mapping[str, str] | None = None) -> Dimension:
-    """Of an expression, or of a constraint, by its name or its text."""
+    """The dimension of an expression, or of a constraint given by name or text."""
     text = problem.constraints.get(text, text)
     parse: Callable[..., Expression] = parse_comparison if SIGN.search(text) else parse_value
     try:
         return dimension(parse(text, problem.vocabulary), si_units(problem) if units is None else units)
-    except ValueError:  # a pattern, or what else has no unit
+    except ValueError:  # a pattern, or anything else without a unit
         return Dimension()
 
 
-def _of_kind(problem: Posed, dimension: Dimension) -> Unit:
-    """The unit most parameters of a dimension were typed in."""
+def _usual_unit(problem: Posed, dimension: Dimension) -> Unit:
+    """The unit that most parameters of a dimension were typed in."""
     of, unit = problem.parameter_set, dimension.unit
     typed = Counter(problem.units[n] for n in of.names if n in problem.units and Dimension.of(of[n].unit) == dimension)
-    return _typed(typed.most_common(1)[0][0] if typed else "", unit)
+    return _make_unit(typed.most_common(1)[0][0] if typed else "", unit)
 
 
-def _typed(written: str, unit: str) -> Unit:
+def _make_unit(written: str, unit: str) -> Unit:
     if unit == "1":
         return Unit()
-    return Unit(written, factor(written, unit)) if written else Unit(unit)
+    return Unit(written, unit_factor(written, unit)) if written else Unit(unit)

@@ -1,4 +1,4 @@
-"""Everything that can be wrong with a problem, each fault with its place and the accepted values."""
+"""Validates a problem: finds every fault, with its key and the accepted values."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,31 +9,30 @@ from tmsopt.models import Model, ParameterSet
 from tmsopt.models.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.models.names import AMBIGUOUS_NAMES
 from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
-from tmsopt.problem.advice.names import example_of, unknown
+from tmsopt.problem.advice.names import example_of, suggest_name
 from tmsopt.problem.cases import Band, points_of
 from tmsopt.problem.quantities import expand_names, root_names
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
-"""Tables of a problem that name parameters beside those of `fixed` and `free`."""
+"""Tables of a problem that name parameters, in addition to `fixed` and `free`."""
 
 SMALLEST = 1e-50
-"""Size of a parameter but 0; its inverse is the largest."""
+"""Least size of a nonzero parameter; its inverse is the greatest."""
 
 MOST_TOLERANCES = 8
-"""Parameters with a tolerance: a box has two corners for one, 256 for eight."""
+"""Greatest number of tolerances; their box has 256 corners."""
 
-
-MOST = {"constraints": 1000, "scenarios": 100}
-"""Constraints of a problem, and values of a scenario."""
+MOST_ENTRIES = {"constraints": 1000, "scenarios": 100}
+"""Greatest number of constraints of a problem, and of values of a scenario."""
 
 _LONGEST = 200  # characters of the name of a pattern
 
 Stated = Any
-"""A Problem as its author stated it: any field may be of any type."""
+"""A problem as stated; any field may have any type."""
 
 
 def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
-    """The parameter set that most of the names belong to, the native one when in doubt."""
+    """The parameter set with most of the names; the native one in case of a tie."""
     return max(model.sets, key=lambda s: len(names.keys() & set(s.names)))
 
 
@@ -52,7 +51,7 @@ _TABLES = {
 
 
 def shape_faults(problem: Stated) -> Iterator[Fault]:
-    """Arguments of a problem that are no model, tables and texts: nothing more can be said before they are."""
+    """Faults of the types of the arguments: model, tables and texts."""
     if not isinstance(problem.model, Model):
         accepted = "a model, such as tmsopt.models.tms"
         yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
@@ -69,12 +68,12 @@ def shape_faults(problem: Stated) -> Iterator[Fault]:
 
 
 def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
-    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > MOST[what]:
-        yield Fault(f"found {len(values)}; accepted: up to {MOST[what]}", key)
+    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > MOST_ENTRIES[what]:
+        yield Fault(f"found {len(values)}; accepted: up to {MOST_ENTRIES[what]}", key)
 
 
-def faults(problem: Stated) -> Iterator[Fault]:
-    """What is wrong with a problem, everything at once."""
+def find_faults(problem: Stated) -> Iterator[Fault]:
+    """Every fault of a problem whose arguments have the right types."""
     names = {**problem.fixed, **problem.free, **problem.scenarios}
     of = guess_parameter_set(problem.model, names)
     yield from _name_faults(problem, of)
@@ -88,15 +87,15 @@ def faults(problem: Stated) -> Iterator[Fault]:
 
 def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
-    advice = limit_advice(unknown)
+    advice = limit_advice(suggest_name)
     tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
     for table, name in ((t, n) for t, names in tables.items() for n in names):
         if name in of.names:
             continue
         if name in others:
             yield Fault(
-                f"{others[name]} parameter '{name}' beside {of.name} ones; the two sets are not mixed: "
-                f"write all in one of them ({' '.join(of.names)})",
+                f"{others[name]} parameter '{name}' among {of.name} ones; do not mix the two sets: "
+                f"write all parameters in one ({' '.join(of.names)})",
                 (table, name),
             )
         else:
@@ -111,7 +110,7 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
         yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{meant}", ("parameters",))
     for name in problem.start:
         if name not in problem.free:
-            yield Fault(f"start for '{name}', which is not a free parameter", ("parameters", name, "start"))
+            yield Fault(f"found a start for '{name}'; accepted: free parameters", ("parameters", name, "start"))
 
 
 def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Fault]:
@@ -141,15 +140,15 @@ def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Faul
 
 
 def _need_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    """Parameters that may differ from 0 where one that they need may be 0."""
+    """Faults of parameters that may differ from 0 while a parameter that they require may be 0."""
     for name, (needed, otherwise) in of.needs.items():
-        if min(_reached(problem, of, needed), default=1.0) <= 0 and any(_reached(problem, of, name)):
+        if min(_possible_values(problem, of, needed), default=1.0) <= 0 and any(_possible_values(problem, of, name)):
             message = f"{needed} may be 0 while {name} is not: {otherwise}; keep {needed} above 0, or leave {name} out"
             yield Fault(message, ("parameters", needed))
 
 
-def _reached(problem: Stated, of: ParameterSet, name: str) -> list[float]:
-    """The ends of what a parameter may be; none where they are no numbers, which is reported as a value."""
+def _possible_values(problem: Stated, of: ParameterSet, name: str) -> list[float]:
+    """Values that a parameter may take: its ends, its scenario points, or its fixed value; none if not numeric."""
     try:
         given = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
         return [float(x) for x in given or (problem.fixed.get(name, of[name].default),)]
@@ -165,13 +164,14 @@ def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
         for name, value in getattr(problem, table).items():
             if name not in of.names:
                 continue
-            if not _is_square(size := _number(value)) or size < 0 or (size == 0 and table == "tolerances"):
+            if not _has_usable_size(size := _number(value)) or size < 0 or (size == 0 and table == "tolerances"):
                 sizes = f"a number {needed}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
                 yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
             elif table == "tolerances":
-                yield from _room_faults(problem, of, name, size)
+                yield from _tolerance_faults(problem, of, name, size)
     if len(problem.tolerances) > MOST_TOLERANCES:
-        message = f"{len(problem.tolerances)} tolerances; accepted: {MOST_TOLERANCES}, those that matter most"
+        found = len(problem.tolerances)
+        message = f"found {found} tolerances; accepted: up to {MOST_TOLERANCES}; keep those that matter most"
         yield Fault(message, ("tolerances",))
 
 
@@ -193,9 +193,9 @@ def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any
             yield from _number_faults(of, name, value, key)
 
 
-def _room_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
-    """Faults of a tolerance that takes a parameter out of its physical range."""
-    ends = _reached(problem, of, name)
+def _tolerance_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
+    """Faults of a tolerance that exceeds the physical range of its parameter."""
+    ends = _possible_values(problem, of, name)
     for value in (min(ends) - tolerance, max(ends) + tolerance) if ends else ():
         if value not in of[name].range:
             message = (
@@ -206,15 +206,15 @@ def _room_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float)
 
 
 def _number(value: Any) -> float:
-    """A number as it was stated; nan for what is none."""
+    """A value as a float; nan if it is not a number."""
     try:
         return math.nan if isinstance(value, bool | str) else float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
 
 
-def _is_square(number: float) -> bool:
-    """Whether a number is 0 or of a size whose products with a few others are doubles."""
+def _has_usable_size(number: float) -> bool:
+    """Whether a number is 0, or neither so small nor so large that products of a few overflow or underflow."""
     return number == 0 or SMALLEST <= abs(number) <= 1 / SMALLEST
 
 
@@ -224,7 +224,7 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
     number = _number(value)
     if not math.isfinite(number):
         yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
-    elif not _is_square(number):
+    elif not _has_usable_size(number):
         yield Fault(f"found {number:g}; accepted: 0, or a size from {SMALLEST:g} to {1 / SMALLEST:g}{unit}", key)
     elif number not in parameter.range:
         degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
@@ -238,9 +238,9 @@ def _objective_faults(problem: Stated) -> Iterator[Fault]:
     key = ("objective",)
     asked = [sense for sense in ("minimize", "maximize") if getattr(problem, sense) is not None]
     if len(asked) > 1:
-        yield Fault("minimize and maximize together; keep one of them", key)
+        yield Fault("found both minimize and maximize; keep one of them", key)
     if problem.pareto and asked:
-        yield Fault("pareto beside minimize or maximize; keep one of them", key)
+        yield Fault(f"found both pareto and {asked[0]}; keep one of them", key)
     texts = problem.pareto
     listed = isinstance(texts, Sequence) and not isinstance(texts, str)
     if not listed or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
@@ -252,7 +252,7 @@ def _objective_faults(problem: Stated) -> Iterator[Fault]:
 
 
 def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
-    """What is wrong with the name of a pattern for the polynomials of a model."""
+    """Faults of the name of a pattern for the polynomials of a model."""
     try:
         if not isinstance(name, str) or len(name) > _LONGEST:
             raise ValueError(f"{short(name)} is no pattern")
@@ -268,12 +268,12 @@ def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fa
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     accepted = (*of.names, *public_names(problem.model, of), *root_names(problem.model))
-    advice = limit_advice(unknown)
+    advice = limit_advice(suggest_name)
 
-    def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
+    def parse_faults(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
         try:
             parse(text, accepted)
-            parse(expand_names(text, of), accepted)  # which may be too long where the text is not
+            parse(expand_names(text, of), accepted)  # may be too long even if the text is not
         except UnknownName as error:
             yield Fault(f"{error.found}; {advice(error.name, problem.model, of)}", key)
         except ExpressionError as error:
@@ -283,6 +283,6 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     for sense, texts in (("minimize", [problem.minimize]), ("maximize", [problem.maximize]), ("pareto", pareto)):
         for text in texts:
             if text is not None or sense == "pareto":
-                yield from parsed(parse_value, text, "objective", sense)
+                yield from parse_faults(parse_value, text, "objective", sense)
     for name, text in problem.constraints.items():
-        yield from parsed(parse_comparison, text, "constraints", name)
+        yield from parse_faults(parse_comparison, text, "constraints", name)

@@ -20,7 +20,7 @@ from tmsopt.models.expression import Expression
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import demands_heavy_damping, depends_on_case, needs_two_sided_bounds, rewards_change_of
 from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.limit import limit_of
+from tmsopt.problem.limit import limit_value
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
 from tmsopt.program.boundary_points import lift_displacements, lift_feet
@@ -371,6 +371,6 @@ def _known(problem: Posed, values: Values) -> dict[str, float]:
 
 def numbers_of(problem: Posed) -> Mapping[str, float]:
     """Numbers that a program takes as parameters: fixed values and limits; one that is 0 shapes it instead."""
-    limits = {name + LIMIT: limit_of(text) for name, text in problem.constraints.items()}
+    limits = {name + LIMIT: limit_value(text) for name, text in problem.constraints.items()}
     every = {**problem.fixed, **limits}
     return Table({name: float(x) for name, x in every.items() if x})

@@ -17,7 +17,7 @@ from tmsopt.models import Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.evaluate import coefficients_of, evaluate
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import regular
+from tmsopt.problem.quantities import regularise
 from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.roots.patterns.pattern import Roots
@@ -343,7 +343,7 @@ def scale_of(problem: Posed) -> Scale:
     a = a[np.all(np.isfinite(a), axis=1) & np.any(a != 0, axis=1)]
     if not len(a):
         return Scale()
-    a = regular(a)
+    a = regularise(a)
     size = np.abs(roots(a))
     size = size[(size > 0) & (size < 1e100)]
     return Scale(_power_of_two(size), _power_of_two(np.abs(a[:, 0])))

@@ -8,7 +8,7 @@ import numpy as np
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import RADIUS, regular
+from tmsopt.problem.quantities import RADIUS, regularise
 from tmsopt.program.formulate import middle, variables_of
 from tmsopt.program.judgement import judge
 from tmsopt.program.nlp import NLP
@@ -83,7 +83,7 @@ def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: b
     radius = _stable_radius(nlp, problem, nominal)
     varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
     values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, varied)]
-    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
+    z = list(roots(regularise(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
     x = variables_of(problem, design)
     for lift in nlp.lifts:
         guess = lift.close if near and lift.close else lift.guess
@@ -96,7 +96,7 @@ def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: b
 def completions(nlp: NLP, problem: Posed, design: Mapping[str, float]) -> Iterator[Array]:
     """Starts from a design with every guess of what an NLP lifts, such as a pattern's unknowns."""
     values = [problem.values(problem.ordered(design))]
-    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
+    z = list(roots(regularise(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
     for guesses in product(*(lift.guess(values, z) for lift in nlp.lifts)):
         yield np.array([*variables_of(problem, design), *(x for guess in guesses for x in guess)])
 
@@ -124,7 +124,7 @@ def _merit(problem: Posed, columns: Mapping[str, Array]) -> tuple[Array, Array]:
         objective += _in_spreads(found.worth)
     if problem.pattern is not None:
         each = coefficients_of(problem, problem.ordered(columns))
-        a = regular(np.stack([np.broadcast_to(c, shape) for c in each], axis=-1))
+        a = regularise(np.stack([np.broadcast_to(c, shape) for c in each], axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
         violation += 3 * _in_spreads(np.array(mismatch))
     for excess in found.excess:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from tmsopt.evaluation.recheck import excesses, recheck
+from tmsopt.evaluation.recheck import measure_excesses, recheck
 from tmsopt.global_search.answer import Answer
 from tmsopt.global_search.tasks import FOUND, UNDECIDED
 from tmsopt.problem.cases import Case
@@ -41,7 +41,7 @@ def confirmed(design: Solution, cases: Sequence[Case], point: Mapping[str, float
     gain = gained(problem, known, seen.objective)
     if max(seen.violations.values(), default=0.0) > _NEARLY or gain < -_NEARLY:
         return Answer(UNDECIDED)  # what the solver's tolerance made of it
-    exact = problem.pattern is None and not any(excesses(problem, problem.ordered(point), cases).values())
+    exact = problem.pattern is None and not any(measure_excesses(problem, problem.ordered(point), cases).values())
     for found in _reached(problem, known, point, known is None or gain > _SURE or exact):
         if feasible(found) and gained(problem, known, found.value) > _BETTER:
             words = "branch and bound found a feasible design that the search from many starts did not"

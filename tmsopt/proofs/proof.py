@@ -19,7 +19,7 @@ from tmsopt.problem.files import Given
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import units_of
-from tmsopt.problem.verdict.stability import CROSSING, crossing_in_words
+from tmsopt.problem.verdict.stability import CROSSING, describe_crossing
 from tmsopt.program.options import AskedOfSolve, documents_options, options_of
 from tmsopt.progress import begin
 from tmsopt.proofs.existence import Existing, as_stored, beside, exactly
@@ -169,7 +169,7 @@ def prove(
     found = solve_any_status(design, how)
     problem = found.problem.posed
     if found.status != "optimal":
-        crossings = [crossing_in_words(m) for m in found.meetings if not m.exceptional]
+        crossings = [describe_crossing(m) for m in found.meetings if not m.exceptional]
         reason = f"the problem is not solved ({found.status}): there is no design to prove"
         if problem.pattern and crossings:
             reason = f"none found: where roots meet is {crossings[0]}"

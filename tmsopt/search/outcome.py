@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tmsopt.evaluation.bound import bounded, instant_bound
+from tmsopt.evaluation.bound import minimizes_abscissa, instant_bound
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.evaluation.worst_case import Worst, worst_cases
+from tmsopt.evaluation.worst_case import Worst, find_worst_cases
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
 from tmsopt.problem.freedom import degrees_of_freedom
@@ -77,7 +77,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
         return None
     notes = _find_doubts(problem, trial, checked)
     optimal = has_converged(trial) and not notes
-    if not (optimal or notes or checked.violations) and bounded(problem):  # no gradient shows it on a plateau
+    if not (optimal or notes or checked.violations) and minimizes_abscissa(problem):  # no gradient shows it on a plateau
         optimal = instant_bound(problem, checked.objective).proven
     status = "optimal" if optimal and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
@@ -116,7 +116,7 @@ def assess_design(problem: Posed, design: Mapping[str, float], note: str = "", f
         fixed: whether nothing is free, which makes it ``optimal`` instead.
     """
     parameters = problem.ordered(design)
-    cases = merge_cases(problem, worst_cases(problem, parameters) if problem.cases else {})
+    cases = merge_cases(problem, find_worst_cases(problem, parameters) if problem.cases else {})
     checked = recheck(problem, parameters, cases)
     status = "infeasible" if checked.violations else "optimal" if fixed else "not_converged"
     return Outcome(parameters, checked, status, {}, Starts(), "none", cases, notes=(note,) if note else ())

@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.boundaries.nearest import Nearest, Robustness, robustness_at
 from tmsopt.problem.cases import Case, weight_of
-from tmsopt.problem.problem import Posed, weighted
+from tmsopt.problem.problem import Posed, radius_parameters
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.formulate import formulate, middle
 from tmsopt.records import Array, Table
@@ -40,7 +40,7 @@ def climb(state: SearchState, start: Start) -> LocalEnd:
         trial = check_end(state, end)
         if trial.checked.violations:
             break
-        claimed, around = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.around
+        claimed, around = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.robustness
         if around is not None and around.radius >= claimed * (1 - state.tuning.exact_radius):
             return end
         design = trial.parameters
@@ -98,7 +98,7 @@ def _add_boundary_points(problem: Posed, points: list[Case], around: Robustness,
 
 def _make_boundary_case(problem: Posed, nearest: Nearest) -> Case:
     """A boundary point in all parameters that the radius varies, also those that are 0 in the design."""
-    names = weighted(problem.parameter_set, problem.weights, problem.fixed)
+    names = radius_parameters(problem.parameter_set, problem.weights, problem.fixed)
     return Case(direction=Table({n: nearest.direction.get(n, 0.0) for n in names}), edge=nearest.kind)
 
 
@@ -117,7 +117,7 @@ def _move_point(case: Case, k: int, trial: CheckedEnd) -> Case:
 def estimate_radii(problem: Posed, columns: Mapping[str, Array], seed: int) -> Array:
     """Upper estimates of the radii of designs, columns of free parameters: how far they stay stable along some rays."""
     of, nominal = problem.parameter_set, {n: np.asarray(x, dtype=float) for n, x in problem.ordered(columns).items()}
-    names, steps = list(weighted(of, problem.weights, problem.fixed)), np.geomspace(5e-3, 1.5, 20)
+    names, steps = list(radius_parameters(of, problem.weights, problem.fixed)), np.geomspace(5e-3, 1.5, 20)
     random = stream(seed, "rays").standard_normal((24, len(names)))
     rays = np.concatenate([np.eye(len(names)), random / np.linalg.norm(random, axis=1, keepdims=True)])
     moves = (np.concatenate([rays, -rays])[:, None] * steps[:, None]).reshape(-1, len(names))  # (moves, names)

@@ -9,10 +9,10 @@ from typing import Unpack
 
 from tmsopt.boundaries import is_exactly_multiple, stands_on
 from tmsopt.evaluation.digits import certified_numbers
-from tmsopt.evaluation.exclusion import known_bound
+from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
-from tmsopt.evaluation.stored import held, missed_note
-from tmsopt.evaluation.worst_case import cover
+from tmsopt.evaluation.stored import find_storable_design, missed_note
+from tmsopt.evaluation.worst_case import prove_worst_case
 from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, remove_rounding, user_structure_name
 from tmsopt.problem.dependence import sense_notes
 from tmsopt.problem.files import Given, as_solvable
@@ -170,7 +170,7 @@ def add_cover(solution: Solution) -> Solution:
     problem = solution.problem.posed
     if solution.status != "optimal" or solution.cover or not (problem.scenarios or problem.tolerances):
         return solution
-    return replace(solution, cover=cover(problem, solution.parameters, solution.abscissa))
+    return replace(solution, cover=prove_worst_case(problem, solution.parameters, solution.abscissa))
 
 
 def solve_if_needed(design: Given, progress: Listener | None) -> Solution:
@@ -292,7 +292,7 @@ def _assemble(
     began: float,
     bound: bool = True,
 ) -> Solution:
-    parameters, checked, lost = held(problem, outcome.parameters, outcome.checked, outcome.cases)
+    parameters, checked, lost = find_storable_design(problem, outcome.parameters, outcome.checked, outcome.cases)
     outcome = replace(outcome, parameters=parameters, checked=checked)
     numbers = certified_numbers(problem, outcome.parameters, checked, outcome.cases)
     confirmed = math.isclose(numbers.value, checked.objective, rel_tol=_SAME_VALUE, abs_tol=_SAME_VALUE)
@@ -315,7 +315,7 @@ def _assemble(
         active=Table(outcome.active),
         violations=checked.amounts,
         missed=Table(lost),
-        bound=known_bound(problem, outcome.status, numbers.value) if bound else Bound(),
+        bound=bound_without_search(problem, outcome.status, numbers.value) if bound else Bound(),
         starts=outcome.starts,
         seconds=time.perf_counter() - began,
         quantities=numbers.quantities,

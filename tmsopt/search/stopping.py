@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from tmsopt.evaluation.bound import bounded, closed, instant_bound
+from tmsopt.evaluation.bound import instant_bound, is_gap_closed, minimizes_abscissa
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.searches import Starts
 from tmsopt.search.state import LocalEnd, SearchState, coefficients_at, same_objective
@@ -47,11 +47,11 @@ def is_hopeless(state: SearchState) -> bool:
 def is_proven(state: SearchState, end: LocalEnd) -> bool:
     """Whether an end reaches a proven bound; tested only where all roots have nearly the same modulus."""
     problem = state.part
-    if not (end.feasible and bounded(problem)):
+    if not (end.feasible and minimizes_abscissa(problem)):
         return False
     a = coefficients_at(problem, end.nlp, end.run)[0]
     own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
-    near = closed(end.objective - own, own, end.nlp.size)
+    near = is_gap_closed(end.objective - own, own, end.nlp.size)
     return near and instant_bound(problem, end.objective).proven
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.evaluation.worst_case import Worst, worst_cases
+from tmsopt.evaluation.worst_case import Worst, find_worst_cases
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
@@ -35,7 +35,7 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
             return None
         if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
             break  # the current cases are not met
-        worst = worst_cases(problem, trial.parameters)
+        worst = find_worst_cases(problem, trial.parameters)
         more = [*_find_uncovered_cases(problem, trial, worst), *_find_nearer_boundary(trial, tuning.nearer)]
         if not more:
             break
@@ -53,7 +53,7 @@ def cover_cases(state: SearchState, policy: Policy) -> Outcome | None:
     if state.best is None:
         return None
     cases = state.best.end.nlp.cases
-    listed = merge_cases(problem, worst or worst_cases(problem, state.best.parameters))
+    listed = merge_cases(problem, worst or find_worst_cases(problem, state.best.parameters))
     return assess_best(state, starts, (*cases, *(c for c in listed if c not in cases)))
 
 
@@ -69,11 +69,11 @@ def _is_worse_than_leaders(state: SearchState, leaders: Sequence[Mapping[str, fl
     return reached > known and not same_objective(reached, known, state.nlp.size, state.tuning.same)
 
 
-def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, Worst]) -> list[Case]:
+def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, find_worst_cases: Mapping[str, Worst]) -> list[Case]:
     """Cases in which the design is worse than in all cases that it was made for."""
     more: list[Case] = []
     known = trial.checked
-    for name, worst in worst_cases.items():
+    for name, worst in find_worst_cases.items():
         match name:
             case "abscissa":
                 excess = worst.value - known.structure.abscissa
@@ -93,7 +93,7 @@ def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mappin
 
 def _find_nearer_boundary(trial: CheckedEnd, least: float) -> list[Case]:
     """The direction in which stability is lost before the radius that the design claims."""
-    around, nlp = trial.checked.around, trial.end.nlp
+    around, nlp = trial.checked.robustness, trial.end.nlp
     if around is None or RADIUS not in nlp.variables:
         return []
     claimed = float(trial.point.x[nlp.variables.index(RADIUS)])

@@ -16,11 +16,11 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 from tmsopt.errors import LISTED, Fault, InputError, count_faults, escape_unprintable, is_number, short, suggest
 from tmsopt.files import read_lines
 from tmsopt.problem.files import as_solvable, problem_from_tables
-from tmsopt.problem.freedom import question_faults
+from tmsopt.problem.freedom import find_question_faults
 from tmsopt.problem.problem import Posed, Problem
-from tmsopt.problem.toml import Key, Number, Page, Section, read_page, validate_tables, within
+from tmsopt.problem.toml import Key, Number, Page, Section, prefix_keys, read_page, validate_tables
 from tmsopt.problem.unit_system import dimension_of, si_units
-from tmsopt.problem.units import TABLES, numbers, with_unit
+from tmsopt.problem.units import TABLES, parse_quantity, read_numbers
 from tmsopt.program.options import STARTS
 from tmsopt.records import Column
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
@@ -116,7 +116,7 @@ def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
     message = f"found {short(value)}; accepted: a finite number"
     if isinstance(value, str) and len(faults) <= LISTED:  # no unit is looked up where it is only counted
         try:
-            return with_unit(value, unit)
+            return parse_quantity(value, unit)
         except ValueError as error:
             message = str(error)
     faults.append(Fault(message, key))
@@ -224,7 +224,7 @@ def _cell(cell: str, unit: str) -> float:
         raise ValueError("an empty cell; accepted: a number in every cell")
     if not unit:
         raise ValueError(f"found {short(cell)}; accepted: a finite number")
-    return with_unit(cell, unit)
+    return parse_quantity(cell, unit)
 
 
 _GOES_WITH: Mapping[Key, tuple[tuple[str, ...], str]] = {
@@ -340,12 +340,12 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
     options, posed = written.study, problem.posed
     faults += [
         *_method_faults(written, {f.key for f in faults}),
-        *within("study", common_faults(posed, options.seed, options.starts, options.report)),
+        *prefix_keys("study", common_faults(posed, options.seed, options.starts, options.report)),
     ]
     read: dict[str, Any] = {}
     if options.method == "monte_carlo":
         given = dict[str, Any].fromkeys(TABLES) | {"tolerances": written.tolerances}
-        tables, _, _, unreadable = numbers(given, posed.parameter_set)
+        tables, _, _, unreadable = read_numbers(given, posed.parameter_set)
         read, faults = tables["tolerances"], faults + unreadable
     elif options.method == "csv" and options.csv:
         read = _read_rows(page, options.csv, posed, faults)
@@ -372,7 +372,7 @@ def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
     stated = page.data.get("problem")
     if isinstance(stated, dict):
         found, problem = problem_from_tables(stated, str(page.data.get("title", "")).strip() or title)
-        faults += within("problem", [*found, *(question_faults(problem.posed) if problem else ())])
+        faults += prefix_keys("problem", [*found, *(find_question_faults(problem.posed) if problem else ())])
         return problem
     if isinstance(stated, str):  # anything else is reported as a fault of shape
         try:

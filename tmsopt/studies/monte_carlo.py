@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tmsopt.errors import Fault, InputError, count_faults, is_number, limit_advice, short, suggest, text_faults
 from tmsopt.files import as_path
 from tmsopt.problem.files import Given, pose
-from tmsopt.problem.freedom import question_faults
+from tmsopt.problem.freedom import find_question_faults
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
@@ -66,7 +66,7 @@ class Sampling:
         object.__setattr__(self, "problem", problem.problem)
         if not self.tolerances:
             object.__setattr__(self, "tolerances", problem.tolerances)
-        found = [*question_faults(problem), *_tolerance_faults(problem, self.tolerances)]
+        found = [*find_question_faults(problem), *_tolerance_faults(problem, self.tolerances)]
         found += [*common_faults(problem, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
         found += count_faults("rows", self.rows, 1, MOST_ROWS)
         if self.distribution not in DISTRIBUTIONS:

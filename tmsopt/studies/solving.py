@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from tmsopt.errors import InputError
-from tmsopt.evaluation.columns import BLOCK, judgeable, verdicts
+from tmsopt.evaluation.columns import BLOCK, can_evaluate_columns, evaluate_columns
 from tmsopt.evaluation.law_rows import law_rows
 from tmsopt.models import tms
 from tmsopt.problem.solution import Solution
@@ -194,7 +194,7 @@ _JUDGED = ("objective", "abscissa", "damping_ratio", "bound", "gap", "oscillates
 def applies(study: Study) -> bool:
     """Whether rows of a study may be judged at once: only fixed parameters vary, and nothing is free."""
     names = study.problem.posed.parameter_set.names
-    return not study.warm and judgeable(study.problem.posed) and all(name in names for name in study.columns)
+    return not study.warm and can_evaluate_columns(study.problem.posed) and all(name in names for name in study.columns)
 
 
 def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
@@ -206,7 +206,9 @@ def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
     given = {name: np.asarray(column) for name, column in study.columns.items()}
     for first in range(0, len(numbers), BLOCK):
         began, some = time.perf_counter(), numbers[first : first + BLOCK]
-        found = verdicts(study.problem.posed, {name: column[some] for name, column in given.items()}, study.report)
+        found = evaluate_columns(
+            study.problem.posed, {name: column[some] for name, column in given.items()}, study.report
+        )
         if found is None:
             return
         if found.certain.any():

@@ -23,8 +23,8 @@ from tmsopt.errors import (
 from tmsopt.models.expression import ExpressionError
 from tmsopt.problem.cases import Band
 from tmsopt.problem.files import Given, pose
-from tmsopt.problem.freedom import question_faults
-from tmsopt.problem.limit import limit_of, with_limit
+from tmsopt.problem.freedom import find_question_faults
+from tmsopt.problem.limit import limit_value, replace_limit
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.program.options import STARTS
 from tmsopt.records import Array, Column, Table
@@ -120,7 +120,7 @@ class Study:
             if not stem:
                 fixed[name] = value
             elif end == "limit":
-                constraints[stem] = with_limit(constraints[stem], value)
+                constraints[stem] = replace_limit(constraints[stem], value)
             else:
                 low, high = free[stem]
                 free[stem] = (value, high) if end == "min" else (low, value)
@@ -230,7 +230,7 @@ def faults(study: Stated) -> Iterator[Fault]:
         message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
         yield Fault(message, ("problem",))
         return
-    yield from (Fault(f.message, ("problem", *f.key)) for f in question_faults(study.problem.posed))
+    yield from (Fault(f.message, ("problem", *f.key)) for f in find_question_faults(study.problem.posed))
     if isinstance(study.columns, Mapping):
         yield from _column_faults(study)
     else:
@@ -243,7 +243,7 @@ def variable_names(problem: Posed) -> tuple[str, ...]:
     """What may vary from row to row of a study of a problem."""
     fixed = tuple(n for n in problem.parameter_set.names if n in problem.fixed and n not in problem.scenarios)
     ends = tuple(f"{n}.{end}" for n in problem.parameter_set.names if n in problem.free for end in ("min", "max"))
-    limits = tuple(f"{n}.limit" for n, text in problem.constraints.items() if limit_of(text) is not None)
+    limits = tuple(f"{n}.limit" for n, text in problem.constraints.items() if limit_value(text) is not None)
     return fixed + ends + limits
 
 

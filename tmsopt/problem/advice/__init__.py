@@ -1,5 +1,5 @@
-"""What to write instead: words for names and lines of a file that cannot be used.
+"""Suggests what to write instead of a wrong name, key or line, and which limits to relax.
 
-In: the text as written. Out: the end of a sentence that says what to write, empty where nothing is known. Open `names`
-first: every name that an expression may use, with its meaning.
+In: the text as written. Out: the end of an error message, empty without a suggestion. Open `names` first: every name
+that an expression may use, with its meaning.
 """

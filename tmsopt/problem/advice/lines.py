@@ -1,15 +1,15 @@
-"""What was meant by a line that is not TOML."""
+"""Suggests what to write instead of a line that is not TOML."""
 
 import re
 
 _QUOTED = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'")
 _NUMBER = r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?"
 _PAIRS = {"[": "]", "{": "}"}
-_LONGEST = 1000  # characters of a line; how one is read takes time by the square of them
+_LONGEST = 1000  # characters of a line, since matching takes quadratic time
 
 
-def line_advice(line: str) -> str:  # noqa: PLR0911 - one per case
-    """The end of a sentence that says what to write for a line that is refused; empty where that is not known."""
+def suggest_line(line: str) -> str:  # noqa: PLR0911 - one per case
+    """The end of an error message that says what to write; empty without a suggestion."""
     if len(line) > _LONGEST:
         return ""
     bare = _QUOTED.sub('""', line).split("#")[0]  # nothing inside quotes is at fault
@@ -21,7 +21,7 @@ def line_advice(line: str) -> str:  # noqa: PLR0911 - one per case
     if share := re.search(rf"=\s*({_NUMBER})\s*%", bare):
         return f"; write {float(share[1]) / 100:.12g} for {share[1]} %"
     if re.search(rf"=\s*(?:{_NUMBER}\s*[+-]\s*)?{_NUMBER}[ij]\s*([,}}]|$)", bare):
-        return "; parameters are real: write the parts of a complex one as two, kr + 1j*ki in H"
+        return "; parameters are real: write a complex number as two of them, kr + 1j*ki in H"
     if unit := re.search(rf"=\s*({_NUMBER}\s*[A-Za-z°µμ][\w°²/^*]*)\s*([,}}]|$)", bare):
         return f'; write a number with a unit in quotes: "{unit[1].strip()}"'
     for opening, closing in _PAIRS.items():

@@ -1,4 +1,4 @@
-"""Every name that an expression may use, with its meaning, and what was meant by one that is not among them."""
+"""Lists every name that an expression may use, with its meaning, and suggests one for an unknown name."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -10,16 +10,20 @@ from tmsopt.models.tables import read_table
 from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 
-_NEAR = 0.7  # of a misspelt word; what is less alike is looked for among the meanings first
+_NEAR = 0.7  # similarity of a misspelt name; below it, meanings are searched first
 
-_USUAL = ((1.0, 0.5, 2.0), (-1.0, -2.0, -0.5), (0.5, 0.2, 1.0))  # a value with a range about it, the first that fits
+_EXAMPLES = (
+    (1.0, 0.5, 2.0),
+    (-1.0, -2.0, -0.5),
+    (0.5, 0.2, 1.0),
+)  # value, least, greatest; the first valid one is used
 
 
 def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity]:
     """Every name that an expression may use, in the order of the documentation."""
     native = () if of is model.sets[0] else model.sets[0].parameters
     known: dict[str, Parameter | Quantity] = {
-        n: Quantity(n, "", _power(model.degree - k), f"a_{{{k}}}", itemgetter(n))
+        n: Quantity(n, "", _coefficient_meaning(model.degree - k), f"a_{{{k}}}", itemgetter(n))
         for k, n in enumerate(model.coefficient_names())
     }
     derived = (*model.quantities, *of.quantities, *ROOT_QUANTITIES, NO_RADIUS)
@@ -29,18 +33,18 @@ def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity
     return {name: known[name] for name in (*of.names, *public_names(model, of), *root_names(model))}
 
 
-def _power(k: int) -> str:
+def _coefficient_meaning(k: int) -> str:
     what = "constant coefficient" if k == 0 else f"coefficient of s^{k}" if k > 1 else "coefficient of s"
     return f"{what} in the characteristic polynomial"
 
 
-def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:
-    """What to write for a name that is none: the nearest by spelling, or the one that means it."""
+def suggest_name(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:
+    """Suggest a name for an unknown one, by spelling or by meaning."""
     if name in model.absent:
         return model.absent[name]
     if name == "s" and accepted is None:
         return f"s is the eigenvalue: write abscissa for the largest Re s, {ANGULAR_FREQUENCY} for the largest |Im s|"
-    if meaning := _elsewhere(name, model):
+    if meaning := _suggest_model(name, model):
         return meaning
     known = vocabulary(model, of)
     names = list(known if accepted is None else accepted)
@@ -53,24 +57,24 @@ def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] |
     return suggest(name, names)
 
 
-def _elsewhere(name: str, model: Model) -> str:
-    """What to write for a name that another bicycle knows."""
+def _suggest_model(name: str, model: Model) -> str:
+    """Suggest the bicycle model that has a name; empty if none has."""
     for other in MODELS.values() if model.name in MODELS else ():
         known = {p.name: p.meaning for s in other.sets for p in s.parameters}
         known |= {q.name: q.meaning for q in (*other.quantities, *(q for s in other.sets for q in s.quantities))}
         if other.name != model.name and name in known:
-            return f'model = "{other.name}" has it ({known[name]}), {model.name} has not'
+            return f'model = "{other.name}" has it ({known[name]}), {model.name} does not'
     return ""
 
 
 def example_of(parameter: Parameter) -> tuple[str, str]:
-    """A value of a parameter, and a range, as a file would write them: such as the parameter may have."""
-    value, low, high = next(u for u in _USUAL if all(x in parameter.range for x in u))
+    """A valid value and a valid range of a parameter, as lines of a file."""
+    value, low, high = next(u for u in _EXAMPLES if all(x in parameter.range for x in u))
     return f"{parameter.name} = {value}", f"{parameter.name} = {{ min = {low:g}, max = {high:g} }}"
 
 
-def unknown_key(key: str, accepted: Mapping[str, object], section: str = "file") -> str:
-    """What to write for a key that a section, or the file itself, does not have."""
+def suggest_key(key: str, accepted: Mapping[str, object], section: str = "file") -> str:
+    """Suggest a key for an unknown one of a section or of the file itself."""
     meant = read_table("advice")["keys"][section].get(key.lower())
     written = f"write {f'[{meant}]' if section == 'file' else meant}; " if meant else ""
     return written + suggest(key, accepted)

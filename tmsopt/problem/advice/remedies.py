@@ -1,4 +1,4 @@
-"""What would free a problem without an answer: limits moved as a file would write them, and the speed that it takes."""
+"""Remedies for infeasible problems: relaxed limits as a file would write them, and the required speed."""
 
 import math
 from collections.abc import Mapping
@@ -12,24 +12,24 @@ from tmsopt.problem.unit_system import unit_of
 from tmsopt.records import Table, plain
 
 DIGITS = 5
-"""Significant digits of a limit that is to be written."""
+"""Significant digits of a suggested limit."""
 
-_LEFT = 1e-11  # of a limit: what rounding, also that of amounts upwards, leaves of it
+_LEFT = 1e-11  # a moved limit below this share of the old one is 0 up to rounding
 
 
 @dataclass(frozen=True)
 class Relaxation:
-    """The smallest move of limits that leaves a feasible design.
+    """The smallest relaxation of limits that makes a problem feasible.
 
     Attributes:
-        parameters: a design that is feasible once the limits are moved.
-        amounts: limit → how far it is moved, in its own units; signed for an equality, else towards what it forbids.
-        conflict: limits that no design was found to meet together in the box, and ends beyond which the others are met.
-        alone: limit → how far it must be moved if it is the only one, where the problem with it was solved again.
-        irreducible: whether designs were found that meet the others without any one of the conflict, and a whole search
-            found none for it; never where limits about the roots leave a0 free to vanish, for needles hide there.
-        remedies: limits as a file would write them, each set enough: the problem was solved again with it, and where
-            stability is wanted the answer is stable. The smallest change comes first; none where none was found.
+        parameters: a design that is feasible with the relaxed limits.
+        amounts: limit → how far it is relaxed, in its own units; signed for an equality.
+        conflict: limits that no design was found to meet together, and ends of ranges beyond which the others are met.
+        alone: limit → how far it must move if it is the only one; confirmed by solving again.
+        irreducible: whether dropping any one limit of the conflict gives a design that meets the others, while a full
+            search found none for all; never if limits on the roots let a0 vanish, since narrow regions may hide there.
+        remedies: sets of limits as a file would write them, smallest change first. Each is sufficient: the problem was
+            solved again with it, and the answer is stable if stability is wanted. Empty if none was found.
     """
 
     parameters: Table[float] = Table()
@@ -45,16 +45,16 @@ class Relaxation:
 
 
 @dataclass(frozen=True)
-class Need:
-    """What a parameter that is fixed, or held below or above it, would have to be for a design that meets all else.
+class RequiredValue:
+    """The value of a fixed or bounded parameter that allows a design to meet every other limit.
 
     Attributes:
-        parameter: such as the speed; everything else may move as the problem says.
-        value: the nearest at which such a design was found; nan where none was.
-        most: whether it is a greatest value, and not a least one.
-        looked: from where to where it was looked for.
-        design: every parameter of that design; empty where none was found.
-        shown: the value rounded to where designs are, at which the problem was solved again.
+        parameter: its name, such as the speed; the other parameters vary as the problem says.
+        value: the nearest value with such a design; nan if none was found.
+        most: whether it is the greatest such value; otherwise it is the least.
+        looked: the range that was searched.
+        design: every parameter of that design; empty if none was found.
+        shown: the value rounded to the feasible side; the problem was solved again there.
     """
 
     parameter: str
@@ -66,36 +66,37 @@ class Need:
 
     @property
     def found(self) -> bool:
-        """Whether there is such a value."""
+        """Whether such a value was found."""
         return math.isfinite(self.value)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; a value that was not found is None."""
+        """Plain data for ``json.dumps``; a missing value is None."""
         return plain(self, "parameter value shown most looked design")
 
 
-def rounded_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
-    """A number rounded up, or down, to significant digits; 0 for what is no number."""
+def round_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
+    """Round a number up or down to significant digits; 0 if it is not finite."""
     if not x or not math.isfinite(x):
         return 0.0
     step = 10.0 ** (math.floor(math.log10(abs(x))) - digits + 1)
     return (math.ceil if up else math.floor)(round(x / step, 6)) * step
 
 
-def moved_limits(problem: Posed, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
-    """Limits moved by amounts, as a file would write them, rounded so that they suffice.
+def move_limits(problem: Posed, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
+    """Move limits by amounts and write them as a file would, rounded outwards.
 
-    Of an end of a range, such as ``v.max``, the number with its unit; of a constraint its whole text, in which numbers
-    have no units.
+    Returns:
+        Name → text: a number with its unit for an end of a range, such as ``v.max``; a whole comparison for a
+        constraint, in which numbers have no units.
     """
-    return {name: _moved(problem, name, amount, digits) for name, amount in amounts.items()}
+    return {name: _move_limit(problem, name, amount, digits) for name, amount in amounts.items()}
 
 
-def with_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
-    """The problem with limits as they are written.
+def replace_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
+    """The problem with other limits, written as by `move_limits`.
 
     Raises:
-        InputError: for an end that its parameter cannot have.
+        InputError: for an end outside the physical range of its parameter.
     """
     ends: dict[str, Any] = dict(problem.free)
     for name, text in written.items():
@@ -107,18 +108,20 @@ def with_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
     return replace(problem.problem, constraints=kept, free=ends, start={}).posed
 
 
-def _moved(problem: Posed, name: str, amount: float, digits: int) -> str:
+def _move_limit(problem: Posed, name: str, amount: float, digits: int) -> str:
     if name not in problem.constraints:
         parameter, _, end = name.rpartition(".")
         up, unit = end == "max", unit_of(problem, name)
-        new = rounded_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
+        new = round_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
         return f"{new:.{DIGITS}g} {unit.text}".rstrip()
     text = problem.constraints[name]
     left, sign, right = written_sides(text)
     limit = split_limit(text)
     if limit is None:
-        more = rounded_outwards(abs(amount), True, digits)
+        more = round_outwards(abs(amount), True, digits)
         return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {more:.{DIGITS}g}"
     change = -amount if (sign == ">=") == bool(limit.before) else amount
     new, left_of_it = limit.value + change, _LEFT * abs(limit.value)
-    return limit.written(f"{rounded_outwards(new, change > 0, digits) if abs(new) > left_of_it else 0.0:.{DIGITS}g}")
+    return limit.replace_number(
+        f"{round_outwards(new, change > 0, digits) if abs(new) > left_of_it else 0.0:.{DIGITS}g}"
+    )

@@ -1,6 +1,6 @@
-"""Searches from many starts as data: how they ended, and what that tells of optima that were not met.
+"""Estimates how many optima a search from many starts has missed.
 
-In: numbers of searches, and of the different optima that they ended in. Out: estimates with a theory. Open `starts`.
+In: the number of searches and of different optima found. Out: statistical estimates. Open `starts`.
 """
 
 from tmsopt.problem.searches.starts import Starts, expected_unseen, expects_few_better

@@ -1,27 +1,26 @@
-"""How starts ended, and what that tells of optima that no start met."""
+"""Counts how starts ended, and estimates how many optima no start found."""
 
 import math
 from dataclasses import dataclass
 
-_BETTER = 0.2  # optima that are better than the best one met and not met yet, expected where a search may end
-_LIKELY = 0.5  # the same, from which one is likely
-_MORE = 2  # starts of the solver beyond the optima met: those that only lead there have not shown any other
+_BETTER = 0.2  # a search may end if no more unseen better optima are expected
+_LIKELY = 0.5  # a better optimum is likely if more are expected
+_EXTRA_RUNS = 2  # least number of solver runs above the number of optima found
 
 
 def expected_unseen(searches: int, optima: int) -> float:
-    """Optima not met yet, expected after so many searches ended in so many different ones: w (w + 1)/(n − w − 2).
+    """Expected number of optima not found yet, w (w + 1)/(n − w − 2), after n searches that found w different ones.
 
-    Boender and Rinnooy Kan (1987), for searches from random starts, whatever the shares of the basins. inf where the
-    searches are too few to tell.
+    Valid for random starts and any sizes of the basins (Boender and Rinnooy Kan 1987); inf if n is too small.
     """
     rest = searches - optima - 2
     return optima * (optima + 1) / rest if rest > 0 else math.inf
 
 
 def expects_few_better(searches: int, optima: int, most: float = _BETTER) -> bool:
-    """Whether few enough optima are expected that no search met and that are better than all w that were.
+    """Whether at most `most` unseen optima better than all found are expected.
 
-    Where each rank is as likely as another, one of w + 1 is the best.
+    Each unseen optimum is the best with probability 1/(w + 1), if all ranks are equally likely.
     """
     return expected_unseen(searches, optima) <= most * (optima + 1)
 
@@ -30,12 +29,12 @@ def expects_few_better(searches: int, optima: int, most: float = _BETTER) -> boo
 class Starts:
     """How many starts were tried, converged to a feasible point, and ended at the best one.
 
-    A design of a sample counts as a start, if a way down leads from it to where another start ended.
+    A sampled design counts as a start if a descent leads from it to where another start ended.
 
     Attributes:
-        optima: values of the objective, or places, that starts ended at.
-        looked: designs of the box that were looked at beside, to know where to start, and whether any is better.
-        runs: starts from which the solver was run.
+        optima: different values of the objective, or places, where starts ended.
+        looked: further designs that were sampled, to choose starts and to check that none is better.
+        runs: starts from which the solver ran.
 
     Example:
         >>> starts = tmsopt.solve("problems/ep4.toml").starts
@@ -54,21 +53,21 @@ class Starts:
 
     @property
     def expected_unseen(self) -> float:
-        """Optima that no start met, as estimated; inf where the starts are too few to tell."""
+        """Estimated number of optima that no start found; inf if there are too few starts."""
         return expected_unseen(self.converged, self.optima)
 
     def suffice(self, alone: int = 0) -> bool:
-        """Whether few better optima are to be expected: where a search ends, and may be sure of its answer.
+        """Whether so few better optima are expected that a search may end.
 
         Args:
-            alone: designs that may lie in basins of their own, to be counted as searches and as optima.
+            alone: designs that may lie in basins of their own; they count as searches and as optima.
         """
-        enough = self.runs >= self.optima + _MORE
+        enough = self.runs >= self.optima + _EXTRA_RUNS
         return enough and expects_few_better(self.converged + alone, self.optima + alone)
 
     @property
     def sureness(self) -> tuple[str, ...]:
-        """How sure it is, unless proved, that the best one met is the best there is; none where nothing was started.
+        """Phrases on how certain the best optimum is if it is not proved; none without starts.
 
         Example:
             >>> tmsopt.Starts(tried=64, converged=64, at_best=1, optima=30, runs=64).sureness

@@ -1,4 +1,4 @@
-"""Units: text such as "40 cm" as a number, the unit of an expression, times and frequencies that roots stand for.
+"""Units: numbers from text such as "40 cm", the unit of an expression, decay times and frequencies of roots.
 
 In: texts, numbers, parameter sets. Out: numbers in the parameters' own units, and names of units. Open `text` first.
 """

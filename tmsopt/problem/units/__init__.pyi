@@ -1,9 +1,10 @@
 from .dimensions import Dimension as Dimension, dimension as dimension
 from .readings import (
     Reading as Reading, decay_time as decay_time, frequencies as frequencies, growth_time as growth_time,
-    reading as reading, readings as readings,
+    convert_to_reading as convert_to_reading, readings as readings,
 )
-from .tables import TABLES as TABLES, numbers as numbers
+from .tables import TABLES as TABLES, read_numbers as read_numbers
 from .text import (
-    USUAL as USUAL, by_pint as by_pint, factor as factor, read as read, with_unit as with_unit,
+    USUAL as USUAL, parse_exact_quantity as parse_exact_quantity, parse_quantity as parse_quantity,
+    pint_factor as pint_factor, unit_factor as unit_factor,
 )

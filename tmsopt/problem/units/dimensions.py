@@ -1,4 +1,4 @@
-"""Dimensions of numbers, so that the unit of an expression follows from the units of what it names."""
+"""Dimensional analysis: the unit of an expression from the units of its names."""
 
 import math
 import re
@@ -17,9 +17,9 @@ _POWERS = re.compile(r"(?P<name>[^\s/^*]+)(\^(?P<power>-?\d+))?")
 
 @dataclass(frozen=True)
 class Dimension:
-    """Base units with their powers, in the order of the alphabet; of what has none, the number that it is, if known.
+    """Base units with their powers in alphabetical order, and the value of a constant without units.
 
-    In sums, what has no unit takes that of the rest. Two different units in a sum leave none, whatever is added.
+    In a sum, terms without a unit take the unit of the others. Two different units make it `mixed`, without a unit.
     """
 
     powers: tuple[tuple[str, Fraction], ...] = ()
@@ -28,22 +28,22 @@ class Dimension:
 
     @classmethod
     def of(cls, unit: str) -> "Dimension":
-        """That of a unit, such as ``kg m^2`` or ``1/s``."""
+        """The dimension of a unit such as ``kg m^2`` or ``1/s``."""
         parts = zip((1, -1), (_DERIVED.get(unit, unit) + "/").split("/"), strict=False)
         each = [(one, sign) for sign, part in parts for one in _POWERS.finditer(part) if one["name"] != "1"]
-        return _product(*((cls(((one["name"], Fraction(1)),)), sign * int(one["power"] or 1)) for one, sign in each))
+        return _multiply(*((cls(((one["name"], Fraction(1)),)), sign * int(one["power"] or 1)) for one, sign in each))
 
     @property
     def unit(self) -> str:
-        """As text; ``1`` for none."""
-        above = " ".join(_power(n, p) for n, p in self.powers if p > 0)
-        below = " ".join(_power(n, -p) for n, p in self.powers if p < 0)
+        """The unit as text; ``1`` without one."""
+        above = " ".join(_power_text(n, p) for n, p in self.powers if p > 0)
+        below = " ".join(_power_text(n, -p) for n, p in self.powers if p < 0)
         text = f"{above or '1'}/{below}" if below else above or "1"
         return _NAMED.get(text, text)
 
 
-def _product(*factors: tuple[Dimension, Fraction | int]) -> Dimension:
-    """Of dimensions, each to a power."""
+def _multiply(*factors: tuple[Dimension, Fraction | int]) -> Dimension:
+    """The product of dimensions, each raised to a power."""
     if any(factor.mixed for factor, _ in factors):
         return Dimension(mixed=True)
     found: dict[str, Fraction] = {}
@@ -53,14 +53,14 @@ def _product(*factors: tuple[Dimension, Fraction | int]) -> Dimension:
     return Dimension(tuple(sorted((n, p) for n, p in found.items() if p)))
 
 
-def _raised(base: Dimension, exponent: Dimension) -> Dimension:
-    """A power; by an exponent that is no number, none."""
+def _raise_power(base: Dimension, exponent: Dimension) -> Dimension:
+    """A power of a dimension; no unit if the exponent is not constant."""
     if not math.isfinite(exponent.number):
         return Dimension()
-    return _product((base, Fraction(exponent.number).limit_denominator(12)))
+    return _multiply((base, Fraction(exponent.number).limit_denominator(12)))
 
 
-def _sum(*terms: Dimension) -> Dimension:
+def _add(*terms: Dimension) -> Dimension:
     known = {term.powers for term in terms if term.powers}
     mixed = len(known) > 1 or any(term.mixed for term in terms)
     return Dimension(() if mixed or not known else known.pop(), mixed)
@@ -68,25 +68,25 @@ def _sum(*terms: Dimension) -> Dimension:
 
 UNITS = Kind(
     {
-        **dict.fromkeys(("add", "sub", "neg", "abs", "min", "max"), _sum),
-        "mul": lambda a, b: _product((a, 1), (b, 1)),
-        "div": lambda a, b: _product((a, 1), (b, -1)),
-        "square": lambda a: _product((a, 2)),
-        "sqrt": lambda a: _product((a, Fraction(1, 2))),
-        "pow": _raised,
+        **dict.fromkeys(("add", "sub", "neg", "abs", "min", "max"), _add),
+        "mul": lambda a, b: _multiply((a, 1), (b, 1)),
+        "div": lambda a, b: _multiply((a, 1), (b, -1)),
+        "square": lambda a: _multiply((a, 2)),
+        "sqrt": lambda a: _multiply((a, Fraction(1, 2))),
+        "pow": _raise_power,
         **dict.fromkeys(("sin", "cos", "tan", "exp", "log"), lambda a: Dimension()),
         **dict.fromkeys(("asin", "acos", "atan"), lambda a: Dimension.of("rad")),
     },
     lambda x: Dimension(number=float(as_double(x))),
 )
-"""What operations make of dimensions."""
+"""Operations on dimensions."""
 
 
-def _power(name: str, p: Fraction) -> str:
+def _power_text(name: str, p: Fraction) -> str:
     return name if p == 1 else f"{name}^{p}" if p.denominator == 1 else f"{name}^({p})"
 
 
 def dimension(expression: Expression, units: Mapping[str, str]) -> Dimension:
-    """What a value has units of, for the units of what it names; of a comparison, of both sides."""
+    """The dimension of an expression, or of both sides of a comparison, for the units of its names."""
     found: Dimension = expression.of({n: Dimension.of(units.get(n, "1")) for n in expression.names}, UNITS)
     return found

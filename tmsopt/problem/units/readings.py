@@ -1,4 +1,4 @@
-"""Numbers in SI as a builder reads them, and the times that roots stand for."""
+"""Readings: numbers in mm, km/h and degrees, and the decay times and frequencies of roots."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -8,23 +8,23 @@ from typing import Any
 from tmsopt.models import ParameterSet
 
 Reading = float | tuple[float, ...]
-"""A number, or one for each of several roots; nan where it does not exist."""
+"""A number, or one per root; nan if undefined."""
 
 _READ_IN = MappingProxyType({"m": ("mm", 1000), "m/s": ("km/h", 18), "rad": ("deg", 180)})
 
 
 _TIMES = ("decay_rate", "decay_time", "frequency")
-"""Quantities that are readings themselves."""
+"""Quantities that are readings already."""
 
 READ_DIGITS = 15
-"""Digits of a reading in another unit: what was written as 15 km/h reads 15 again, not what roundings made of it."""
+"""Digits of a converted reading, so that 15 km/h reads 15 again despite rounding."""
 
 
-def read_in(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
-    """A number in SI as a builder reads it: in mm, km/h and degrees, others as they are.
+def convert_exactly(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
+    """Convert an SI number of any kind to mm, km/h or degrees; other units stay.
 
     Returns:
-        The number, of any kind; its unit; and the decimal digits to round it to, 0 where it is not converted.
+        The number, its unit, and the decimal digits to round it to: 0 if it was not converted.
     """
     if unit not in _READ_IN:
         return value, unit, 0
@@ -32,9 +32,9 @@ def read_in(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
     return value * factor / {"mm": 1, "km/h": 5, "deg": pi}[name], name, READ_DIGITS
 
 
-def reading(value: float, unit: str) -> tuple[float, str]:
-    """A number in SI as a builder reads it, with its unit, to 15 digits where it is converted."""
-    value, unit, digits = read_in(value, unit)
+def convert_to_reading(value: float, unit: str) -> tuple[float, str]:
+    """Convert an SI number to mm, km/h or degrees with 15 digits; other units stay."""
+    value, unit, digits = convert_exactly(value, unit)
     return float(f"{value:.{digits}g}") if digits else value, unit
 
 
@@ -43,7 +43,7 @@ def decay_time(abscissa: Any, rate: Any) -> Any:
 
     Args:
         abscissa: largest real part of the roots, dimensionless.
-        rate: how many 1/s a rate of 1 is (`ParameterSet.rate`).
+        rate: a dimensionless rate of 1 in 1/s (`ParameterSet.rate`).
     """
     return 1 / (-abscissa * rate) if abscissa < 0 else math.nan
 
@@ -54,7 +54,7 @@ def growth_time(abscissa: Any, rate: Any) -> Any:
 
 
 def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any, ...]:
-    """Frequency in Hz of each distinct oscillating pair of roots, in the order of the roots."""
+    """Frequency in Hz of each distinct complex pair of roots, in the order of the roots."""
     return tuple(root.im * rate / (2 * pi) for root in roots if root.im > 0)
 
 
@@ -66,10 +66,10 @@ def readings(
     roots: Iterable[Any],
     pi: Any = math.pi,
 ) -> Iterator[tuple[str, Any, int]]:
-    """Times, frequencies, and everything with a unit, by names that end in the unit: ``v_kmh``, ``x_B_mm``.
+    """Times, frequencies and everything with a unit, named with the unit: ``v_kmh``, ``x_B_mm``.
 
-    Numbers of any kind, each with the decimal digits to round it to, 0 for none. Nothing for a set that has no unit of
-    time.
+    Yields:
+        Name, number of any kind, and the decimal digits to round it to (0: none). Nothing for a set without seconds.
     """
     if of.rate is None:
         return
@@ -80,5 +80,5 @@ def readings(
     units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities if q.name not in _TIMES}
     for name in (n for n, unit in units.items() if unit != "1"):
         value = parameters[name] if name in parameters else quantities[name]
-        read, unit, digits = read_in(value, units[name], pi)
+        read, unit, digits = convert_exactly(value, units[name], pi)
         yield f"{name}_{''.join(filter(str.isalnum, unit))}", read, digits

@@ -1,4 +1,4 @@
-"""The tables of a problem, in which any number may be a text with a unit."""
+"""Reads the tables of a problem, in which any number may be a text with a unit."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,24 +9,25 @@ from typing import Any
 from tmsopt.errors import Fault
 from tmsopt.models import ParameterSet, decimal
 from tmsopt.models.exact import Exact
-from tmsopt.problem.units.text import LONGEST, read
+from tmsopt.problem.units.text import LONGEST, parse_exact_quantity
 
 TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
-"""Tables of a problem that hold numbers; a unit that is typed first stands."""
-
+"""Tables of a problem that hold numbers; the first unit typed for a parameter is kept."""
 
 Typed = dict[str, dict[float, str]]
-"""Parameter → double → the exact number that was typed for it, where the double's own decimal is another."""
+"""Parameter → double → the exact number that was typed, if the double's decimal differs."""
 
 
-def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
-    """The tables of a problem with texts such as "25 cm" as numbers.
+def read_numbers(
+    tables: Mapping[str, Any], of: ParameterSet
+) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
+    """Convert texts such as "25 cm" in the tables of a problem to numbers.
 
     Args:
-        tables: those of `TABLES`, of numbers and texts.
+        tables: the tables named in `TABLES`, of numbers and texts.
 
     Returns:
-        The tables; the units that were typed; the exact numbers that were typed; what is wrong.
+        The tables, the units as typed, the exact numbers as typed, and the faults.
     """
     units: dict[str, str] = {}
     typed: Typed = {}
@@ -38,17 +39,17 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
         unit = of[name].unit
         sizes = table in ("tolerances", "weights")
         if unit == "1" and sizes:
-            unit = of[name].multiple_of or unit  # a tolerance of 5 mm is one of 0.005 wheelbases of 1 m
+            unit = of[name].multiple_of or unit  # 5 mm is 0.005 of a wheelbase of 1 m
         try:
             found, written, exact = (
-                read(value, unit) if isinstance(value, str) else (value, "", Exact.from_fraction(Fraction(value)))
+                parse_exact_quantity(value, unit) if isinstance(value, str) else (value, "", Exact.from_fraction(Fraction(value)))
             )
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)
-        except OverflowError:  # a whole number that is no double
+        except OverflowError:  # an integer too large for a double
             return value
         except ValueError as error:
-            faults.append(Fault(f"{error}{_meant(value)}", (table, name, *end)))
+            faults.append(Fault(f"{error}{_suggest_text(value)}", (table, name, *end)))
             return value
         if written and not sizes:
             units.setdefault(name, written)
@@ -71,8 +72,8 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
     return found, units, typed, faults
 
 
-def _meant(text: object) -> str:
-    """The end of a sentence that says what to write for a text that is refused; empty where that is not known."""
+def _suggest_text(text: object) -> str:
+    """The end of an error message that says what to write; empty without a suggestion."""
     if not isinstance(text, str) or len(text) > LONGEST:
         return ""
     if comma := re.fullmatch(r"\s*([+-]?\d+),(\d+.*)", text):

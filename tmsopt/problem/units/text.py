@@ -1,4 +1,4 @@
-"""Text such as "40 cm", "1/3 m" or "8/3" as a number in the parameter's own unit."""
+"""Parses text such as "40 cm", "1/3 m" or "8/3" as a number in the parameter's own unit."""
 
 import math
 import re
@@ -13,29 +13,28 @@ from tmsopt.models.tables import read_table
 LONGEST = 80
 """Characters of a number with its unit."""
 
-_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
+_LARGEST_DENOMINATOR = 10**6  # of a factor between units such as 5/18
 _ROUNDED = 4e-16  # relative error of a factor in double precision
 _DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"(?P<number>(?>{_DECIMAL}|pi\b|[a-z]+\(|[-+](?!\s*[-+])|[*/()\s])*+)(?P<unit>.*)", re.A | re.S)
 _POWER = r"(?: ?(?:\*\*|\^) ?-?\d)?"
 _UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:(?: ?[*/] ?| )[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
-"""Names with one-digit powers, joined by * / or one blank, so that a text matches in one way at most: anything richer
-could keep a parser busy for ever."""
+"""Names with one-digit powers, joined by * / or one blank. A text matches in one way at most, so matching is fast."""
 
-_OF_TWO = "write its parts as two parameters, kr + 1j*ki in H"
+_TWO_PARAMETERS = "write its parts as two parameters, kr + 1j*ki in H"
 
 _UNITS = read_table("units")
 USUAL: Mapping[str, Mapping[str, float]] = _UNITS["usual"]
-"""By unit, how many of it one of another is: those that are written every day, for which pint need not be loaded."""
+"""Unit → other common unit → factor to the first, without loading pint."""
 
 
-def with_unit(text: str, unit: str) -> float:
-    """The number that a text with a unit stands for, in `unit`.
+def parse_quantity(text: str, unit: str) -> float:
+    """The number in `unit` that a text with a unit means.
 
     Raises:
-        ValueError: saying what was found and what is accepted.
+        ValueError: with the text found and what is accepted.
     """
-    return read(text, unit)[0]
+    return parse_exact_quantity(text, unit)[0]
 
 
 def _is_complex(text: str) -> bool:
@@ -45,21 +44,19 @@ def _is_complex(text: str) -> bool:
         return False
 
 
-def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0912 - one for each fault
-    """The same, with the unit as written and the exact number, None where no exact factor between the units is known.
+def parse_exact_quantity(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0912 - one for each fault
+    """The number in `unit`, the unit as written, and the exact number (None without an exact factor of the units).
 
     Raises:
-        ValueError: likewise.
+        ValueError: with the text found and what is accepted.
     """
     accepted = f"accepted: {_UNITS['examples'].get(unit, unit)}"
     if unit != "1":
         accepted += f", or a number without quotes in {unit}"
     if len(text) > LONGEST:
-        raise ValueError(
-            f"found '{text[:LONGEST]}…', {len(text)} characters, and a number has up to {LONGEST}; {accepted}"
-        )
+        raise ValueError(f"found '{text[:LONGEST]}…', {len(text)} characters; write up to {LONGEST}; {accepted}")
     if _is_complex(text):
-        raise ValueError(f"found '{text}', a complex number, and parameters are real; {_OF_TWO}")
+        raise ValueError(f"found '{text}', a complex number, but parameters are real; {_TWO_PARAMETERS}")
     parts = _QUANTITY.fullmatch(text.strip())
     assert parts  # any text matches: either part may be empty
     number, written = parts["number"].strip(), parts["unit"]
@@ -78,41 +75,46 @@ def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0
     written = " ".join(written.replace("²", "^2").replace("³", "^3").replace("·", "*").split())
     if not _UNIT.fullmatch(written):
         raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
-    one = _factor(written.replace("°", "deg"), unit)
+    one = _known_factor(written.replace("°", "deg"), unit)
     if one is None:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
-    share, exact = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR), None
-    if abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
+    share, exact = _exact_factor(one), None
+    if share is not None:
+        exact = found.times(share)
+        value = float(exact)  # correctly rounded: 70 cm is 0.7 m
+    else:  # an angle
         value = float(found) * one
         if one == USUAL["rad"]["deg"]:
             exact = found.to_radians()
-    else:
-        exact = found.times(share)
-        value = float(exact)  # the nearest to what is written: 70 cm is 0.7 m
     if not math.isfinite(value) or (value == 0) != (float(found) == 0):
         raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
     return value, written, exact
 
 
-def factor(written: str, unit: str) -> float:
-    """How many `unit` one of a unit is that was read before; of what is kept as a fraction, the nearest double."""
-    found = _factor(written.replace("°", "deg"), unit)
+def unit_factor(written: str, unit: str) -> float:
+    """The factor from a valid unit to `unit`; the nearest double if it is a fraction."""
+    found = _known_factor(written.replace("°", "deg"), unit)
     assert found is not None, written
-    share = Fraction(found).limit_denominator(_LARGEST_DENOMINATOR)
-    return found if abs(share - Fraction(found)) > _ROUNDED * share else float(share)
+    return float(_exact_factor(found) or found)
+
+
+def _exact_factor(one: float) -> Fraction | None:
+    """The fraction that a factor is, up to rounding; None for an irrational one."""
+    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
+    return None if abs(share - Fraction(one)) > _ROUNDED * share else share
 
 
 @cache
-def _factor(written: str, unit: str) -> float | None:
-    """How many `unit` one written unit is, or None where it is not one."""
-    return USUAL.get(unit, {}).get(written) or by_pint(written, unit)
+def _known_factor(written: str, unit: str) -> float | None:
+    """The factor from a unit as written to `unit`; None if they do not match."""
+    return USUAL.get(unit, {}).get(written) or pint_factor(written, unit)
 
 
-def by_pint(written: str, unit: str) -> float | None:
-    """The same, of any unit that pint knows."""
+def pint_factor(written: str, unit: str) -> float | None:
+    """The factor from a unit that pint knows to `unit`; None if they do not match."""
     registry = _registry()
     try:
-        # Angles carry no dimension for pint, so their power is compared by name.
+        # Angles have no dimension in pint, so compare their powers by name.
         found = registry.parse_units(written)
         powers = dict(registry.Quantity(1.0, found).to_base_units().unit_items())
         if powers.get("radian", 0) != {"rad": 1}.get(unit, -int(unit.endswith("/rad"))):
@@ -126,6 +128,6 @@ def by_pint(written: str, unit: str) -> float | None:
 
 @cache
 def _registry() -> Any:
-    import pint  # a third of a second, paid only where an unusual unit is written
+    import pint  # takes a third of a second, so only for uncommon units
 
     return pint.UnitRegistry()

@@ -1,7 +1,7 @@
-"""Verdicts: the one place that decides which word a solution gets, from facts alone.
+"""Verdicts: decides from facts alone how a solution is described.
 
 In: facts such as an abscissa, Jordan chains, a status. Out: a word or a phrase. Open `stability` first, then `status`;
-`meetings` finds the facts about multiple roots.
+`meetings` finds the eigenvectors of multiple roots.
 """
 
 import lazy_loader

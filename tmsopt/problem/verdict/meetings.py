@@ -1,4 +1,4 @@
-"""Where roots meet, whether eigenvectors meet too: ranks of the model's matrices at its multiple roots."""
+"""Finds the eigenvectors of multiple roots, by ranks of the model's matrices."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
@@ -15,39 +15,39 @@ from tmsopt.roots.jordan import equilibrate
 from tmsopt.roots.patterns.structure import fit_unknowns
 
 _RANK = 1e-10  # relative singular value that counts as 0
-_CLOSE = 1e-3  # singular values that may vanish beside the design: those of a double root are off by √1e-10 and less
-_REACH = 3e-5  # of the box: how far from a design its crossing may be, which coefficients see to their square root
-_STEP, _STEPS = 1e-6, 6  # of the box, for differences; of Gauss and Newton
-_MET = 1e-12  # of the terms of the matrices: what is left of a block that vanishes
-_NEAR = 1e-6  # of their size: a located root and one shown are the same
-_UNIT = 1e-3  # of the largest root: the unit in which matrices are weighed at a smaller one
+_CLOSE = 1e-3  # singular values that may vanish near the design; those of a double root are at most about √1e-10
+_REACH = 3e-5  # greatest distance of a crossing from the design, as a share of the box
+_STEP, _STEPS = 1e-6, 6  # difference step as a share of the box; number of Gauss–Newton steps
+_VANISHED = 1e-12  # a block this small, relative to the terms of the matrices, vanishes
+_NEAR = 1e-6  # relative distance within which two roots are the same
+_UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of the largest root
 
 
 def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
-    """The multiple ones among roots of the polynomial of a design, rightmost first, as users read them."""
+    """The multiple roots among the roots of a design's polynomial, rightmost first, as users read them."""
     found: list[MultipleRoot] = []
     of_H = problem.model.carrier is not None
     for root in roots:
         if root.multiplicity > 1 and (root.im < 0 if of_H else root.im >= 0):
-            (told,) = user_roots(problem.model, [root])
-            meeting = _meeting(problem, parameters, root, told, roots)
+            (user_root,) = user_roots(problem.model, [root])
+            meeting = _find_eigenvectors(problem, parameters, root, user_root, roots)
             found += [meeting] if of_H or not root.im else [meeting, replace(meeting, im=-root.im)]
     return tuple(sorted(found, key=lambda m: (-m.re, -m.im)))
 
 
 def is_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> bool:
-    """Whether a located multiple root has more than one eigenvector, so that it is no exceptional point."""
+    """Whether a located multiple root has several eigenvectors, so that it is no exceptional point."""
     return any(not m.exceptional for m in located_meetings(problem, pattern, parameters))
 
 
 def located_meetings(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> tuple[MultipleRoot, ...]:
-    """The multiple roots that ``EP`` in the name of a pattern asks for; none without matrices."""
+    """The multiple roots of a pattern with ``EP`` in its name; none without matrices."""
     if problem.model.pencil is None or "EP" not in pattern.name:
         return ()
-    return meetings(problem, parameters, _located(problem, pattern, parameters))
+    return meetings(problem, parameters, _located_roots(problem, pattern, parameters))
 
 
-def _located(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
+def _located_roots(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
     """The multiple roots of the nearest polynomial of a pattern."""
     values = problem.values(parameters)
     try:
@@ -66,16 +66,16 @@ def _located(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) 
 def every_meeting(
     problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root], violated: Collection[str]
 ) -> tuple[MultipleRoot, ...]:
-    """The multiple roots of a solution: first those of its pattern, unless that is violated, then the others."""
+    """The multiple roots of a solution: first those of its pattern, unless it is violated, then the others."""
     shown, pattern = meetings(problem, parameters, roots), problem.pattern
     lost = any(name in violated for name in problem.located)
     located = located_meetings(problem, pattern, parameters) if pattern is not None and not lost else ()
-    ours = [m for m in shown if any(_beside(m, other) for other in located)]
-    rest = [m for m in located if not any(_beside(m, other) for other in shown)]
+    ours = [m for m in shown if any(_is_near(m, other) for other in located)]
+    rest = [m for m in located if not any(_is_near(m, other) for other in shown)]
     return (*ours, *rest, *(m for m in shown if m not in ours))
 
 
-def _beside(one: MultipleRoot, other: MultipleRoot) -> bool:
+def _is_near(one: MultipleRoot, other: MultipleRoot) -> bool:
     a, b = _number(one), _number(other)
     return abs(a - b) <= _NEAR * (abs(a) + abs(b) or 1.0)
 
@@ -85,63 +85,63 @@ def _number(root: Root | MultipleRoot) -> complex:
 
 
 def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
-    """The parameters at which located roots cross beside a design: sharper than coefficients see them."""
-    roots = _located(problem, pattern, parameters)
+    """The parameters near a design where its located roots cross, more accurate than from coefficients."""
+    roots = _located_roots(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
-    found, _ = _crossed(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
+    found, _ = _find_crossing(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
     return {n: min(max(found[n], low), high) for n, (low, high) in problem.free.items()}
 
 
-def _meeting(
-    problem: Posed, parameters: Mapping[str, float], root: Root, told: Root, roots: Sequence[Root]
+def _find_eigenvectors(
+    problem: Posed, parameters: Mapping[str, float], root: Root, user_root: Root, roots: Sequence[Root]
 ) -> MultipleRoot:
     k, pencil = root.multiplicity, problem.model.pencil
     if pencil is None:
-        return MultipleRoot(told.re, told.im, k, None, k)
+        return MultipleRoot(user_root.re, user_root.im, k, None, k)
     of = problem.parameter_set
     unit = _unit(root, roots)
-    at, s = _crossed(problem, parameters, _number(root), k, unit)
+    at, s = _find_crossing(problem, parameters, _number(root), k, unit)
     matrices = pencil(of.native({n: flint.arb(x) for n, x in at.items()}))
     found = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK, unit)
     partial = found.partial or (k - found.geometric + 1,)
-    return MultipleRoot(told.re, told.im, k, found.geometric, partial[0])
+    return MultipleRoot(user_root.re, user_root.im, k, found.geometric, partial[0])
 
 
 def _unit(root: Root, roots: Sequence[Root]) -> float:
-    """The size of a root in which matrices are weighed."""
+    """The unit of a root for scaling the matrices."""
     return max(abs(_number(root)), _UNIT * max(abs(_number(r)) for r in roots)) or 1.0
 
 
-def _crossed(
+def _find_crossing(
     problem: Posed, parameters: Mapping[str, float], s: complex, k: int, unit: float
 ) -> tuple[Mapping[str, float], complex]:
-    """The crossing beside a design, and its root: the design itself where there is none so near.
+    """The crossing near a design and its root; the design itself if there is none nearby.
 
-    Coefficients see a crossing to the square root of their digits alone, so a design may be 1e-5 away from it. There
-    the block of L(s) that belongs to the least singular values vanishes, which is regular in the parameters.
+    Coefficients determine a crossing to half of their digits only, so the design may be 1e-5 away from it. At the
+    crossing the block of L(s) of the least singular values vanishes, which is a regular equation in the parameters.
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
     widths = np.array([problem.free[n][1] - problem.free[n][0] for n in free])
     size, scale = equilibrate(_matrices(problem, parameters), unit)
-    scale = scale / np.linalg.norm(size * scale, 2)  # held, lest it jumps as entries change
+    scale = scale / np.linalg.norm(size * scale, 2)  # constant, so that it does not jump with the entries
 
-    def moved(x: Array) -> dict[str, float]:
+    def design_at(x: Array) -> dict[str, float]:
         return {**parameters, **dict(zip(free, x.tolist(), strict=True))}
 
-    def weighed(x: Array, z: complex) -> Complex:
-        matrices = _matrices(problem, moved(x))
+    def scaled_matrix(x: Array, z: complex) -> Complex:
+        matrices = _matrices(problem, design_at(x))
         whole = sum(P * z ** (len(matrices) - 1 - j) for j, P in enumerate(matrices))
         return np.asarray(scale * whole, dtype=complex)
 
     for count in range(k, 1, -1):
         x, z = np.array([float(parameters[n]) for n in free]), s
         for _ in range(_STEPS):
-            left, values, right = np.linalg.svd(weighed(x, z))
+            left, values, right = np.linalg.svd(scaled_matrix(x, z))
             if count > len(values) or values[-count] > _CLOSE:
                 break
-            if values[-count] <= _MET:
-                return moved(x), z
-            step = _step(weighed, x, widths, z, unit, left[:, -count:], right[-count:])
+            if values[-count] <= _VANISHED:
+                return design_at(x), z
+            step = _newton_step(scaled_matrix, x, widths, z, unit, left[:, -count:], right[-count:])
             x, z = x + widths * step[:-2], z + unit * complex(*step[-2:])
             if (np.abs(x - [parameters[n] for n in free]) > _REACH * widths).any():
                 break
@@ -154,8 +154,8 @@ def _matrices(problem: Posed, parameters: Mapping[str, float]) -> list[Array]:
     return [np.array(P, dtype=float) for P in found]
 
 
-def _step(
-    weighed: Callable[[Array, complex], Complex],
+def _newton_step(
+    scaled_matrix: Callable[[Array, complex], Complex],
     x: Array,
     widths: Array,
     z: complex,
@@ -163,10 +163,10 @@ def _step(
     left: Complex,
     right: Complex,
 ) -> Array:
-    """Gauss and Newton for a block of L that shall vanish, in shares of the box and of the unit of the root."""
+    """A Gauss–Newton step towards a vanishing block of L, in shares of the box and of the unit of the root."""
 
     def block(at: Array, root: complex) -> Array:
-        B = (left.conj().T @ weighed(at, root) @ right.conj().T).ravel()
+        B = (left.conj().T @ scaled_matrix(at, root) @ right.conj().T).ravel()
         return np.concatenate([B.real, B.imag])
 
     base = block(x, z)

@@ -1,4 +1,4 @@
-"""Stable, marginally stable, growing or not stable: one rule, and the words for each."""
+"""The stability verdict: stable, marginally stable, growing or not stable, and its words."""
 
 import math
 from collections.abc import Collection, Iterable
@@ -14,31 +14,31 @@ STABLE, MARGINAL, GROWING, EDGE, UNSTABLE = (
     "on the edge of stability",
     "not stable",
 )
-"""Verdicts. `EDGE` is for a root at infinity, whose sign nobody knows."""
+"""Verdicts. `EDGE` is for a root at infinity, whose side is unknown."""
 
 CROSSING = "diabolic point (semisimple), not an EP"
-"""Where roots meet, and as many eigenvectors remain."""
+"""Name of a multiple root with as many eigenvectors as its multiplicity."""
 
 ROUNDED = ", as far as rounding tells"
-"""Of what holds of doubles, and is not known in fractions."""
+"""Added to a verdict that holds in doubles but was not confirmed in exact arithmetic."""
 
 _TIMES, _FAINT = 2.0, 1e-6
-"""An abscissa is 0, as far as rounding tells, up to so many times its distance from that of the numbers as stored: both
-are roots that the pattern makes one. At most so much of the largest root: beyond it, the stored numbers decide."""
+"""An abscissa counts as 0 up to `_TIMES` its distance from the one as stored, as both have the roots that the pattern
+makes multiple, and up to `_FAINT` of the largest root; beyond that the stored numbers decide."""
 
 _LINE = 1e-12
-"""Of the largest root: real parts that differ by less are one, as far as rounding tells."""
+"""Real parts are equal up to rounding if they differ by less, relative to the largest root."""
 
 
 @dataclass(frozen=True)
 class MultipleRoot:
-    """A multiple root, or a multiple eigenfrequency, and its eigenvectors.
+    """A multiple root, or a multiple eigenfrequency, with its eigenvectors.
 
     Attributes:
         re, im: the root as users read it.
-        multiplicity: how many roots meet.
-        geometric: number of independent eigenvectors; None for a system given by coefficients, which cannot tell.
-        longest: length of the longest Jordan chain; for coefficients that of the equation p(d/dt) y = 0.
+        multiplicity: its algebraic multiplicity.
+        geometric: number of independent eigenvectors; None for a system given by coefficients.
+        longest: length of the longest Jordan chain; for coefficients, in the equation p(d/dt) y = 0.
     """
 
     re: float
@@ -49,22 +49,22 @@ class MultipleRoot:
 
     @property
     def defective(self) -> bool | None:
-        """Whether eigenvectors are missing; None where coefficients cannot tell."""
+        """Whether it has fewer eigenvectors than its multiplicity; None if unknown."""
         return None if self.geometric is None else self.geometric < self.multiplicity
 
     @property
     def exceptional(self) -> bool:
-        """Whether it may be called an exceptional point of its order: one eigenvector, or nobody can tell."""
+        """Whether it may be an exceptional point of its order: one eigenvector, or an unknown number."""
         return self.geometric in (1, None)
 
 
 def power_of_t(longest: int) -> str:
-    """The power of t beside the exponential of a Jordan chain; empty for a chain of one vector."""
+    """The power of t that multiplies the exponential of a Jordan chain; empty for a chain of one vector."""
     return "" if longest < 2 else "t" if longest == 2 else f"t^{longest - 1}"
 
 
-def longest_on_line(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int | None:
-    """Length of the longest Jordan chain on the rightmost line; None where no root on it is multiple."""
+def longest_chain_on_line(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int | None:
+    """Length of the longest Jordan chain on the rightmost line; None if no root on it is multiple."""
     return max((m.longest for m in meetings if m.re >= abscissa - _LINE * largest), default=None)
 
 
@@ -73,8 +73,8 @@ class StabilityVerdict:
     """The verdict on a solution.
 
     Attributes:
-        verdict: one of the words above; empty where a root is at infinity.
-        growth: of a solution that is `GROWING`, the power of t, such as ``t^2``; else empty.
+        verdict: one of the words above; empty if the abscissa does not exist.
+        growth: the power of t, such as ``t^2``, if the verdict is `GROWING`; else empty.
     """
 
     verdict: str
@@ -82,7 +82,7 @@ class StabilityVerdict:
 
     @property
     def on_edge(self) -> bool:
-        """Whether the rightmost roots are on the imaginary axis, or at infinity."""
+        """Whether the rightmost roots are on the imaginary axis or at infinity."""
         return self.verdict in (MARGINAL, GROWING, EDGE)
 
     def to_json(self) -> dict[str, Any]:
@@ -96,61 +96,62 @@ def stability(
     """The verdict on a solution.
 
     Args:
-        ends: the abscissa of the ideal solution and of the numbers as stored; between them rounding decides.
-        edges: boundaries of stability on which it stands, such as ``weave``.
-        meetings: its multiple roots.
+        ends: the abscissa of the ideal solution and that as stored; their difference shows the effect of rounding.
+        edges: boundaries of stability that contain the solution, such as ``weave``.
+        meetings: multiple roots of the solution.
         largest: size of the largest root.
     """
     if not all(map(math.isfinite, ends)):
         return StabilityVerdict("")
-    told = min(_TIMES * abs(ends[0] - ends[1]), _FAINT * largest)
-    if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > told:
+    rounding = min(_TIMES * abs(ends[0] - ends[1]), _FAINT * largest)
+    if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > rounding:
         return StabilityVerdict(STABLE if max(ends) < 0 else UNSTABLE)
-    growth = power_of_t(longest_on_line(meetings, ends[0], largest) or 1)
+    growth = power_of_t(longest_chain_on_line(meetings, ends[0], largest) or 1)
     return StabilityVerdict(GROWING if growth else EDGE if "infinity" in edges else MARGINAL, growth)
 
 
-def joined(solution: Any) -> dict[str, Any]:
-    """What JSON says of the multiple roots: beside the solution of the first, and on the entry of each root.
+def roots_to_json(solution: Any) -> dict[str, Any]:
+    """JSON of the roots, with the facts on multiple ones: for the solution as a whole, and in the entry of each root.
 
     Args:
-        solution: its `roots`, `eigenfrequencies`, `meetings` and `stability`.
+        solution: an object with `roots`, `eigenfrequencies`, `meetings` and `stability`.
     """
     growing: str = solution.stability.growth
     found: dict[str, Any] = {}
     top = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
     near = _LINE * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
 
-    def of(m: MultipleRoot) -> dict[str, Any]:
+    def chain_facts(m: MultipleRoot) -> dict[str, Any]:
         grows = {"growth": power_of_t(m.longest)} if growing and m.re == top and m.longest > 1 else {}
         return {"defective": m.defective, "geometric_multiplicity": m.geometric, **grows}
 
     for name, each in plain(solution, "roots eigenfrequencies").items():
         for entry, root in zip(each, solution.roots, strict=True) if each else ():
             for meeting in (m for m in solution.meetings if math.hypot(m.re - root.re, m.im - root.im) <= near):
-                entry.update(of(meeting))
+                entry.update(chain_facts(meeting))
         found |= {name: each} if each or name == "roots" else {}
-    first = {n: x for n, x in of(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}
+    first = {n: x for n, x in chain_facts(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}
     return first | found
 
 
-def stability_in_words(found: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
-    """A verdict as a headline says it.
+def describe_stability(found: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
+    """A verdict for a headline.
 
     Args:
-        exact: whether the roots are exactly on the axis, and so are the chains; else as far as rounding tells.
-        of_matrices: whether Jordan chains are known; coefficients know the scalar equation alone.
+        exact: whether roots on the axis and their chains were confirmed in exact arithmetic.
+        of_matrices: whether Jordan chains are known; coefficients only give the scalar equation.
+        of_H: whether the system is complex, so that the roots are eigenfrequencies.
     """
     if not found.on_edge:
         return found.verdict
     root = "real eigenfrequency" if of_H else "root on the imaginary axis"
     why = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
-    said = f"growing as {found.growth}, {why}" if found.growth else found.verdict
-    return said if exact else f"{said}{ROUNDED}"
+    words = f"growing as {found.growth}, {why}" if found.growth else found.verdict
+    return words if exact else f"{words}{ROUNDED}"
 
 
-def crossing_in_words(meeting: MultipleRoot) -> str:
-    """What a multiple root with more than one eigenvector is called."""
+def describe_crossing(meeting: MultipleRoot) -> str:
+    """The name of a multiple root with more than one eigenvector."""
     if meeting.defective:
         return f"{meeting.geometric} Jordan chains, not an EP{meeting.multiplicity}"
     return CROSSING

@@ -1,9 +1,9 @@
-"""How a search ended: the words for each status, and the exception that carries a solution that is none."""
+"""Describes status and verdict of a solution, and defines the exception for problems without one."""
 
 from typing import TYPE_CHECKING
 
 from tmsopt.problem.unit_system import amounts_text
-from tmsopt.problem.verdict.stability import UNSTABLE, stability_in_words
+from tmsopt.problem.verdict.stability import UNSTABLE, describe_stability
 
 if TYPE_CHECKING:
     from tmsopt.problem.problem import Posed
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 
 def status_text(problem: "Posed", status: str) -> str:
-    """A status in words; where nothing is free, a design is judged: it is not optimal but feasible."""
+    """A status in words; with nothing free, an optimal design is called feasible."""
     return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
 
 
-def status_in_words(solution: "Solution") -> str:
-    """How a search ended, as a headline says it."""
+def describe_status(solution: "Solution") -> str:
+    """The status of a solution for a headline."""
     problem, bound, status = solution.problem, solution.bound, solution.status
     if solution.interrupted and status != "optimal":
         return "stopped before the end, the best design so far"
@@ -33,8 +33,8 @@ def status_in_words(solution: "Solution") -> str:
     return ", ".join(["optimal", *(["proved"] if bound.proven else [*solution.starts.sureness, unproved])])
 
 
-def verdict_in_words(solution: "Solution") -> str:
-    """Whether a solution is stable; for one that is not though that was sought, whether any is."""
+def describe_verdict(solution: "Solution") -> str:
+    """The stability of a solution; if an unstable one was to be stable, also whether any design is."""
     problem, known, found = solution.problem, solution.any_stable, solution.stability
     located_none = problem.posed.sense == "locate" and solution.status == "not_converged"
     if located_none or (solution.status == "infeasible" and known is not False):
@@ -45,7 +45,7 @@ def verdict_in_words(solution: "Solution") -> str:
     sought = solution.stability_sought and not known
     if found.verdict != UNSTABLE:
         model = problem.model
-        words = stability_in_words(
+        words = describe_stability(
             found, exact=solution.edge_is_exact, of_matrices=model.pencil is not None, of_H=model.carrier is not None
         )
         return f"{words}; {others}" if found.on_edge and sought and others else words
@@ -55,7 +55,7 @@ def verdict_in_words(solution: "Solution") -> str:
 
 
 class NotSolved(RuntimeError):
-    """Raised by `solve` when there is no optimal design; `solution` holds the best point found.
+    """Raised by `solve` if it finds no optimal design; `solution` holds the best point found.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # no abscissa below -1

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from tmsopt.evaluation.bound import bounded
+from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.problem.dependence import stability_wanted
+from tmsopt.problem.dependence import stability_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.program.options import Options
@@ -42,7 +42,7 @@ def solve_again(
 
 def _require_stability(problem: Posed, original: Posed) -> Posed:
     """The limits of a problem, and stability if the original problem needs it."""
-    limits = {**problem.constraints, **stability_wanted(original, _LEAST_DECAY)}
+    limits = {**problem.constraints, **stability_limit(original, _LEAST_DECAY)}
     return problem.derive(constraints=limits, minimize=None, maximize=None)
 
 
@@ -56,7 +56,7 @@ def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Out
     if has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway):
         return None
     agreed = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
-    settled = agreed and not thorough and bounded(state.part)
+    settled = agreed and not thorough and minimizes_abscissa(state.part)
     return outcome if settled or _is_met(stable, outcome) else None
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from tmsopt.errors import InputError
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.problem.advice.remedies import DIGITS, Relaxation, moved_limits, with_limits
-from tmsopt.problem.dependence import STABLE, stability_wanted
+from tmsopt.problem.advice.remedies import DIGITS, Relaxation, move_limits, replace_limits
+from tmsopt.problem.dependence import STABLE, stability_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.program.options import Options
 from tmsopt.records import Table
@@ -84,7 +84,7 @@ class _Changes:
         """
         problem = self.original
         remedies, enough = dict[Table[str], None](), dict[str, float]()
-        wanted = stability_wanted(problem)
+        wanted = stability_limit(problem)
         stable = problem.derive(constraints=wanted, **_NO_GOAL)
         box = wide.derive(constraints={**wide.constraints, **wanted})
         joint = [] if recheck(stable, relaxation.parameters).violations else [relaxation.amounts]
@@ -110,9 +110,9 @@ class _Changes:
         """
         tried = list[dict[str, str]]()
         for factor, digits in margins if amounts and all(map(np.isfinite, amounts.values())) else ():
-            text = moved_limits(problem, {n: factor * amount for n, amount in amounts.items()}, digits)
+            text = move_limits(problem, {n: factor * amount for n, amount in amounts.items()}, digits)
             with suppress(InputError):  # a bound outside the physical range
-                moved = with_limits(problem, text)
+                moved = replace_limits(problem, text)
                 untried = text not in tried and not _loses_stability(problem, moved, text)
                 design = solve_again(moved, self.options, self.original) if untried else None
                 if design:
@@ -145,7 +145,7 @@ class _Changes:
         Args:
             wide: the problem in the box that was relaxed already without a remedy.
         """
-        stable = stability_wanted(self.original)
+        stable = stability_limit(self.original)
         problem = self.original.derive(constraints={**self.original.constraints, **stable}, **_NO_GOAL)
         *_, (box, movable) = list_stages(problem)
         if not stable and box.free == wide.free:
@@ -162,7 +162,7 @@ def _loses_stability(problem: Posed, moved: Posed, names: Collection[str]) -> bo
     """Whether a changed limit admits unstable designs that it excluded before."""
 
     def needs_stability(text: str) -> bool:
-        return bool(stability_wanted(problem.derive(constraints={"limit": text}, **_NO_GOAL)))
+        return bool(stability_limit(problem.derive(constraints={"limit": text}, **_NO_GOAL)))
 
     about = [name for name in names if name in problem.asked_of_roots]
     return any(needs_stability(problem.constraints[n]) and not needs_stability(moved.constraints[n]) for n in about)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.evaluation.worst_case import worst_cases
+from tmsopt.evaluation.worst_case import find_worst_cases
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
@@ -160,7 +160,7 @@ def _is_feasible(problem: Posed, design: Mapping[str, float]) -> bool:
     """Whether a design meets all limits, also between the cases."""
     if recheck(problem, design).violations:
         return False
-    between = [w.case for w in worst_cases(problem, design).values()] if problem.cases else []
+    between = [w.case for w in find_worst_cases(problem, design).values()] if problem.cases else []
     return not between or not recheck(problem, design, (*problem.cases, *between)).violations
 
 

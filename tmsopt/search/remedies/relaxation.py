@@ -10,8 +10,8 @@ import numpy as np
 
 from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import NODES, atan
-from tmsopt.evaluation.recheck import FEASIBLE, excesses, recheck
-from tmsopt.evaluation.worst_case import worst_cases
+from tmsopt.evaluation.recheck import FEASIBLE, measure_excesses, recheck
+from tmsopt.evaluation.worst_case import find_worst_cases
 from tmsopt.models import Values
 from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
@@ -235,7 +235,7 @@ def _drop_limits(problem: Posed, limits: Sequence[Limit]) -> Posed:
 
 def _find_worse_cases(wide: Posed, limits: Sequence[Limit], trial: CheckedEnd, cases: Sequence[Case]) -> list[Case]:
     """Cases between the listed ones in which a design needs more."""
-    worst = [w.case for w in worst_cases(wide, trial.parameters).values()]
+    worst = [w.case for w in find_worst_cases(wide, trial.parameters).values()]
     known, all_ = (_compute_amounts(wide, limits, trial.parameters, c) for c in (cases, (*cases, *worst)))
     grown = any(abs(a) > abs(known.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in all_.items())
     return [case for case in worst if case not in cases] if grown else []
@@ -245,7 +245,7 @@ def _compute_amounts(
     wide: Posed, limits: Sequence[Limit], parameters: Mapping[str, float], cases: Sequence[Case]
 ) -> dict[str, float]:
     """The amounts that a design needs, by its own recheck."""
-    excess = excesses(wide, parameters, cases)
+    excess = measure_excesses(wide, parameters, cases)
     needed = {limit.name: (limit.measure_need(parameters, excess), limit.scale) for limit in limits}
     return {
         name: amount * (1 + _ROUND_UP) for name, (amount, scale) in needed.items() if abs(amount) > FEASIBLE * scale

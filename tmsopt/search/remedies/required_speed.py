@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 
-from tmsopt.problem.advice.remedies import DIGITS, Need, rounded_outwards
+from tmsopt.problem.advice.remedies import DIGITS, RequiredValue, round_outwards
 from tmsopt.problem.dependence import STABLE
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
@@ -55,13 +55,13 @@ def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, 
                 for shown in _list_rounded(problem.posed, name, design[name], not highest):
                     fixed = _set_range(problem.posed, name, (shown, shown))
                     if solve_again(fixed, short, problem.posed, thorough=True):
-                        need = Need(name, design[name], highest, ends, Table(design), shown)
+                        need = RequiredValue(name, design[name], highest, ends, Table(design), shown)
                         return replace(solution, need=need), None
             return solution, None
         if time.perf_counter() - began > _SECONDS:
             break
     beyond = (min(searched), max(searched)) if searched else None
-    return (replace(solution, need=Need(name, math.nan, False, beyond)) if beyond else solution), None
+    return (replace(solution, need=RequiredValue(name, math.nan, False, beyond)) if beyond else solution), None
 
 
 def _set_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
@@ -74,7 +74,7 @@ def _set_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
 def _list_rounded(problem: Posed, name: str, value: float, up: bool) -> Iterator[float]:
     """The value rounded to fewer and fewer digits, towards where a design exists."""
     one = unit_of(problem, name).one
-    yield from dict.fromkeys(rounded_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
+    yield from dict.fromkeys(round_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
 
 
 def _can_speed_help(solution: Solution) -> bool:
