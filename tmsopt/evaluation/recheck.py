@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt.algebra.formula import Formula, NotAccepted, formula, symbol
 from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.kinds import gradients
-from tmsopt.boundaries.nearest import Robustness, robustness_at
+from tmsopt.boundaries.nearest import Robustness, find_stability_margins
 from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import public_names
@@ -247,7 +247,7 @@ def _look(
     }
     shared = {name: each[k][name] for name, k in worst.items()}
     if around is None and problem.asks_radius and stored is None:
-        around = robustness_at(problem, parameters)
+        around = find_stability_margins(problem, parameters)
     if around is not None:
         shared[RADIUS] = around.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **shared}) for v in (nominal, *each))

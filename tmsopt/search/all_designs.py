@@ -16,10 +16,10 @@ from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.validate import SMALLEST
-from tmsopt.program.formulate import design_of, matching
+from tmsopt.program.formulate import design_of, formulate_matching
 from tmsopt.program.nlp import NLP
-from tmsopt.program.options import Asked, Options, documents_options, options_of
-from tmsopt.program.starts import completions, spread
+from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
+from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain
 from tmsopt.search.local import run_from
@@ -118,8 +118,8 @@ class Every(Tabular):
         return found | {"complete": self.complete, "undecided": len(known.undecided) if known else None}
 
 
-@documents_options(Asked, _DEFAULTS)
-def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Asked]) -> Every:
+@documents_options(CommonOptions, _DEFAULTS)
+def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[CommonOptions]) -> Every:
     """Every design in the box with the pattern that a problem locates, where that leaves no freedom.
 
     Interval branch and prune shows which designs there are, and that there is no other. Where it does not come to an
@@ -147,7 +147,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
     if not is_number(seconds):
         raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
     nlp = _posed(problem)
-    state = SearchState(problem, problem, nlp, options_of(options, defaults=_DEFAULTS))
+    state = SearchState(problem, problem, nlp, make_options(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
     proof = completeness(problem, seconds, state.options.progress) if seconds > 0 else None
     proved = [] if proof is None else [_clipped(problem, design) for design in proof.designs]
@@ -184,10 +184,10 @@ def _search(problem: Posed, nlp: NLP, state: SearchState) -> tuple[list[Array], 
     errors: list[dict[str, float]] = []
     hits: list[int] = []
     done = singular = crossings = 0
-    for design in spread(problem, state.options.seed):
+    for design in sample_box(problem, state.options.seed):
         if done >= starts or _covered(done, hits):
             break
-        ends = [newton(system, x) for x in completions(nlp, problem, design)]
+        ends = [newton(system, x) for x in complete_starts(nlp, problem, design)]
         if done % _BY_IPOPT == 0:
             ended = run_from(state, Start(design, near=False))
             ends.append((newton(system, ended.run.x) or newton_step(system, ended.run.x)) if ended.feasible else None)
@@ -245,9 +245,9 @@ def _posed(problem: Posed) -> NLP:
         conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"
         message = f"{free} and {conditions} do not make single solutions; {advice}"
         raise InputError([Fault(message, ("parameters",))])
-    nlp = matching(problem)
-    if nlp.touches:
-        found = f"the constraints use {', '.join(nlp.touches)}, which only the roots define"
+    nlp = formulate_matching(problem)
+    if nlp.contacts:
+        found = f"the constraints use {', '.join(nlp.contacts)}, which only the roots define"
         accepted = "parameters, coefficients, and quantities with a formula in these"
         advice = "write them so, or ask for one design alone by solve, which names other solutions too"
         raise InputError([Fault(f"{found}; accepted: {accepted}; {advice}", ("constraints",))])

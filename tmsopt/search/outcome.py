@@ -15,10 +15,10 @@ from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import OtherBranch
-from tmsopt.program.formulate import abscissa, matching
-from tmsopt.program.ipopt import Point, gains
+from tmsopt.program.formulate import formulate_abscissa, formulate_matching
+from tmsopt.program.ipopt import Point, relaxation_gain
 from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import designs, initial_point
+from tmsopt.program.starts import choose_starts, initial_point
 from tmsopt.records import Array, Table
 from tmsopt.roots import Root
 from tmsopt.search.accept import check_again, claim_matches, has_converged
@@ -94,7 +94,9 @@ def found(state: SearchState, starts: Starts, cases: Sequence[Case] | None = Non
         notes += (f"{surplus}, and they are not consistent{_fewer_conditions(problem, -counted.count)}",)
     branches: tuple[OtherBranch, ...] = ()
     if counted.kind == "square":
-        equations = nlp if not nlp.kinks else matching(problem) if problem.pattern else abscissa(problem)
+        equations = (
+            nlp if not nlp.kinks else formulate_matching(problem) if problem.pattern else formulate_abscissa(problem)
+        )
         branches = _other_branches(problem, equations, parameters)
     active, looked = _active(problem, nlp, trial.point), tuple(nlp.cases if cases is None else cases)
     return Outcome(parameters, checked, status, active, starts, nlp.formulation, looked, branches, notes)
@@ -171,7 +173,7 @@ def _active(problem: Posed, nlp: NLP, point: Point) -> dict[str, float]:
     active: dict[str, float] = {}
     if problem.objective is None:
         return active
-    sign, gain = problem.sign, gains(nlp, point)
+    sign, gain = problem.sign, relaxation_gain(nlp, point)
     rows = zip(nlp.rows, point.row_multipliers.tolist(), nlp.row_lower, nlp.row_upper, strict=True)
     inequalities: dict[str, list[int]] = {}
     for k, (row, multiplier, lower, upper) in enumerate(rows):
@@ -199,7 +201,7 @@ def _other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -> tup
     of = problem.parameter_set
     branches: list[OtherBranch] = []
     known = [np.array([found[n] for n in problem.free])]
-    starts = (initial_point(nlp, problem, start) for start in designs(problem, 0, _BRANCH_STARTS))
+    starts = (initial_point(nlp, problem, start) for start in choose_starts(problem, 0, _BRANCH_STARTS))
     for x in solutions(nlp, starts, len(problem.free)):
         values = np.array([np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)])
         if any(np.abs(values - k).max() <= _SAME_BRANCH * (1 + np.abs(k).max()) for k in known):
@@ -212,7 +214,7 @@ def _other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -> tup
 
 def _excluded(problem: Posed, nlp: NLP, x: Array) -> tuple[str, ...]:
     """Names of the bounds and inequality rows that a solution violates."""
-    values = (*x, *nlp.at(x)[1])
+    values = (*x, *nlp.evaluate(x)[1])
     lower, upper = (*nlp.lower, *nlp.row_lower), (*nlp.upper, *nlp.row_upper)
     names: dict[str, None] = {}
     for k, name in enumerate((*problem.free, *nlp.variables[len(problem.free) :], *nlp.rows)):

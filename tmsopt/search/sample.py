@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
-from tmsopt.program.cube import Cube
-from tmsopt.program.judgement import Judged, judge
+from tmsopt.program.design_scores import DesignScores, score_designs
+from tmsopt.program.unit_box import UnitBox
 from tmsopt.records import Array
 from tmsopt.search.tuning import TUNING, Tuning
 
@@ -93,11 +93,11 @@ class Box:
         judged: what these are, limit by limit.
     """
 
-    space: Cube
+    space: UnitBox
     seed: int
     scales: Array
     drawn: Looked
-    judged: Judged
+    judged: DesignScores
     tuning: Tuning = TUNING
 
     @property
@@ -111,7 +111,7 @@ class Box:
 
     def look(self, u: Array) -> Looked:
         """Judge points of shape (n, size)."""
-        return _looked(u, judge(self.problem, self.space.designs(u)), self.scales, self.tuning)
+        return _looked(u, score_designs(self.problem, self.space.designs(u)), self.scales, self.tuning)
 
     def design(self, found: Looked, row: int = 0) -> dict[str, float]:
         """The free parameters of one design."""
@@ -204,7 +204,7 @@ class Box:
         size = self.space.size
         ahead = np.where(u < 0.5, self.tuning.difference, -self.tuning.difference)
         moved = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * ahead[:, None]
-        found = judge(self.problem, self.space.designs(moved.reshape(-1, size)))
+        found = score_designs(self.problem, self.space.designs(moved.reshape(-1, size)))
         beyond = found.beyond.reshape(len(found.beyond), len(u), size + 1) / self.scales[:, None, None]
         violated = found.equal[:, None] | (beyond[:, :, 0] > 0)
         target = np.where(violated, beyond[:, :, 0], 0.0)
@@ -266,9 +266,9 @@ def stream(seed: int, stage: str) -> np.random.Generator:
 
 def draw_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Box:
     """Judge corners, a quasi-random sequence, and some of it moved to faces."""
-    space = Cube(problem)
+    space = UnitBox(problem)
     u = _drawn(space, seed, tuning)
-    judged = judge(problem, space.designs(u))
+    judged = score_designs(problem, space.designs(u))
     sizes = [np.abs(beyond[np.isfinite(beyond)]) for beyond in judged.beyond]
     medians = np.array([float(np.median(x)) if x.size else 0.0 for x in sizes])
     scales = np.where(medians > 0, medians, 1.0)
@@ -292,7 +292,7 @@ def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
     return Sample(box, refined.take(refined.ranked), bold.apart(tuning.bold, tuning.apart), spread, singular)
 
 
-def _drawn(space: Cube, seed: int, tuning: Tuning) -> Array:
+def _drawn(space: UnitBox, seed: int, tuning: Tuning) -> Array:
     """Points of the sample: a third of them beside 0 in all parameters, another in some; a few on faces."""
     problem, size = space.problem, space.size
     cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= 4 else tuning.slower)
@@ -302,13 +302,13 @@ def _drawn(space: Cube, seed: int, tuning: Tuning) -> Array:
     u = (offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
     turn = np.arange(count)[:, None]
     beside = (turn % 3 == 1) | ((turn % 3 == 2) & (turn // 3 >> np.arange(size) & 1 == 1))
-    u = np.where(beside, space.drawn_beside_zero(u), u)
+    u = np.where(beside, space.sample_near_zero(u), u)
     u[:: tuning.faces] = np.clip(3 * u[:: tuning.faces] - 1, 0.0, 1.0)
     corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= tuning.corners else np.empty((0, size))
     return np.concatenate([np.full((1, size), 0.5), corners, u])
 
 
-def _looked(u: Array, judged: Judged, scales: Array, tuning: Tuning) -> Looked:
+def _looked(u: Array, judged: DesignScores, scales: Array, tuning: Tuning) -> Looked:
     worth = np.zeros(len(u)) if judged.worth is None else judged.worth
     excess = judged.excess / scales[:, None]
     violation = np.where(excess <= tuning.met, 0.0, excess).sum(axis=0)
@@ -318,7 +318,7 @@ def _looked(u: Array, judged: Judged, scales: Array, tuning: Tuning) -> Looked:
 def _with_basins(box: Box, leaders: Looked) -> Looked:
     """Leaders refined, and after them the best of the basins that the designs drawn show, refined alike."""
     tuning = box.tuning
-    rows, reach = find_basins(box.drawn, *box.space.even(box.drawn.u), tuning)
+    rows, reach = find_basins(box.drawn, *box.space.even_near_zero(box.drawn.u), tuning)
     count, start = len(leaders), leaders.joined(box.drawn.take(rows[: tuning.basins]))
     steps: list[float | Array] = [
         np.concatenate([np.full((count, 1, box.space.size), far), share * reach[: tuning.basins, None]])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tmsopt.program.starts import designs
+from tmsopt.program.starts import choose_starts
 from tmsopt.search.enough import is_proven
 from tmsopt.search.sample import Sample, sample_box
 from tmsopt.search.state import LocalEnd, SearchState, Start
@@ -28,7 +28,7 @@ def propose_starts(state: SearchState) -> Iterator[Start]:
     yield from (Start(design) for design in state.extra if state.holds(design))
     if state.sample:
         yield from sample_starts(state.sample)
-    yield from (Start(design, near=False) for design in designs(part, state.options.seed, state.options.starts))
+    yield from (Start(design, near=False) for design in choose_starts(part, state.options.seed, state.options.starts))
 
 
 def sample_starts(sample: Sample) -> Iterator[Start]:

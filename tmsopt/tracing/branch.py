@@ -89,20 +89,22 @@ class Branch(Tabular):
         return len(self.arclength)
 
     @property
-    def told(self) -> Mapping[str, Array]:
+    def pattern_unknowns(self) -> Mapping[str, Array]:
         """The unknowns of the pattern; of a complex system the multiple eigenfrequency, where it is one."""
         return self.unknowns if self.eigenfrequency is None else self.eigenfrequency
 
     def records(self) -> Iterable[dict[str, Any]]:
         """One record per point, as written to CSV."""
-        marks: dict[int, list[str]] = {}
+        events_at: dict[int, list[str]] = {}
         for event in self.events:
-            marks.setdefault(event.index, []).append(f"{event.name}: {event.detail}" if event.detail else event.name)
+            events_at.setdefault(event.index, []).append(
+                f"{event.name}: {event.detail}" if event.detail else event.name
+            )
         columns: dict[str, NDArray[Any]] = {
             "arclength": self.arclength,
             **self.parameters,
             **{f"d_{name}": column for name, column in self.tangent.items()},
-            **name_unknowns(self.pattern, self.told, self.parameters),
+            **name_unknowns(self.pattern, self.pattern_unknowns, self.parameters),
             "abscissa": self.abscissa,
             "kind": self.kinds,
             "stable": self.stable,
@@ -110,7 +112,7 @@ class Branch(Tabular):
             "constraints": self.satisfied,
         }
         for k, row in enumerate(zip(*(column.tolist() for column in columns.values()), strict=True)):
-            yield dict(zip(columns, row, strict=True)) | {"event": "; ".join(marks.get(k, []))}
+            yield dict(zip(columns, row, strict=True)) | {"event": "; ".join(events_at.get(k, []))}
 
     def to_json(self) -> dict[str, Any]:
         """Columns and events; numbers that do not exist are null."""

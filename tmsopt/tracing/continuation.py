@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.records import Array
-from tmsopt.tracing.solving import MappedFunction, crossings, evaluated, rows_of
+from tmsopt.tracing.solving import MappedFunction, evaluate_rows, find_zeros, map_rows
 
 _CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
 _CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
@@ -85,7 +85,7 @@ class Walk:
         return self.ends[1].reason == CLOSED
 
 
-def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
+def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
     """Compile the curve equations(x) = 0 of a CasADi symbol x of n + 1 entries; limits are of x.
 
     More equations than n leave points at most, which `Curve.evaluate` is enough to find.
@@ -119,30 +119,30 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
     return Curve(scale, low, high, scaled, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
 
-def tangent_at(on: Curve, y: Array) -> Array:
+def compute_tangent(curve: Curve, y: Array) -> Array:
     """Unit tangent at a point of the curve.
 
     Raises:
         ValueError: where the equations do not determine a direction.
     """
-    jacobian = even = evaluated(on.evaluate, y[None])[1][0]
+    jacobian = balanced = evaluate_rows(curve.evaluate, y[None])[1][0]
     for axis in (0, 1):  # norms of 1: units, which differ by much beside infinity, do not make it look singular
-        norm = np.linalg.norm(even, axis=axis, keepdims=True)
-        even = even / np.where(norm > 0, norm, 1.0)
-    singular = np.linalg.svd(even, compute_uv=False)
+        norm = np.linalg.norm(balanced, axis=axis, keepdims=True)
+        balanced = balanced / np.where(norm > 0, norm, 1.0)
+    singular = np.linalg.svd(balanced, compute_uv=False)
     if singular[-1] <= _ISOLATED * singular[0]:
         raise ValueError("the equations leave more than a curve here")
     return np.asarray(np.linalg.svd(jacobian)[2][-1])
 
 
-def follow(on: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
+def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
     """The points after a start in the direction of its tangent, until a limit, a closed loop or infinity; then why."""
 
     def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
         new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
         return new[0], tangent[0], *checks[0].tolist()
 
-    y, t, count, step_from = start.y, start.t, 1, MappedFunction(on.advance, 1)
+    y, t, count, step_from = start.y, start.t, 1, MappedFunction(curve.advance, 1)
     s, reach = step / 4, advance(y, t, 0.0)[6]
     while True:
         s = min(s, step * reach)
@@ -154,11 +154,11 @@ def follow(on: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
             if s < _SMALLEST:
                 yield End(INFINITE if np.abs(y).max() > _FADING else SINGULAR)
                 return
-        if count > 2 and 0 < ahead <= s and far <= 2 * s and _alike(advance(y, t, ahead)[0], start.y):
+        if count > 2 and 0 < ahead <= s and far <= 2 * s and _is_same_point(advance(y, t, ahead)[0], start.y):
             yield from (start, End(CLOSED))
             return
-        if slack < 0 and not _along(on, new, tangent):
-            yield from _at_limit(on, y, t, s, new)
+        if slack < 0 and not _runs_along_limit(curve, new, tangent):
+            yield from _stop_at_limit(curve, y, t, s, new)
             return
         yield CurvePoint(new, tangent)
         if largest > _FAR:
@@ -167,65 +167,67 @@ def follow(on: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
         y, t, s, count = new, tangent, s * _GROWTH, count + 1
 
 
-def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
+def walk(curve: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
     """Follow the curve from y in the direction t until it ends, or there are `most` points."""
     start = CurvePoint(y, t)
-    points: list[Any] = [start, *islice(follow(on, start, step), most - 1)]
+    points: list[Any] = [start, *islice(follow(curve, start, step), most - 1)]
     end = points.pop() if isinstance(points[-1], End) else End(f"stopped after {most} points")
     return Walk(np.array([p.y for p in points]), np.array([p.t for p in points]), (End("start"), end))
 
 
-def both_ways(on: Curve, y: Array, step: float, most: int) -> Walk | None:
+def walk_both_ways(curve: Curve, y: Array, step: float, most: int) -> Walk | None:
     """The whole curve through a point; None where it is no regular point of one."""
-    began = time.perf_counter()
+    started = time.perf_counter()
     try:
-        t = tangent_at(on, y)
+        t = compute_tangent(curve, y)
     except ValueError:
         return None
-    whole = walk(on, y, t, step, most)
+    whole = walk(curve, y, t, step, most)
     if not whole.closed:
-        back = walk(on, y, -t, step, most)
+        back = walk(curve, y, -t, step, most)
         points, tangents = (np.concatenate(x) for x in ([back.y[:0:-1], whole.y], [-back.t[:0:-1], whole.t]))
         whole = Walk(points, tangents, (back.ends[1], whole.ends[1]))
-    return replace(whole, seconds=time.perf_counter() - began) if len(whole.y) > 2 else None
+    return replace(whole, seconds=time.perf_counter() - started) if len(whole.y) > 2 else None
 
 
-def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
+def step_along(curve: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
     """Points and tangents at arclengths s beyond points of the curve, a row each, s no more than a step."""
-    new, tangent, _ = rows_of(on.advance, y, t, s[:, None], y)
+    new, tangent, _ = map_rows(curve.advance, y, t, s[:, None], y)
     return new, tangent
 
 
-def contains(on: Curve, walked: Walk, y: Array) -> bool:
+def is_on_walk(curve: Curve, walked: Walk, y: Array) -> bool:
     """Whether a point lies on a curve already walked."""
-    apart = np.linalg.norm(walked.y - y, axis=1)
-    k = int(np.argmin(apart))
-    if apart[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
+    distances = np.linalg.norm(walked.y - y, axis=1)
+    k = int(np.argmin(distances))
+    if distances[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
         return False
-    new, _ = between(on, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
-    return _alike(new[0], y)
+    new, _ = step_along(curve, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
+    return _is_same_point(new[0], y)
 
 
-def _alike(y: Array, other: Array) -> bool:
+def _is_same_point(y: Array, other: Array) -> bool:
     """Whether points are one."""
     return bool(np.abs(y - other).max() <= _SAME * (1 + np.abs(other).max()))
 
 
-def _along(on: Curve, y: Array, t: Array) -> bool:
+def _runs_along_limit(curve: Curve, y: Array, t: Array) -> bool:
     """Whether a curve that is beyond limits runs along them: it lies in an edge of the box, up to rounding."""
-    beyond = np.maximum(on.lower - y, y - on.upper)
-    over = beyond > 0
-    return bool(np.all(beyond[over] <= _EDGE) and np.all(np.abs(t[over]) <= _EDGE))
+    outside = np.maximum(curve.lower - y, y - curve.upper)
+    violated = outside > 0
+    return bool(np.all(outside[violated] <= _EDGE) and np.all(np.abs(t[violated]) <= _EDGE))
 
 
-def _at_limit(on: Curve, y: Array, t: Array, s: float, beyond: Array) -> tuple[CurvePoint, End]:
+def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outside: Array) -> tuple[CurvePoint, End]:
     """The first point before one that lies beyond limits, a step s further, that is on a limit, on it exactly."""
-    limits = np.clip(beyond, on.lower, on.upper)
-    k = np.flatnonzero(limits != beyond)
+    limits = np.clip(outside, curve.lower, curve.upper)
+    k = np.flatnonzero(limits != outside)
     here, along = np.tile(y, (len(k), 1)), np.tile(t, (len(k), 1))
-    lengths = crossings(lambda r: between(on, here, along, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s))
+    lengths = find_zeros(
+        lambda r: step_along(curve, here, along, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s)
+    )
     lengths = np.nan_to_num(lengths)  # nan: it is beyond the limit already
     first = k[np.argmin(lengths)]
-    (last,), (tangent,) = between(on, y[None], t[None], lengths.min(keepdims=True))
+    (last,), (tangent,) = step_along(curve, y[None], t[None], lengths.min(keepdims=True))
     last[first] = limits[first]
-    return CurvePoint(last, tangent), End("max" if beyond[first] > limits[first] else "min", int(first))
+    return CurvePoint(last, tangent), End("max" if outside[first] > limits[first] else "min", int(first))

@@ -12,26 +12,26 @@ from tmsopt.errors import refusal
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
-from tmsopt.program.formulate import matching, variables_of
+from tmsopt.program.formulate import formulate_matching, variables_of
 from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import completions, spread
+from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.records import Array, Truth
 from tmsopt.roots import Pattern
-from tmsopt.tracing.continuation import Curve, curve
-from tmsopt.tracing.solving import rows_of
+from tmsopt.tracing.continuation import Curve, compile_curve
+from tmsopt.tracing.solving import map_rows
 
 _SAMPLE = 32  # designs by which sizes are judged
 _VANISHED = 1e-9
 
 
-def coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
+def compute_coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
     """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
     a = np.broadcast_arrays(*coefficients_of(problem, problem.ordered(columns)), next(iter(columns.values())))[:-1]
     return np.stack(a, axis=-1).astype(float)
 
 
 @dataclass(frozen=True)
-class Traced:
+class TracedProblem:
     """A problem made ready for tracing one pattern.
 
     Attributes:
@@ -43,26 +43,26 @@ class Traced:
     problem: Posed
     pattern: Pattern
     nlp: NLP
-    on: Curve
+    curve: Curve
     unit: Array
     unknowns: slice
 
-    def leads(self, a: Array) -> Truth:
+    def has_leading_coefficient(self, a: Array) -> Truth:
         """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit; a of shape (…, n + 1)."""
         size = np.abs(a) / self.nlp.unit ** np.arange(a.shape[-1])
         return np.asarray(size[..., 0] > _VANISHED * size.max(axis=-1))
 
-    def starts(self, design: Mapping[str, float], best: bool) -> list[Array]:
+    def list_starts(self, design: Mapping[str, float], best_first: bool) -> list[Array]:
         """All variables at a design, in units of the scale, for each guess of the unknowns; the best first if asked."""
-        every = [x * self.unit / self.on.scale for x in completions(self.nlp, self.problem, design)]
-        return sorted(every, key=lambda y: best and np.abs(rows_of(self.on.evaluate, y[None])[0]).max())
+        every = [x * self.unit / self.curve.scale for x in complete_starts(self.nlp, self.problem, design)]
+        return sorted(every, key=lambda y: best_first and np.abs(map_rows(self.curve.evaluate, y[None])[0]).max())
 
 
-def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
+def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedProblem:
     """The equations of a pattern, by default the one that the problem locates, compiled for tracing."""
     pattern, free = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
-    nlp = matching(problem.derive(constraints=equalities), pattern)
+    nlp = formulate_matching(problem.derive(constraints=equalities), pattern)
     unit, unknowns = np.ones(len(nlp.variables)), slice(free, free + len(pattern.unknowns))
     unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])  # of the NLP; x has natural units
     x = ca.SX.sym("x", len(unit))
@@ -78,10 +78,12 @@ def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = (next(completions(nlp, problem, design), None) for design in islice(spread(problem, 0), _SAMPLE))
-    if known := [guess for guess in sample if guess is not None]:
-        scale[free:] = (unit * np.clip(np.median(np.abs(known), axis=0), 0.1, 1e3))[free:]
-    return Traced(problem, pattern, nlp, curve(x, ca.vertcat(*rows), scale, lower, upper), unit, unknowns)
+    sample = (next(complete_starts(nlp, problem, design), None) for design in islice(sample_box(problem, 0), _SAMPLE))
+    if guesses := [guess for guess in sample if guess is not None]:
+        scale[free:] = (unit * np.clip(np.median(np.abs(guesses), axis=0), 0.1, 1e3))[free:]
+    return TracedProblem(
+        problem, pattern, nlp, compile_curve(x, ca.vertcat(*rows), scale, lower, upper), unit, unknowns
+    )
 
 
 def design_at(problem: Posed, x: Array) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from tmsopt.roots import lienard_chipart, roots
 from tmsopt.roots.meetings import CLOSED, balance
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.tracing.branch import name_unknowns
-from tmsopt.tracing.equations import Traced, design_at
+from tmsopt.tracing.equations import TracedProblem, design_at
 
 NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
 
@@ -25,7 +25,7 @@ _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e
 class Points:
     """Points y of a traced curve, in units of its scale, and its tangents t, both of shape (n, variables)."""
 
-    ready: Traced
+    traced: TracedProblem
     y: Array
     t: Array
 
@@ -35,30 +35,30 @@ class Points:
     @cached_property
     def x(self) -> Array:
         """The points in natural units."""
-        return np.asarray(self.y * self.ready.on.scale)
+        return np.asarray(self.y * self.traced.curve.scale)
 
     @property
     def unknowns(self) -> list[Array]:
         """Those of the pattern, shape (n,) each."""
-        return list(self.x[:, self.ready.unknowns].T)
+        return list(self.x[:, self.traced.unknowns].T)
 
     @property
     def speed(self) -> Array:
         """How fast the free parameters move along the curve, in units of the scale."""
-        return np.asarray(np.linalg.norm(self.t[:, : len(self.ready.problem.free)], axis=1))
+        return np.asarray(np.linalg.norm(self.t[:, : len(self.traced.problem.free)], axis=1))
 
     @cached_property
     def parameters(self) -> dict[str, Array]:
         """Every parameter of the problem, shape (n,) each."""
-        problem = self.ready.problem
-        free = {n: _within(v, *problem.free[n]) for n, v in design_at(problem, self.x).items()}
+        problem = self.traced.problem
+        free = {n: _clip_rounding(v, *problem.free[n]) for n, v in design_at(problem, self.x).items()}
         return {n: np.array(np.broadcast_to(v, len(self)), dtype=float) for n, v in problem.ordered(free).items()}
 
     @cached_property
     def values(self) -> Values:
         """Quantities; those of the roots come from the factors, where multiple roots are exact."""
-        z = roots_along(self.ready.pattern.factors(self.unknowns), len(self))
-        problem = self.ready.problem
+        z = roots_along(self.traced.pattern.factors(self.unknowns), len(self))
+        problem = self.traced.problem
         return Values(problem.model, problem.parameter_set, self.parameters, extra=(NO_RADIUS,)).with_known(
             {
                 "abscissa": z.real.max(axis=-1),
@@ -79,7 +79,7 @@ class Points:
     @cached_property
     def named_unknowns(self) -> dict[str, Array]:
         """The unknowns by name."""
-        pattern = self.ready.pattern
+        pattern = self.traced.pattern
         return name_unknowns(pattern.name, dict(zip(pattern.unknowns, self.unknowns, strict=True)), self.parameters)
 
     @cached_property
@@ -91,19 +91,19 @@ class Points:
     def heavily_damped(self) -> Truth:
         """Where the other roots are real and negative, and the pattern has none but those."""
         real = np.all(np.abs(self._others.imag) <= _REAL * np.abs(self._others), axis=-1)
-        return np.asarray(self.stable & real & ("W" not in self.ready.pattern.unknowns))
+        return np.asarray(self.stable & real & ("W" not in self.traced.pattern.unknowns))
 
     @property
     def satisfied(self) -> Truth:
         """Where every inequality constraint holds."""
-        limits = [c for c in self.ready.problem.conditions.values() if not c.equality]
+        limits = [c for c in self.traced.problem.conditions.values() if not c.equality]
         held = [self.column(True), *(c.holds(self.column(c(self.values))) for c in limits)]
         return np.asarray(np.all(held, axis=0))
 
     @property
     def residual(self) -> Array:
         """Largest mismatch of a coefficient, relative to the terms that it is made of."""
-        monic = self.ready.pattern.monic(self.unknowns)
+        monic = self.traced.pattern.monic(self.unknowns)
         a0 = self.column(self.values.coefficients[0])
         unit = self.column(mean_size(monic))
         unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots come to 0, that of the curve
@@ -115,11 +115,11 @@ class Points:
     @property
     def special(self) -> list[str]:
         """Special cases of the pattern that are met along the whole curve, up to rounding."""
-        return [name for name in self.ready.pattern.marks if np.median(np.abs(self.mark(name))) <= NOTHING]
+        return [name for name in self.traced.pattern.marks if np.median(np.abs(self.mark(name))) <= NOTHING]
 
     def mark(self, name: str) -> Array:
         """What vanishes at a special case of the pattern."""
-        pattern = self.ready.pattern
+        pattern = self.traced.pattern
         return self.column(pattern.marks[name](pattern.reduced(self.unknowns)))
 
     def column(self, value: Any) -> Array:
@@ -129,10 +129,10 @@ class Points:
     @cached_property
     def _others(self) -> Complex:
         """The roots that the pattern does not tie."""
-        return roots_along(self.ready.pattern.remaining(self.unknowns), len(self))
+        return roots_along(self.traced.pattern.remaining(self.unknowns), len(self))
 
 
-def _within(v: Array, low: float, high: float) -> Array:
+def _clip_rounding(v: Array, low: float, high: float) -> Array:
     """A limit met exactly, where a tangent and its inverse have rounded past it."""
     limited = np.clip(v, low, high)
     return np.where(np.abs(v - limited) <= _ROUNDED * (1 + np.abs(v)), limited, v)
@@ -140,20 +140,20 @@ def _within(v: Array, low: float, high: float) -> Array:
 
 def roots_along(factors: list[list[Any]], count: int) -> Complex:
     """Roots of factors along a curve, shape (count, roots); nan where one is beyond doubles, as beside infinity."""
-    found = [np.zeros((count, 0), dtype=complex)]
+    columns = [np.zeros((count, 0), dtype=complex)]
     for factor in factors:
         rows = np.stack([np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor], axis=-1)
-        known = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
-        found.append(np.full((count, len(factor) - 1), np.nan, dtype=complex))
-        found[-1][known] = roots(rows[known])
-    return np.concatenate(found, axis=-1)
+        finite = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
+        columns.append(np.full((count, len(factor) - 1), np.nan, dtype=complex))
+        columns[-1][finite] = roots(rows[finite])
+    return np.concatenate(columns, axis=-1)
 
 
-def on_axis(z: Complex) -> Truth:
+def is_on_axis(z: Complex) -> Truth:
     """Which roots lie on the imaginary axis, up to rounding."""
     return np.asarray(np.abs(z.real) <= _ROUNDED * np.abs(z))
 
 
-def margins(factor: list[Any]) -> list[Any]:
+def axis_functions(factor: list[Any]) -> list[Any]:
     """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
     return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], balance(factor)]

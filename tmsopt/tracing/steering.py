@@ -8,11 +8,11 @@ from tmsopt.errors import refusal
 from tmsopt.problem import Solution
 from tmsopt.problem.files import Given, pose
 from tmsopt.tracing.branch import BranchPoint, table_at
-from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, follow, tangent_at
+from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, compute_tangent, follow
 from tmsopt.tracing.description import describe_end, find_events, make_branch
-from tmsopt.tracing.equations import Traced, prepare
-from tmsopt.tracing.events import TOGETHER, Event, check_events
-from tmsopt.tracing.seeds import seeds
+from tmsopt.tracing.equations import TracedProblem, prepare_tracing
+from tmsopt.tracing.events import SAME_PLACE, Event, check_events
+from tmsopt.tracing.seeds import find_seeds
 from tmsopt.tracing.trace import STARTS, STEP, check_options, locate_pattern
 
 
@@ -48,18 +48,18 @@ def continue_from(
     """
     if through is None and isinstance(problem, Solution):
         through = {name: problem.parameters[name] for name in problem.problem.free}
-    posed, own = locate_pattern(pose(problem), pattern), check_events(events)
+    problem_with_pattern, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
     designs = [] if through is None else [through]
-    check_options(posed, step, through=designs)
-    ready = prepare(posed)
-    for _, points in seeds(ready, 0 if designs else STARTS, 0, designs, []):
+    check_options(problem_with_pattern, step, through=designs)
+    traced = prepare_tracing(problem_with_pattern)
+    for _, points in find_seeds(traced, 0 if designs else STARTS, 0, designs, []):
         for y in points:
             try:
-                return Continuation(ready, CurvePoint(y, tangent_at(ready.on, y)), step, own)
+                return Continuation(traced, CurvePoint(y, compute_tangent(traced.curve, y)), step, checked_events)
             except ValueError:  # no regular point of a curve
                 continue
     near = "near the design" if designs else "in the box"
-    raise refusal(f"no point of {posed.locate} found {near}; give another one to begin at", "through")
+    raise refusal(f"no point of {problem_with_pattern.locate} found {near}; give another one to begin at", "through")
 
 
 class Continuation(Iterator[BranchPoint]):
@@ -86,8 +86,8 @@ class Continuation(Iterator[BranchPoint]):
 
     end: str
 
-    def __init__(self, ready: Traced, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
-        self._ready, self._step, self._events = ready, step, events
+    def __init__(self, traced: TracedProblem, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
+        self._traced, self._step, self._events = traced, step, events
         self._sign, self._arclength, self._last, self.end = 1, 0.0, start, ""
         self._points = self._follow(start, fresh=True)
 
@@ -102,19 +102,21 @@ class Continuation(Iterator[BranchPoint]):
     def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
         """Points from the next on, or from the start on where it is `fresh`; then it is said why there are no more."""
         behind = [start]
-        for new in follow(self._ready.on, start, self._step):
+        for new in follow(self._traced.curve, start, self._step):
             if isinstance(new, End):
-                self.end = describe_end(self._ready, new) or CLOSED
+                self.end = describe_end(self._traced, new) or CLOSED
                 return
             y, t = (np.array([getattr(p, name) for p in (*behind, new)]) for name in "yt")
-            walked, happened = find_events(self._ready, Walk(y, t, (End(""), End(""))), self._events)
-            branch, arclength = make_branch(self._ready, walked, happened), self._arclength
-            first = int(np.flatnonzero(np.all(walked.y == behind[-1].y, axis=1))[-1])
-            for row in range(first + (not fresh), len(walked.y)):
-                events = [event for at, event in happened if at == row]
-                again = len(behind) == 1 and np.abs(walked.y[row] - start.y).max() <= TOGETHER  # it turned round there
-                if (events and not again) or row == len(walked.y) - 1 or (fresh and row == first):
-                    self._last = CurvePoint(walked.y[row], walked.t[row])
+            walk, row_events = find_events(self._traced, Walk(y, t, (End(""), End(""))), self._events)
+            branch, arclength = make_branch(self._traced, walk, row_events), self._arclength
+            first = int(np.flatnonzero(np.all(walk.y == behind[-1].y, axis=1))[-1])
+            for row in range(first + (not fresh), len(walk.y)):
+                events = [event for at, event in row_events if at == row]
+                is_repeated = (
+                    len(behind) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
+                )  # it turned round there
+                if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
+                    self._last = CurvePoint(walk.y[row], walk.t[row])
                     self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])
                     yield BranchPoint(
                         table_at(branch.parameters, row),

@@ -27,10 +27,10 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.continuation import Walk
-from tmsopt.tracing.description import describe
-from tmsopt.tracing.equations import prepare
+from tmsopt.tracing.description import make_branches
+from tmsopt.tracing.equations import prepare_tracing
 from tmsopt.tracing.events import Event, check_events
-from tmsopt.tracing.seeds import beyond_infinity, missed, seeds, walk_new
+from tmsopt.tracing.seeds import find_beyond_infinity, find_missed, find_seeds, walk_new_curves
 
 STARTS = 48
 STEP = 0.005
@@ -74,29 +74,35 @@ def trace(
 
     More: docs/how_to/tracing.md
     """
-    began = time.perf_counter()
-    problem, own = locate_pattern(pose(problem), pattern), check_events(events)
+    started = time.perf_counter()
+    problem, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
     counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _FEWEST, None)
     check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
-    ready = prepare(problem)
+    traced = prepare_tracing(problem)
     walks: list[Walk] = []
     tried = 0
 
     def points() -> Iterator[list[Array]]:
         nonlocal tried
-        for source in (seeds(ready, starts, seed, through, walks), missed(ready, walks), beyond_infinity(ready, walks)):
+        for source in (
+            find_seeds(traced, starts, seed, through, walks),
+            find_missed(traced, walks),
+            find_beyond_infinity(traced, walks),
+        ):
             for count, found in source:
                 tried = max(tried, count)
                 if steps:
                     steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
                 yield found
 
-    walk_new(ready.on, points(), (step, most), walks)
+    walk_new_curves(traced.curve, points(), (step, most), walks)
     with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
-        branches = [b for w in walks for b in describe(ready, w, own) if b.residual <= _MET]  # not where it is nan
+        branches = [
+            b for w in walks for b in make_branches(traced, w, checked_events) if b.residual <= _FITTING
+        ]  # not where it is nan
     branches.sort(key=lambda b: -float(b.arclength[-1]))
-    seconds = time.perf_counter() - began
+    seconds = time.perf_counter() - started
     return Trace(problem.problem, str(problem.locate), tuple(branches), tried, seconds, sum(w.seconds for w in walks))
 
 
@@ -113,8 +119,8 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
         why = "" if str(error).endswith("is no pattern") else f": {error}"
         message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
         raise refusal(message, "objective", "locate") from error
-    asked = problem.derive(locate=name, minimize=None, maximize=None)
-    count = degrees_of_freedom(asked)
+    question = problem.derive(locate=name, minimize=None, maximize=None)
+    count = degrees_of_freedom(question)
     if count.count != 1:
         free, needed = ", ".join(problem.free) or "none", count.conditions + 1
         advice = (
@@ -128,7 +134,7 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
             f"and {count.free} {'is' if count.free == 1 else 'are'} free ({free}); {advice}"
         )
         raise refusal(message, "parameters")
-    return asked
+    return question
 
 
 def check_options(
@@ -167,4 +173,4 @@ STEPS = (1e-6, 0.1)
 
 _DESIGN = "{'Fr': 1.2, 'mu': 0.1}"
 _FEWEST = 4  # points that make a curve with tangents
-_MET = 1e-3  # mismatch of the coefficients beyond which a curve is none of the pattern
+_FITTING = 1e-3  # mismatch of the coefficients beyond which a curve is none of the pattern

@@ -10,7 +10,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.verdict.meetings import nearest_crossing
-from tmsopt.program.formulate import formulate, middle
+from tmsopt.program.formulate import default_start, formulate
 from tmsopt.program.options import Options
 from tmsopt.progress import begin
 from tmsopt.search.accept import accept_best
@@ -45,7 +45,7 @@ def explain_none(problem: Posed, states: Sequence[SearchState], policy: Policy) 
         partial(irreducible, reached=partial(_reached, problem, options)),
         partial(answered, asked=problem),
     )
-    free = relaxation.parameters if relaxation else middle(problem)
+    free = relaxation.parameters if relaxation else default_start(problem)
     design = {n: min(max(free[n], lo), hi) for n, (lo, hi) in problem.free.items()}
     none = f"of {tried} starts, none"
     if relaxation is None or relaxation.amounts:
