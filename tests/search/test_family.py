@@ -112,7 +112,7 @@ def test_nothing_grows_without_end():
     problem = replace(EP4, minimize=None, locate="EP3")
     for k in range(80):
         assert formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)}).posed).program
-    assert nlp._MADE.of.cache_info().currsize == nlp._MADE.of.cache_info().maxsize == 64
+    assert nlp._PROGRAMS.get.cache_info().currsize == nlp._PROGRAMS.get.cache_info().maxsize == 64
 
 
 def test_a_number_is_a_parameter_unless_it_is_nothing():
@@ -124,7 +124,7 @@ def test_a_number_is_a_parameter_unless_it_is_nothing():
     lighter = formulate(with_fixed(EP4, chi_H=1.02, mu=0.0).posed)
     assert len(lighter.formula.steps) < len(ours.formula.steps)
     x = np.linspace(0.3, 1.2, len(ours.variables))
-    own = np.array([ours.at(x)[0], *ours.at(x)[1]])
+    own = np.array([ours.evaluate(x)[0], *ours.evaluate(x)[1]])
     np.testing.assert_allclose(own, np.array(ours.fold(x, FLOATS), dtype=float), rtol=1e-12, atol=1e-13)
 
 

@@ -176,7 +176,7 @@ def test_most_points_and_infinity():
 def test_a_point_where_the_equations_leave_more_than_a_curve_is_no_start():
     x = ca.SX.sym("x", 3)
     twice = compile_curve(x, ca.vertcat(x[0], 2 * x[0]), np.ones(3), np.full(3, -np.inf), np.full(3, np.inf))
-    with pytest.raises(ValueError, match="more than a curve"):
+    with pytest.raises(ValueError, match="direction"):
         compute_tangent(twice, np.zeros(3))
     assert walk_both_ways(twice, np.zeros(3), 0.01, 100) is None
 

@@ -48,7 +48,7 @@ def find_edges(
 ) -> tuple[tuple[str, ...], bool]:
     """The stability boundaries that a design is on, and whether they and the growth on them are certain.
 
-    Certain are simple roots that a located pattern ties to the axis, and results in exact fractions.
+    They are certain for simple roots that a located pattern places on the axis, and where exact fractions decide.
 
     Args:
         abscissa, meetings: of the design, in doubles.

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from tmsopt.models import Values
-from tmsopt.program.lifts import TWO_FACTORS, LiftedQuantity, ProgramBuilder, factors_of
-from tmsopt.program.nlp import AddedVariable, Contact, Factor
+from tmsopt.program.lifts import LiftedQuantity, ProgramBuilder, factors_of, lift_factors
+from tmsopt.program.nlp import AddedVariable, Contact
 from tmsopt.records import Array
-from tmsopt.roots import product
 from tmsopt.roots.patterns.pattern import Roots
 
 
@@ -21,34 +20,21 @@ def lift_angular_frequency(build: ProgramBuilder) -> LiftedQuantity:
     s + d. If the NLP reaches a0 = 0, the first factor is m s² + p s + q with m = ±a0 and p² + 4 m² Ω² ≥ 4 m q; for an
     odd degree the linear factor is m s + d instead.
     """
-    cases, first, lead = build.covered_cases, build.size[0], build.lead
+    first = build.size[0]
     omega = build.variable("angular_frequency", 0.0)
-    contacts = [Contact(lambda x: 0.0, variable=first)]
-    products: list[tuple[Factor, ...]] = []
-    for case in cases:
-        a, factors = build.polynomial(case), list[Factor]()
-        monic: list[list[Any]] = []
-        odd = len(a) % 2 == 0
-        if lead:
-            build.row("a0", lead * a[0], 0.0, np.inf)
-        for k in range(1, (len(a) - 1) // 2 + 1):
-            at, has_lead = build.size[0], lead and k == 1 and not odd
-            p, q, m = build.variable(f"p{k}.{case}"), build.variable(f"q{k}.{case}"), lead * a[0] if has_lead else 1
-            monic.append([m, p, q])
-            build.row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
-            if not has_lead:
-                factors.append(Factor(at))
-            if not has_lead or len(a) <= TWO_FACTORS:
-                contacts.append(Contact(partial(_strip_distance, at), row=build.size[1] - 1))
-        if odd:
-            if not lead:
-                factors.append(Factor(build.size[0], linear=True))
-            monic.append([lead * a[0] if lead else 1, build.variable(f"d.{case}")])
-        build.equal("angular_frequency", a, [(lead or a[0]) * c for c in product(*monic)])
-        products.append(tuple(factors))
-    guess, close = (partial(_guess, cases, near, abs(lead) / build.leading_unit) for near in (False, True))
+
+    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        at = build.size[0]
+        p, q, m = build.variable(f"p{k}.{case}"), build.variable(f"q{k}.{case}"), 1 if lead is None else lead
+        build.row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
+        return [m, p, q], [Contact(partial(_strip_distance, at), row=build.size[1] - 1)]
+
+    contacts, products = lift_factors(build, "angular_frequency", quadratic, linear=("d", -np.inf))
+    scale = abs(build.lead) / build.leading_unit
+    guess, close = (partial(_guess, build.covered_cases, near, scale) for near in (False, True))
     lift = AddedVariable("angular_frequency", build.size[0] - first, guess, close)
-    return LiftedQuantity(build.unit * omega, lift, tuple(contacts), tuple(products))
+    all_real = Contact(lambda x: 0.0, variable=first)
+    return LiftedQuantity(build.unit * omega, lift, (all_real, *contacts), products)
 
 
 def _strip_distance(at: int, x: Array) -> float:

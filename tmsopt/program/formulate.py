@@ -232,8 +232,8 @@ class Builder:
 
     def require_real_roots(self) -> None:
         """Require real roots in every case."""
-        asked = (self.problem.objective, *self.problem.conditions.values())
-        line = any("abscissa" in expression.names for expression in asked if expression)
+        expressions = (self.problem.objective, *self.problem.conditions.values())
+        line = any("abscissa" in expression.names for expression in expressions if expression)
         lifted = lift_real_roots(self, line)
         self.lifts.append(lifted.lift)
         self.fix_quantity("damping_ratio", 1.0)

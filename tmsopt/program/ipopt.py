@@ -8,14 +8,13 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.program.nlp import NLP, CompiledProgram, forget_programs
+from tmsopt.program.nlp import NLP, CompiledProgram, PerThread, forget_programs
 from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
 
@@ -93,9 +92,7 @@ def make_ipopt(
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
-        first, *ends = (
-            (column / np.array(unit)).tolist() for column in (x0, lower, upper)
-        )  # quicker in CasADi than arrays
+        first, *ends = ((column / np.array(unit)).tolist() for column in (x0, lower, upper))  # lists are faster
         rows = {"lbg": limits.row_lower, "ubg": limits.row_upper}
         with interruptible():
             answer = solver(x0=first, p=limits.constants, lbx=ends[0], ubx=ends[1], **rows)
@@ -141,20 +138,13 @@ def _conditions(program: CompiledProgram) -> ca.Function:
     return ca.Function("kkt", [x, rows, p], [*first, hessian])
 
 
-class PerThread(threading.local):
-    """Caches the results of a function for its last few arguments, separately for each thread."""
-
-    def __init__(self, make: Callable[..., ca.Function], most: int = 32) -> None:
-        self.get = lru_cache(maxsize=most)(make)
-
-
-_SOLVERS, _CONDITIONS = PerThread(_solver, 96), PerThread(_conditions)
+_SOLVERS, _CONDITIONS = PerThread(_solver, 96), PerThread(_conditions, 32)
 
 
 def forget_solvers() -> None:
     """Drop every compiled program and solver of this thread."""
-    for made in (_SOLVERS, _CONDITIONS):
-        made.get.cache_clear()
+    for cache in (_SOLVERS, _CONDITIONS):
+        cache.get.cache_clear()
     forget_programs()
 
 
@@ -218,8 +208,8 @@ def interruptible() -> Iterator[None]:
         yield
         return
     received: list[int] = []
-    found = ((number, signal.getsignal(number)) for number in _SIGNALS)
-    handlers = {int(number): handler for number, handler in found if callable(handler)}
+    installed = ((number, signal.getsignal(number)) for number in _SIGNALS)
+    handlers = {int(number): handler for number, handler in installed if callable(handler)}
     for number in handlers:
         signal.signal(number, lambda number, frame: received.append(number))
     try:

@@ -79,15 +79,17 @@ def _may_have_kinks(nlp: NLP) -> bool:
     """Whether the box may contain a kink or a pole; one pass of interval arithmetic excludes most NLPs."""
     if not {step.op for step in nlp.formula.steps} & {*_PIECES, *_POLES}:
         return False
-    known = INTERVALS.operations
+    operations = INTERVALS.operations
 
-    def replace_pole(op: str, *operands: Any) -> Any:
-        lower, upper = interval(known["cos"](*operands) if op == "tan" else operands[-1])
+    def divide_off_pole(op: str, *operands: Any) -> Any:
+        lower, upper = interval(operations["cos"](*operands) if op == "tan" else operands[-1])
         if lower <= 0 <= upper:
             raise NotAccepted
-        return known[op](*operands)
+        return operations[op](*operands)
 
-    smooth = {op: f for op, f in known.items() if op not in _PIECES} | {op: partial(replace_pole, op) for op in _POLES}
+    smooth = {op: f for op, f in operations.items() if op not in _PIECES} | {
+        op: partial(divide_off_pole, op) for op in _POLES
+    }
     box = [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
     try:
         nlp.fold(box, Kind(smooth, INTERVALS.constant))

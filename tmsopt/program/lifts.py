@@ -1,6 +1,6 @@
 """Root quantities as variables with polynomial factors: statements about roots without computing a root."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -61,6 +61,53 @@ class LiftedQuantity:
     products: tuple[tuple[Factor, ...], ...]
 
 
+def lift_factors(
+    build: ProgramBuilder,
+    name: str,
+    quadratic: Callable[[int, int, Any], tuple[list[Any], list[Contact]]],
+    squared: bool = False,
+    linear: tuple[str, float] = ("d", 0.0),
+    line: Any = None,
+) -> tuple[list[Contact], tuple[tuple[Factor, ...], ...]]:
+    """Write the polynomial of each covered case as a product of quadratic factors, and a linear one for an odd degree.
+
+    Args:
+        quadratic: (number, case, lead) → coefficients and contacts of a factor; `lead` is ±a0 in the factor that takes
+            it so that the NLP reaches a0 = 0, else None.
+        squared: see `Factor`.
+        linear: name and lower bound of the constant term of the linear factor.
+        line: shift of the polynomial, to a line that the linear factor's root may be on.
+
+    Returns:
+        All contacts, and the factors of each case.
+    """
+    lead, contacts, products = build.lead, list[Contact](), list[tuple[Factor, ...]]()
+    for case in build.covered_cases:
+        a, factors, monic = build.polynomial(case), list[Factor](), list[list[Any]]()
+        count, odd = divmod(len(a) - 1, 2)
+        if lead:
+            build.row("a0", lead * a[0], 0.0, np.inf)
+        for k in range(1, count + 1):
+            at, own = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
+            coefficients, own_contacts = quadratic(k, case, own)
+            monic.append(coefficients)
+            if own is None:
+                factors.append(Factor(at, squared=squared))
+            if own is None or count == 1:  # the largest roots are not on the edge
+                contacts += own_contacts
+        if odd:
+            at, (letter, lower) = build.size[0], linear
+            monic.append([lead * a[0] if lead else 1, build.variable(f"{letter}.{case}", lower)])
+            if not lead:
+                factors.append(Factor(at, linear=True))
+            if line is not None and (not lead or not count):
+                contacts.append(Contact(partial(_step_distance, at), variable=at))
+        left = a if line is None else shift(a, line)
+        build.equal(name, left, [(lead or a[0]) * c for c in product(*monic)])
+        products.append(tuple(factors))
+    return contacts, tuple(products)
+
+
 def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
     """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
 
@@ -68,36 +115,21 @@ def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
     reaches a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may go to infinity; for an odd degree the linear
     factor is ±a0 t + δ instead.
     """
-    cases, first, lead = build.covered_cases, build.size[0], build.lead
+    first = build.size[0]
     gamma = build.variable("abscissa")
-    contacts: list[Contact] = []
-    products: list[tuple[Factor, ...]] = []
-    for case in cases:
-        a, monic, factors = build.polynomial(case), [], []
-        odd = len(a) % 2 == 0
-        if lead:
-            build.row("a0", lead * a[0], 0.0, np.inf)
-        for k in range(1, (len(a) - 1) // 2 + 1):
-            at, has_lead = build.size[0], lead and k == 1 and not odd
-            if not has_lead:
-                factors.append(Factor(at, squared=False))
-            beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
-            monic.append([lead * a[0] if has_lead else 1, beta, kappa])
-            if not has_lead or len(a) <= TWO_FACTORS:  # the largest roots are not on the line
-                contacts.append(Contact(partial(_pair_distance, at), variable=at))
-                contacts.append(Contact(partial(_real_distance, at), variable=at + 1))
-        if odd:
-            at = build.size[0]
-            monic.append([lead * a[0] if lead else 1, build.variable(f"delta.{case}", 0.0)])
-            if not lead:
-                factors.append(Factor(at, linear=True))
-            if not lead or len(a) <= TWO_FACTORS // 2:
-                contacts.append(Contact(partial(_step_distance, at), variable=at))
-        build.equal("abscissa", shift(a, gamma), [(lead or a[0]) * c for c in product(*monic)])
-        products.append(tuple(factors))
-    guess, close = (partial(_abscissa_guess, cases, near, abs(lead) / build.leading_unit) for near in (False, True))
+
+    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        at = build.size[0]
+        beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
+        distances = (_pair_distance, _real_distance)
+        contacts = [Contact(partial(distance, at), variable=at + j) for j, distance in enumerate(distances)]
+        return [1 if lead is None else lead, beta, kappa], contacts
+
+    contacts, products = lift_factors(build, "abscissa", quadratic, linear=("delta", 0.0), line=gamma)
+    scale = abs(build.lead) / build.leading_unit
+    guess, close = (partial(_abscissa_guess, build.covered_cases, near, scale) for near in (False, True))
     lift = AddedVariable("abscissa", build.size[0] - first, guess, close)
-    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), tuple(products))
+    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), products)
 
 
 def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
@@ -107,36 +139,23 @@ def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
     s + d, d ≥ 0. If the NLP reaches a0 = 0, the first factor is m² s² + p s + w² with m² = ±a0 and p ≥ 2 ζ m w; for an
     odd degree the linear factor is ±a0 s + d instead.
     """
-    cases, first, lead = build.covered_cases, build.size[0], build.lead
+    first = build.size[0]
     zeta = build.variable("damping_ratio", -1.0, 1.0)
-    contacts = [Contact(lambda x: 1.0, variable=first, value=1.0)]
-    products: list[tuple[Factor, ...]] = []
-    for case in cases:
-        a, monic, factors = build.polynomial(case), [], []
-        odd = len(a) % 2 == 0
-        if lead:
-            build.row("a0", lead * a[0], 0.0, np.inf)
-        for k in range(1, (len(a) - 1) // 2 + 1):
-            at, has_lead = build.size[0], lead and k == 1 and not odd
-            p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
-            if has_lead:
-                m = build.variable(f"m.{case}", 0.0)
-                build.row("damping_ratio", m * m - lead * a[0], 0.0, 0.0)
-            else:
-                factors.append(Factor(at, squared=True))
-            monic.append([m * m, p, w * w])
-            build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
-            if not has_lead or len(a) <= TWO_FACTORS:
-                contacts.append(Contact(partial(_sector_distance, at), row=build.size[1] - 1))
-        if odd:
-            if not lead:
-                factors.append(Factor(build.size[0], linear=True))
-            monic.append([lead * a[0] if lead else 1, build.variable(f"d.{case}", 0.0)])
-        build.equal("damping_ratio", a, [(lead or a[0]) * c for c in product(*monic)])
-        products.append(tuple(factors))
-    guess = partial(_damping_guess, cases, abs(lead) / build.leading_unit)
+
+    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        at = build.size[0]
+        p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
+        if lead is not None:
+            m = build.variable(f"m.{case}", 0.0)
+            build.row("damping_ratio", m * m - lead, 0.0, 0.0)
+        build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
+        return [m * m, p, w * w], [Contact(partial(_sector_distance, at), row=build.size[1] - 1)]
+
+    contacts, products = lift_factors(build, "damping_ratio", quadratic, squared=True)
+    guess = partial(_damping_guess, build.covered_cases, abs(build.lead) / build.leading_unit)
     lift = AddedVariable("damping_ratio", build.size[0] - first, guess)
-    return LiftedQuantity(zeta, lift, tuple(contacts), tuple(products))
+    all_real = Contact(lambda x: 1.0, variable=first, value=1.0)
+    return LiftedQuantity(zeta, lift, (all_real, *contacts), products)
 
 
 def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
@@ -199,7 +218,6 @@ def worst_guess(
     return [[max((v for v in found if np.isfinite(v)), default=0.0)]]
 
 
-TWO_FACTORS = 4  # with more coefficients there are two quadratic factors or more
 _DOUBLE = 1e-3  # real roots closer than this, relative to the largest root, may be one double root
 
 
@@ -280,7 +298,7 @@ def _abscissa_guess(
 
 
 def _real_guess(cases: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """Real roots at the real parts of the given ones, left of 0."""
+    """Real roots at the real parts of the design's roots, but left of 0."""
     every = np.concatenate([z[case] for case in cases])
     gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3) if line else 0.0
     steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in cases]

@@ -34,8 +34,8 @@ _KEPT = 64
 """Compiled programs kept; while cases are added one by one, most are used once."""
 
 _FIRST_DERIVATIVES = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
-_SCALE_DESIGNS = 33
-_ORDINARY = (1e-2, 1e3)
+_SCALE_DESIGNS = 33  # designs from which scales are estimated
+_ORDINARY = (1e-2, 1e3)  # sizes that need no scaling
 
 Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
 """Starting values of added variables, from the quantities and roots of the nominal design and each case; one list per
@@ -179,12 +179,14 @@ class NLP:
     @cached_property
     def program(self) -> "CompiledProgram":
         """The compiled functions f and g, shared by NLPs with one formula in one thread."""
-        return _PROGRAMS.get(self.formula, len(self.variables))
+        program: CompiledProgram = _PROGRAMS.get(self.formula, len(self.variables))
+        return program
 
     @property
     def constants(self) -> list[float]:
         """Inputs of the compiled functions besides x: every value that depends on the numbers alone."""
-        return _PROGRAMS.constants(self.formula, len(self.variables), tuple(self.numbers.items()))
+        values: list[float] = _CONSTANTS.get(self.formula, len(self.variables), tuple(self.numbers.items()))
+        return values
 
     def impose_contacts(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
         """The NLP with one contact held for each entry of `contacts`: first the nearest to a point, then others.
@@ -292,25 +294,25 @@ def compile_program(formula: Formula, count: int) -> CompiledProgram:
     return CompiledProgram(number_formula, function)
 
 
-class _Programs(threading.local):
-    """The compiled programs of one thread; other threads must not use them."""
-
-    def __init__(self) -> None:
-        self.get = lru_cache(maxsize=_KEPT)(compile_program)
-        self.constants = lru_cache(maxsize=_KEPT)(self._constants)
-
-    def _constants(self, formula: Formula, count: int, numbers: tuple[tuple[str, float], ...]) -> list[float]:
-        with np.errstate(all="ignore"):
-            return [float(c) for c in fold(self.get(formula, count).number_formula, dict(numbers), FLOATS)]
+def _compute_constants(formula: Formula, count: int, numbers: tuple[tuple[str, float], ...]) -> list[float]:
+    with np.errstate(all="ignore"):
+        return [float(c) for c in fold(_PROGRAMS.get(formula, count).number_formula, dict(numbers), FLOATS)]
 
 
-_PROGRAMS = _Programs()
+class PerThread(threading.local):
+    """Caches the last results of a function for each thread: CasADi objects must not be used from two threads."""
+
+    def __init__(self, make: Callable[..., Any], most: int) -> None:
+        self.get = lru_cache(maxsize=most)(make)
+
+
+_PROGRAMS, _CONSTANTS = PerThread(compile_program, _KEPT), PerThread(_compute_constants, _KEPT)
 
 
 def forget_programs() -> None:
     """Drop the compiled programs of this thread."""
-    for made in (_PROGRAMS.get, _PROGRAMS.constants):
-        made.cache_clear()
+    for cache in (_PROGRAMS, _CONSTANTS):
+        cache.get.cache_clear()
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.program.ipopt import PerThread, Run, interruptible
-from tmsopt.program.nlp import NLP, CompiledProgram
+from tmsopt.program.ipopt import Run, interruptible
+from tmsopt.program.nlp import NLP, CompiledProgram, PerThread
 from tmsopt.records import Array
 
 _QUIET = ("print_header", "print_iteration", "print_status", "print_time", "show_eval_warnings", "error_on_fail")
@@ -45,4 +45,4 @@ def _solver(program: CompiledProgram, max_iterations: int) -> ca.Function:
     return ca.nlpsol("sqp", "sqpmethod", {"x": x, "p": p, "f": f, "g": g}, settings)
 
 
-_SOLVERS = PerThread(_solver)
+_SOLVERS = PerThread(_solver, 32)

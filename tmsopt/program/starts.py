@@ -1,11 +1,12 @@
 """Designs to start from, spread over the box, and matching starting values of the added variables."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, product
 
 import numpy as np
 
 from tmsopt.algebra.sequence import golden_steps
+from tmsopt.models import Values
 from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, regular
@@ -14,6 +15,7 @@ from tmsopt.program.formulate import default_start, variables_of
 from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, roots
+from tmsopt.roots.patterns.pattern import Roots
 from tmsopt.roots.patterns.structure import guess_distance
 
 _CANDIDATES = 16
@@ -53,8 +55,8 @@ def choose_starts(problem: Posed, seed: int, count: int) -> Iterator[dict[str, f
 def _find_stable_radius(nlp: NLP, problem: Posed, nominal: Mapping[str, float]) -> float:
     """A radius at which the design is stable in all directions of an NLP; small if there is none."""
     directed = [case for case in nlp.cases if case.direction and not case.edge]
-    feet = (float(np.linalg.norm(list(case.direction.values()))) for case in nlp.cases if case.edge)
-    most = min(feet, default=np.inf)
+    upper_bounds = (float(np.linalg.norm(list(case.direction.values()))) for case in nlp.cases if case.edge)
+    most = min(upper_bounds, default=np.inf)
     if not directed and np.isfinite(most):
         return most
     for radius in (r for r in _RADII if directed and r <= most):
@@ -83,7 +85,7 @@ def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: b
     radius = _find_stable_radius(nlp, problem, nominal)
     varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
     values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, varied)]
-    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
+    z = _compute_roots(nlp, values)
     x = variables_of(problem, design)
     for lift in nlp.lifts:
         guess = lift.close if near and lift.close else lift.guess
@@ -96,9 +98,14 @@ def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: b
 def complete_starts(nlp: NLP, problem: Posed, design: Mapping[str, float]) -> Iterator[Array]:
     """Starts from a design with every combination of guesses for the added variables."""
     values = [problem.values(problem.ordered(design))]
-    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
+    z = _compute_roots(nlp, values)
     for guesses in product(*(lift.guess(values, z) for lift in nlp.lifts)):
         yield np.array([*variables_of(problem, design), *(x for guess in guesses for x in guess)])
+
+
+def _compute_roots(nlp: NLP, values: Sequence[Values]) -> list[Roots]:
+    """Roots in each case, in the NLP's unit."""
+    return list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
 
 
 def sample_box(problem: Posed, seed: int) -> Iterator[dict[str, float]]:

@@ -1,4 +1,4 @@
-"""From a walked curve to branches in the parameters of the problem, with what happens along them among their points."""
+"""Converts a walked curve to branches in the parameters of the problem, with the events among their points."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -18,23 +18,23 @@ from tmsopt.tracing.events import SAME_PLACE, Event, LocatedEvent, insert_events
 from tmsopt.tracing.points import Points, roots_along
 from tmsopt.tracing.solving import project_rows
 
-_NEAR = 1e-3  # distance within which an EP4 is looked for near an EP3 and a 2EP2
-_LOW = 1e-2  # of the marks next to a place where they may touch 0: they grow with the square of a step of 0.1
-_EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
+_NEAR = 1e-3  # distance within which an EP4 is searched near an EP3 and a 2EP2
+_LOW = 1e-2  # marks below it may touch 0 nearby: they grow with the square of a step of 0.1
+_EXACT = 1e-13  # relative mismatch of a coefficient at an EP4: a few roundings
 _SAME_DESIGN = 1e-6
-"""Like `SAME_PLACE`, in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
-_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+"""Like `SAME_PLACE`, for the free parameters alone; the unknowns scatter where the equations are singular."""
+_FITTING = 1e-6  # largest mismatch of a coefficient at a point of a branch
 
-_SQUARE = 1e-9  # of a coefficient
+_SQUARE = 1e-9  # relative difference of c from b²/4 below which a quadratic factor has a double root
 
 _EP4 = Event("EP4", lambda points: points.residual)  # located by equations of its own
 
 RowEvent = tuple[int, Event]
-"""A row of a walk and what happens there."""
+"""A row of a walk and the event there."""
 
 
 def make_branches(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
-    """A walked curve as one branch, or as several where events stop it, with its events among its points."""
+    """A walked curve as one branch, or as several if events stop it, with its events among its points."""
     walk, row_events = find_events(traced, _trim_inexact_ends(traced, walk), events)
     if walk.closed and (stops := [row for row, event in row_events if event.stop]):
         first, around = stops[0], len(walk.y) - 1
@@ -50,7 +50,7 @@ def make_branches(traced: TracedProblem, walk: Walk, events: Sequence[Event] = (
 
 
 def find_events(traced: TracedProblem, walk: Walk, events: Sequence[Event]) -> tuple[Walk, list[RowEvent]]:
-    """A walk with its events among its points, and at which rows they are."""
+    """The walk with its events among its points, and the rows of the events."""
     walk = refine_walk(traced, walk, events)
     groups = _group_events(
         _add_exact_EP4(traced, walk, [*locate_events(traced, walk, events)]), len(traced.problem.free)
@@ -62,9 +62,9 @@ def find_events(traced: TracedProblem, walk: Walk, events: Sequence[Event]) -> t
 
 
 def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent]) -> Branch:
-    """A walk in the parameters of the problem."""
+    """A walk as a branch in the parameters of the problem."""
     problem, pattern, points = traced.problem, traced.pattern, Points(traced, walk.y, walk.t)
-    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a quadratic factor: exact, or it scatters by 1e-8
+    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a factor would scatter by 1e-8
         b, c = (points.x[:, traced.unknowns.stop - k] for k in (2, 1))
         for row in {row for row, event in row_events if "EP" in event.name}:
             c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE * abs(c[row]) else c[row]
@@ -77,7 +77,7 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
     residual, columns = points.residual, points.parameters
     named = [(row, event.name, event.detail) for row, event in row_events]
     for row, end in () if walk.closed else zip((0, len(points) - 1), walk.ends, strict=True):
-        # a curve may be singular where roots meet and eigenvectors do not
+        # where roots meet but eigenvectors do not, the curve is singular
         crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
         named.append((row, "end", CROSSING if crossed else describe_end(traced, end)))
     located = [
@@ -104,7 +104,7 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
 
 
 def _eigenfrequency(points: Points) -> dict[str, Array] | None:
-    """Of a complex system ω = i s of a multiple root, of s² + bs + c less the carrier; None of a real one."""
+    """The multiple eigenfrequency ω = i s of a complex system, minus the carrier; None for a real system."""
     carrier, pattern = points.traced.problem.model.carrier, points.traced.pattern
     if carrier is None:
         return None
@@ -115,7 +115,7 @@ def _eigenfrequency(points: Points) -> dict[str, Array] | None:
 
 
 def _group_events(located: Sequence[LocatedEvent], free: int) -> list[list[LocatedEvent]]:
-    """Events along the curve, those at one place together, the first of the list first: it says where that is."""
+    """Events along the curve, grouped by place; the first of the list is first and gives the place."""
     groups: list[list[int]] = []
     for k in sorted(range(len(located)), key=lambda k: (located[k].after, located[k].s)):
         distance = np.abs(located[k].y - located[groups[-1][-1]].y) if groups else np.array([np.inf])
@@ -126,13 +126,13 @@ def _group_events(located: Sequence[LocatedEvent], free: int) -> list[list[Locat
 
 
 def _merge_events(group: Sequence[LocatedEvent], events: Sequence[Event]) -> Iterator[Event]:
-    """What happens at one place: the most special event of the package, the others in its detail; then a user's."""
+    """The events at one place: the most special package event, with the others in its detail; then the user's."""
     package_events = [f.event for f in group if f.event not in events]
     if package_events:
         names = {e.name for e in package_events}
         name = "double zero" if {"weave", "capsize"} <= names else package_events[0].name
         folds = dict.fromkeys(e.detail for e in package_events if e.name == "fold")
-        words = [f"beside an {higher}"] if (higher := _find_higher_order(name, names)) else []
+        words = [f"next to an {higher}"] if (higher := _find_higher_order(name, names)) else []
         for e in package_events:
             if e.name != "fold" and ("EP" not in e.name or e.name == "EP2"):
                 words.append(e.detail if e.name == name else f"{e.name} {e.detail}".strip())
@@ -145,14 +145,14 @@ def _merge_events(group: Sequence[LocatedEvent], events: Sequence[Event]) -> Ite
 
 
 def _find_higher_order(name: str, names: set[str]) -> str:
-    """EP(k+1) where EPk and EP(k−1)+EP2, the two ways in which EP(k−1) comes near it, are at one place; else empty."""
+    """EP(k+1) if EPk and EP(k−1)+EP2 coincide, the two ways in which it unfolds into EP(k−1); else empty."""
     match = re.fullmatch(r"EP(\d+)", name)
     order = int(match[1]) if match else 0
     return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
 
 
 def _natural_tangent(points: Points) -> dict[str, Array]:
-    """Derivative of the free parameters by the arclength in widths of the box."""
+    """Derivatives of the free parameters by the arclength in widths of the box."""
     problem, along = points.traced.problem, points.t * points.traced.curve.scale / (points.speed[:, None] + 1e-300)
     of = problem.parameter_set
     columns = zip(problem.free, along.T, points.x.T, strict=False)
@@ -160,7 +160,7 @@ def _natural_tangent(points: Points) -> dict[str, Array]:
 
 
 def _trim_inexact_ends(traced: TracedProblem, walk: Walk) -> Walk:
-    """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
+    """The walk without end points near infinity whose parameters no longer fit the unknowns."""
     with np.errstate(all="ignore"):
         good = np.flatnonzero(Points(traced, walk.y, walk.t).residual <= _FITTING)
     if walk.closed or not good.size:
@@ -181,9 +181,9 @@ def describe_end(traced: TracedProblem, end: End) -> str:
 
 
 def _add_exact_EP4(traced: TracedProblem, walk: Walk, located: list[LocatedEvent]) -> list[LocatedEvent]:
-    """The events, each EP4 exact and first; where symmetry takes a curve through one, it is located to 1e-6 only.
+    """The events, each EP4 exact and first; symmetry can take a curve through one, which is then found to 1e-6 only.
 
-    On a curve of EP2 it is where EP3 and 2EP2 vanish at once: in a section through it they only touch 0.
+    On a curve of EP2, an EP4 is where the marks of EP3 and 2EP2 vanish at once; in a symmetric section they touch 0.
     """
     near = [f for f in located if f.event.name == "EP4"]
     if traced.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*traced.pattern.marks}:
@@ -216,5 +216,5 @@ def _exact_EP4(traced: TracedProblem, walk: Walk, located: LocatedEvent) -> Loca
 
 
 def _convert_unknowns(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:
-    """Unknowns of another pattern, for the roots that this one has."""
+    """The unknowns of another pattern, for the same roots."""
     return np.array(other.guesses(roots_along(pattern.factors(list(unknowns)), 1)[0])[0])

@@ -1,7 +1,7 @@
 """The domains of asymptotic stability and of heavy damping in a plane, bounded by exact curves.
 
-A boundary is not read off a grid: each arc is a traced root pattern, cut where the other roots cease to be left of
-the imaginary axis, or real.
+Each arc of a boundary is a traced root pattern, not a contour of a grid. It is cut where the other roots are no longer
+left of the imaginary axis, or real.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,11 +25,11 @@ from tmsopt.tracing.points import is_on_axis, roots_along
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
-"""Widths of the box, a step, between the last point before infinity or a singular end and the corner it belongs to."""
+"""Largest distance, in widths of the box, from an end at infinity or a singular end to its corner."""
 
-_EDGE = 1e-9  # widths of the box: a branch that starts beside an edge, not in it, leaves it by more
+_EDGE = 1e-9  # widths of the box: largest distance from an edge of a branch that lies in it
 
-_OFFSET = 1e-4  # widths of the box from a curve to its sides, where damping outgrows rounding
+_OFFSET = 1e-4  # widths of the box from a curve to the designs that test its sides
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Arc:
 class Corner:
     """A point where arcs of a boundary meet or turn back: ``EP3`` is a cusp, ``2EP2`` a crossing.
 
-    ``infinity and weave`` is where a weave boundary runs into a0 = 0, ``infinity`` where two roots go there at once.
+    At ``infinity and weave`` a weave boundary meets a0 = 0; at ``infinity`` two roots go to infinity at once.
     """
 
     name: str
@@ -59,15 +59,14 @@ class Corner:
 
 @dataclass(frozen=True, repr=False)
 class Domain(Printable):
-    """Boundaries inside a box; where a domain leaves the box, its boundary ends at the edge. A boundary that
-    lies in an edge, such as that of designs without damping, is that edge and is left out.
+    """Boundaries inside a box. They end at its edges; a boundary that lies in an edge is left out.
 
     Attributes:
         stability: arcs that bound asymptotic stability.
         heavy_damping: arcs that bound the designs whose roots are all real and negative.
-        parting: arcs that part capsize from weave among the unstable designs: two positive real roots merge, or one
-            passes 0 or infinity, where no other root is real and positive.
-        corners: of the first two boundaries.
+        parting: arcs that separate capsize from weave among the unstable designs: two positive real roots merge, or
+            one passes 0 or infinity, while no other root is real and positive.
+        corners: corners of the first two boundaries.
 
     Example:
         >>> (corner,) = tmsopt.domain("problems/chart.toml").corners  # the tip of heavy damping, by the paper's law
@@ -93,7 +92,7 @@ def domain(
 ) -> Domain:
     """Boundaries of stability and of heavy damping in the plane of the two free parameters.
 
-    Constraints of the problem are left aside. `step`, `starts`, `seed` and `progress` are those of `trace`.
+    Constraints of the problem are ignored. `step`, `starts`, `seed` and `progress` are as in `trace`.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # heavily damped beyond the parabola c² = 4 k
@@ -128,19 +127,19 @@ def domain(
 
 
 def _is_in_edge(branch: Branch, problem: Posed) -> bool:
-    """Whether a branch lies in an edge of the box, which bounds the picture anyway: it has one side only."""
+    """Whether a branch lies in an edge of the box; it then bounds the picture anyway."""
     limits = ((branch.parameters[n], limit, np.ptp(ends)) for n, ends in problem.free.items() for limit in ends)
     return any(np.abs(column - limit).max() <= _EDGE * width for column, limit, width in limits)
 
 
 def _find_runs(inside: Truth) -> list[tuple[int, int]]:
-    """Begin and end of every run of truth."""
+    """Begin and end of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _list_changes(curve: InfinityCurve, corners: bool = False) -> Iterator[Corner]:
-    """Points on a0 = 0 where another boundary comes in; only the corners of stability and of heavy damping, or all."""
+    """Points on a0 = 0 where another boundary meets it; `corners`: only those of stability or heavy damping."""
     for row, event in curve.changes.items():
         if not corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
             name, detail = (f"infinity and {event}", "a0 = 0") if event != "infinity" else ("infinity", "a0 = a1 = 0")
@@ -148,7 +147,7 @@ def _list_changes(curve: InfinityCurve, corners: bool = False) -> Iterator[Corne
 
 
 def _cut_arcs(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
-    """Runs of points that bound a domain; the events at their ends belong to them, and a corner beyond an end."""
+    """Runs of points that bound a domain, with the events at their ends and a corner beyond an end."""
     marked, beyond = inside.copy(), dict[int, Corner]()
     for event in branch.events:
         k = event.index
@@ -167,9 +166,9 @@ def _cut_arcs(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequen
 
 
 def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
-    """Where the other roots are stable, or on the axis too and the designs of one side alone stable.
+    """Where the other roots are stable, or on the axis with stable designs on one side only.
 
-    Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
+    If several pairs stay on the axis together, each on its curve, the curve of the fastest counts.
     """
     rest = pattern_of(problem.model, branch.pattern).remaining(list(branch.unknowns.values()))
     z = roots_along(rest, len(branch))
@@ -182,14 +181,14 @@ def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
     )
     offset = np.array([[-_OFFSET], [_OFFSET]]) / (np.hypot(dx, dy) + 1e-300)
     sides = dict(zip(problem.free, (x - offset * wide * dy, y + offset * high * dx), strict=True))
-    with np.errstate(all="ignore"):  # a side may lie beyond what the model is made for: nan is not stable
+    with np.errstate(all="ignore"):  # outside the model's range nan is not stable
         one, other = is_stable(compute_coefficients(problem, sides))
     fastest = (tied >= 0) & (branch.unknowns.get("W", np.inf) >= tied)
     return np.asarray(branch.stable | (fastest & (one != other)))
 
 
 def _parts_instabilities(branch: Branch) -> Truth:
-    """Where one side has a positive real root and the other, unstable too, has none."""
+    """Where one side has a positive real root and the other, also unstable, has none."""
     rest = _other_roots(branch)
     found = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
     if len(rest) > 1:
@@ -198,12 +197,12 @@ def _parts_instabilities(branch: Branch) -> Truth:
 
 
 def _other_roots(branch: Branch) -> list[Any]:
-    """The other roots of a curve of double roots or of roots 0, as one factor; [1] without any."""
+    """The other roots of a curve of double roots or of roots 0, as one factor; [1] if there are none."""
     return [np.ones(len(branch)), *(column for name, column in branch.unknowns.items() if name != "r")]
 
 
 def _is_drawn_here(branch: Branch) -> Truth:
-    """Where a curve of two double roots is met by the larger of them: the other draws the same curve again."""
+    """Where a curve of two double roots is parametrised by the larger; the other draws the same curve again."""
     if not np.any(branch.kinds == "2EP2"):
         return np.ones(len(branch), dtype=bool)
     r, other = branch.unknowns["r"], nearest_two(_other_roots(branch))
@@ -222,7 +221,7 @@ def _list_corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
 
 
 def _merge_corners(corners: Sequence[Corner]) -> list[Corner]:
-    """Each place once, with every name it has: where a weave arc meets a capsize arc, both end there."""
+    """Each place once, with all its names: weave and capsize arcs that meet both end there."""
     found: list[Corner] = []
     for corner in corners:
         for k, other in enumerate(found):

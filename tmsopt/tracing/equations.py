@@ -1,4 +1,4 @@
-"""A problem made ready to be traced: its pattern's equations as a curve, in units of its coefficients over the box."""
+"""The equations of a pattern as a compiled curve, with variables of order 1 over the box."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from tmsopt.roots import Pattern
 from tmsopt.tracing.continuation import Curve, compile_curve
 from tmsopt.tracing.solving import map_rows
 
-_SAMPLE = 32  # designs by which sizes are judged
+_SAMPLE = 32  # designs from which sizes of the unknowns are estimated
 _VANISHED = 1e-9
 
 
@@ -32,12 +32,12 @@ def compute_coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
 
 @dataclass(frozen=True)
 class TracedProblem:
-    """A problem made ready for tracing one pattern.
+    """A problem prepared for tracing one pattern.
 
     Attributes:
         problem: with the pattern to locate and every constraint.
         unit: of the variables of the NLP, in natural units.
-        unknowns: where the unknowns of the pattern stand among the variables.
+        unknowns: indices of the pattern's unknowns among the variables.
     """
 
     problem: Posed
@@ -48,18 +48,18 @@ class TracedProblem:
     unknowns: slice
 
     def has_leading_coefficient(self, a: Array) -> Truth:
-        """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit; a of shape (…, n + 1)."""
+        """Whether a0 is not negligible, for a of shape (…, n + 1): with a0 = a1 = … = 0 any factors fit."""
         size = np.abs(a) / self.nlp.unit ** np.arange(a.shape[-1])
         return np.asarray(size[..., 0] > _VANISHED * size.max(axis=-1))
 
     def list_starts(self, design: Mapping[str, float], best_first: bool) -> list[Array]:
-        """All variables at a design, in units of the scale, for each guess of the unknowns; the best first if asked."""
+        """All variables at a design, in units of the scale, for each guess of the unknowns; sorted if `best_first`."""
         every = [x * self.unit / self.curve.scale for x in complete_starts(self.nlp, self.problem, design)]
         return sorted(every, key=lambda y: best_first and np.abs(map_rows(self.curve.evaluate, y[None])[0]).max())
 
 
 def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedProblem:
-    """The equations of a pattern, by default the one that the problem locates, compiled for tracing."""
+    """Compile the equations of a pattern, by default the one that the problem locates."""
     pattern, free = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = formulate_matching(problem.derive(constraints=equalities), pattern)
@@ -70,7 +70,7 @@ def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedPro
     rows = [g[k] for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
     if equalities and len(rows) != len(unit) - 1:
         names = ", ".join(equalities)
-        message = f"an equality of a root quantity cannot be traced along {pattern.name}; leave out {names}"
+        message = f"cannot trace {pattern.name} under an equality constraint on a root quantity; remove {names}"
         raise refusal(message, "constraints")
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     for k, name in enumerate(pattern.unknowns):
@@ -87,13 +87,13 @@ def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedPro
 
 
 def design_at(problem: Posed, x: Array) -> dict[str, Any]:
-    """Free parameters for traced variables, floats or columns."""
+    """Free parameters from traced variables, as floats or columns."""
     of = problem.parameter_set
     return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
 def limits_of(problem: Posed) -> tuple[Array, Array]:
-    """Least and greatest values of the traced variables that are free parameters."""
+    """Smallest and largest values of the traced variables that are free parameters."""
     sides = zip(*problem.free.values(), strict=True)
     low, high = (np.array(variables_of(problem, dict(zip(problem.free, side, strict=True)))) for side in sides)
     return low, high

@@ -1,7 +1,7 @@
-"""Events: functions of the points of a curve, whose zeros are located on the curve itself, to rounding.
+"""Events: functions of the points of a curve, whose zeros are located on the curve to rounding.
 
-What the package looks for and what a user looks for are `Event`s alike. Between two steps a function may have two
-zeros: where it comes near 0, `refine_walk` adds the point at which it is nearest.
+Events of the package and of the user are treated alike. A function may have two zeros between two steps; where it comes
+near 0, `refine_walk` adds the point at which it is nearest.
 """
 
 import re
@@ -21,27 +21,27 @@ from tmsopt.tracing.points import NOTHING, Points, axis_functions
 from tmsopt.tracing.solving import find_zeros
 
 SAME_PLACE = 1e-6
-"""Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""
+"""Events closer than this, in units of the scale, are at one place; each is located to 1e-12 or better."""
 
 CHANGES = "stability changes"
-"""Detail of the events that count only where they change it."""
+"""Detail of weave and capsize events, which count only where stability changes."""
 
 _OWN = r"weave|capsize|fold|constraint|end|(double|\d+-fold) zero|\d*C?EP\d\S*"  # names of events of the package
 _DIP = 0.5
-"""Share of a small value that a parabola must fall further by, for its least to be looked for between the steps."""
-_ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as beside a singular point it may
+"""A minimum between two steps is searched if a parabola falls by this share of the value there."""
+_ASTRAY = 2.0  # arclengths: a point further away lies on another curve, as may happen near a singular point
 _ROUNDING = 1e-14  # of a variable of order 1
 
 
 @dataclass(frozen=True)
 class Event:
-    """What to look for along a curve: a function that changes its sign there.
+    """A place on a curve where a function changes its sign.
 
     Attributes:
-        name: shown wherever the curve is, on one line.
-        function: of a point, to a number. The point is a mapping: ``p["Fr"]`` is a parameter of the problem, a
-            quantity of its model such as ``p["abscissa"]``, or an unknown of the pattern such as ``p["r"]``.
-        stop: whether a branch ends there. The curve beyond is another branch.
+        name: one line, shown wherever the curve is shown.
+        function: point → number. The point is a mapping: ``p["Fr"]`` is a parameter of the problem, ``p["abscissa"]`` a
+            quantity of its model, ``p["r"]`` an unknown of the pattern.
+        stop: whether the branch ends there. The curve after it is another branch.
         detail: words to show next to the name.
 
     Example:
@@ -63,7 +63,7 @@ class Event:
 
 @dataclass(frozen=True)
 class LocatedEvent:
-    """A zero of an event between two rows of a walk, an arclength s after the first of them."""
+    """A zero of an event at an arclength s after the row `after` of a walk."""
 
     event: Event
     y: Array
@@ -73,10 +73,10 @@ class LocatedEvent:
 
 
 def check_events(events: Any) -> list[Event]:
-    """The events that a user gave, as functions of many `Points`, like those of the package.
+    """The events of a user as functions of many `Points`, like those of the package.
 
     Raises:
-        InputError: for what is no list of events, and later, where a function raises or gives no finite number.
+        InputError: for anything but a list of events; later, where a function raises or returns no finite number.
     """
     faults = list_faults("events", events, "[tmsopt.Event('Fr is 3', lambda p: p['Fr'] - 3)]")
     for k, event in enumerate(() if faults else events):
@@ -87,7 +87,7 @@ def check_events(events: Any) -> list[Event]:
         elif wrong := text_faults(event.name, "events", f"{k}", "name"):
             faults += wrong
         elif re.fullmatch(_OWN, event.name):
-            message = f"found '{event.name}', which tmsopt calls an event of its own; accepted: another name"
+            message = f"found '{event.name}', the name of a built-in event; accepted: another name"
             faults.append(Fault(message, ("events", f"{k}", "name")))
     if faults:
         raise InputError(faults)
@@ -105,7 +105,7 @@ def _evaluate_at(event: Event, point: Mapping[str, float]) -> float:
         value = event.function(point)
         if is_number(value):
             return float(value)
-        what = f"the function gives {short(value)}"
+        what = f"the function returns {short(value)}"
     except Exception as error:
         what = f"the function raises {type(error).__name__}: {error}"
     place = ", ".join(f"{name} = {point[name]:.6g}" for name in point)
@@ -114,7 +114,7 @@ def _evaluate_at(event: Event, point: Mapping[str, float]) -> float:
 
 @dataclass(frozen=True)
 class _PointView(Mapping[str, float]):
-    """One of many points, as a user's function sees it; it lists the free parameters and knows all names."""
+    """One of many points, as a user's function sees it; iteration lists the free parameters."""
 
     points: Points
     row: int
@@ -132,7 +132,7 @@ class _PointView(Mapping[str, float]):
 
 
 def list_package_events(points: Points) -> Iterator[Event]:
-    """Everything that the package looks for along a curve."""
+    """All events that the package locates along a curve."""
     problem, pattern = points.traced.problem, points.traced.pattern
 
     def margin(number: int, k: int, points: Points) -> Any:
@@ -141,13 +141,12 @@ def list_package_events(points: Points) -> Iterator[Event]:
     for name in pattern.marks:
         yield Event(name, partial(Points.mark, name=name))
     if pattern.form == "EP2" and "2EP2" in points.special:
-        # q(r) has a double zero where r is the double root of q
         yield Event("EP4", lambda p: p.unknowns[0] - nearest_two(pattern.factors(p.unknowns)[-1]))
     for number, factor in enumerate(pattern.remaining(points.unknowns)):
-        for k in range(len(axis_functions(factor))):  # the first quantity is the constant term
+        for k in range(len(axis_functions(factor))):  # the first function is the constant term
             yield Event("weave" if k else "capsize", partial(margin, number, k), detail=CHANGES)
     for k, parameter in enumerate(problem.free):
-        # by the arclength in the parameters: the unknowns may move much faster
+        # per arclength of the parameters, since the unknowns may move much faster
         yield Event("fold", partial(lambda k, p: p.t[:, k] / (p.speed + 1e-300), k), detail=parameter)
     for name, condition in problem.conditions.items():
         if not condition.equality:
@@ -155,7 +154,7 @@ def list_package_events(points: Points) -> Iterator[Event]:
 
 
 def locate_events(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[LocatedEvent]:
-    """Every zero of an event of the package, and of others, between the rows that show its change of sign."""
+    """Every zero of an event between the rows that show its change of sign."""
     points, free = Points(traced, walk.y, walk.t), list(traced.problem.free)
     for event, values in _list_active(points, events):
         for located in locate_zeros(traced.curve, walk, partial(Points, traced), event, values):
@@ -168,13 +167,13 @@ def locate_events(traced: TracedProblem, walk: Walk, events: Sequence[Event] = (
 def locate_zeros(
     curve: Curve, walk: Walk, make_points: Callable[[Array, Array], Any], event: Event, values: Array
 ) -> Iterator[LocatedEvent]:
-    """Zeros of an event between rows where its values change sign; its function takes what `at` makes of y and t."""
+    """Zeros of an event between rows with a change of sign; its function takes what `make_points` returns."""
     rows = np.flatnonzero(has_sign_change(values))
     here, along = walk.y[rows], walk.t[rows]
     ends = np.sum(along * (walk.y[rows + 1] - here), axis=1)
     if rows.size:
         s = find_zeros(lambda s: event.function(make_points(*step_along(curve, here, along, s))), ends)
-        real = np.isfinite(s)  # else a jump through infinity, noise, or nan
+        real = np.isfinite(s)  # else a pole, noise, or nan
         located = zip(
             *step_along(curve, here[real], along[real], s[real]), rows[real].tolist(), s[real].tolist(), strict=True
         )
@@ -184,7 +183,7 @@ def locate_zeros(
 
 
 def has_sign_change(value: Array) -> Truth:
-    """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
+    """Where a sequence changes sign to the next entry; a 0 takes the sign before it, or else after it."""
     sign = np.sign(value)
     if (known := np.flatnonzero(sign)).size:
         sign = sign[known[np.maximum(np.searchsorted(known, range(len(sign)), side="right") - 1, 0)]]
@@ -192,7 +191,7 @@ def has_sign_change(value: Array) -> Truth:
 
 
 def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Walk:
-    """The walk with a point wherever an event comes nearest to 0 between two steps: two zeros then show two signs."""
+    """The walk with added points where an event comes nearest to 0 between two steps, so that two zeros show."""
     steps = np.sum(walk.t[:-1] * np.diff(walk.y, axis=0), axis=1)
     before, after = steps[:-1], steps[1:]
     minima: dict[tuple[int, float], LocatedEvent] = {}
@@ -209,13 +208,12 @@ def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ())
             def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:
                 return sign * float(event.function(Points(traced, *step_along(traced.curve, *row, np.array([s]))))[0])
 
-            from scipy.optimize import minimize_scalar  # a fifth of a second, paid only where it is needed
+            from scipy.optimize import minimize_scalar  # importing it takes 0.2 s
 
             least = minimize_scalar(height, bounds=(-before[k], after[k]), method="bounded", options={"xatol": 1e-14})
             s, nearby = float(least.x), step_along(traced.curve, *row, np.array([least.x]))
-            (y,), (t,) = step_along(
-                traced.curve, *nearby, np.zeros(1)
-            )  # once more: beside a singular point Newton is slow
+            # again, since Newton's method converges slowly near singular points
+            (y,), (t,) = step_along(traced.curve, *nearby, np.zeros(1))
             if np.abs(y - row[0][0]).max() <= _ASTRAY * abs(s) and t @ row[1][0] > 0:
                 place = (k + 1, s) if s >= 0 else (k, before[k] + s)
                 minima.setdefault(place, LocatedEvent(event, y, t, *place))
@@ -223,7 +221,7 @@ def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ())
 
 
 def insert_events(walk: Walk, located: Sequence[LocatedEvent]) -> tuple[list[int], Walk]:
-    """Rows of what was found, in order, and the walk with it among its points."""
+    """The rows of the events, in order, and the walk with them among its points."""
     order = np.argsort([*range(len(walk.y)), *(f.after + 0.5 for f in located)], kind="stable")
     y, t = np.array([*walk.y, *(f.y for f in located)]), np.array([*walk.t, *(f.t for f in located)])
     return np.flatnonzero(order >= len(walk.y)).tolist(), replace(walk, y=y[order], t=t[order])
@@ -239,9 +237,9 @@ def _list_active(points: Points, events: Iterable[Event]) -> Iterator[tuple[Even
 
 
 def _is_fold(walk: Walk, i: int, y: Array, k: int) -> bool:
-    """Whether a variable has its neighbours, next or next but one, on one side of it by more than rounding.
+    """Whether the neighbours of a point, next or next but one, are on one side of it by more than rounding.
 
-    Where the equations are singular the tangent alone may say so.
+    The tangent alone is not reliable where the equations are singular.
     """
     rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walk.y) - 1)
     back, ahead = walk.y[rows, k] - y[k]

@@ -1,6 +1,6 @@
-"""Where a root goes through infinity: the curves a0 = 0 in a plane, and what the other roots do along them.
+"""The curves a0 = 0 in a plane, where a root goes through infinity, and the other roots along them.
 
-On one side of such a curve a large root is negative, on the other positive: it bounds stability where the other
+On one side of such a curve a large root is negative, on the other positive. The curve bounds stability where the other
 roots are stable, and heavy damping where they are real and negative.
 """
 
@@ -27,7 +27,7 @@ from tmsopt.tracing.points import axis_functions
 from tmsopt.tracing.seeds import find_unexplained, walk_new_curves
 from tmsopt.tracing.solving import map_rows, project_rows
 
-_NOTHING = 1e-12  # of the largest coefficient: a constant term this small all along the curve vanishes with a0
+_NOTHING = 1e-12  # of the largest coefficient: a constant term below it all along the curve vanishes with a0
 _MOST = 10**6
 
 
@@ -37,10 +37,10 @@ class InfinityCurve:
 
     Attributes:
         parameters: free parameter → values at n points.
-        stable: where it bounds stability, for each of the n - 1 segments.
-        heavily_damped: where it bounds heavy damping, likewise.
-        parting: where it parts capsize from weave.
-        changes: row → what the other roots do there, ``capsize``, ``weave``, ``EP2`` or a second ``infinity``.
+        stable: for each of the n - 1 segments, whether it bounds stability.
+        heavily_damped: whether it bounds heavy damping.
+        parting: whether it separates capsize from weave.
+        changes: row → the change of the other roots there: ``capsize``, ``weave``, ``EP2`` or a second ``infinity``.
     """
 
     parameters: dict[str, Array]
@@ -67,13 +67,13 @@ def find_infinity_curves(problem: Posed, step: float, starts: int, seed: int) ->
 
 
 def _find_points(problem: Posed, curve: Curve, starts: int, seed: int, walks: Sequence[Walk]) -> Iterator[Array]:
-    """Points of the curve in the box, from designs spread over it, then from a grid where no line is yet."""
+    """Points of the curve in the box: from designs spread over it, then from a grid where no curve is known."""
     spots = list(islice(sample_box(problem, seed), starts))
     unexplained = ([d] for d in find_unexplained(problem, curve, lambda a: a[0], walks))
     for designs in chain([spots] if spots else [], unexplained):
         at = np.array([variables_of(problem, d) for d in designs]) / curve.scale
         y = project_rows(curve.evaluate, at, [k % 2 for k in range(len(at))])
-        yield y[np.all((curve.lower <= y) & (y <= curve.upper), axis=1)]  # not where it is nan
+        yield y[np.all((curve.lower <= y) & (y <= curve.upper), axis=1)]  # never for nan
 
 
 def _describe_curve(problem: Posed, curve: Curve, walk: Walk, rest: ca.Function) -> InfinityCurve:
@@ -83,7 +83,7 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, rest: ca.Function)
         return map_rows(rest, y * curve.scale)[0]
 
     def tests(y: Array) -> list[tuple[str, Array]]:
-        """Functions without a zero wherever the other roots keep their class, and what a zero means."""
+        """Functions whose zeros are changes of the other roots, each with the name of the change."""
         v = values(y)
         c = list(v[:, : -2 if constant_vanishes else -1].T)
         tested = [("weave" if k else "capsize", value) for k, value in enumerate(axis_functions(c))]
@@ -98,7 +98,7 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, rest: ca.Function)
         located += locate_zeros(curve, walk, lambda y, t: tests(y), event, column)
     located.sort(key=lambda f: (f.after, f.s, f.event.name))
     rows, walk = insert_events(walk, located)
-    distinct = np.append(True, np.any(np.diff(walk.y, axis=0) != 0, axis=1))  # else a zero at a point that was there
+    distinct = np.append(True, np.any(np.diff(walk.y, axis=0) != 0, axis=1))  # a zero may coincide with a point
     points, numbers = walk.y[distinct], (np.cumsum(distinct) - 1)[rows].tolist()
     bounds = _classify_segments(values((points[1:] + points[:-1]) / 2), constant_vanishes)
     row_events = zip(numbers, [f.event.name for f in located], strict=True)
@@ -107,10 +107,10 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, rest: ca.Function)
 
 
 def _classify_segments(v: Array, constant_vanishes: bool) -> tuple[Truth, Truth, Truth]:
-    """Whether a crossing bounds stability, bounds heavy damping, and parts capsize from weave.
+    """Whether each segment bounds stability, bounds heavy damping, or separates capsize from weave.
 
-    Where the constant term vanishes with a0, another root goes through 0: to the same side only if both change
-    sign alike.
+    If the constant term vanishes with a0, another root goes through 0; it goes to the same side only if both
+    coefficients change sign alike.
     """
     c = v[:, : -2 if constant_vanishes else -1]
     stable, damped, parting = np.zeros((3, len(c)), dtype=bool)

@@ -15,10 +15,10 @@ from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.tracing.branch import name_unknowns
 from tmsopt.tracing.equations import TracedProblem, design_at
 
-NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
+NOTHING = 1e-9  # a function below it all along the curve counts as 0 there
 
-_ROUNDED = 1e-14  # a tangent, its inverse and the scale, or a real part beside the modulus: some roundings
-_REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
+_ROUNDED = 1e-14  # a few roundings
+_REAL = 1e-6  # imaginary part of a real root, of |s|: rounding of 1e-15 moves double roots by its square root
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class Points:
 
     @property
     def unknowns(self) -> list[Array]:
-        """Those of the pattern, shape (n,) each."""
+        """The unknowns of the pattern, shape (n,) each."""
         return list(self.x[:, self.traced.unknowns].T)
 
     @property
     def speed(self) -> Array:
-        """How fast the free parameters move along the curve, in units of the scale."""
+        """Speed of the free parameters along the curve, in units of the scale."""
         return np.asarray(np.linalg.norm(self.t[:, : len(self.traced.problem.free)], axis=1))
 
     @cached_property
@@ -56,7 +56,7 @@ class Points:
 
     @cached_property
     def values(self) -> Values:
-        """Quantities; those of the roots come from the factors, where multiple roots are exact."""
+        """Quantities; those of the roots come from the factors, in which multiple roots are exact."""
         z = roots_along(self.traced.pattern.factors(self.unknowns), len(self))
         problem = self.traced.problem
         return Values(problem.model, problem.parameter_set, self.parameters, extra=(NO_RADIUS,)).with_known(
@@ -73,7 +73,7 @@ class Points:
 
     @property
     def names(self) -> list[str]:
-        """What `__getitem__` takes."""
+        """Names that `__getitem__` accepts."""
         return [*self.values, *self.named_unknowns]
 
     @cached_property
@@ -84,12 +84,12 @@ class Points:
 
     @cached_property
     def stable(self) -> Truth:
-        """Where the other roots lie left of the imaginary axis by more than rounding; none count as stable."""
+        """Where all other roots, if any, are left of the imaginary axis by more than rounding."""
         return np.asarray(np.all(self._others.real < -_ROUNDED * np.abs(self._others), axis=-1))
 
     @property
     def heavily_damped(self) -> Truth:
-        """Where the other roots are real and negative, and the pattern has none but those."""
+        """Where all roots are real and the other ones negative."""
         real = np.all(np.abs(self._others.imag) <= _REAL * np.abs(self._others), axis=-1)
         return np.asarray(self.stable & real & ("W" not in self.traced.pattern.unknowns))
 
@@ -102,23 +102,23 @@ class Points:
 
     @property
     def residual(self) -> Array:
-        """Largest mismatch of a coefficient, relative to the terms that it is made of."""
+        """Largest mismatch of a coefficient, relative to its terms."""
         monic = self.traced.pattern.monic(self.unknowns)
         a0 = self.column(self.values.coefficients[0])
         unit = self.column(mean_size(monic))
-        unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots come to 0, that of the curve
+        unit = np.maximum(unit, np.median(unit)) + 1e-300  # near roots 0, the unit of the whole curve
         pairs = enumerate(zip(self.values.coefficients, monic, strict=True))
         terms = [(a - a0 * c, np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k) for k, (a, c) in pairs]
-        # a size of 0: roots that are all 0
+        # a size is 0 if all roots are 0
         return np.asarray(np.max([np.abs(off) / np.where(size == 0, 1.0, size) for off, size in terms], axis=0))
 
     @property
     def special(self) -> list[str]:
-        """Special cases of the pattern that are met along the whole curve, up to rounding."""
+        """Special cases of the pattern that hold along the whole curve, up to rounding."""
         return [name for name in self.traced.pattern.marks if np.median(np.abs(self.mark(name))) <= NOTHING]
 
     def mark(self, name: str) -> Array:
-        """What vanishes at a special case of the pattern."""
+        """The function that vanishes at a special case of the pattern."""
         pattern = self.traced.pattern
         return self.column(pattern.marks[name](pattern.reduced(self.unknowns)))
 
@@ -128,18 +128,18 @@ class Points:
 
     @cached_property
     def _others(self) -> Complex:
-        """The roots that the pattern does not tie."""
+        """The roots that the pattern leaves free."""
         return roots_along(self.traced.pattern.remaining(self.unknowns), len(self))
 
 
 def _clip_rounding(v: Array, low: float, high: float) -> Array:
-    """A limit met exactly, where a tangent and its inverse have rounded past it."""
+    """Values with rounding errors beyond a limit clipped to the limit."""
     limited = np.clip(v, low, high)
     return np.where(np.abs(v - limited) <= _ROUNDED * (1 + np.abs(v)), limited, v)
 
 
 def roots_along(factors: list[list[Any]], count: int) -> Complex:
-    """Roots of factors along a curve, shape (count, roots); nan where one is beyond doubles, as beside infinity."""
+    """Roots of factors along a curve, shape (count, roots); nan where they overflow, near infinity."""
     columns = [np.zeros((count, 0), dtype=complex)]
     for factor in factors:
         rows = np.stack([np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor], axis=-1)
@@ -150,10 +150,10 @@ def roots_along(factors: list[list[Any]], count: int) -> Complex:
 
 
 def is_on_axis(z: Complex) -> Truth:
-    """Which roots lie on the imaginary axis, up to rounding."""
+    """Whether roots are on the imaginary axis, up to rounding."""
     return np.asarray(np.abs(z.real) <= _ROUNDED * np.abs(z))
 
 
 def axis_functions(factor: list[Any]) -> list[Any]:
-    """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
+    """Functions of which one vanishes when a root of the factor reaches the imaginary axis; the first for a root 0."""
     return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], balance(factor)]

@@ -1,4 +1,4 @@
-"""A coarse grid over the plane of two free parameters, to see where branches of a pattern may be missing."""
+"""Points on the curves of a pattern: from many designs, from a grid over two parameters, and from beyond infinity."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, cycle, islice
@@ -14,28 +14,28 @@ from tmsopt.tracing.continuation import INFINITE, Curve, Walk, is_on_walk, walk_
 from tmsopt.tracing.equations import TracedProblem, compute_coefficients, design_at
 from tmsopt.tracing.solving import project_rows
 
-_BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
-_FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
-_ROUNDS = 8  # times the starts asked for, at most
+_BACK = 300.0  # size of an unknown at which extrapolation through infinity begins
+_FAR = 1e5  # largest unknown of a seed, in units of its scale: above it a0 nearly vanishes
+_ROUNDS = 8  # the search uses at most this many times `starts` designs
 _GUESSES = 4  # starting values of the unknowns tried at each design
 
 POINTS = 256
-"""Along each axis; an edge of the grid is as long as a step of a trace."""
+"""Grid points along each axis; an edge of the grid is about as long as a step of a trace."""
 
 FEWER = 96
-"""Likewise where the tests take roots, above the degrees with closed forms: 9 216 polynomials take a second or two."""
+"""The same for degrees without closed forms, where tests compute roots: 9,216 polynomials take one or two seconds."""
 
 _PATIENCE = 32  # designs in a row that lead to nothing new
-_BLOCK = 256  # points whose distances from a line are found at once
+_BLOCK = 256  # points per block of distances
 
 
 def find_unexplained(
     problem: Posed, curve: Curve, test: Callable[[Sequence[Any]], Any], walks: Sequence[Walk]
 ) -> Iterator[dict[str, float]]:
-    """Designs by which a function of the coefficients changes sign, far from every walk; `walks` may grow meanwhile.
+    """Designs near sign changes of a function of the coefficients that no walk explains; `walks` may grow meanwhile.
 
-    They are middles of the edges of a grid over the box, and the function does not count where it is nan. Those between
-    which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
+    They are midpoints of edges of a grid over the box; nan values do not count. Edges on which a0 changes sign too come
+    last, and only while they lead to new curves, since a0 alone explains most of them.
     """
     low, high = np.array(list(problem.free.values())).T
     points = POINTS if problem.model.degree <= CLOSED else FEWER
@@ -51,7 +51,7 @@ def find_unexplained(
             turns, through = (np.nan_to_num(np.diff(np.sign(v), axis=axis)) != 0 for v in (value, a[..., 0]))
             middles.append(np.argwhere(turns & (through == last)) + np.eye(2)[axis] / 2)
         left = np.concatenate(middles) / (points - 1)
-        np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
+        np.random.default_rng(0).shuffle(left)  # neighbours mostly belong to one branch
         fruitless = seen = 0
         while len(left) and (fruitless < _PATIENCE or not last):
             fruitless = fruitless + 1 if seen == len(walks) else 0
@@ -77,7 +77,7 @@ def is_far_from_line(points: Array, line: Array, distance: float) -> Truth:
 def walk_new_curves(
     curve: Curve, points: Iterable[Iterable[Array]], step_and_most: tuple[float, int], walks: list[Walk]
 ) -> None:
-    """Walk the curves through some of many points, shape (points, n + 1) each, that are on none of the `walks` yet."""
+    """Walk the curves through those points, shape (points, n + 1) each, that are on none of the `walks` yet."""
     for y in chain.from_iterable(points):
         if (
             not any(is_on_walk(curve, known, y) for known in walks)
@@ -89,10 +89,9 @@ def walk_new_curves(
 def find_seeds(
     traced: TracedProblem, starts: int, seed: int, through: Sequence[Mapping[str, float]], walks: Sequence[Walk]
 ) -> Iterator[tuple[int, list[Array]]]:
-    """Points of the pattern's curve in the box, found from each of many designs, and the number of these.
+    """Points of the pattern's curves in the box, from each of many designs, with the count of designs so far.
 
-    Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `walks`
-    grows meanwhile.
+    Without a grid test, the search goes on until `starts` designs in a row find nothing new; `walks` grows meanwhile.
     """
     problem = traced.problem
     free = len(problem.free)
@@ -116,20 +115,20 @@ def _has_grid_test(traced: TracedProblem) -> bool:
 
 
 def find_missed(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
-    """Points of the curve where a test function of the pattern changes sign over a grid, off the walks so far."""
+    """Points of the curves where a test function of the pattern changes sign on a grid, off the walks so far."""
     if traced.pattern.test is not None and _has_grid_test(traced):
         for design in find_unexplained(traced.problem, traced.curve, traced.pattern.test, walks):
             yield 0, _project_designs(traced, [design])[0]
 
 
 def find_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
-    """Points where a curve may come back from infinity: there a root changes sides, and the parameters go on.
+    """Points where a curve may return from infinity: a root changes sides there, and the parameters continue.
 
-    They approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit, and a point beyond
-    it.
+    The parameters approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit and a point
+    beyond it.
     """
     free = len(traced.problem.free)
-    for walk in walks:  # they may grow meanwhile
+    for walk in walks:  # `walks` grows meanwhile
         for end, y in zip(walk.ends, (walk.y[::-1], walk.y), strict=True):
             if end.reason != INFINITE:
                 continue
@@ -145,7 +144,7 @@ def find_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterat
 def _project_designs(
     traced: TracedProblem, designs: Sequence[Mapping[str, float]], held: Sequence[int | None] = (None,), most: int = 1
 ) -> list[list[Array]]:
-    """Points of the curve in the box near each design, not too far out, from the best guesses, one variable held."""
+    """Points of the curves in the box near each design, from the best guesses, with one variable held."""
     curve, free = traced.curve, len(traced.problem.free)
     tried = [
         (k, y) for k, design in enumerate(designs) for y in traced.list_starts(design, best_first=most == 1)[:most]
@@ -154,7 +153,7 @@ def _project_designs(
         return [[] for _ in designs]
     owner = [k for k, _ in tried]
     y = project_rows(curve.evaluate, np.array([y for _, y in tried]), [held[k] for k in owner])
-    inside = np.all((y >= curve.lower - 1e-12) & (y <= curve.upper + 1e-12), axis=1)  # not where it is nan
+    inside = np.all((y >= curve.lower - 1e-12) & (y <= curve.upper + 1e-12), axis=1)  # never for nan
     inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, curve.lower, curve.upper)
     inside[inside] = traced.has_leading_coefficient(

@@ -1,4 +1,4 @@
-"""Where equations and functions vanish: many starts at once, each row of an array on its own."""
+"""Zeros of equations and functions, for many starts at once; each row of an array is independent."""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array
 
-_SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
-_DAMPING = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step, the first that helps is taken
+_SOLVED = 1e-10  # largest relative residual of a solution; excludes stationary points of the residual
+_DAMPING = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step; the first that reduces the residual is taken
 _STEPS = 40  # of Gauss–Newton at most
-_FINE = 1e-17  # of an interval: a zero at 0 up to rounding has no relative accuracy
-_AT_END = 1e-6  # of the value at one end of an interval: a value so small at the other is a zero there
+_FINE = 1e-17  # absolute accuracy, of the interval, for a zero near 0
+_AT_END = 1e-6  # an end is a zero if its value is below this share of the value at the other end
 _EPS = 4 * np.finfo(float).eps
 _HALVINGS = 100  # steps towards a zero at most
 
 
 @np.errstate(over="ignore")
 def project_rows(system: ca.Function, y: Array, held: Sequence[int | None]) -> Array:
-    """Solutions near the rows of y by damped Gauss–Newton, in each a variable held or none; nan where none is found.
+    """Solutions near the rows of y by damped Gauss–Newton, with one variable per row held or none; nan if none exists.
 
     `system` gives the equations, any number of them, and their Jacobian.
     """
@@ -56,12 +56,12 @@ def project_rows(system: ca.Function, y: Array, held: Sequence[int | None]) -> A
 
 
 def find_zeros(function: Callable[[Array], Array], ends: Array) -> Array:
-    """`crossing` on many intervals [0, end] at once, by Chandrupatla's method; nan where the sign does not change."""
+    """Zeros in many intervals [0, end] at once, by Chandrupatla's method; nan without a change of sign."""
     a, b = ends.astype(float), np.zeros(len(ends))
     fa, fb = function(a), function(b)
     found = np.where(np.abs(fa) < np.abs(fb), a, b)
     small, large = np.sort(np.abs([fa, fb]), axis=0)
-    found = np.where(small <= _AT_END * large, found, np.nan)  # at a point of the curve rounding may hide the change
+    found = np.where(small <= _AT_END * large, found, np.nan)  # rounding may hide a zero at an end
     active = np.sign(fa) * np.sign(fb) < 0
     share = np.full(len(ends), 0.5)
     for _ in range(_HALVINGS):
@@ -69,7 +69,7 @@ def find_zeros(function: Callable[[Array], Array], ends: Array) -> Array:
             break
         x = a + share * (b - a)
         fx = function(x)
-        kept = np.sign(fx) == np.sign(fa)  # the sign of which end; a is the newest place, c the one before it
+        kept = np.sign(fx) == np.sign(fa)  # a is the newest point, c the one before it
         c, fc = np.where(kept, a, b), np.where(kept, fa, fb)
         b, fb = np.where(kept, b, a), np.where(kept, fb, fa)
         a, fa = x, fx
@@ -92,26 +92,26 @@ def evaluate_rows(system: ca.Function, y: Array) -> tuple[Array, Array]:
 
 def map_rows(function: ca.Function, *arguments: Array) -> list[Array]:
     """A function of dense columns at every row of its arguments."""
-    room = 1 << max(len(arguments[0]) - 1, 0).bit_length()  # few sizes, for a map costs more to make than to call
+    room = 1 << max(len(arguments[0]) - 1, 0).bit_length()  # few sizes, since making a map is costly
     return MappedFunction(function, room)(*arguments)
 
 
 class MappedFunction:
-    """A function of dense columns at up to so many rows, without the cost of converting its arguments."""
+    """A function of dense columns at up to `count` rows, without the cost of converting its arguments."""
 
     def __init__(self, function: ca.Function, count: int) -> None:
         self._inputs = [np.zeros((count, function.numel_in(k))) for k in range(function.n_in())]
         self._outputs = [np.empty((count, function.numel_out(k))) for k in range(function.n_out())]
         buffer: Any
         buffer, self._call = _map_function(function, count).buffer()
-        self._buffer = buffer  # kept alive with the memory that it points to
+        self._buffer = buffer  # keeps the memory alive
         for k, memory in enumerate(self._inputs):
             buffer.set_arg(k, memory.data)
         for k, memory in enumerate(self._outputs):
             buffer.set_res(k, memory.data)
 
     def __call__(self, *arguments: Array) -> list[Array]:
-        """The results, a row each; as many as there are arguments."""
+        """One array of results per output, a row per row of the arguments."""
         count = len(arguments[0])
         for memory, a in zip(self._inputs, arguments, strict=True):
             memory[:count] = a

@@ -1,4 +1,4 @@
-"""One curve followed by hand: an iterator of its points, which a user stops, turns round and listens to."""
+"""Follows one curve point by point: an iterator that a user can stop and turn around."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -27,15 +27,15 @@ def continue_from(
     """Follow one curve of a pattern point by point, from a point near a design.
 
     Args:
-        problem: as for `trace`; of a solution, its design is where the curve begins.
+        problem: as for `trace`; the curve of a solution begins at its parameters.
         pattern: name; by default the one that the problem locates.
-        through: the design to begin near, a value for every free parameter; by default the one of a solution, or the
-            first from which the search of `trace` finds a point.
+        through: a point to begin near, with a value for every free parameter; by default the parameters of a solution,
+            or the first from which the search of `trace` finds a point.
         step: longest step, in widths of the box.
-        events: what to look for, besides the events that tmsopt knows.
+        events: events to locate in addition to the built-in ones.
 
     Raises:
-        InputError: as `trace`, and where no point of the pattern is found.
+        InputError: as for `trace`, and if no point of the pattern is found.
 
     Example:
         >>> fast = tmsopt.Event("Fr is 3", lambda p: p["Fr"] - 3)
@@ -56,20 +56,19 @@ def continue_from(
         for y in points:
             try:
                 return Continuation(traced, CurvePoint(y, compute_tangent(traced.curve, y)), step, checked_events)
-            except ValueError:  # no regular point of a curve
+            except ValueError:  # not a regular point of a curve
                 continue
     near = "near the design" if designs else "in the box"
-    raise refusal(f"no point of {problem_with_pattern.locate} found {near}; give another one to begin at", "through")
+    raise refusal(f"no point of {problem_with_pattern.locate} found {near}; give another point to begin at", "through")
 
 
 class Continuation(Iterator[BranchPoint]):
     """Iterator of the points of one curve, events located among them; `continue_from` makes it.
 
-    It ends where the curve leaves the box, closes or has no direction, and at an event that stops it. Stop before by
-    asking for no more points.
+    It ends where the curve leaves the box, closes or has no direction, and at an event that stops it.
 
     Attributes:
-        end: in words, why there are no more points; empty while there are.
+        end: why there are no more points, in words; empty while there are more.
 
     Example:
         >>> curve = tmsopt.continue_from("problems/ep_set.toml", step=0.02)
@@ -95,12 +94,12 @@ class Continuation(Iterator[BranchPoint]):
         return next(self._points)
 
     def reverse(self) -> None:
-        """Turn round at the last point: the next one lies behind it."""
+        """Turn around at the last point; the next one lies behind it."""
         self._sign, self.end = -self._sign, ""
         self._points = self._follow(CurvePoint(self._last.y, -self._last.t), fresh=False)
 
     def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
-        """Points from the next on, or from the start on where it is `fresh`; then it is said why there are no more."""
+        """Yield the points after a start, or from it if `fresh`; then set `end`."""
         behind = [start]
         for new in follow(self._traced.curve, start, self._step):
             if isinstance(new, End):
@@ -114,7 +113,7 @@ class Continuation(Iterator[BranchPoint]):
                 events = [event for at, event in row_events if at == row]
                 is_repeated = (
                     len(behind) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
-                )  # it turned round there
+                )  # it turned around there
                 if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
                     self._last = CurvePoint(walk.y[row], walk.t[row])
                     self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])

@@ -2,7 +2,7 @@
 
 In two of the parameters, here chi_B and T = tan λ_s, the coefficients are affine. A double root r at a given value of
 the third, Fr, is then two linear equations p(r) = p′(r) = 0, so (Fr, r) parametrises the whole surface. It turns back
-where the root is triple (EP3) and meets itself where a second pair is double (2EP2); cut there, every patch is smooth.
+where the root is triple (EP3) and crosses itself where a second pair is double (2EP2). Cut there, patches are smooth.
 """
 
 from collections.abc import Iterable
@@ -27,7 +27,7 @@ from tmsopt.tracing.solving import find_zeros
 from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]
-"""A double root and what is there: an edge of the surface, or of the box."""
+"""A double root and the kind of edge there: of the surface, or of the box."""
 
 AffineCoefficients = tuple[Array, Array, Array]
 """Coefficients A, B, C of a polynomial A + x B + y C, where x and y are the last two variables."""
@@ -90,11 +90,11 @@ def swallowtail(
     """The surface of real negative double roots in the box of three free parameters: one, and an affine pair.
 
     Args:
-        problem: with Fr, chi_B and lambda_s free, or three parameters of another model of which the coefficients
-            are affine in the last two (their tangents, for angles).
-        rows, across: points along the first parameter, and along r between two edges.
-        starts: of the traces of its edges; see `trace`.
-        progress: called with a `tmsopt.Progress` now and then.
+        problem: with Fr, chi_B and lambda_s free, or three parameters of another model whose coefficients are affine
+            in the last two (in their tangents, for angles).
+        rows, across: number of points along the first parameter, and along r between two edges.
+        starts: starts of the traces of its edges; see `trace`.
+        progress: function called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for another number of free parameters, coefficients that are not affine in two of them, or a
@@ -110,15 +110,15 @@ def swallowtail(
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
     if plane.model.degree < _LEAST:
         message = (
-            f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_LEAST} or more, for a "
-            "swallowtail crosses itself where two double roots stand side by side; trace EP2 and EP3 instead"
+            f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_LEAST} or more, since a "
+            "swallowtail crosses itself at two double roots; trace EP2 and EP3 instead"
         )
         raise refusal(message, "model")
     if len(plane.free) != 3:
-        raise refusal(f"a surface takes three free parameters, and {len(plane.free)} are free", "parameters")
+        raise refusal(f"found {len(plane.free)} free parameters; accepted: 3 for a surface", "parameters")
     first, *pair = plane.free
     if not _is_affine(plane):
-        message = f"the coefficients are not affine in {' and '.join(pair)}; put two in which they are last"
+        message = f"the coefficients are not affine in {' and '.join(pair)}; list two last in which they are"
         raise refusal(message, "parameters")
     cusps, crossing = (trace(plane, name, starts=starts, progress=progress) for name in ("EP3", "2EP2"))
     grid = _choose_rows(plane, rows, (*cusps.events, *crossing.events))
@@ -131,7 +131,7 @@ def swallowtail(
         if steps:
             steps(done, len(grid))
     patches = []
-    # Neighbouring rows with the same cuts in the same order belong to one set of patches.
+    # neighbouring rows with the same cuts form one set of patches
     for _, run in groupby(range(len(grid)), key=lambda k: [[kind for _, kind in interval] for interval in cuts[k]]):
         inside = list(run)
         for intervals in zip(*(cuts[k] for k in inside), strict=True) if len(inside) > 1 else ():
@@ -141,18 +141,20 @@ def swallowtail(
 
 
 def _choose_rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Array:
-    """Values of the first parameter: evenly spaced, and around each at which the number of edges changes."""
+    """Values of the first parameter: evenly spaced, with extra ones around each change of the number of edges."""
     name, (low, high) = next(iter(problem.free.items()))
     changes = [
         e.parameters[name] + _AROUND for e in events if e.name == "EP4" or (e.name == "fold" and name in e.detail)
     ]
     grid = np.unique(np.concatenate([np.linspace(low, high, count), *changes]))
     grid = grid[(grid >= low) & (grid <= high)]
-    return np.asarray(grid[np.append(True, np.diff(grid) > _SAME * (high - low))])  # an EP4 is on every edge
+    return np.asarray(
+        grid[np.append(True, np.diff(grid) > _SAME * (high - low))]
+    )  # an EP4 is an event of several traces
 
 
 def _compute_polynomials(problem: Posed, x: Any) -> Array:
-    """Coefficients at variables x, tangents for angles, shape (designs, 3)."""
+    """Coefficients at variables x, tangents for angles, shape (designs, n + 1)."""
     return compute_coefficients(problem, design_at(problem, np.asarray(x)))
 
 
@@ -178,9 +180,10 @@ def _solve_double_root(affine: AffineCoefficients, r: Array) -> tuple[Array, Arr
 
 
 def _find_cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
-    """For each interval of r inside the box, ascending: its ends, and the edges between them; `scan` has values of r.
+    """For each interval of r inside the box, ascending: its ends and the edges between them; `scan` holds values of r.
 
-    Edges are zeros along r: of the slack to the box, of the other roots' polynomial at r (EP3), of its discriminant.
+    Edges are zeros along r of the slack to the box, of the other roots' polynomial at r (EP3), and of its
+    discriminant (2EP2).
     """
     affine, (low, high) = _split_affine(problem, first), (limit[1:, None] for limit in limits_of(problem))
 
@@ -203,7 +206,7 @@ def _find_cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
 
 
 def _divide(p: Array, r: Array) -> Array:
-    """Quotient of polynomials by s − r, coefficients first: Horner's rule."""
+    """Quotients of polynomials by s − r, coefficients first, by Horner's rule."""
     rows = [p[0]]
     for row in p[1:-1]:
         rows.append(row + rows[-1] * r)
