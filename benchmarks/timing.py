@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.executor import here, processes
-from tmsopt.program import forget
+from tmsopt.program import forget_solvers
 
 
 def best(works: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
@@ -70,7 +70,7 @@ class IpoptRun:
 def ipopt_runs() -> Iterator[list[IpoptRun]]:
     """Note every run of IPOPT in this thread; solvers are built anew."""
     runs: list[IpoptRun] = []
-    forget()
+    forget_solvers()
     made_by: Any = ca.nlpsol
 
     class Noted:
@@ -90,4 +90,4 @@ def ipopt_runs() -> Iterator[list[IpoptRun]]:
 
     with patch.object(ca, "nlpsol", Noted):
         yield runs
-    forget()
+    forget_solvers()

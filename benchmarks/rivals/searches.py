@@ -17,7 +17,7 @@ from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, 
 
 from benchmarks.rivals.reduced import Found, Reduced, Watch
 from tmsopt import Problem
-from tmsopt.program import designs
+from tmsopt.program import choose_starts
 
 STARTS = 5
 """Designs that the local rivals start from: the first ones of `tmsopt.solve`."""
@@ -69,7 +69,7 @@ def local(method: str, problem: Problem, starts: int = STARTS, watch: Watch | No
     began = time.perf_counter()
     ends: list[Found] = []
     with quiet():
-        for design in designs(problem.posed, 0, starts):
+        for design in choose_starts(problem.posed, 0, starts):
             start = np.array([design[name] for name in reduced.names])
             answer: Any = minimize(function, start, bounds=bounds, **search)
             ends.append(reduced.found(method, np.asarray(answer.x), 0.0))

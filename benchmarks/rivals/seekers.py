@@ -20,7 +20,7 @@ from benchmarks.rivals.nonsmooth import pygranso, rightmost
 from benchmarks.rivals.reduced import Reduced, Watch
 from benchmarks.rivals.searches import LOCAL, differential, local, quiet
 from tmsopt import Problem
-from tmsopt.program import designs
+from tmsopt.program import choose_starts
 from tmsopt.records import Array
 
 _MANY = 1_000_000
@@ -135,5 +135,5 @@ def slopes(reduced: Reduced, x: Array) -> tuple[Array, Array]:
 
 
 def _starts(reduced: Reduced) -> Iterator[Array]:
-    for design in designs(reduced.problem.posed, 0, _MANY):
+    for design in choose_starts(reduced.problem.posed, 0, _MANY):
         yield np.array([design[n] for n in reduced.names])

@@ -231,7 +231,7 @@ def test_a_recheck_finds_the_radius_without_ipopt(monkeypatch):
         raise AssertionError
 
     for name in ("program.ipopt", "boundaries.nearest"):
-        monkeypatch.setattr(import_module(f"tmsopt.{name}"), "ipopt", nothing)
+        monkeypatch.setattr(import_module(f"tmsopt.{name}"), "make_ipopt", nothing)
     for design, radius in claimed:
         asked = replace(problem(design), constraints={"far": "radius >= 0"}).posed
         assert recheck(asked, design).quantities["radius"] == pytest.approx(radius, rel=1e-8)

@@ -346,7 +346,7 @@ def test_chart_json_is_finite(run):
     ("arguments", "words"),
     [
         (["trace", "problems/ep_set.toml", "--pattern", "EP9"], "unknown pattern 'EP9'"),
-        (["trace", "problems/ep_set.toml", "--pattern", "EP2"], "takes 2 free parameters"),
+        (["trace", "problems/ep_set.toml", "--pattern", "EP2"], "2 free parameters"),
         (["trace", "problems/chart.toml"], "no pattern to trace"),
         (
             ["trace", "problems/ep_set.toml", "--plot", "x.png", "--axes", "Fr,mu"],
@@ -376,7 +376,7 @@ def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
 def test_a_pattern_with_other_freedom_ends_a_process_with_2():
     done = tmsopt("trace", "problems/ep_set.toml", "--pattern", "EP2")
     assert (done.returncode, done.stdout) == (2, "")
-    assert "takes 2 free parameters" in done.stderr
+    assert "2 free parameters" in done.stderr
     assert "Traceback" not in done.stderr
 
 

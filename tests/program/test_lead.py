@@ -29,7 +29,7 @@ def test_any_design_has_such_factors(degree, objective, sign):
     for a0 in (1.0, 0.3, 1e-2, 1e-3):
         a = sign * np.array([a0, *rng.uniform(0.5, 2, degree)])
         x = initial_point(nlp, problem.posed, dict(zip(NAMES, a.tolist(), strict=False)), False)
-        rows = np.array(nlp.at(x)[1]).ravel()
+        rows = np.array(nlp.evaluate(x)[1]).ravel()
         size = np.abs(x).max()
         assert np.all(rows >= np.array(nlp.row_lower) - 1e-9 * size)
         assert np.all(rows <= np.array(nlp.row_upper) + 1e-9 * size)

@@ -12,7 +12,7 @@ from tmsopt import laws
 from tmsopt.algebra import FLOATS
 from tmsopt.models import from_coefficients, tms
 from tmsopt.problem import Problem, load, replace_limit
-from tmsopt.program import forget, formulate
+from tmsopt.program import forget_solvers, formulate
 from tmsopt.search import solve
 
 nlp = import_module("tmsopt.program.nlp")
@@ -74,10 +74,10 @@ MEMBERS = {
 def test_a_member_is_solved_as_alone_and_whatever_came_before(name):
     """The very same bits as of what is compiled anew."""
     member, values = MEMBERS[name]
-    forget()
+    forget_solvers()
     shared = [solve(member(v)) for v in values]
     for value, found in zip(values, shared, strict=True):
-        forget()
+        forget_solvers()
         fresh = solve(member(value))
         assert dict(fresh.parameters) == dict(found.parameters)
         assert fresh.value == found.value or (math.isnan(fresh.value) and math.isnan(found.value))
@@ -112,7 +112,7 @@ def test_nothing_grows_without_end():
     problem = replace(EP4, minimize=None, locate="EP3")
     for k in range(80):
         assert formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)}).posed).compiled
-    assert nlp._MADE.of.cache_info().currsize == nlp._MADE.of.cache_info().maxsize == 64
+    assert nlp._PROGRAMS.get.cache_info().currsize == nlp._PROGRAMS.get.cache_info().maxsize == 64
 
 
 def test_a_number_is_a_parameter_unless_it_is_nothing():
@@ -138,7 +138,7 @@ def test_a_member_of_another_size_is_solved_in_units_of_its_own(varied):
         free = {"a": (0.5, 6.0), "b": (0.5, 6.0)}
         problem = Problem(model=model, fixed=fixed, free=free, minimize="k*abscissa", constraints={"tie": "a >= 0.6"})
         found = solve(problem)
-        forget()
+        forget_solvers()
         alone = solve(problem)
         assert dict(found.parameters) == dict(alone.parameters)
         assert found.abscissa == pytest.approx(-fixed["r"], rel=1e-9)

@@ -14,7 +14,7 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.evaluation import omega0_bound
 from tmsopt.problem import degrees_of_freedom
-from tmsopt.program import AskedOfSolve, Options
+from tmsopt.program import Options, SolveOptions
 from tmsopt.roots import PATTERNS, pattern_distance, roots
 
 TMS = tmsopt.models.tms
@@ -297,7 +297,7 @@ def test_a_misspelt_option_is_refused_with_the_nearest_name():
         tmsopt.solve(ep4_problem(), start=3)
     with pytest.raises(TypeError, match="unknown option 'near'; accepted: starts seed linear_solver progress"):
         tmsopt.compare(ep4_problem(), near={})
-    assert list(AskedOfSolve.__annotations__) == [field.name for field in fields(Options)]
+    assert list(SolveOptions.__annotations__) == [field.name for field in fields(Options)]
 
 
 def test_seeded_runs_are_identical_and_threads_do_not_share_solvers():

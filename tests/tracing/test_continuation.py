@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tmsopt.tracing import End, both_ways, curve, tangent_at, walk
+from tmsopt.tracing import End, compile_curve, compute_tangent, walk, walk_both_ways
 
 ROUNDING = 1e-14
 """A corrected point is a solution to a few units of rounding of numbers of order 1."""
@@ -16,7 +16,7 @@ INFINITE = np.array([np.inf, np.inf])
 
 def plane(equation, lower=-INFINITE, upper=INFINITE, scale=(1.0, 1.0)):
     x = ca.SX.sym("x", 2)
-    return curve(x, equation(x[0], x[1]), np.array(scale), np.array(lower, float), np.array(upper, float))
+    return compile_curve(x, equation(x[0], x[1]), np.array(scale), np.array(lower, float), np.array(upper, float))
 
 
 def circle(x, y):
@@ -57,7 +57,7 @@ def test_circle_closes_in_either_sense(sense, step):
 def test_scale_of_the_variables_does_not_change_the_curve():
     """x²/100² + y² = 1 in units of (100, 1) is a circle."""
     on = plane(lambda x, y: (x / 100) ** 2 + y**2 - 1, scale=(100.0, 1.0))
-    walked = both_ways(on, np.array([0.6, 0.8]), 0.01, 10**5)
+    walked = walk_both_ways(on, np.array([0.6, 0.8]), 0.01, 10**5)
     assert walked is not None
     assert walked.closed
     assert np.abs(np.hypot(*walked.y.T) - 1).max() <= ROUNDING
@@ -66,7 +66,7 @@ def test_scale_of_the_variables_does_not_change_the_curve():
 def test_lemniscate_is_followed_straight_through_its_crossing():
     """(x² + y²)² = x² − y² has length 2ϖ = 5.24411510858 (lemniscate constant), its lobes opposite areas ±1/2."""
     on = plane(lambda x, y: (x * x + y * y) ** 2 - x * x + y * y)
-    walked = both_ways(on, np.array([1.0, 0.0]), 0.002, 10**5)
+    walked = walk_both_ways(on, np.array([1.0, 0.0]), 0.002, 10**5)
     assert walked is not None
     assert walked.closed
     h = lengths(walked).max()
@@ -82,8 +82,8 @@ def test_a_closed_curve_in_space():
     """Viviani: x² + y² + z² = 4, (x − 1)² + y² = 1, which crosses itself at (2, 0, 0)."""
     x = ca.SX.sym("x", 3)
     equations = ca.vertcat(ca.dot(x, x) - 4, (x[0] - 1) ** 2 + x[1] ** 2 - 1)
-    on = curve(x, equations, np.ones(3), -INFINITE[[0, 0, 0]], INFINITE[[0, 0, 0]])
-    walked = both_ways(on, np.array([0.0, 0.0, 2.0]), 0.005, 10**5)
+    on = compile_curve(x, equations, np.ones(3), -INFINITE[[0, 0, 0]], INFINITE[[0, 0, 0]])
+    walked = walk_both_ways(on, np.array([0.0, 0.0, 2.0]), 0.005, 10**5)
     assert walked is not None
     assert walked.closed
     assert np.abs((walked.y**2).sum(axis=1) - 4).max() <= 10 * ROUNDING
@@ -95,7 +95,7 @@ def test_a_neighbouring_curve_is_not_jumped_to():
     """Circles of radius 1 and 1.01: prediction errors of a longer step are as large as the gap."""
     on = plane(lambda x, y: (x * x + y * y - 1) * (x * x + y * y - 1.01**2))
     for radius in (1.0, 1.01):
-        walked = both_ways(on, np.array([radius, 0.0]), 0.05, 10**5)
+        walked = walk_both_ways(on, np.array([radius, 0.0]), 0.05, 10**5)
         assert walked is not None
         assert walked.closed
         assert np.abs(np.hypot(*walked.y.T) - radius).max() <= 1e-12  # the equation is flatter by the gap
@@ -107,7 +107,7 @@ def test_a_neighbouring_curve_is_not_jumped_to():
 def test_folds_are_passed_and_limits_met_exactly():
     """x = y³ − y turns back in x at y = ±1/√3."""
     on = plane(lambda x, y: y**3 - y - x, lower=[-6, -2], upper=[6, 2], scale=(12.0, 4.0))
-    walked = both_ways(on, np.array([0.0, 0.0]), 0.002, 10**5)
+    walked = walk_both_ways(on, np.array([0.0, 0.0]), 0.002, 10**5)
     assert walked is not None
     assert not walked.closed
     x, y = (walked.y * on.scale).T
@@ -123,7 +123,7 @@ def test_folds_are_passed_and_limits_met_exactly():
 
 def test_a_limit_is_reached_exactly():
     on = plane(circle, lower=[-2, -2], upper=[0.5, 2], scale=(2.5, 4.0))
-    walked = both_ways(on, np.array([-1.0, 0.0]) / on.scale, 0.01, 10**5)
+    walked = walk_both_ways(on, np.array([-1.0, 0.0]) / on.scale, 0.01, 10**5)
     assert walked is not None
     assert walked.ends == (End("max", 0), End("max", 0))
     ends = walked.y[[0, -1]] * on.scale
@@ -142,7 +142,7 @@ def test_of_two_limits_within_one_step_the_first_is_taken():
 
 def test_a_start_on_the_limit_walks_inward_only():
     on = plane(circle, lower=[0, -2], upper=[2, 2])
-    walked = both_ways(on, np.array([0.0, 1.0]), 0.01, 10**5)
+    walked = walk_both_ways(on, np.array([0.0, 1.0]), 0.01, 10**5)
     assert walked is not None
     assert np.all(walked.y[:, 0] >= 0)
     assert walked.y[[0, -1], 0].tolist() == [0.0, 0.0]
@@ -166,7 +166,7 @@ def test_most_points_and_infinity():
     walked = walk(on, np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.001, 17)
     assert len(walked.y) == 17
     assert walked.ends[1].reason == "stopped after 17 points"
-    hyperbola = both_ways(plane(lambda x, y: x * y - 1), np.array([1.0, 1.0]), 0.01, 10**5)
+    hyperbola = walk_both_ways(plane(lambda x, y: x * y - 1), np.array([1.0, 1.0]), 0.01, 10**5)
     assert hyperbola is not None
     assert all("infinity" in end.reason for end in hyperbola.ends)
     assert np.abs(hyperbola.y[:, 0] * hyperbola.y[:, 1] - 1).max() <= 1e-10  # 1e4 · rounding of 1e-4
@@ -175,10 +175,10 @@ def test_most_points_and_infinity():
 
 def test_a_point_where_the_equations_leave_more_than_a_curve_is_no_start():
     x = ca.SX.sym("x", 3)
-    twice = curve(x, ca.vertcat(x[0], 2 * x[0]), np.ones(3), np.full(3, -np.inf), np.full(3, np.inf))
-    with pytest.raises(ValueError, match="more than a curve"):
-        tangent_at(twice, np.zeros(3))
-    assert both_ways(twice, np.zeros(3), 0.01, 100) is None
+    twice = compile_curve(x, ca.vertcat(x[0], 2 * x[0]), np.ones(3), np.full(3, -np.inf), np.full(3, np.inf))
+    with pytest.raises(ValueError, match="direction"):
+        compute_tangent(twice, np.zeros(3))
+    assert walk_both_ways(twice, np.zeros(3), 0.01, 100) is None
 
 
 # Its parts
@@ -187,7 +187,7 @@ def test_a_point_where_the_equations_leave_more_than_a_curve_is_no_start():
 def test_a_curve_in_an_edge_of_the_box_is_followed():
     """y (1 + x²) = 0 with y ≥ 0: rounding on the wrong side of the edge does not end it."""
     x = ca.SX.sym("x", 2)
-    on = curve(x, x[1] * (1 + x[0] ** 2), np.ones(2), np.array([-1.0, 0.0]), np.array([1.0, 1.0]))
-    walked = both_ways(on, np.array([0.1, -1e-17]), 0.05, 500)
+    on = compile_curve(x, x[1] * (1 + x[0] ** 2), np.ones(2), np.array([-1.0, 0.0]), np.array([1.0, 1.0]))
+    walked = walk_both_ways(on, np.array([0.1, -1e-17]), 0.05, 500)
     assert sorted(walked.y[[0, -1], 0]) == [-1, 1]
     assert np.abs(walked.y[:, 1]).max() < 1e-15

@@ -122,11 +122,11 @@ def test_a_closed_curve_is_cut_where_it_stops(level):
     ("function", "words"),
     [
         (lambda p: p["Fr"] / 0, "raises ZeroDivisionError"),
-        (lambda p: math.nan, "gives nan"),
-        (lambda p: "fast", "gives 'fast'"),
-        (lambda p: None, "gives None"),
+        (lambda p: math.nan, "nan at Fr"),
+        (lambda p: "fast", "'fast' at Fr"),
+        (lambda p: None, "None at Fr"),
         (lambda p: p["Frr"], "did you mean 'Fr'"),
-        (lambda p: p["Fr"] > 3, "gives True|gives False"),
+        (lambda p: p["Fr"] > 3, "(True|False) at Fr"),
     ],
 )
 def test_a_function_that_gives_no_number_is_named(function, words):
@@ -147,10 +147,7 @@ def test_a_function_that_gives_no_number_is_named(function, words):
         ([HALF, Event("x", 3)], "events.1: found"),
         ([Event("two\nlines", HALF.function)], "events.0.name"),
         ([Event(3, HALF.function)], "events.0.name: found 3; accepted: a text"),
-        *[
-            ([Event(n, HALF.function)], f"events.0.name: found '{n}', which tmsopt")
-            for n in ("fold", "EP4", "2EP2", "end")
-        ],
+        *[([Event(n, HALF.function)], f"events.0.name: found '{n}'") for n in ("fold", "EP4", "2EP2", "end")],
     ],
 )
 def test_what_is_no_event_is_refused(events, words):

@@ -325,7 +325,7 @@ def test_sections_beside_ep4_keep_their_events_apart(below):
                 true = certified(equations("EP3"), start, fixed)
                 assert event.parameters["chi_B"] == pytest.approx(float(true["chi_B"]), abs=1e-10)
     else:  # events closer than 1e-6 are one
-        assert sorted(named) == [("2EP2", "")] * 2 + [("EP3", "beside an EP4; cusp")]
+        assert sorted(named) == [("2EP2", "")] * 2 + [("EP3", "next to an EP4; cusp")]
 
 
 @pytest.mark.slow
@@ -619,7 +619,7 @@ def test_si_parameters_trace_the_same_curve():
 @pytest.mark.parametrize(
     ("pattern", "free", "words"),
     [
-        ("EP2", {"Fr": (0.1, 5.0)}, "takes 2 free parameters"),
+        ("EP2", {"Fr": (0.1, 5.0)}, "2 free parameters"),
         ("EP2", {"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0)}, "fix 1 of them"),
         ("EP4", {"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0)}, "free 1 more"),
         ("EP5", {"Fr": (0.1, 5.0), "lambda_s": (0.1, 1.0)}, "EP5"),
@@ -727,7 +727,7 @@ def test_options_out_of_range_are_refused(options, words):
 
 def test_a_box_one_rounding_wide_is_a_number():
     fixed, free = BASE | {"chi_B": SQRT2}, {"Fr": (2.0, 2.0000000000000004), "lambda_s": (0.01, 1.4)}
-    with pytest.raises(InputError, match="1 is free"):
+    with pytest.raises(InputError, match="found 1 "):
         traced("EP2", fixed, free)
 
 

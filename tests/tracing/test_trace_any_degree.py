@@ -361,7 +361,7 @@ def test_a_pattern_that_the_degree_has_no_room_for_is_named():
         trace(plane, "EP3")
     with pytest.raises(InputError, match=r"no pattern to trace.*EP2 weave capsize"):
         trace(plane)
-    with pytest.raises(InputError, match=r"EP3 takes 3 free parameters \(2 conditions"):
+    with pytest.raises(InputError, match=r"EP3 needs 3 free parameters \(2 conditions"):
         traced(chain(), "EP3", PLANE, CHAIN)
 
 

@@ -191,14 +191,14 @@ def _judged(solution: Solution) -> Posed:
     if demands_heavy_damping(problem):
         raise NotCovered("heavy damping is asked for, which holds the roots on the real line as well")
     nlp = formulate(problem)
-    if set(nlp.touches) & set(ROOT_NAMES):
+    if set(nlp.contacts) & set(ROOT_NAMES):
         raise NotCovered(
             "an objective or constraint asks for a large abscissa, a small damping ratio or a high frequency"
         )
     x = initial_point(nlp, problem, solution.parameters)
     if "abscissa" in nlp.variables:
         x[nlp.variables.index("abscissa")] = solution.abscissa / nlp.unit
-    rows = nlp.at(nlp.filled(x))[1]
+    rows = nlp.evaluate(nlp.set_kinks(x))[1]
     if any(np.sort(rows[list(kink.rows)])[1] <= _MET for kink in nlp.kinks if not kink.quotient):
         raise NotCovered("two sides of an abs, min or max meet there")
     return problem

@@ -26,7 +26,7 @@ import numpy as np
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.solution import Solution
-from tmsopt.program.formulate import abscissa, variables_of
+from tmsopt.program.formulate import formulate_abscissa, variables_of
 from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import Root, product, shift
@@ -95,7 +95,7 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
     Raises:
         NotCovered: where the damping ratio binds, or the abscissa does not.
     """
-    nlp, values, free = abscissa(problem), problem.values(solution.parameters), problem.free
+    nlp, values, free = formulate_abscissa(problem), problem.values(solution.parameters), problem.free
     values = values.with_known({"abscissa": solution.abscissa})
     units = {"abscissa": nlp.unit, ANGULAR_FREQUENCY: nlp.unit}
     at = dict(zip(free, variables_of(problem, solution.parameters), strict=True))
@@ -104,7 +104,7 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
     x = {n: ca.SX.sym(n) for n in at}
     every = ca.vertcat(*x.values())
     f, g = nlp.symbolic(every)
-    reached = nlp.at(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
+    reached = nlp.evaluate(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
     tied = {n: _rows_of(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
     # what is the greatest of several, and here the constant one of them
     steady = [n for n, rows in tied.items() if all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in rows)]

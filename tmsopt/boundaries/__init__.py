@@ -1,7 +1,6 @@
 """How far a design is from weave, capsize, infinity and heavy damping: the robustness radius.
 
-In: a design with weights on its parameters. Out: the nearest point of each boundary, and the radius. Open `nearest`
-first.
+`nearest` finds the nearest point of one boundary for a design with weighted parameters, `robustness` the points of all.
 """
 
 import lazy_loader

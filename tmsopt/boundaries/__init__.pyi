@@ -1,6 +1,6 @@
-from .axis import edges_at as edges_at, is_exactly_multiple as is_exactly_multiple, stands_on as stands_on
-from .boundaries import edges as edges, heavily_damped as heavily_damped
+from .axis import edges_at as edges_at, find_edges as find_edges, is_exactly_multiple as is_exactly_multiple
+from .boundaries import is_heavily_damped as is_heavily_damped, list_edges as list_edges
 from .nearest import (
-    Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness,
-    robustness_at as robustness_at,
+    Nearest as Nearest, Robustness as Robustness, find_stability_margins as find_stability_margins, nearest as nearest,
+    robustness as robustness,
 )

@@ -1,4 +1,4 @@
-"""Whether a design stands on the boundary of stability already, as far as the rounding of its parameters tells."""
+"""Whether a design is already on a stability boundary, up to the rounding of its parameters."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,31 +14,31 @@ from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure, exact_longest, lienard_chipart, rebuilt, structure
 from tmsopt.roots.exact import isolated_roots
 
-_ROUNDING = 64 * float(np.finfo(float).eps)  # of the terms of a coefficient: what a solver and numeric roots leave
-_FAR = 1e-3  # of the largest root: an abscissa of no edge
-_ON_LINE = 1e-6  # of the largest root: beyond it none is on the axis but for rounding
+_ROUNDING = 64 * float(np.finfo(float).eps)  # of the terms of a coefficient: error of a solver and of numeric roots
+_FAR = 1e-3  # of the largest root: a larger abscissa is not on an edge
+_ON_LINE = 1e-6  # of the largest root: a larger real part is not rounding
 
 
 def edges_at(problem: Posed, parameters: Numbers) -> tuple[str, ...]:
-    """The boundaries of stability that a design stands on as far as rounding tells, of weave, capsize and infinity.
+    """The stability boundaries that a design is on up to rounding: weave, capsize, infinity.
 
-    Empty where a root is right of the imaginary axis. Judged by coefficients: with roots moved onto the axis, or the
-    leading coefficient 0, they change by no more than the rounding of the parameters may change them.
+    Empty if a root is right of the imaginary axis. The test moves roots onto the axis, or the leading coefficient to 0,
+    and compares the change of the coefficients with the rounding of the parameters.
     """
     values = problem.values(parameters)
-    c, off = np.array([float(x) for x in values.coefficients]), np.array(values.roundings())
-    known = np.abs(c) > off
+    c, errors = np.array([float(x) for x in values.coefficients]), np.array(values.roundings())
+    known = np.abs(c) > errors
     if not np.all(np.isfinite(c)) or not known[:-1].any():
         return ()
     lead = int(np.argmax(known))
-    found: Structure = structure(c[lead:], off=off[lead:]) if lead else values["structure"]
-    on_axis = _on_axis(found.roots, off[lead:] / abs(c[lead]))
-    if on_axis and problem.model.carrier is not None:  # a root 0 of the double is a real eigenfrequency like others
+    found: Structure = structure(c[lead:], off=errors[lead:]) if lead else values["structure"]
+    on_axis = _classify_axis_roots(found.roots, errors[lead:] / abs(c[lead]))
+    if on_axis and problem.model.carrier is not None:  # a zero root is an ordinary real eigenfrequency
         on_axis = ("weave",)
     return () if on_axis is None else (*on_axis, *(["infinity"] if lead else []))
 
 
-def stands_on(
+def find_edges(
     problem: Posed,
     parameters: Numbers,
     structure: Structure,
@@ -46,31 +46,31 @@ def stands_on(
     abscissa: float,
     meetings: Sequence[MultipleRoot],
 ) -> tuple[tuple[str, ...], bool]:
-    """The boundaries of stability that a design stands on, and whether that and its growth are certain.
+    """The stability boundaries that a design is on, and whether they and the growth on them are certain.
 
-    Certain are simple roots that a located pattern ties to the axis, and what fractions show.
+    They are certain for simple roots that a located pattern places on the axis, and where exact fractions decide.
 
     Args:
         abscissa, meetings: of the design, in doubles.
     """
-    beyond = beyond_axis(problem.model, problem.located if optimal else (), structure.roots)
+    right_of_axis = beyond_axis(problem.model, problem.located if optimal else (), structure.roots)
     largest = max((r.size for r in structure.roots), default=0.0)
-    if beyond or (abs(structure.abscissa) > _FAR * largest and largest):
+    if right_of_axis or (abs(structure.abscissa) > _FAR * largest and largest):
         return (), False
-    edges = edges_at(problem, parameters) or (("weave",) if beyond == 0 else ())
+    edges = edges_at(problem, parameters) or (("weave",) if right_of_axis == 0 else ())
     longest = longest_chain_on_line(meetings, abscissa, largest)
-    tied = beyond == 0 and longest is None
-    return edges, tied or (bool(edges) and longest_on_axis(problem, parameters) == (longest or 1))
+    is_tied = right_of_axis == 0 and longest is None
+    return edges, is_tied or (bool(edges) and find_longest_chain(problem, parameters) == (longest or 1))
 
 
-def longest_on_axis(problem: Posed, parameters: Numbers) -> int | None:
-    """Length of the longest Jordan chain of roots on the imaginary axis, in fractions.
+def find_longest_chain(problem: Posed, parameters: Numbers) -> int | None:
+    """Length of the longest Jordan chain of a root on the imaginary axis, in exact fractions.
 
-    None where no root is there or one is right of it, and where fractions do not tell.
+    None if no root is on the axis, if one is right of it, or if fractions do not decide.
     p(s) = e(s²) + s o(s²) has the roots s² = x of gcd(e, o) on the axis, mirrored in it, or in four quadrants.
     """
     model, of = problem.model, problem.parameter_set
-    design = as_typed(problem, parameters)
+    design = convert_as_typed(problem, parameters)
     a = design.coefficients(model, of)
     if a is None or a[0] == 0:
         return None
@@ -93,28 +93,28 @@ def longest_on_axis(problem: Posed, parameters: Numbers) -> int | None:
 
 
 def is_exactly_multiple(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> bool:
-    """Whether the multiplicities of the roots of a polynomial are those of the numbers as typed, in fractions."""
-    a = as_typed(problem, parameters).coefficients(problem.model, problem.parameter_set)
+    """Whether the roots have the multiplicities of the polynomial of the numbers as typed, in fractions."""
+    a = convert_as_typed(problem, parameters).coefficients(problem.model, problem.parameter_set)
     if a is None or a[0] == 0:
         return False
     return sorted(r.multiplicity for r in roots) == sorted(m for _, m in isolated_roots(a))
 
 
-def as_typed(problem: Posed, parameters: Numbers) -> ExactDesign:
-    """A design in exact numbers: what was typed for the fixed ones, decimals for the others."""
+def convert_as_typed(problem: Posed, parameters: Numbers) -> ExactDesign:
+    """A design in exact numbers: fixed parameters as typed, the others as decimals."""
     typed = {n: text for n, text in problem.typed(parameters).items() if n in problem.fixed}
     return as_exact_design(problem.parameter_set, parameters, None, typed)
 
 
-def _on_axis(roots: Sequence[Root], off: Array) -> tuple[str, ...] | None:
-    """What roots on the imaginary axis make of monic coefficients that may be off; None where one is right of it."""
+def _classify_axis_roots(roots: Sequence[Root], errors: Array) -> tuple[str, ...] | None:
+    """Kinds of the roots on the imaginary axis, within the coefficients' errors; None if one is right of it."""
     z = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity)])
     near = np.abs(z.real) <= _ON_LINE * np.abs(z).max(initial=0.0)
-    moved = np.where(near, 1j * z.imag, z)
-    change = np.abs(rebuilt(moved) - rebuilt(z))
-    if len(z) != len(off) - 1 or np.any(change > off + _ROUNDING * rebuilt(-np.abs(z).astype(complex))):
+    on_line = np.where(near, 1j * z.imag, z)
+    change = np.abs(rebuilt(on_line) - rebuilt(z))
+    if len(z) != len(errors) - 1 or np.any(change > errors + _ROUNDING * rebuilt(-np.abs(z).astype(complex))):
         near[:] = False
     if np.any(z.real[~near] >= 0):
         return None
     kinds = {"weave": near & (z.imag != 0), "capsize": near & (z.imag == 0)}
-    return tuple(kind for kind, which in kinds.items() if which.any())
+    return tuple(kind for kind, mask in kinds.items() if mask.any())

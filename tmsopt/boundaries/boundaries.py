@@ -1,7 +1,7 @@
-"""The boundaries of stability and of heavy damping as factored forms, without division by a0.
+"""The boundaries of stability and of heavy damping in factored form, without division by a0.
 
-Coefficients c here are those of the polynomial times the sign of a0 on the stable side, so that all of them are
-positive where the roots are left of the imaginary axis. Every form stays regular where a0 vanishes.
+Coefficients c here are multiplied by the sign of a0 on the stable side; all are positive if the roots are left of the
+imaginary axis. Every form stays regular where a0 vanishes.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,18 +14,18 @@ import numpy as np
 from tmsopt.records import Array, Table, Truth
 from tmsopt.roots import discriminant, is_stable, product, real_roots, rebuilt, roots
 
-MATCHED = 1e-10
-"""Relative change of a coefficient up to which a polynomial counts as on an edge."""
+EDGE_TOLERANCE = 1e-10
+"""A polynomial within this relative change of its coefficients counts as on an edge."""
 
-_LEAD = 1e-9  # of the largest coefficient: a smaller leading one is replaced before roots are guessed from
+_LEAD = 1e-9  # of the largest coefficient: smallest leading coefficient for computing roots
 _SMALL = 1e-3
 
 
 @dataclass(frozen=True)
-class Rest:
-    """All polynomials of a degree with no root in Re s > 0 by their factors; where `real`, those with real roots alone.
+class Cofactor:
+    """All polynomials of a degree without roots in Re s > 0, by their factors; if `real`, with real roots only.
 
-    Above degree 2 a linear factor, if any, is f s + 1 − f; the first quadratic has any size, the others are
+    Above degree 2 the linear factor, if any, is f s + 1 − f. The first quadratic factor has any size; the others are
     a s² + b s + 1 − a − b.
     """
 
@@ -34,13 +34,13 @@ class Rest:
 
     @property
     def unknowns(self) -> dict[str, float]:
-        """Names of the factor coefficients, each ≥ 0, and what they are at most."""
+        """Names of the factor coefficients, each ≥ 0, and their upper bounds."""
         more = {f"{letter}{k}": 1.0 for k in range(1, self.degree // 2) for letter in "ab"}
         return dict.fromkeys("f" * self._odd, 1.0) | dict.fromkeys("ABC"[: self.degree + 1], np.inf) | more
 
     @property
     def _odd(self) -> int:
-        """How many factors are linear beside the first."""
+        """Number of linear factors before the first quadratic one."""
         return self.degree % 2 if self.degree > 2 else 0
 
     def factors(self, u: Sequence[Any]) -> list[list[Any]]:
@@ -50,15 +50,15 @@ class Rest:
         return [*([f, 1 - f] for f in linear), list(u[self._odd : more]), *scaled]
 
     def nonnegative(self, u: Sequence[Any]) -> list[Any]:
-        """Expressions of the unknowns that are ≥ 0."""
+        """Expressions of the unknowns that must be ≥ 0."""
         quadratics = [factor for factor in self.factors(u) if len(factor) == 3]
         return [c for _, _, c in quadratics[1:]] + ([b * b - 4 * a * c for a, b, c in quadratics] if self.real else [])
 
     def guess(self, c: Array) -> list[float]:
-        """Unknowns near numeric coefficients: quadratics of neighbouring roots; the rightmost real one is linear."""
+        """Unknowns near numeric coefficients: quadratics pair neighbouring roots; the rightmost real root is linear."""
         if self.degree <= 2:
             return list(c.tolist())
-        found = roots(regular(c))
+        found = roots(replace_small_lead(c))
         linear: list[float] = []
         if self._odd:
             rightmost = max((z for z in found if z.imag == 0), key=lambda z: z.real)
@@ -66,8 +66,8 @@ class Rest:
             found = np.delete(found, np.flatnonzero(found == rightmost)[0])
         order = np.lexsort((found.imag, np.abs(found.imag), found.real, found.imag == 0))
         z, w = found[order].reshape(-1, 2).T
-        bounded = np.maximum(np.stack([np.ones(len(z)), -(z + w).real, (z * w).real], axis=1), 0.0)
-        scaled = bounded / bounded.sum(axis=1, keepdims=True)
+        nonnegative = np.maximum(np.stack([np.ones(len(z)), -(z + w).real, (z * w).real], axis=1), 0.0)
+        scaled = nonnegative / nonnegative.sum(axis=1, keepdims=True)
         whole = np.array(product(*([x, 1 - x] for x in linear), *scaled), dtype=float)
         size = max(float(whole @ c) / float(whole @ whole), 0.0)
         return [*linear, *(size * scaled[0]).tolist(), *scaled[1:, :2].ravel().tolist()]
@@ -75,16 +75,16 @@ class Rest:
 
 @dataclass(frozen=True)
 class Edge:
-    """A piece of a boundary: the multiples of a divisor by a `Rest`, with unknowns that are ≥ 0.
+    """A piece of a boundary: the multiples of a divisor by a `Cofactor`, with unknowns ≥ 0.
 
-    A divisor with unknown roots is e s² + 1 − e, or e s + 1 − e squared, which reaches infinity at e = 0.
+    A divisor with an unknown root is e s² + 1 − e, or e s + 1 − e squared; its root is at infinity for e = 0.
 
     Attributes:
-        name: ``weave``, ``capsize``, ``infinity``, ``EP2``, and ``capsize, real`` and ``infinity, real``, where
-            all other roots are real; ``real`` for heavy damping itself, as it is seen from outside.
-        real: whether the other roots are real, or else not right of the axis.
-        divisor: of e.
-        candidates: values of e that may be near, for numeric coefficients; None for a divisor without e.
+        name: ``weave``, ``capsize``, ``infinity``, ``EP2``; ``capsize, real`` and ``infinity, real`` if all other roots
+            are real; ``real`` for heavy damping itself, approached from outside.
+        real: whether the other roots are real; else they are not right of the axis.
+        divisor: the divisor as a function of e.
+        candidates: values of e for numeric coefficients; None for a divisor without e.
     """
 
     name: str
@@ -95,45 +95,45 @@ class Edge:
 
     @property
     def unknowns(self) -> dict[str, float]:
-        """Names of factor coefficients, and what they are at most."""
-        return dict.fromkeys("e" * self._own, 1.0) | self._rest.unknowns
+        """Names of the factor coefficients and their upper bounds."""
+        return dict.fromkeys("e" * self._own, 1.0) | self._cofactor.unknowns
 
     @property
-    def _rest(self) -> Rest:
-        return Rest(self.degree + 1 - len(self.divisor(0.0)), self.real)
+    def _cofactor(self) -> Cofactor:
+        return Cofactor(self.degree + 1 - len(self.divisor(0.0)), self.real)
 
     @property
     def _own(self) -> int:
         return int(self.candidates is not None)
 
     def equations(self, c: Sequence[Any], u: Sequence[Any]) -> dict[int, Any]:
-        """Number of a coefficient → an expression of the coefficients and the unknowns that is 0."""
-        whole = product(self.divisor(u[0] if self._own else 0.0), *self._rest.factors(u[self._own :]))
+        """Index of a coefficient → an expression of coefficients and unknowns that must be 0."""
+        whole = product(self.divisor(u[0] if self._own else 0.0), *self._cofactor.factors(u[self._own :]))
         return {k: a - b for k, (a, b) in enumerate(zip(c, whole, strict=True))}
 
     def nonnegative(self, u: Sequence[Any]) -> list[Any]:
-        """Expressions of the unknowns that are ≥ 0: the other roots are not right of the axis, or are real."""
-        return self._rest.nonnegative(u[self._own :])
+        """Expressions of the unknowns that must be ≥ 0: the other roots are not right of the axis, or are real."""
+        return self._cofactor.nonnegative(u[self._own :])
 
     def guess(self, c: Array) -> list[float]:
-        """The e with which the divisor divides c most nearly, and the unknowns of the quotient."""
-        size = terms(c)
+        """The e whose divisor divides c best, and the unknowns of the quotient."""
+        size = measure_terms(c)
 
-        def left(e: float) -> Array:
-            return quotient(c, np.array(self.divisor(e)), size)
+        def cofactor(e: float) -> Array:
+            return divide_nearly(c, np.array(self.divisor(e)), size)
 
-        def off(e: float) -> float:
-            return float(np.abs((c - np.convolve(self.divisor(e), left(e))) / size).max())
+        def mismatch(e: float) -> float:
+            return float(np.abs((c - np.convolve(self.divisor(e), cofactor(e))) / size).max())
 
-        best = min(self.candidates(c) if self.candidates else [0.0], key=off)
-        return [best] * self._own + self._rest.guess(left(best))
+        best = min(self.candidates(c) if self.candidates else [0.0], key=mismatch)
+        return [best] * self._own + self._cofactor.guess(cofactor(best))
 
 
 @lru_cache(maxsize=16)
-def edges(degree: int) -> Table[Edge]:
-    """Every piece of a boundary among the polynomials of a degree ≥ 2, by name.
+def list_edges(degree: int) -> Table[Edge]:
+    """Every piece of a boundary for polynomials of a degree ≥ 2, by name.
 
-    Heavy damping is seen from outside too: there the nearest polynomial with real roots is on an edge, or on several.
+    From outside heavy damping, the nearest polynomial with real roots is on one edge or on several.
     """
     every = (
         Edge("weave", degree, False, lambda e: [e, 0, 1 - e], _pairs),
@@ -148,28 +148,28 @@ def edges(degree: int) -> Table[Edge]:
 
 
 def _pairs(c: Array) -> list[float]:
-    """Every pair as if it were on the axis."""
-    z = roots(regular(c))
+    """Each pair as if it were on the axis."""
+    z = roots(replace_small_lead(c))
     return [float(1 / (1 + abs(x) ** 2)) for x in z[z.imag > 0]] + [0.0, 1.0]
 
 
 def _doubles(c: Array) -> list[float]:
-    """Every two neighbours as if they were one."""
-    z = roots(regular(c))
+    """Each two neighbours as if they were equal."""
+    z = roots(replace_small_lead(c))
     real = np.sort(z[z.imag == 0].real)
     doubles = [*((real[1:] + real[:-1]) / 2), *z[z.imag > 0].real]
     return [float(1 / (1 - x)) for x in doubles if x < 0] or [1 / (1 + float(np.abs(z).mean()))]
 
 
-def heavily_damped(c: Array) -> Truth:
-    """Whether all roots are real, negative and different, for coefficients of shape (…, n + 1), up to rounding.
+def is_heavily_damped(c: Array) -> Truth:
+    """Whether all roots are real, negative and distinct, for coefficients of shape (…, n + 1), up to rounding.
 
-    A quartic has four different real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
-    16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted.
+    A quartic has four distinct real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
+    16 c0² c1 c3 − 3 c1⁴ < 0; a cubic or a quadratic has all roots real where Δ > 0; higher degrees are counted.
     """
     columns, damped = [*np.moveaxis(c, -1, 0)], np.asarray(is_stable(c, exact=False))
     if len(columns) > 5:
-        return _counted(c, damped)
+        return _has_all_real_roots(c, damped)
     if len(columns) > 2:
         damped = damped & (discriminant(columns) > 0)
     if len(columns) == 5:
@@ -179,8 +179,8 @@ def heavily_damped(c: Array) -> Truth:
     return np.asarray(damped)
 
 
-def _counted(c: Array, stable: Truth) -> Truth:
-    """As many real roots as the degree; Newton's inequalities c_k² > (1 + 1/k)(1 + 1/(n − k)) c_{k−1} c_{k+1} first."""
+def _has_all_real_roots(c: Array, stable: Truth) -> Truth:
+    """Whether all roots are real; Newton's c_k² > (1 + 1/k)(1 + 1/(n − k)) c_{k−1} c_{k+1} is tested first."""
     n = c.shape[-1] - 1
     k = np.arange(1, n)
     newton = c[..., 1:-1] ** 2 > (1 - 1e-9) * (1 + 1 / k) * (1 + 1 / (n - k)) * c[..., :-2] * c[..., 2:]
@@ -189,29 +189,29 @@ def _counted(c: Array, stable: Truth) -> Truth:
     return damped
 
 
-def losses(c: Array, heavy: bool) -> tuple[str, ...]:
-    """The edges that a polynomial just beyond them has crossed, c signed as on the other side."""
-    passed = [n for n, k in (("capsize", -1), ("infinity", 0)) if c[k] <= 0]
+def find_crossed_edges(c: Array, heavy: bool) -> tuple[str, ...]:
+    """The edges between a polynomial just beyond them and the other side, whose sign c has."""
+    crossed = [n for n, k in (("capsize", -1), ("infinity", 0)) if c[k] <= 0]
     if heavy:
-        return tuple(f"{n}, real" for n in passed) or ("EP2",)
-    return tuple(passed) or ("weave",)
+        return tuple(f"{n}, real" for n in crossed) or ("EP2",)
+    return tuple(crossed) or ("weave",)
 
 
-def regular(c: Array) -> Array:
-    """The same with a leading coefficient that is not too small for roots."""
+def replace_small_lead(c: Array) -> Array:
+    """The coefficients with a leading one that is large enough for computing roots."""
     size = float(np.abs(c).max()) or 1.0
     return np.concatenate([[c[0] if abs(c[0]) > _LEAD * size else _LEAD * size], c[1:]])
 
 
-def terms(c: Array) -> Array:
-    """Size of the terms that each coefficient is summed from; a root at 0 counts as a thousandth of the median."""
-    lead = regular(c)
+def measure_terms(c: Array) -> Array:
+    """Size of the terms that each coefficient sums; a root at 0 counts as a thousandth of the median."""
+    lead = replace_small_lead(c)
     radius = np.abs(roots(lead))
-    least = _SMALL * (float(np.median(radius)) or 1.0)  # where all are at 0
+    least = _SMALL * (float(np.median(radius)) or 1.0)  # 1 if all are 0
     return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, least).astype(complex)))
 
 
-def quotient(c: Array, factor: Array, size: Array) -> Array:
-    """What a polynomial divided by a factor is most nearly, in units of the size of each coefficient."""
+def divide_nearly(c: Array, factor: Array, size: Array) -> Array:
+    """The quotient that best fits c, in units of the size of each coefficient."""
     columns = np.stack([np.convolve(factor, unit) for unit in np.eye(len(c) - len(factor) + 1)], axis=1)
     return np.asarray(np.linalg.lstsq(columns / size[:, None], c / size, rcond=None)[0])

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from tmsopt.analysis import Diagnosis, Explanation, diagnose, explain, infeasible_sentences
-from tmsopt.boundaries import Robustness, robustness, robustness_at
+from tmsopt.boundaries import Robustness, find_stability_margins, robustness
 from tmsopt.dynamics import stable_speeds
 from tmsopt.errors import InputError
 from tmsopt.problem.solution import Solution
@@ -62,7 +62,7 @@ class Analysis:
         if not self._sought:
             return None
         start_steps(self._progress, "looking for the nearest boundaries")
-        return robustness_at(self.solution.problem.posed, self.solution.parameters)
+        return find_stability_margins(self.solution.problem.posed, self.solution.parameters)
 
     @cached_property
     def boundaries(self) -> Robustness | None:

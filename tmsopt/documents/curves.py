@@ -11,7 +11,7 @@ from tmsopt.documents.tables import format_value, thin_rows, write_question
 from tmsopt.models import Model, in_words_of
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.unit_system import Unit, unit_of, common_unit
+from tmsopt.problem.unit_system import Unit, common_unit, unit_of
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail

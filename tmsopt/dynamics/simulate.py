@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.boundaries.surroundings import parameter_faults
+from tmsopt.boundaries.weighted_design import parameter_faults
 from tmsopt.dynamics.asked import Disturbance, asked_for
 from tmsopt.dynamics.flow import sampled, shaken, stationary
 from tmsopt.dynamics.measures import FINEST, MOST, Measure, Watched, grid, measured

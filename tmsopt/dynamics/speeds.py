@@ -11,7 +11,7 @@ from flint.utils.flint_exceptions import DomainError
 from tmsopt.algebra.balls import rational
 from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS
-from tmsopt.boundaries.surroundings import parameter_faults
+from tmsopt.boundaries.weighted_design import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, user_crossings
 from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet

@@ -24,7 +24,13 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIM
 from tmsopt.problem.units import Reading, frequencies, readings
 from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.patterns.root_enclosures import EnclosedRoot, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
+from tmsopt.roots.patterns.root_enclosures import (
+    EnclosedRoot,
+    enclosed_roots,
+    nearest_decimal,
+    nearest_double,
+    nearest_roots,
+)
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits to try in turn; the first are 64 digits, half of which a fit may lose."""

@@ -44,11 +44,11 @@ def _is_box_excluded(problem: Posed) -> bool:
     inside = {n: ends for n, ends in box.items() if ends[0] < ends[1]}
     fixed = {**problem.fixed, **{n: ends[0] for n, ends in box.items() if n not in inside}}
     build = Builder(problem.derive(free=inside, fixed=fixed, start={}), problem.cases[:1])
-    build.constraints(without=problem.asked_of_roots)
+    build.add_constraints(without=problem.asked_of_roots)
     if not build.rows:
         return False
     try:
-        found = build.over([row[1] for row in build.rows])
+        found = build.enclose([row[1] for row in build.rows])
     except UnsupportedOperation:
         return False
     return any(

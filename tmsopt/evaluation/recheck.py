@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt.algebra.formula import Formula, UnsupportedOperation, formula, symbol
 from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.kinds import gradients
-from tmsopt.boundaries.nearest import Robustness, robustness_at
+from tmsopt.boundaries.nearest import Robustness, find_stability_margins
 from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import public_names
@@ -251,7 +251,7 @@ def _evaluate_cases(
     }
     shared = {name: each[k][name] for name, k in worst.items()}
     if robustness is None and problem.asks_radius and stored is None:
-        robustness = robustness_at(problem, parameters)
+        robustness = find_stability_margins(problem, parameters)
     if robustness is not None:
         shared[RADIUS] = robustness.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **shared}) for v in (nominal, *each))

@@ -12,7 +12,7 @@ from tmsopt.explorer.page import html_of
 from tmsopt.files import as_path, write_text
 from tmsopt.problem import Given, Posed, Problem, Solution, pose
 from tmsopt.problem.toml import read_page
-from tmsopt.program.options import Asked
+from tmsopt.program.options import CommonOptions
 from tmsopt.progress import start_steps
 from tmsopt.search import solve
 
@@ -60,7 +60,7 @@ class Explorer:
         return frame(self.html, self.problem.title)
 
 
-def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
+def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
     """The page of a problem, which is solved if it asks something; of a solution, without solving it again.
 
     The page shows one design at a time: of bands and tolerances the nominal one. Of a front the first objective is

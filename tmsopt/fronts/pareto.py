@@ -15,7 +15,7 @@ from tmsopt.fronts.team import AT_ONCE, can_send, each
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
-from tmsopt.program.options import Asked, Options, documents_options, options_of
+from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
 from tmsopt.progress import Steps
 
 POINTS = 25
@@ -26,8 +26,8 @@ _DEFAULTS = Options(starts=STARTS)
 _ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of optima that count as the same
 
 
-@documents_options(Asked, _DEFAULTS)
-def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, **options: Unpack[Asked]) -> Front:
+@documents_options(CommonOptions, _DEFAULTS)
+def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, **options: Unpack[CommonOptions]) -> Front:
     """The front of two or three objectives, each minimised, with its ends, kinks and gaps.
 
     Two objectives: minimise one subject to the other ≤ eps, the next eps where neighbours are farthest apart and on
@@ -62,7 +62,7 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise input_error(message, "objective")
-    how = options_of(options, defaults=_DEFAULTS, fewest=0)
+    how = make_options(options, defaults=_DEFAULTS, fewest=0)
     faults = count_faults("points", points, 2, MOST_POINTS)
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)

@@ -143,8 +143,8 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
     for sign in question.signs():
         nlp = question.program(sign)
         x = initial_point(nlp, question.problem, design)
-        rows = nlp.at(x)[1]
-        _, *reached = ranges(nlp.baked, list(zip(nlp.lower, nlp.upper, strict=True)))
+        rows = nlp.evaluate(x)[1]
+        _, *reached = ranges(nlp.numeric_formula, list(zip(nlp.lower, nlp.upper, strict=True)))
         sizes = np.array([max(map(abs, ends)) for ends in reached])
         sizes = np.where(np.isfinite(sizes), np.maximum(sizes, 1e-300), 1.0)
         off = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / sizes

@@ -21,7 +21,7 @@ from tmsopt.global_search.conditions import Ends, Sheet, rotating_frame, sheet, 
 from tmsopt.global_search.pruning import Box, Puzzle, ends, prepared, prune
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
-from tmsopt.program.nlp import Scale, reaches_of, scale_of
+from tmsopt.program.nlp import Scale, proof_units, scale_of
 from tmsopt.progress import Counts
 from tmsopt.records import Array, Table, plain
 
@@ -241,7 +241,7 @@ def _ends(sheet: Sheet) -> list[tuple[Any, Any]]:
 def _zero(sheet: Sheet, box: Box) -> _Zero | None:
     """The zero beside a box, proved; None where the test fails."""
     start = {n: flint.arb(lo + (hi - lo) / 2) for n, (lo, hi) in zip(sheet.names, box, strict=True)}
-    units = reaches_of(sheet.problem)
+    units = proof_units(sheet.problem)
     try:
         system = partial(fold, sheet.equations, kind=BALLS)
         middle = refine_solution(system, start, sheet.names, _DIGITS, units)

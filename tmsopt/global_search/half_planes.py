@@ -15,7 +15,7 @@ from tmsopt.algebra.intervals import Interval, bound_roots
 from tmsopt.global_search.interlacing import interlace, squares_of
 from tmsopt.models import Model, Values
 from tmsopt.program.formulate import Builder
-from tmsopt.program.lifts import Lifted, quadratic_pairs
+from tmsopt.program.lifts import LiftedQuantity, pair_roots
 from tmsopt.program.nlp import AddedVariable
 from tmsopt.roots import Pattern, product, shift
 from tmsopt.roots.patterns.pattern import Roots
@@ -71,33 +71,33 @@ def compact(model: Model, values: Values) -> list[Any]:
     return list(values.coefficients)
 
 
-def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lifted:
+def half_planes(frame: Frame, build: Builder, line: float | None = None) -> LiftedQuantity:
     """Every root of every case at or left of a line: a known one, or a variable."""
-    first, covered, values = len(build.x), build.covered, build.values
+    first, covered, values = len(build.x), build.covered_cases, build.values
     looked = [case for case in covered if case in frame.signs]
     at: Any = line
     if line is None:  # it is no larger than the largest root, unless that is one of a case not looked at
         most = frame.unit * max(
-            frame.largest(build.over(frame.coefficients(values, case)), case == looked[0]) for case in looked
+            frame.largest(build.enclose(frame.coefficients(values, case)), case == looked[0]) for case in looked
         )
         at = build.variable("abscissa", -most, most if len(values) == 1 or not frame.touching else math.inf)
     for case in looked:
         c = frame.about(values, case, at)
-        edges = interlace(build, case, c, frame.largest(build.over(c), case == covered[0]), frame.compact)
+        edges = interlace(build, case, c, frame.largest(build.enclose(c), case == covered[0]), frame.compact)
         if line is None and frame.touching and len(covered) == 1:
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
     guess = partial(_half_plane_guess, frame, looked, line)
-    return Lifted(constant(at), AddedVariable("abscissa", len(build.x) - first, guess), (), ())
+    return LiftedQuantity(constant(at), AddedVariable("abscissa", len(build.x) - first, guess), (), ())
 
 
-def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
+def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> LiftedQuantity:
     """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
 
     A root s > 0 has ζ = −1, and with another s < 0 no such factor. Where ζ may be −1, the factors are s² + pᵢ s + qᵢ,
     with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked. An odd degree
     has one factor s + d more, d ≥ 0 asked only of other ζ: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
     """
-    first, covered, values = len(build.x), build.covered, build.values
+    first, covered, values = len(build.x), build.covered_cases, build.values
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
     looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
 
@@ -111,7 +111,7 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
 
     for case in looked:
         a = frame.coefficients(values, case)
-        largest = frame.largest(build.over(a), case == covered[0])
+        largest = frame.largest(build.enclose(a), case == covered[0])
         pairs, monic = [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
@@ -132,13 +132,13 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
     at_least(1, zeta)  # real roots would satisfy any larger one, too
     guess = partial(_sector_guess, frame, looked, ratio, build.unit)
-    return Lifted(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first, guess), (), ())
+    return LiftedQuantity(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
     """Ranges for the unknown factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
     count = len(pattern.unknowns)
-    largest = bound_roots(build.over(compact(frame.model, build.values[0]))) / build.unit
+    largest = bound_roots(build.enclose(compact(frame.model, build.values[0]))) / build.unit
     symbols = build.x[-count:]
     for factor in pattern.factors(symbols):
         for k, c in enumerate(factor[1:], start=1):
@@ -164,7 +164,7 @@ def _sector_guess(
     """Damping ratio, if it is not known, and factors; the roots are given in the unit of the NLP."""
     factors = []
     for case in covered:
-        split = quadratic_pairs(z[case] * unit / frame.unit)
+        split = pair_roots(z[case] * unit / frame.unit)
         for p, q in sorted((float(-r.sum().real), float(r.prod().real)) for r in split if len(r) == 2):
             unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
             factors += [p, abs(p) / 2 if unstable else math.sqrt(q), *([q] if ratio is None else [])]

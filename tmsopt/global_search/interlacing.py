@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.program.lifts import Rows
+from tmsopt.program.lifts import ProgramBuilder
 from tmsopt.roots import product
 
 Square = tuple[Any, Any]
@@ -50,7 +50,9 @@ def _alternating(part: Sequence[Any], x: Any, y: Any) -> Any:
     return total
 
 
-def interlace(build: Rows, case: int, coefficients: Sequence[Any], largest: float, compact: bool) -> list[Any]:
+def interlace(
+    build: ProgramBuilder, case: int, coefficients: Sequence[Any], largest: float, compact: bool
+) -> list[Any]:
     """Variables and rows that hold all roots in Re t ≤ 0, none larger than `largest`; what vanishes with a root on it.
 
     Of the returned expressions, none negative, one can be 0 exactly if some root has Re t = 0.

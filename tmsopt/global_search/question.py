@@ -19,7 +19,7 @@ from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import rewards_change_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.program.formulate import Builder, Lifting
+from tmsopt.program.formulate import Builder, LiftFunction
 from tmsopt.program.nlp import NLP
 from tmsopt.roots import Root
 
@@ -50,8 +50,8 @@ class Question:
         """Each sign that a0 can have in the box, with that of every case where it is known then."""
         build = Builder(self.problem, self.cases)
         leading = [compact(self.problem.model, values)[0] for values in build.values]
-        can = [(upper > 0, lower < 0) for lower, upper in build.over(leading)]
-        first = build.covered[0]
+        can = [(upper > 0, lower < 0) for lower, upper in build.enclose(leading)]
+        first = build.covered_cases[0]
         known = {k: 1 if positive else -1 for k, (positive, negative) in enumerate(can) if positive != negative}
         alike = [k for k, a in enumerate(leading) if formula([a]) == formula([leading[first]])]
         possible = [sign for sign, some in zip((1, -1), can[first], strict=True) if some]
@@ -60,11 +60,11 @@ class Question:
     def leading(self, sign: int) -> NLP | None:
         """The least leading coefficient under the constraints; None where the box alone keeps it away from 0."""
         build = Builder(self.problem, self.cases)
-        first = build.covered[0]
+        first = build.covered_cases[0]
         build.objective = sign * compact(self.problem.model, build.values[first])[0]
-        if build.over([build.objective])[0][0] > 0:
+        if build.enclose([build.objective])[0][0] > 0:
             return None
-        build.constraints(without=self.problem.asked_of_roots)
+        build.add_constraints(without=self.problem.asked_of_roots)
         return build.finish("leading")
 
     def program(self, sign: int, least: float = 0.0) -> NLP:
@@ -74,21 +74,21 @@ class Question:
             raise UnsupportedOperation(ANGULAR_FREQUENCY)
         frame = Frame(problem.model, signs, self.unit, rewards_change_of(problem, "abscissa"), self.compact, least)
         carried = {"abscissa": partial(half_planes, frame), "damping_ratio": partial(sectors, frame)}
-        lifts: Mapping[str, Lifting] = carried
+        lifts: Mapping[str, LiftFunction] = carried
         build = Builder(problem, self.cases, lifts)
-        first = build.covered[0]
+        first = build.covered_cases[0]
         build.row("a0", frame.coefficients(build.values, first)[0], 0.0, np.inf)
         if problem.pattern is not None:
-            build.pattern(problem.pattern)
+            build.add_pattern(problem.pattern)
             bound_unknowns(frame, build, problem.pattern)
         for name, lift in carried.items():
             value = self._known(name)
-            if value is not None and name not in build.shared:
-                build.take(name, value)
+            if value is not None and name not in build.quantities:
+                build.fix_quantity(name, value)
                 build.lifts.append(lift(build, value).lift)
-        build.constraints()
+        build.add_constraints()
         if self.limit is not None:
-            build.optimise()
+            build.add_objective()
             sense = problem.sign
             build.row("limit", build.objective, -np.inf, sense * self.limit)
         build.objective = 0

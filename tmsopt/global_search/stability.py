@@ -13,7 +13,7 @@ from tmsopt.global_search.scip import SCIP
 from tmsopt.global_search.signs import none_stable
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, Failed
 from tmsopt.problem.problem import Posed
-from tmsopt.program.formulate import middle
+from tmsopt.program.formulate import default_start
 from tmsopt.progress import Counts
 
 SOLVER = SCIP
@@ -67,7 +67,7 @@ def any_stable(
         return Stability()
     kept = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
     asked = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=kept)
-    best = _checked(asked, {n: known[n] for n in problem.free} if known else middle(problem))
+    best = _checked(asked, {n: known[n] for n in problem.free} if known else default_start(problem))
     unit = unit_of(best.structure.roots)
     at_axis = Question(asked, asked.cases, 0.0, unit)
     with SolverPool(SOLVER) as crew:

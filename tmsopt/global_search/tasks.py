@@ -80,5 +80,5 @@ class GlobalSolver:
 
 def task(nlp: NLP, seconds: float, *, least: bool = False, within: tuple[tuple[float, float], ...] = ()) -> Task:
     """An NLP as a task: whether it has any feasible point, or a bound on its objective."""
-    bare = replace(nlp, lifts=(), touches={}, products=(), cases=())  # the rest cannot always be pickled
+    bare = replace(nlp, lifts=(), contacts={}, products=(), cases=())  # the rest cannot always be pickled
     return Task(bare, seconds, least, within)

@@ -8,7 +8,7 @@ from tmsopt.evaluation.law_rows import LawRow, law_rows
 from tmsopt.models import tms
 from tmsopt.problem.files import Given, as_solvable
 from tmsopt.problem.solution import Solution
-from tmsopt.program.options import Asked, Options, documents_options, options_of
+from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
 from tmsopt.progress import begin
 from tmsopt.records import Tabular, plain
 from tmsopt.roots import PATTERNS
@@ -58,8 +58,8 @@ class Comparison(Tabular):
         return {"schema": SCHEMA} | plain(self, "design laws") | {"formulations": formulations}
 
 
-@documents_options(Asked)
-def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
+@documents_options(CommonOptions)
+def compare(design: Given, **options: Unpack[CommonOptions]) -> Comparison:
     """Set a design beside the laws of the paper, which are of skates alone, and solve it by the other formulation.
 
     The laws are of one design at one speed: scenarios and tolerances are left aside, and the problem is solved again.
@@ -75,7 +75,7 @@ def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
 
     More: docs/explanation/paper.md
     """
-    how = options_of(options)
+    how = make_options(options)
     problem = as_solvable(design)
     one = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
     found = solve_any_status(design if one else problem.nominal, how)

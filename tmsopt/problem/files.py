@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import Field, StrictInt, StrictStr
 
-from tmsopt.errors import Fault, InputError, short, suggest, escape_unprintable
+from tmsopt.errors import Fault, InputError, escape_unprintable, short, suggest
 from tmsopt.models import MODELS, Model, gain_names
 from tmsopt.models.bicycle_files import read_bicycle
 from tmsopt.problem.advice.names import suggest_key

@@ -1,7 +1,7 @@
-"""A design problem as a smooth nonlinear program by factors, and IPOPT on it.
+"""A design problem as a smooth nonlinear program (NLP), and IPOPT on it.
 
-In: a `Problem`. Out: an `NLP` with functions, bounds and units, starting points, runs of IPOPT, and points polished
-by Newton. Open `formulate` first: the three forms; `builder` puts them together, `ipopt` alone calls the solver.
+Roots enter through polynomial factors, not through eigenvalues. `formulate` writes the NLP of a `Problem`; `nlp` holds
+it as plain data; `ipopt` alone calls the solver; `starts` chooses where to begin.
 """
 
 import lazy_loader

@@ -1,7 +1,7 @@
-"""Feet: nearest points of the boundaries of stability as variables, so that a radius is exact wherever the design is.
+"""The nearest boundary points of a design as variables of the NLP, so that its stability radius is exact.
 
-A foot u meets e(u) = 0, the equations of its boundary, and u + Jᵀλ = 0 with their slopes J. Stability ends there or
-nearer: |u| bounds the radius from above, be it the nearest foot or another.
+A boundary point at the displacement u satisfies the boundary equations e(u) = 0 and u + Jᵀλ = 0, J their Jacobian.
+Stability ends there or nearer, so |u| bounds the radius from above, whether or not the point is the nearest one.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,14 +15,14 @@ from tmsopt.algebra.formula import Formula, fold, formula
 from tmsopt.algebra.kinds import FLOATS, gradients
 from tmsopt.models import Values
 from tmsopt.problem.cases import weight_of
-from tmsopt.program.lifts import Rows
+from tmsopt.program.lifts import ProgramBuilder
 from tmsopt.program.nlp import AddedVariable
 from tmsopt.roots.patterns.pattern import Roots
 
 
 @dataclass(frozen=True)
-class _Foot:
-    """One case, and slopes of its equations in the unknowns u and w."""
+class _BoundaryPoint:
+    """The boundary point of one case, and the Jacobian of its equations in the unknowns u and w."""
 
     case: int
     names: tuple[str, ...]
@@ -31,47 +31,51 @@ class _Foot:
     slopes: Formula
 
     @property
-    def weave(self) -> bool:
+    def has_frequency(self) -> bool:
         return len(self.unknowns) > len(self.names)
 
 
-Feet = Mapping[int, Mapping[str, Any]]
-"""Number of a case → parameter → variable of its displacement, in units of its weight."""
+Displacements = Mapping[int, Mapping[str, Any]]
+"""Case → parameter → variable of its displacement, in units of its weight."""
 
 
-def lift_displacements(weights: Mapping[str, float], feet: Feet) -> AddedVariable:
-    """The radius and all displacements, to start where the cases are evaluated."""
+def lift_displacements(weights: Mapping[str, float], points: Displacements) -> AddedVariable:
+    """The radius and all displacements as variables; they start at the cases as evaluated."""
 
     def guess(values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-        moves = (x for k, foot in feet.items() for x in _displacement(weights, tuple(foot), values[0], values[k]))
+        moves = (
+            x for k, point in points.items() for x in _measure_displacement(weights, tuple(point), values[0], values[k])
+        )
         return [[float(values[0]["radius"]), *moves]]
 
-    return AddedVariable("radius", 1 + sum(map(len, feet.values())), guess)
+    return AddedVariable("radius", 1 + sum(map(len, points.values())), guess)
 
 
-def _displacement(weights: Mapping[str, float], names: Sequence[str], own: Values, at: Values) -> list[float]:
-    return [float(at[n] - own[n]) / weight_of(n, float(own[n]), weights) for n in names]
+def _measure_displacement(
+    weights: Mapping[str, float], names: Sequence[str], nominal: Values, at: Values
+) -> list[float]:
+    return [float(at[n] - nominal[n]) / weight_of(n, float(nominal[n]), weights) for n in names]
 
 
-def lift_feet(
-    build: Rows,
+def lift_boundary_points(
+    build: ProgramBuilder,
     radius: Any,
-    feet: Feet,
+    points: Displacements,
     edges: Mapping[int, str],
-    known: Callable[[Values], Mapping[str, float]],
+    numeric_inputs: Callable[[Values], Mapping[str, float]],
     weights: Mapping[str, float],
 ) -> AddedVariable:
-    """The conditions of a foot in some cases, and radius² ≤ u·u.
+    """Add the conditions of a boundary point in some cases, and radius² ≤ u·u.
 
     Args:
-        edges: the boundaries that they stand on.
-        known: the numbers of a numeric design that decide on a polynomial, by name.
+        edges: case → the boundary its point lies on.
+        numeric_inputs: the numeric values, by name, on which the polynomial of a design depends.
     """
-    made, first = [], build.size[0]
-    for k, foot in feet.items():
-        edge, u = edges[k], [*foot.values()]
+    lifted, first = [], build.size[0]
+    for k, point in points.items():
+        edge, u = edges[k], [*point.values()]
         w = [build.variable(f"w.{k}", 0.0)] if edge == "weave" else []
-        equations = _on_edge(edge, build.polynomial(k), *w)
+        equations = _edge_equations(edge, build.polynomial(k), *w)
         slopes = gradients(equations, [*u, *w])
         multipliers = [build.variable(f"l{j}.{k}") for j in range(len(equations))]
         pull = [
@@ -81,38 +85,40 @@ def lift_feet(
         for row in (*equations, *pull):
             build.row("radius", row, 0.0, 0.0)
         build.row("radius", sum(x * x for x in u) - radius * radius, 0.0, np.inf)
-        asked = formula(x for row in slopes for x in row)
-        made.append(_Foot(k, tuple(foot), [x.value for x in (*u, *w)], len(equations), asked))
-    return AddedVariable("feet", build.size[0] - first, partial(_guess, made, known, weights))
+        gradient = formula(x for row in slopes for x in row)
+        lifted.append(_BoundaryPoint(k, tuple(point), [x.value for x in (*u, *w)], len(equations), gradient))
+    return AddedVariable(
+        "boundary points", build.size[0] - first, partial(_guess_unknowns, lifted, numeric_inputs, weights)
+    )
 
 
-def _on_edge(edge: str, a: Sequence[Any], w: Any = None) -> list[Any]:
-    """What is 0 on a boundary: p(i√w), in its even and its odd powers; the last coefficient, or the first one."""
+def _edge_equations(edge: str, a: Sequence[Any], w: Any = None) -> list[Any]:
+    """Expressions that vanish on a boundary: both parts of p(i√w), or the last or first coefficient."""
     if edge == "weave":
         return [sum((-w) ** k * c for k, c in enumerate(a[::-1][odd::2])) for odd in (0, 1)]
     return [a[-1] if edge == "capsize" else a[0]]
 
 
-def _guess(
-    feet: Sequence[_Foot],
-    known: Callable[[Values], Mapping[str, float]],
+def _guess_unknowns(
+    points: Sequence[_BoundaryPoint],
+    numeric_inputs: Callable[[Values], Mapping[str, float]],
     weights: Mapping[str, float],
     values: Sequence[Values],
     z: Sequence[Roots],
 ) -> list[list[float]]:
-    """√w of the pair next to the axis, and multipliers by least squares."""
-    found: list[float] = []
-    for foot in feet:
-        w = [_pair(z[foot.case])] if foot.weave else []
-        u = _displacement(weights, foot.names, values[0], values[foot.case])
-        at = {**known(values[0]), **dict(zip(foot.unknowns, [*u, *w], strict=True))}
-        slopes = np.array(fold(foot.slopes, at, FLOATS), dtype=float).reshape(foot.equations, -1)
+    """√w of the pair nearest to the axis, and multipliers by least squares."""
+    guesses: list[float] = []
+    for point in points:
+        w = [_axis_pair_size(z[point.case])] if point.has_frequency else []
+        u = _measure_displacement(weights, point.names, values[0], values[point.case])
+        at = {**numeric_inputs(values[0]), **dict(zip(point.unknowns, [*u, *w], strict=True))}
+        slopes = np.array(fold(point.slopes, at, FLOATS), dtype=float).reshape(point.equations, -1)
         multipliers = np.linalg.lstsq(slopes.T, -np.array([*u, *[0.0] * len(w)]), rcond=None)[0]
-        found += [*w, *multipliers.tolist()]
-    return [found]
+        guesses += [*w, *multipliers.tolist()]
+    return [guesses]
 
 
-def _pair(z: Roots) -> float:
-    """|s|² of the pair that is nearest to the imaginary axis."""
+def _axis_pair_size(z: Roots) -> float:
+    """|s|² of the pair nearest to the imaginary axis."""
     pairs = z[z.imag > 0]
     return float(np.abs(pairs[np.argmin(np.abs(pairs.real))]) ** 2) if pairs.size else 1.0

@@ -1,11 +1,11 @@
-"""Kinks as variables: abs, min and max of an NLP, which a solver of smooth problems cannot look through.
+"""Replaces abs, min and max in an NLP by variables, since a smooth solver cannot handle kinks.
 
-Each becomes t with a row t ≥ piece for every piece: |e| is the greatest of e and −e, a minimum of a and b minus the
-greatest of −a and −b. Where more of t is never an advantage, that is exact, as it is of a bound on a root quantity;
-elsewhere t is held equal to one piece, the others below it, case by case.
+Each becomes a variable t with a row t ≥ piece for every piece: |e| is the greatest of e and −e, min(a, b) minus the
+greatest of −a and −b. This is exact where a larger t is never an advantage; elsewhere t is held equal to one piece at a
+time, with the others below it.
 
-A quotient or a tangent with a pole in the box becomes t with an equation t · denominator = numerator: on its own side
-of the pole a solver then has nothing to look through, and the other side is infinitely far.
+A quotient or tangent with a pole in the box becomes t with the equation t · denominator = numerator, which is smooth on
+either side of the pole.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,27 +21,27 @@ from tmsopt.algebra.intervals import ball, interval
 from tmsopt.algebra.kinds import INTERVALS, NODES
 from tmsopt.models import Values
 from tmsopt.problem.dependence import WORSE_DIRECTION
-from tmsopt.program.nlp import NLP, AddedVariable, Contact, MaximumVariable, name_of
+from tmsopt.program.nlp import NLP, AddedVariable, Contact, MaximumVariable, variable_name
 from tmsopt.roots.patterns.pattern import Roots
 
 KINK = ".kink"
-"""Name of the rows of kinks: no constraint has it."""
+"""Name of the rows of kinks; no constraint has this name."""
 
 
-def epigraph_form(nlp: NLP, overclaims: bool) -> NLP:
-    """An NLP with its kinks as variables, and with the touches that it needs: where more is claimed without them.
+def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
+    """An NLP with its kinks as variables, and with the contacts it needs to be exact.
 
     Args:
-        overclaims: whether bounds on root quantities would, kinks aside.
+        two_sided: whether root quantities need their contacts, kinks aside.
     """
-    plain = nlp if overclaims else replace(nlp, touches={})
-    if not _suspect(nlp):
+    plain = nlp if two_sided else replace(nlp, contacts={})
+    if not _may_have_kinks(nlp):
         return plain
-    build = _Unfolding(nlp)
+    build = _EpigraphBuilder(nlp)
     f, g = build.expressions()
     if not build.kinks:
         return plain
-    names = (*map(name_of, range(len(nlp.variables) + len(build.kinks))), *nlp.numbers)
+    names = (*map(variable_name, range(len(nlp.variables) + len(build.kinks))), *nlp.numbers)
     count, first = len(build.kinks), len(nlp.rows)
     rows = sum(len(kink.rows) for kink in build.kinks)
     plain = replace(
@@ -53,41 +53,43 @@ def epigraph_form(nlp: NLP, overclaims: bool) -> NLP:
         rows=(*nlp.rows, *[KINK] * rows),
         row_lower=(*nlp.row_lower, *[0.0] * rows),
         row_upper=(*nlp.row_upper, *(0.0 if kink.quotient else np.inf for kink in build.kinks for _ in kink.rows)),
-        lifts=(*nlp.lifts, *[AddedVariable(KINK, 1, _filled_later)] * count),
+        lifts=(*nlp.lifts, *[AddedVariable(KINK, 1, _guess_later)] * count),
         kinks=tuple(build.kinks),
     )
     x = ca.SX.sym("x", len(plain.variables))
     slopes = partial(_slopes, ca.jacobian(ca.vertcat(*plain.symbolic(x)), x))
     held: dict[str, tuple[Contact, ...]] = {}
     equal = set[int]()
-    for kink in reversed(build.kinks):  # what is made of others comes before them
+    for kink in reversed(build.kinks):  # a kink precedes those it is made of
         if kink.quotient:
             equal.update(kink.rows)
-        elif not _worsens(plain, slopes(kink.variable), 1.0, equal, kink.rows):
+        elif not _never_improves(plain, slopes(kink.variable), 1.0, equal, kink.rows):
             held[f"{KINK}{kink.variable}"] = tuple(Contact(row=k) for k in kink.rows)
             equal.update(kink.rows)
     rooted = range(first, first + rows)
-    for name, touches in nlp.touches.items():
+    for name, contacts in nlp.contacts.items():
         at = slopes(nlp.variables.index(name))
         among = {k: slope for k, slope in at.items() if k in rooted}
-        if overclaims or not _worsens(plain, among, WORSE_DIRECTION[name], equal):
-            held[name] = touches
-    return replace(plain, touches=held)
+        if two_sided or not _never_improves(plain, among, WORSE_DIRECTION[name], equal):
+            held[name] = contacts
+    return replace(plain, contacts=held)
 
 
-def _suspect(nlp: NLP) -> bool:
-    """Whether there may be a kink, or a pole in the box: of most NLPs one look by interval arithmetic denies it."""
+def _may_have_kinks(nlp: NLP) -> bool:
+    """Whether the box may contain a kink or a pole; one pass of interval arithmetic excludes most NLPs."""
     if not {step.op for step in nlp.formula.steps} & {*_PIECES, *_POLES}:
         return False
-    known = INTERVALS.operations
+    operations = INTERVALS.operations
 
-    def divided(op: str, *operands: Any) -> Any:
-        lower, upper = interval(known["cos"](*operands) if op == "tan" else operands[-1])
+    def divide_off_pole(op: str, *operands: Any) -> Any:
+        lower, upper = interval(operations["cos"](*operands) if op == "tan" else operands[-1])
         if lower <= 0 <= upper:
             raise UnsupportedOperation
-        return known[op](*operands)
+        return operations[op](*operands)
 
-    smooth = {op: f for op, f in known.items() if op not in _PIECES} | {op: partial(divided, op) for op in _POLES}
+    smooth = {op: f for op, f in operations.items() if op not in _PIECES} | {
+        op: partial(divide_off_pole, op) for op in _POLES
+    }
     box = [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
     try:
         nlp.fold(box, Kind(smooth, INTERVALS.constant))
@@ -96,8 +98,8 @@ def _suspect(nlp: NLP) -> bool:
     return False
 
 
-class _Unfolding:
-    """Collects the kinks of one NLP; discarded once they are known."""
+class _EpigraphBuilder:
+    """Collects the kinks of one NLP."""
 
     def __init__(self, nlp: NLP) -> None:
         self.nlp, self.count = nlp, len(nlp.variables)
@@ -105,15 +107,17 @@ class _Unfolding:
         self.kinks: list[MaximumVariable] = []
 
     def expressions(self) -> tuple[Any, list[Any]]:
-        """Objective and rows, without a kink."""
-        own = {op: partial(self.applied, op) for op in _PIECES} | {op: partial(self.divided, op) for op in _POLES}
+        """Objective and rows without kinks."""
+        own = {op: partial(self.replace_kink, op) for op in _PIECES} | {
+            op: partial(self.replace_pole, op) for op in _POLES
+        }
         kind = Kind({**NODES.operations, **own}, NODES.constant, NODES.number)
         f, *g = fold(self.nlp.formula, {n: symbol(n) for n in self.nlp.formula.names}, kind)
         return f, [*g, *self.rows]
 
-    def applied(self, op: str, *operands: Any) -> Any:
-        """A kink that depends on variables, as a new one."""
-        every = set(map(name_of, range(self.count)))
+    def replace_kink(self, op: str, *operands: Any) -> Any:
+        """A kink that depends on variables, as a new variable."""
+        every = set(map(variable_name, range(self.count)))
         if not any(depends_on(e, every) for e in operands):
             return make_node(op, *operands)
         t = self.variable(pieces := _PIECES[op](*operands), quotient=False)
@@ -121,18 +125,18 @@ class _Unfolding:
         return -t if op == "min" else t
 
     def variable(self, rows: Sequence[Any], quotient: bool) -> Any:
-        """A new variable, and the rows that are to come."""
+        """A new variable for the rows that follow."""
         first = len(self.nlp.rows) + len(self.rows)
         self.kinks.append(MaximumVariable(self.count, tuple(range(first, first + len(rows))), quotient=quotient))
         self.count += 1
-        return symbol(name_of(self.count - 1))
+        return symbol(variable_name(self.count - 1))
 
-    def divided(self, op: str, *operands: Any) -> Any:
-        """A quotient or tangent; as a new variable where the denominator may be 0 in the box."""
+    def replace_pole(self, op: str, *operands: Any) -> Any:
+        """A quotient or tangent; a new variable if the denominator can vanish in the box."""
         numerator, denominator = _POLES[op](*operands)
         own, plain = formula([denominator]), make_node(op, *operands)
         if not own.dependent_steps(self.nlp.inputs) or own.dependent_steps(
-            set(map(name_of, range(len(self.nlp.inputs), self.count)))
+            set(map(variable_name, range(len(self.nlp.inputs), self.count)))
         ):
             return plain
         box = [ball(ends) for ends in zip(self.nlp.lower, self.nlp.upper, strict=True)]
@@ -160,15 +164,17 @@ _PIECES: Mapping[str, Callable[..., Sequence[Any]]] = {
 
 
 def _slopes(jacobian: Any, variable: int) -> dict[int, Any]:
-    """By how much the objective (−1) and the rows change with a variable, where they do."""
+    """Derivatives of the objective (−1) and of the rows by a variable, where they are not 0."""
     column = jacobian[:, variable]
     return {k - 1: column[k] for k in range(column.size1()) if not column[k].is_zero()}
 
 
-def _worsens(nlp: NLP, slopes: Mapping[int, Any], worse: float, equal: set[int], but: Sequence[int] = ()) -> bool:
-    """Whether it is certain that nothing gets better as a variable moves up (or down: `worse` −1), rows `but` aside.
+def _never_improves(
+    nlp: NLP, slopes: Mapping[int, Any], worse: float, equal: set[int], but: Sequence[int] = ()
+) -> bool:
+    """Whether raising a variable (lowering it for `worse` = −1) provably improves nothing, rows `but` aside.
 
-    It is where slopes are constants of the right sign. Rows that may be held `equal` get better either way.
+    This needs constant slopes of the right sign; a row that may be held `equal` can improve either way.
     """
     for k, slope in slopes.items():
         if k in but:
@@ -181,6 +187,6 @@ def _worsens(nlp: NLP, slopes: Mapping[int, Any], worse: float, equal: set[int],
     return True
 
 
-def _filled_later(values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """What a kink starts from is known once the variables before it are."""
+def _guess_later(values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    """A placeholder: the start of a kink follows from the variables before it."""
     return [[0.0]]

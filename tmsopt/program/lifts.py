@@ -1,6 +1,6 @@
-"""Root quantities as variables with factors: statements about roots without a root."""
+"""Root quantities as variables with polynomial factors: statements about roots without computing a root."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -15,7 +15,7 @@ from tmsopt.roots import product, shift
 from tmsopt.roots.patterns.pattern import Roots
 
 
-class Rows(Protocol):
+class ProgramBuilder(Protocol):
     """An NLP under construction."""
 
     def variable(self, name: str, lower: float = ..., upper: float = ...) -> Any:
@@ -25,26 +25,26 @@ class Rows(Protocol):
         """A new row."""
 
     def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
-        """Equations between coefficient lists."""
+        """Equate coefficient lists."""
 
     def polynomial(self, case: int) -> list[Any]:
-        """Coefficients in one case, in the NLP's own unit of the roots."""
+        """Coefficients in one case, in the NLP's unit of the roots."""
 
     @property
-    def covered(self) -> Sequence[int]:
-        """Numbers of the cases that root quantities are the worst over."""
+    def covered_cases(self) -> Sequence[int]:
+        """Numbers of the cases over which root quantities are the worst."""
 
     @property
     def unit(self) -> float:
-        """The NLP's own unit of the roots."""
+        """The NLP's unit of the roots."""
 
     @property
     def lead(self) -> int:
-        """Sign of a0 in an NLP that goes as far as a0 = 0; else 0."""
+        """Sign of a0 in an NLP that reaches a0 = 0; else 0."""
 
     @property
     def leading_unit(self) -> float:
-        """The NLP's own unit of a0."""
+        """The NLP's unit of a0."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -52,124 +52,143 @@ class Rows(Protocol):
 
 
 @dataclass(frozen=True)
-class Lifted:
+class LiftedQuantity:
     """A root quantity as a variable."""
 
     symbol: Any
     lift: AddedVariable
-    touches: tuple[Contact, ...]
+    contacts: tuple[Contact, ...]
     products: tuple[tuple[Factor, ...], ...]
 
 
-def lift_abscissa(build: Rows) -> Lifted:
-    """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
+def lift_factors(
+    build: ProgramBuilder,
+    name: str,
+    quadratic: Callable[[int, int, Any], tuple[list[Any], list[Contact]]],
+    squared: bool = False,
+    linear: tuple[str, float] = ("d", 0.0),
+    line: Any = None,
+) -> tuple[list[Contact], tuple[tuple[Factor, ...], ...]]:
+    """Write the polynomial of each covered case as a product of quadratic factors, and a linear one for an odd degree.
 
-    An odd degree has one factor t + δ, δ ≥ 0, more. Some β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ.
-    Where the NLP goes as far as a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may be at infinity; of an
-    odd degree the linear one is ±a0 t + δ instead.
+    Args:
+        quadratic: (number, case, lead) → coefficients and contacts of a factor; `lead` is ±a0 in the factor that takes
+            it so that the NLP reaches a0 = 0, else None.
+        squared: see `Factor`.
+        linear: name and lower bound of the constant term of the linear factor.
+        line: shift of the polynomial, to a line that the linear factor's root may be on.
+
+    Returns:
+        All contacts, and the factors of each case.
     """
-    covered, first, lead = build.covered, build.size[0], build.lead
-    gamma = build.variable("abscissa")
-    touches: list[Contact] = []
-    products: list[tuple[Factor, ...]] = []
-    for case in covered:
-        a, monic, factors = build.polynomial(case), [], []
-        odd = len(a) % 2 == 0
+    lead, contacts, products = build.lead, list[Contact](), list[tuple[Factor, ...]]()
+    for case in build.covered_cases:
+        a, factors, monic = build.polynomial(case), list[Factor](), list[list[Any]]()
+        count, odd = divmod(len(a) - 1, 2)
         if lead:
             build.row("a0", lead * a[0], 0.0, np.inf)
-        for k in range(1, (len(a) - 1) // 2 + 1):
-            at, led = build.size[0], lead and k == 1 and not odd
-            if not led:
-                factors.append(Factor(at, squared=False))
-            beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
-            monic.append([lead * a[0] if led else 1, beta, kappa])
-            if not led or len(a) <= TWO_FACTORS:  # the largest roots do not stand on the line
-                touches.append(Contact(partial(_pair_distance, at), variable=at))
-                touches.append(Contact(partial(_real_distance, at), variable=at + 1))
+        for k in range(1, count + 1):
+            at, own = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
+            coefficients, own_contacts = quadratic(k, case, own)
+            monic.append(coefficients)
+            if own is None:
+                factors.append(Factor(at, squared=squared))
+            if own is None or count == 1:  # the largest roots are not on the edge
+                contacts += own_contacts
         if odd:
-            at = build.size[0]
-            monic.append([lead * a[0] if lead else 1, build.variable(f"delta.{case}", 0.0)])
+            at, (letter, lower) = build.size[0], linear
+            monic.append([lead * a[0] if lead else 1, build.variable(f"{letter}.{case}", lower)])
             if not lead:
                 factors.append(Factor(at, linear=True))
-            if not lead or len(a) <= TWO_FACTORS // 2:
-                touches.append(Contact(partial(_step_distance, at), variable=at))
-        build.equal("abscissa", shift(a, gamma), [(lead or a[0]) * c for c in product(*monic)])
+            if line is not None and (not lead or not count):
+                contacts.append(Contact(partial(_step_distance, at), variable=at))
+        left = a if line is None else shift(a, line)
+        build.equal(name, left, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
-    guess, close = (partial(_abscissa_guess, covered, near, abs(lead) / build.leading_unit) for near in (False, True))
+    return contacts, tuple(products)
+
+
+def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
+    """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
+
+    An odd degree adds one factor t + δ, δ ≥ 0. Any β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ. If the NLP
+    reaches a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may go to infinity; for an odd degree the linear
+    factor is ±a0 t + δ instead.
+    """
+    first = build.size[0]
+    gamma = build.variable("abscissa")
+
+    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        at = build.size[0]
+        beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
+        distances = (_pair_distance, _real_distance)
+        contacts = [Contact(partial(distance, at), variable=at + j) for j, distance in enumerate(distances)]
+        return [1 if lead is None else lead, beta, kappa], contacts
+
+    contacts, products = lift_factors(build, "abscissa", quadratic, linear=("delta", 0.0), line=gamma)
+    scale = abs(build.lead) / build.leading_unit
+    guess, close = (partial(_abscissa_guess, build.covered_cases, near, scale) for near in (False, True))
     lift = AddedVariable("abscissa", build.size[0] - first, guess, close)
-    return Lifted(build.unit * gamma, lift, tuple(touches), tuple(products))
+    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), products)
 
 
-def lift_damping_ratio(build: Rows) -> Lifted:
+def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
     """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
 
-    pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector; with real roots alone, ζ = 1. An odd degree has one factor s + d,
-    d ≥ 0, more. Where the NLP goes as far as a0 = 0, the first factor is m² s² + p s + w², m² = ±a0, p ≥ 2 ζ m w; of an
-    odd degree the linear one is ±a0 s + d instead.
+    pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector; real roots alone allow ζ = 1. An odd degree adds one factor
+    s + d, d ≥ 0. If the NLP reaches a0 = 0, the first factor is m² s² + p s + w² with m² = ±a0 and p ≥ 2 ζ m w; for an
+    odd degree the linear factor is ±a0 s + d instead.
     """
-    covered, first, lead = build.covered, build.size[0], build.lead
+    first = build.size[0]
     zeta = build.variable("damping_ratio", -1.0, 1.0)
-    touches = [Contact(lambda x: 1.0, variable=first, value=1.0)]
-    products: list[tuple[Factor, ...]] = []
-    for case in covered:
-        a, monic, factors = build.polynomial(case), [], []
-        odd = len(a) % 2 == 0
-        if lead:
-            build.row("a0", lead * a[0], 0.0, np.inf)
-        for k in range(1, (len(a) - 1) // 2 + 1):
-            at, led = build.size[0], lead and k == 1 and not odd
-            p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
-            if led:
-                m = build.variable(f"m.{case}", 0.0)
-                build.row("damping_ratio", m * m - lead * a[0], 0.0, 0.0)
-            else:
-                factors.append(Factor(at, squared=True))
-            monic.append([m * m, p, w * w])
-            build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
-            if not led or len(a) <= TWO_FACTORS:
-                touches.append(Contact(partial(_sector_distance, at), row=build.size[1] - 1))
-        if odd:
-            if not lead:
-                factors.append(Factor(build.size[0], linear=True))
-            monic.append([lead * a[0] if lead else 1, build.variable(f"d.{case}", 0.0)])
-        build.equal("damping_ratio", a, [(lead or a[0]) * c for c in product(*monic)])
-        products.append(tuple(factors))
-    guess = partial(_damping_guess, covered, abs(lead) / build.leading_unit)
+
+    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        at = build.size[0]
+        p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
+        if lead is not None:
+            m = build.variable(f"m.{case}", 0.0)
+            build.row("damping_ratio", m * m - lead, 0.0, 0.0)
+        build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
+        return [m * m, p, w * w], [Contact(partial(_sector_distance, at), row=build.size[1] - 1)]
+
+    contacts, products = lift_factors(build, "damping_ratio", quadratic, squared=True)
+    guess = partial(_damping_guess, build.covered_cases, abs(build.lead) / build.leading_unit)
     lift = AddedVariable("damping_ratio", build.size[0] - first, guess)
-    return Lifted(zeta, lift, tuple(touches), tuple(products))
+    all_real = Contact(lambda x: 1.0, variable=first, value=1.0)
+    return LiftedQuantity(zeta, lift, (all_real, *contacts), products)
 
 
-def lift_positive_root(build: Rows) -> AddedVariable:
-    """A damping ratio of −1 in the one case there is: p = a0 (s − r) q(s), r ≥ 0."""
-    (case,) = build.covered
+def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
+    """A damping ratio of −1 in the only case: p = a0 (s − r) q(s), r ≥ 0."""
+    (case,) = build.covered_cases
     a = build.polynomial(case)
     r, *q = build.variable("r", 0.0), *(build.variable(f"q{k}") for k in range(1, len(a) - 1))
     build.equal("damping_ratio", a, [a[0] * c for c in product([1, -r], [1, *q])])
     return AddedVariable("r", len(a) - 1, partial(_positive_guess, case))
 
 
-def lift_real_roots(build: Rows, line: bool) -> Lifted:
-    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 unless a `line` is asked.
+def lift_real_roots(build: ProgramBuilder, line: bool) -> LiftedQuantity:
+    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 without a `line`.
 
-    As many equations as sectors and half-planes need twice over, and regular at multiple roots, where the dᵢ between
+    This takes half as many equations as sectors and half-planes, and is regular at multiple roots, where the dᵢ between
     them are at their bound 0; p² ≥ 4q has dependent gradients there. d₁ = 0 puts a root on the line Re s = γ.
     """
-    covered, first = build.covered, build.size[0]
+    cases, first = build.covered_cases, build.size[0]
     gamma = build.variable("abscissa", upper=0.0) if line else 0.0
-    touches: list[Contact] = []
-    for case in covered:
+    contacts: list[Contact] = []
+    for case in cases:
         a = build.polynomial(case)
         at = build.size[0]
         steps = [build.variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
-        touches.append(Contact(partial(_step_distance, at), variable=at))
+        contacts.append(Contact(partial(_step_distance, at), variable=at))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
-    lift = AddedVariable("abscissa", build.size[0] - first, partial(_real_guess, covered, line))
-    return Lifted(build.unit * gamma, lift, tuple(touches), ())
+    lift = AddedVariable("abscissa", build.size[0] - first, partial(_real_guess, cases, line))
+    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), ())
 
 
-def lift_radius(build: Rows, directions: Sequence[int]) -> AddedVariable:
-    """Stability at the distance `radius` in the given directions: p = a0 ∏ (s² + βᵢ s + κᵢ) at each, a0 of one sign."""
+def lift_radius(build: ProgramBuilder, directions: Sequence[int]) -> AddedVariable:
+    """Stability at the distance `radius` in given directions: p = a0 ∏ (s² + βᵢ s + κᵢ), a0 of one sign."""
     size = 0
     for case in directions:
         a = build.polynomial(case)
@@ -185,43 +204,42 @@ def lift_radius(build: Rows, directions: Sequence[int]) -> AddedVariable:
     return AddedVariable("directions", size, partial(_radius_guess, directions))
 
 
-def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, AddedVariable]:
-    """A derived quantity as a variable, to be tied by its division-free equation."""
+def lift_quantity(build: ProgramBuilder, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, AddedVariable]:
+    """A derived quantity as a variable, to be fixed by its division-free equation."""
     symbol = build.variable(name if case == 0 else f"{name}.{case}", *ends)
     return symbol, AddedVariable(name, 1, lambda values, z: [[_finite(values[case][name])]])
 
 
 def worst_guess(
-    sign: float, expression: Expression, covered: Sequence[int], values: Sequence[Values], z: Sequence[Any]
+    sign: float, expression: Expression, cases: Sequence[int], values: Sequence[Values], z: Sequence[Any]
 ) -> list[list[float]]:
-    """The worst value over the cases, where it exists."""
-    found = [sign * float(expression(values[k])) for k in covered]
+    """The worst finite value over the cases."""
+    found = [sign * float(expression(values[k])) for k in cases]
     return [[max((v for v in found if np.isfinite(v)), default=0.0)]]
 
 
-TWO_FACTORS = 4  # coefficients, beyond which there are two quadratic factors or more
-_DOUBLE = 1e-3  # of the largest root: distance of two real ones that may be meant to be one
+_DOUBLE = 1e-3  # real roots closer than this, relative to the largest root, may be one double root
 
 
 def _pair_distance(at: int, x: Array) -> float:
-    """Distance of a complex pair of t² + βt + κ from the line, or of the middle of a real pair."""
+    """Distance from the line to a complex pair of t² + βt + κ, or to the middle of a real pair."""
     return float(x[at] / 2)
 
 
 def _real_distance(at: int, x: Array) -> float:
-    """Distance of the nearer of two real roots from the line; for a complex pair, as far as it is from real, too."""
+    """Distance from the line to the nearer of two real roots; for a complex pair, plus its imaginary part."""
     half, kappa = x[at] / 2, x[at + 1]
     rest = float(np.sqrt(abs(half * half - kappa)))
     return float(half + rest if half * half < kappa else kappa / (half + rest or 1.0))
 
 
 def _step_distance(at: int, x: Array) -> float:
-    """Distance of the rightmost root from the line."""
+    """Distance from the line to the rightmost root."""
     return float(x[at])
 
 
 def _sector_distance(at: int, x: Array) -> float:
-    """Damping ratio of the pair, the least of which is on the edge."""
+    """Damping ratio of a pair; the pair with the smallest one is on the edge."""
     p, w = x[at], x[at + 1]
     return float(p / (2 * w)) if w > 0 else np.inf
 
@@ -230,10 +248,10 @@ def _finite(value: Any) -> float:
     return float(value) if np.isfinite(value) else 1.0
 
 
-def quadratic_pairs(z: Roots) -> list[Roots]:
+def pair_roots(z: Roots) -> list[Roots]:
     """Roots two by two: conjugates together, nearly equal real ones together, then real neighbours.
 
-    Of an odd number, one real root comes last and alone: the leftmost of those that are not nearly equal.
+    For an odd number, one real root comes last and alone: the leftmost that is not nearly equal to another.
     """
     pairs, real = [z[k : k + 2] for k in range(0, len(z) - 1, 2) if z[k].imag], np.sort(z[z.imag == 0].real)
     alone = real[:0]
@@ -254,9 +272,9 @@ def quadratic_pairs(z: Roots) -> list[Roots]:
 def factors_of(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
     """β and κ of the factors about the line Re s = γ; δ of a linear one.
 
-    With a `lead` other than 1, that of the linear one, or else of the first, which then has the largest roots.
+    A `lead` other than 1 scales the linear factor, or else the first one, which then has the largest roots.
     """
-    pairs = [pair - gamma for pair in quadratic_pairs(z)]
+    pairs = [pair - gamma for pair in pair_roots(z)]
     if lead != 1.0:
         pairs.sort(key=lambda pair: (len(pair) < 2, -abs(pair.prod())))
     leads = [1.0] * len(pairs)
@@ -266,44 +284,43 @@ def factors_of(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
 
 
 def _abscissa_guess(
-    covered: Sequence[int], near: bool, led: float, values: Sequence[Values], z: Sequence[Roots]
+    cases: Sequence[int], near: bool, lead_scale: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """γ a little right of the rightmost root and the factors of the shifted polynomials: feasible exactly.
+    """γ slightly right of the rightmost root, and the factors of the shifted polynomials: exactly feasible.
 
-    `near` a solution, by no more than the abscissa may still be improved: a lightly damped system has one far smaller
-    than its roots.
+    `near` a solution the step is at most a tenth of the abscissa, which may be far smaller than the roots.
     """
-    every = np.concatenate([z[case] for case in covered])
+    every = np.concatenate([z[case] for case in cases])
     right, step = float(every.real.max()), 0.05 * float(np.abs(every).mean())
     gamma = right + (min(step, 0.1 * abs(right)) + 1e-6 if near else step + 1e-3)
-    leads = [led * abs(float(values[case].coefficients[0])) if led else 1.0 for case in covered]
-    return [[gamma, *(c for case, a0 in zip(covered, leads, strict=True) for c in factors_of(z[case], gamma, a0))]]
+    leads = [lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0 for case in cases]
+    return [[gamma, *(c for case, a0 in zip(cases, leads, strict=True) for c in factors_of(z[case], gamma, a0))]]
 
 
-def _real_guess(covered: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """Roots on the real axis below their own, and left of 0."""
-    every = np.concatenate([z[case] for case in covered])
+def _real_guess(cases: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    """Real roots at the real parts of the design's roots, but left of 0."""
+    every = np.concatenate([z[case] for case in cases])
     gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3) if line else 0.0
-    steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in covered]
+    steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in cases]
     return [[*([gamma] if line else []), *(float(d) for part in steps for d in part)]]
 
 
 def _damping_guess(
-    covered: Sequence[int], led: float, values: Sequence[Values], z: Sequence[Roots]
+    cases: Sequence[int], lead_scale: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """ζ a little less than it is, and p and w of every factor; if led, the led one with its coefficient, and m."""
-    every = np.concatenate([z[case] for case in covered])
+    """ζ slightly below its value, p and w of every factor, and m if `lead_scale` is not 0."""
+    every = np.concatenate([z[case] for case in cases])
     found = [min(max(float(np.min(-every.real / (np.abs(every) + 1e-300))) - 0.05, -0.95), 0.95)]
-    for case in covered:
-        a0 = led * abs(float(values[case].coefficients[0])) if led else 1.0
+    for case in cases:
+        a0 = lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0
         factors = factors_of(z[case], 0.0, a0)
         roots = [np.sqrt(abs(c)) if k % 2 else c for k, c in enumerate(factors)]
-        found += [*roots[:2], *([np.sqrt(a0)] if led and len(z[case]) % 2 == 0 else []), *roots[2:]]
+        found += [*roots[:2], *([np.sqrt(a0)] if lead_scale and len(z[case]) % 2 == 0 else []), *roots[2:]]
     return [[float(x) for x in found]]
 
 
 def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """The rightmost real root, or what is nearest to one, and the polynomial of the others."""
+    """The rightmost real root, or the root nearest to one, and the polynomial of the others."""
     first = int(np.argmax(z[case].real - 2 * np.abs(z[case].imag)))
     rest = np.atleast_1d(np.poly(np.delete(z[case], first))).real
     return [[max(float(z[case][first].real), 0.0), *map(float, rest[1:])]]

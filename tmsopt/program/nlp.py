@@ -1,4 +1,4 @@
-"""An NLP as plain data, the units it is written in, and what its solver needs to start."""
+"""An NLP as plain data, its units, and the values it starts from."""
 
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -22,32 +22,32 @@ from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.roots.patterns.pattern import Roots
 
-_TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where two factors share it, digits are lost
+_SHARED = 1e-3  # relative distance below which roots of two factors count as shared
 
 _TIE = 1e-3
-"""Difference of distances that are the same."""
+"""Distances that differ by less count as equal."""
 
 _LARGE = 50_000
-"""Operations times variables: derivatives as expressions would be too many, so that functions are differentiated."""
+"""Operations times variables above which functions are differentiated instead of expressions."""
 
 _KEPT = 64
-"""Compiled formulas kept: where cases are added row by row, most are not met again."""
+"""Compiled programs kept; while cases are added one by one, most are used once."""
 
-_FIRST = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
-_DESIGNS = 33
-_ORDINARY = (1e-2, 1e3)
+_FIRST_DERIVATIVES = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
+_SCALE_DESIGNS = 33  # designs from which scales are estimated
+_ORDINARY = (1e-2, 1e3)  # sizes that need no scaling
 
 Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
-"""Starting values of lifted variables for a numeric design and its roots, the nominal design first and then each
-case; several where there is a choice."""
+"""Starting values of added variables, from the quantities and roots of the nominal design and each case; one list per
+choice."""
 
 
 @dataclass(frozen=True)
 class AddedVariable:
-    """Variables that the formulation adds to the parameters, and how to start them.
+    """Variables that the formulation adds to the parameters, and their starting values.
 
     Attributes:
-        close: how to start them beside a solution, if otherwise.
+        close: starting values near a solution, if they differ.
     """
 
     name: str
@@ -58,12 +58,12 @@ class AddedVariable:
 
 @dataclass(frozen=True)
 class Contact:
-    """One way in which a root can stand on the edge that a root quantity describes, or a kink on one of its pieces.
+    """One way in which a root can lie on the edge of a root quantity's region, or a kink on one of its pieces.
 
     Attributes:
-        distance: how far the root is from the edge at a point of the NLP; of several ways, the least is taken. Without
-            it, what the row is off 0.
-        variable, row: what is held at a value.
+        distance: distance of the root from the edge at a point of the NLP; by default the value of the row. The nearest
+            of several contacts is tried first.
+        variable, row: what is held at `value`.
     """
 
     distance: Callable[[Array], float] | None = None
@@ -77,7 +77,7 @@ class MaximumVariable:
     """A variable t that stands for the greatest of several pieces, and its rows t − piece ≥ 0.
 
     Attributes:
-        quotient: it stands for a quotient instead, with one row t · denominator − numerator = 0.
+        quotient: t stands for a quotient instead, with one row t · denominator − numerator = 0.
     """
 
     variable: int
@@ -87,11 +87,12 @@ class MaximumVariable:
 
 @dataclass(frozen=True)
 class Factor:
-    """Where an NLP keeps a factor t² + βt + κ, or s² + ps + w², or t + δ.
+    """The variables of a factor t² + βt + κ, or s² + ps + w², or t + δ.
 
     Attributes:
+        first: index of the first variable.
         squared: whether the second variable is w, not its square.
-        linear: whether there is no second one.
+        linear: whether there is no second variable.
     """
 
     first: int
@@ -99,7 +100,7 @@ class Factor:
     linear: bool = False
 
     def real_roots(self, x: Array) -> tuple[float, ...]:
-        """Its real roots, the smaller first; none of a complex pair."""
+        """Its real roots in ascending order; none for a complex pair."""
         if self.linear:
             return (-float(x[self.first]),)
         half, q = -x[self.first] / 2, x[self.first + 1]
@@ -114,20 +115,20 @@ class NLP:
     Attributes:
         formulation: ``abscissa`` or ``matching``.
         variables: names; the free parameters come first, each as itself or as its tangent.
-        formula: f, then each row of g, in the variables, named by `name_of`, and in numbers of the problem.
-        numbers: name → value: of fixed parameters that are not 0, and of limits such as ``trail.limit``.
-        rows: name of each row of g: a constraint's name, or the equation it belongs to.
+        formula: f, then each row of g, in the variables (see `variable_name`) and the numbers.
+        numbers: name → value, for fixed parameters that are not 0 and for limits such as ``trail.limit``.
+        rows: name of each row of g: a constraint, or the equation it belongs to.
         lifts: the variables after the free parameters, in order.
         cases: the variations of the design that its rows cover.
-        touches: root quantity or kink → the ways in which it is met exactly; unless one is held, the NLP only bounds
-            it, which is too little for those that are listed.
-        kinks: those that others are made of come first.
+        contacts: root quantity or kink → the ways in which its bound is attained. It is listed if a bound alone is not
+            enough; then one of its contacts must hold.
+        kinks: a kink comes after those it depends on.
         products: the factors of each polynomial.
         exact: whether starts satisfy the equations of all cases.
         unit: of the roots in its variables.
         size: of the objective, as far as it is known beforehand.
-        units: of the first variables, the free parameters, in which a solver of absolute tolerances moves them.
-        objective_unit: likewise, of the objective where it is small.
+        units: of the free parameters, for a solver with absolute tolerances.
+        objective_unit: of the objective if it is small, for the same reason.
     """
 
     formulation: str
@@ -141,7 +142,7 @@ class NLP:
     row_upper: tuple[float, ...]
     lifts: tuple[AddedVariable, ...] = field(repr=False, default=())
     cases: tuple[Case, ...] = field(repr=False, default=())
-    touches: Mapping[str, tuple[Contact, ...]] = field(repr=False, default_factory=dict)
+    contacts: Mapping[str, tuple[Contact, ...]] = field(repr=False, default_factory=dict)
     kinks: tuple[MaximumVariable, ...] = field(repr=False, default=())
     products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
     exact: bool = False
@@ -153,87 +154,91 @@ class NLP:
     @property
     def inputs(self) -> tuple[str, ...]:
         """The names of the variables in the formula."""
-        return tuple(map(name_of, range(len(self.variables))))
+        return tuple(map(variable_name, range(len(self.variables))))
 
-    def at(self, x: Array) -> tuple[float, Array]:
-        """f and g."""
-        f, g = self.compiled.function(x.tolist(), self.constants)
+    def evaluate(self, x: Array) -> tuple[float, Array]:
+        """f and g at a point."""
+        f, g = self.program.function(x.tolist(), self.constants)
         return float(f), g.full().ravel()
 
     @cached_property
-    def baked(self) -> Formula:
+    def numeric_formula(self) -> Formula:
         """The formula with its numbers as constants."""
         numbers = {n: constant(v) for n, v in self.numbers.items()}
         return formula(fold(self.formula, {n: symbol(n) for n in self.inputs} | numbers, NODES), self.inputs)
 
     def fold(self, x: Sequence[Any], kind: Kind, shared: Callable[[Any], Any] | None = None) -> list[Any]:
-        """f and the rows of g for variables of a kind; numbers are constants."""
-        return fold(self.baked, dict(zip(self.inputs, x, strict=True)), kind, shared)
+        """f and the rows of g for variables of one kind of number."""
+        return fold(self.numeric_formula, dict(zip(self.inputs, x, strict=True)), kind, shared)
 
     def symbolic(self, x: Any) -> tuple[Any, Any]:
-        """f and g for a vector of CasADi."""
+        """f and g for a CasADi vector."""
         f, *g = self.fold(ca.vertsplit(x), CASADI)
         return ca.densify(ca.SX(f)), ca.densify(ca.vertcat(ca.SX(0, 1), *g))
 
     @cached_property
-    def compiled(self) -> "Compiled":
-        """Functions of CasADi for f and g; of each formula one in each thread."""
-        return _MADE.of(self.formula, len(self.variables))
+    def program(self) -> "CompiledProgram":
+        """The compiled functions f and g, shared by NLPs with one formula in one thread."""
+        program: CompiledProgram = _PROGRAMS.get(self.formula, len(self.variables))
+        return program
 
     @property
     def constants(self) -> list[float]:
-        """What the functions take beside the variables: all that depends on numbers alone."""
-        return _MADE.constants(self.formula, len(self.variables), tuple(self.numbers.items()))
+        """Inputs of the compiled functions besides x: every value that depends on the numbers alone."""
+        values: list[float] = _CONSTANTS.get(self.formula, len(self.variables), tuple(self.numbers.items()))
+        return values
 
-    def touchings(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
-        """The same with everything in `touches` met exactly: in the ways that a point is closest to, then in others.
+    def impose_contacts(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
+        """The NLP with one contact held for each entry of `contacts`: first the nearest to a point, then others.
 
-        In each of the others one way is exchanged for one that is as close, but for a `tie`.
+        Each of the others exchanges one contact for another that is as near, up to `tie`.
         """
-        rows = self.at(x)[1] if self.kinks else x
+        rows = self.evaluate(x)[1] if self.kinks else x
         ranked: list[list[Contact]] = []
-        for ways in self.touches.values():
-            distances = [float(rows[way.row]) if way.distance is None else way.distance(x) for way in ways]
+        for contacts in self.contacts.values():
+            distances = [
+                float(rows[contact.row]) if contact.distance is None else contact.distance(x) for contact in contacts
+            ]
             order = np.argsort(distances, kind="stable")
-            ranked.append([ways[k] for k in order if distances[k] <= distances[order[0]] + tie or k == order[0]])
+            ranked.append([contacts[k] for k in order if distances[k] <= distances[order[0]] + tie or k == order[0]])
         nearest = [close[0] for close in ranked]
-        yield self._held(nearest)
+        yield self._hold_contacts(nearest)
         for k, close in enumerate(ranked):
-            for way in close[1:]:
-                yield self._held([*nearest[:k], way, *nearest[k + 1 :]])
+            for contact in close[1:]:
+                yield self._hold_contacts([*nearest[:k], contact, *nearest[k + 1 :]])
 
-    def _held(self, ways: Sequence[Contact]) -> "NLP":
+    def _hold_contacts(self, contacts: Sequence[Contact]) -> "NLP":
         lower, upper, row_upper = list(self.lower), list(self.upper), list(self.row_upper)
-        for way in ways:
-            if way.variable is not None:
-                lower[way.variable] = upper[way.variable] = way.value
-            if way.row is not None:
-                row_upper[way.row] = way.value
+        for contact in contacts:
+            if contact.variable is not None:
+                lower[contact.variable] = upper[contact.variable] = contact.value
+            if contact.row is not None:
+                row_upper[contact.row] = contact.value
         return replace(self, lower=tuple(lower), upper=tuple(upper), row_upper=tuple(row_upper))
 
-    def filled(self, x: Array) -> Array:
-        """A point with every kink the greatest of its pieces."""
+    def set_kinks(self, x: Array) -> Array:
+        """A point with every kink variable set to the greatest of its pieces."""
         x = x.copy()
         for kink in self.kinks:
             x[kink.variable] = 0.0
-            value = -float(self.at(x)[1][list(kink.rows)].min())
+            value = -float(self.evaluate(x)[1][list(kink.rows)].min())
             if kink.quotient:
                 x[kink.variable] = 1.0
-                denominator = float(self.at(x)[1][kink.rows[0]]) + value
+                denominator = float(self.evaluate(x)[1][kink.rows[0]]) + value
                 value = value / denominator if denominator else 0.0
             x[kink.variable] = value if np.isfinite(value) else 0.0
         return x
 
-    def tangled(self, x: Array) -> bool:
-        """Whether two factors share a root that is double in neither of them.
+    def has_split_double_root(self, x: Array) -> bool:
+        """Whether two factors share a root that is double in neither.
 
-        Such a double root cannot become a pair, so the point may be stationary for the NLP and not for the design:
-        with both of it in one factor, the way is open.
+        Such a double root cannot become a pair, so the point may be stationary for the NLP but not for the design. With
+        both roots in one factor it can.
         """
         for factors in self.products:
             real = [found for factor in factors if (found := factor.real_roots(x))]
             for one, other in combinations(real, 2):
-                near = _TANGLED * (1 + max(map(abs, (*one, *other))))
+                near = _SHARED * (1 + max(map(abs, (*one, *other))))
                 shared = min(abs(r - t) for r in one for t in other) <= near
                 double = any(len(pair) == 2 and pair[1] - pair[0] <= near for pair in (one, other))
                 if shared and not double:
@@ -241,73 +246,73 @@ class NLP:
         return False
 
 
-def name_of(variable: int) -> str:
-    """The name of a variable in a formula, which no parameter has."""
+def variable_name(variable: int) -> str:
+    """The name of a variable in a formula; no parameter has such a name."""
     return f":{variable}"
 
 
 @dataclass(frozen=True, eq=False)
-class Compiled:
-    """The functions of an NLP as CasADi compiles them, for whatever numbers: the one place where they are made.
+class CompiledProgram:
+    """The CasADi functions of an NLP, for any numbers.
 
     Attributes:
-        early: what the functions take beside the variables, in numbers.
+        number_formula: inputs of the functions besides the variables, as formulas of the numbers.
         function: (x, p) → (f, g).
     """
 
-    early: Formula
+    number_formula: Formula
     function: ca.Function
 
     @property
     def symbols(self) -> list[Any]:
-        """Symbols for x, p and multipliers of the rows, of the kind that the functions are made of."""
+        """Symbols for x, p and the multipliers of the rows, of the functions' own kind."""
         kind: Any = ca.MX if self.function.is_a("MXFunction") else ca.SX
         sizes = {"x": self.function.size1_in(0), "p": self.function.size1_in(1), "m": self.function.size1_out(1)}
         return [kind.sym(name, size) for name, size in sizes.items()]
 
     @cached_property
     def derivatives(self) -> dict[str, ca.Function]:
-        """What CasADi else derives anew for every solver."""
+        """Derivatives that CasADi would otherwise form anew for every solver."""
         make = self.function.factory
-        first = {of: make("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
+        first = {of: make("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST_DERIVATIVES.items()}
         second = make("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
         return {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
 
 
-def compile_formula(formula: Formula, count: int) -> Compiled:
-    """A formula of an NLP as functions of CasADi of so many variables."""
-    variables = tuple(map(name_of, range(count)))
-    names, early, late = formula.split(formula.dependent_steps(variables))
+def compile_program(formula: Formula, count: int) -> CompiledProgram:
+    """Compile the formula of an NLP with `count` variables to CasADi functions."""
+    variables = tuple(map(variable_name, range(count)))
+    names, number_formula, rest = formula.split(formula.dependent_steps(variables))
     x, p = ca.SX.sym("x", count), ca.SX.sym("p", len(names))
     given = dict(zip((*variables, *names), [*ca.vertsplit(x), *ca.vertsplit(p)], strict=True))
-    f, *g = fold(late, given, CASADI)
+    f, *g = fold(rest, given, CASADI)
     outputs = [ca.densify(ca.SX(f)), ca.densify(ca.vertcat(ca.SX(0, 1), *g))]
     function = ca.Function("nlp", [x, p], outputs, ["x", "p"], ["f", "g"])
-    if len(late.steps) * count >= _LARGE:
+    if len(rest.steps) * count >= _LARGE:
         inputs: list[Any] = [ca.MX.sym("x", count), ca.MX.sym("p", len(names))]
         function = ca.Function("nlp", inputs, list(function(*inputs)), ["x", "p"], ["f", "g"])
-    return Compiled(early, function)
+    return CompiledProgram(number_formula, function)
 
 
-class _Formulas(threading.local):
-    """Compiled formulas; those of another thread are not to be used."""
-
-    def __init__(self) -> None:
-        self.of = lru_cache(maxsize=_KEPT)(compile_formula)
-        self.constants = lru_cache(maxsize=_KEPT)(self._constants)
-
-    def _constants(self, formula: Formula, count: int, numbers: tuple[tuple[str, float], ...]) -> list[float]:
-        with np.errstate(all="ignore"):
-            return [float(c) for c in fold(self.of(formula, count).early, dict(numbers), FLOATS)]
+def _compute_constants(formula: Formula, count: int, numbers: tuple[tuple[str, float], ...]) -> list[float]:
+    with np.errstate(all="ignore"):
+        return [float(c) for c in fold(_PROGRAMS.get(formula, count).number_formula, dict(numbers), FLOATS)]
 
 
-_MADE = _Formulas()
+class PerThread(threading.local):
+    """Caches the last results of a function for each thread: CasADi objects must not be used from two threads."""
+
+    def __init__(self, make: Callable[..., Any], most: int) -> None:
+        self.get = lru_cache(maxsize=most)(make)
 
 
-def forget_formulas() -> None:
-    """Compile formulas anew, in this thread."""
-    for made in (_MADE.of, _MADE.constants):
-        made.cache_clear()
+_PROGRAMS, _CONSTANTS = PerThread(compile_program, _KEPT), PerThread(_compute_constants, _KEPT)
+
+
+def forget_programs() -> None:
+    """Drop the compiled programs of this thread."""
+    for cache in (_PROGRAMS, _CONSTANTS):
+        cache.get.cache_clear()
 
 
 @dataclass(frozen=True)
@@ -322,8 +327,8 @@ class Scale:
     unit: float = 1.0
     lead: float = 1.0
 
-    def scaled(self, coefficients: Sequence[Any]) -> list[Any]:
-        """Coefficients, descending, of the polynomial in s/unit, over the unit of the leading one."""
+    def scale_coefficients(self, coefficients: Sequence[Any]) -> list[Any]:
+        """Descending coefficients of the polynomial in s/unit, over the unit of the leading one."""
         if self == Scale():
             return list(coefficients)
         n = len(coefficients) - 1
@@ -331,13 +336,10 @@ class Scale:
 
 
 def scale_of(problem: Posed) -> Scale:
-    """Median sizes of roots and leading coefficients over some designs of the box.
-
-    Every unit is as exact as another; this one makes tolerances mean the same for all equations.
-    """
+    """Median sizes of roots and leading coefficients over the box, which make tolerances mean the same everywhere."""
     if problem.model.natural:
         return Scale()
-    found = coefficients_of(problem, problem.ordered(_designs(problem)))
+    found = coefficients_of(problem, problem.ordered(_spread_designs(problem)))
     a = np.stack(np.broadcast_arrays(*found), axis=-1)
     a = a.reshape(-1, a.shape[-1])
     a = a[np.all(np.isfinite(a), axis=1) & np.any(a != 0, axis=1)]
@@ -350,45 +352,45 @@ def scale_of(problem: Posed) -> Scale:
 
 
 def objective_size(problem: Posed) -> float:
-    """Size below which differences of the objective are none, relative: that of the roots where it is about these."""
+    """The size of the objective: at most 1; the unit of the roots if the objective is the abscissa."""
     about = problem.objective.names if problem.objective else ()
     return min(1.0, scale_of(problem).unit) if about == ("abscissa",) else 1.0
 
 
-def _designs(problem: Posed) -> dict[str, Any]:
+def _spread_designs(problem: Posed) -> dict[str, Any]:
     """Columns of designs spread over the box."""
     names = list(problem.free)
-    share = (0.5 + np.arange(_DESIGNS)[:, None] * golden_steps(len(names))) % 1.0 if names else np.zeros((1, 0))
+    share = (0.5 + np.arange(_SCALE_DESIGNS)[:, None] * golden_steps(len(names))) % 1.0 if names else np.zeros((1, 0))
     lower, upper = (np.array([ends[k] for ends in problem.free.values()]) for k in (0, 1))
     return dict(zip(names, (lower + (upper - lower) * share).T, strict=True))
 
 
 def objective_unit(problem: Posed) -> float:
-    """A power of 2 near the size of a small objective: a solver brings large ones down by itself, but none up."""
+    """A power of 2 near the size of a small objective; IPOPT scales large ones itself, small ones not."""
     if problem.model.natural or problem.objective is None or not problem.free:
         return 1.0
-    [values] = evaluate(problem, [problem.objective], problem.ordered(_designs(problem)))
+    [values] = evaluate(problem, [problem.objective], problem.ordered(_spread_designs(problem)))
     size = np.abs(np.atleast_1d(values))
     size = size[np.isfinite(size) & (size > 0)]
     return _power_of_two(size) if len(size) and np.median(size) < _ORDINARY[0] else 1.0
 
 
 def units_of(problem: Posed) -> tuple[float, ...]:
-    """For each free parameter a power of 2 near the size of its range, or 1 where that is near enough."""
+    """For each free parameter a power of 2 near the size of its range, or 1 if that is close enough."""
     if problem.model.natural:
         return ()
     sizes = [max(map(abs, ends)) for ends in problem.free.values()]
-    return tuple(ordinary(size) for size in sizes)
+    return tuple(unit_near(size) for size in sizes)
 
 
-def reaches_of(problem: Posed) -> dict[str, float]:
-    """For each free parameter a power of 2 near its size, or its range where it is large: what a proof moves it by."""
-    units = dict(zip(problem.free, units_of(problem), strict=False))  # none of natural units
-    return {n: u if u <= 1 else ordinary(problem.free[n][1] - problem.free[n][0]) for n, u in units.items()}
+def proof_units(problem: Posed) -> dict[str, float]:
+    """For each free parameter a power of 2 near its size, or near its range if it is large: the unit of a proof."""
+    units = dict(zip(problem.free, units_of(problem), strict=False))  # empty for natural units
+    return {n: u if u <= 1 else unit_near(problem.free[n][1] - problem.free[n][0]) for n, u in units.items()}
 
 
-def ordinary(size: float) -> float:
-    """A power of 2 near a size, or 1 where that is near enough, or there is none."""
+def unit_near(size: float) -> float:
+    """A power of 2 near a size; 1 if that is close enough, or the size is 0 or not finite."""
     near = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
     return 1.0 if near else _power_of_two(np.array([size]))
 

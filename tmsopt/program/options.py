@@ -1,7 +1,7 @@
-"""How to solve: declared here once, and handed on as one from the verb that a user calls to IPOPT."""
+"""How to solve: the options, declared once and passed from a command or verb to IPOPT."""
 
 import inspect
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict, TypeVar
 
@@ -9,14 +9,14 @@ from tmsopt.errors import MOST_STARTS, Fault, InputError, call_faults, count_fau
 from tmsopt.progress import Listener, Steps, steps_for
 
 LINEAR_SOLVERS = ("mumps", "spral")
-"""Inside IPOPT: those in the CasADi wheel; any other name fails there without an error."""
+"""Linear solvers of the IPOPT in the CasADi wheel; it ignores any other name without an error."""
 
 STARTS = 64
-"""Starts tried at most; most problems settle with a dozen."""
+"""Default maximum of starts; most problems need a dozen."""
 
 
-class Asked(TypedDict, total=False):
-    """What every verb that solves lets its user say by name; see `Options`."""
+class CommonOptions(TypedDict, total=False):
+    """Options that every solving function takes by name; see `Options`."""
 
     starts: int
     seed: int
@@ -24,8 +24,8 @@ class Asked(TypedDict, total=False):
     progress: Listener | None
 
 
-class AskedOfSolve(Asked, total=False):
-    """What `solve` lets its user say beside that."""
+class SolveOptions(CommonOptions, total=False):
+    """Options that `solve` takes in addition."""
 
     exhaustive: bool
     near: Mapping[str, float] | None
@@ -39,19 +39,19 @@ class Options:
     """How to solve.
 
     Attributes:
-        starts: starts tried at most, of each side of the box and again by each rescue; the search ends early when few
-            better optima are expected, or at a proof.
-        seed: of the quasi-random starting designs.
+        starts: maximum number of starts, for each side of the box and again for each rescue; the search ends early
+            when few better optima are expected, or at a proof.
+        seed: seed of the quasi-random starting designs.
         linear_solver: ``mumps`` or ``spral``.
-        progress: called with a `tmsopt.Progress` now and then: what is being done, how far it is.
-        exhaustive: try all the starts, even when several agree.
-        near: a design that may be close to the optimum, tried first; where both signs of a parameter are searched,
-            only its own is.
-        alone: of an infeasible problem, also find how far each limit in conflict would have to give alone.
-        stability: where a stable design was looked for and none was found, seconds for branch and bound to look for one
-            or to prove that there is none; 0 to do without. `solve` gives it 5, where SCIP is installed.
-        interruptible: whether Ctrl-C ends the search with the best design so far, as `solve` has it; else it goes on to
-            whoever called, as it always does where no design is in hand yet.
+        progress: function called with a `tmsopt.Progress` now and then.
+        exhaustive: try all starts, even if several agree.
+        near: a design that may be close to the optimum, tried first; if both signs of a parameter could be searched,
+            only the sign of this design is.
+        alone: if the problem is infeasible, also find how far each limit in conflict would have to be relaxed alone.
+        stability: if no stable design was found, seconds for branch and bound to find one or to prove that none
+            exists; 0 skips it. `solve` allows 5 s if SCIP is installed.
+        interruptible: whether Ctrl-C ends the search with the best design so far, as in `solve`; otherwise, or without
+            a design yet, the interrupt reaches the caller.
 
     Example:
         >>> tmsopt.Options().starts, tmsopt.solve("problems/ep4.toml", starts=4, seed=1).structure
@@ -70,11 +70,6 @@ class Options:
     stability: float = 0.0
     interruptible: bool = False
 
-    @property
-    def of_ipopt(self) -> Hashable:
-        """What IPOPT must know: where it is the same, a solver can be used again."""
-        return self.linear_solver
-
 
 DEFAULTS = Options()
 
@@ -83,9 +78,9 @@ Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 
 def documents_options(accepted: type, defaults: Options = DEFAULTS) -> Callable[[Verb], Verb]:
-    """A decorator of verbs: `help` and notebooks list the options that one takes by name, each with its default."""
+    """A decorator that adds the accepted options and their defaults to a function's signature."""
 
-    def listed(verb: Verb) -> Verb:
+    def add_signature(verb: Verb) -> Verb:
         own = inspect.signature(verb)
         named = [p for p in own.parameters.values() if p.kind is not p.VAR_KEYWORD]
         options = [
@@ -95,23 +90,23 @@ def documents_options(accepted: type, defaults: Options = DEFAULTS) -> Callable[
         vars(verb)["__signature__"] = own.replace(parameters=[*named, *options])
         return verb
 
-    return listed
+    return add_signature
 
 
-def options_of(
-    asked: Asked | AskedOfSolve, accepted: type = Asked, defaults: Options = DEFAULTS, fewest: int = 1
+def make_options(
+    chosen: CommonOptions | SolveOptions, accepted: type = CommonOptions, defaults: Options = DEFAULTS, fewest: int = 1
 ) -> Options:
-    """Options that a user named, and the verb's own defaults for the others.
+    """The options that a user named, with defaults for the others.
 
     Args:
-        fewest: starts that make sense.
+        fewest: smallest meaningful number of starts.
 
     Raises:
-        TypeError: for a name that is not accepted.
-        InputError: for a value that is not.
+        TypeError: for an unknown name.
+        InputError: for a value out of range.
     """
-    given: dict[str, Any] = {**vars(defaults), **asked}
-    for name in asked:
+    given: dict[str, Any] = {**vars(defaults), **chosen}
+    for name in chosen:
         if name not in accepted.__annotations__:
             raise TypeError(f"unknown option '{name}'; {suggest(name, accepted.__annotations__)}")
     faults = [*count_faults("starts", given["starts"], fewest, MOST_STARTS), *count_faults("seed", given["seed"], 0)]

@@ -1,4 +1,4 @@
-"""CasADi's sequential quadratic programming: for small programs that are to be solved without IPOPT."""
+"""CasADi's sequential quadratic programming, for small programs that are solved without IPOPT."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,20 +6,17 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.program.ipopt import PerThread, Run, interruptible
-from tmsopt.program.nlp import NLP, Compiled
+from tmsopt.program.ipopt import Run, interruptible
+from tmsopt.program.nlp import NLP, CompiledProgram, PerThread
 from tmsopt.records import Array
 
 _QUIET = ("print_header", "print_iteration", "print_status", "print_time", "show_eval_warnings", "error_on_fail")
 _QUIET_QP = ("print_header", "print_iter", "print_info", "error_on_fail")
 
 
-def sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
-    """A solver of one NLP: start → run. It learns the curvature from gradients.
-
-    Not to be shared between threads.
-    """
-    solver = _SOLVERS.of(nlp.compiled, max_iterations)
+def make_sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
+    """A solver of one NLP: start → run; it approximates the Hessian from gradients. Do not share it between threads."""
+    solver = _SOLVERS.get(nlp.program, max_iterations)
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     limits = {"lbx": nlp.lower, "ubx": nlp.upper, "lbg": nlp.row_lower, "ubg": nlp.row_upper, "p": nlp.constants}
 
@@ -33,9 +30,9 @@ def sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
     return run
 
 
-def _solver(compiled: Compiled, max_iterations: int) -> ca.Function:
-    x, p, _ = compiled.symbols
-    f, g = compiled.function(x, p)
+def _solver(program: CompiledProgram, max_iterations: int) -> ca.Function:
+    x, p, _ = program.symbols
+    f, g = program.function(x, p)
     settings: dict[str, Any] = {
         **dict.fromkeys(_QUIET, False),
         "qpsol": "qrqp",
@@ -48,4 +45,4 @@ def _solver(compiled: Compiled, max_iterations: int) -> ca.Function:
     return ca.nlpsol("sqp", "sqpmethod", {"x": x, "p": p, "f": f, "g": g}, settings)
 
 
-_SOLVERS = PerThread(_solver)
+_SOLVERS = PerThread(_solver, 32)

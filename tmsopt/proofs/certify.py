@@ -179,8 +179,8 @@ def _over_the_box(design: Solution) -> Bound:
     if problem.objective is None or set(problem.objective.names) & set(ROOT_NAMES) or not math.isfinite(design.value):
         return Bound()
     build = Builder(problem, _cases(design))
-    build.optimise()
-    lower, upper = build.over([build.objective])[0]  # of the negative, where it is maximised
+    build.add_objective()
+    lower, upper = build.enclose([build.objective])[0]  # of the negative, where it is maximised
     sense = problem.sign
     gap = max(sense * design.value - lower, 0.0)
     return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()

@@ -122,7 +122,7 @@ def _starts(system: Equations, held: Mapping[str, Any], problem: Posed) -> Itera
     values = problem.values(own)
     lifted = {q.name: flint.arb(float(values[q.name])) for q in system.lifted}
     scale = Scale(system.unit)
-    coefficients = scale.scaled([float(c) for c in problem.model.coefficients(own, of)])
+    coefficients = scale.scale_coefficients([float(c) for c in problem.model.coefficients(own, of)])
     try:
         fits = fit_unknowns(system.pattern, coefficients)
     except ValueError:

@@ -20,7 +20,7 @@ from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.verdict.stability import CROSSING, describe_crossing
-from tmsopt.program.options import AskedOfSolve, documents_options, options_of
+from tmsopt.program.options import SolveOptions, documents_options, make_options
 from tmsopt.progress import begin
 from tmsopt.proofs.existence import Existing, as_stored, beside, exactly
 from tmsopt.proofs.factored import multiple_roots
@@ -134,9 +134,9 @@ class Proof(Printable):
         }
 
 
-@documents_options(AskedOfSolve)
+@documents_options(SolveOptions)
 def prove(
-    design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[AskedOfSolve]
+    design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[SolveOptions]
 ) -> Proof:
     """Prove that the design a problem asks for exists, in ball arithmetic, with what follows for its stability.
 
@@ -165,7 +165,7 @@ def prove(
     if isinstance(design, Solution) and wrong:
         message = f"found {', '.join(wrong)}; options are for solving, and this is solved: give the problem instead"
         raise InputError([Fault(message, ("options",))])
-    how = options_of(options, AskedOfSolve)
+    how = make_options(options, SolveOptions)
     found = solve_any_status(design, how)
     problem = found.problem.posed
     if found.status != "optimal":

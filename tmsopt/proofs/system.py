@@ -12,7 +12,7 @@ from tmsopt.models import Quantity
 from tmsopt.models.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
-from tmsopt.program.nlp import ordinary, reaches_of, scale_of
+from tmsopt.program.nlp import proof_units, scale_of, unit_near
 from tmsopt.proofs.factored import abscissa_formula
 from tmsopt.records import Array
 from tmsopt.roots import Pattern
@@ -88,9 +88,9 @@ def equations(problem: Posed, pattern: Pattern, parameters: Mapping[str, float])
             f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest"
         )
     lifted = lifted_quantities(problem.model, problem.parameter_set, parameters, equalities)
-    own = Equations(problem, pattern, equalities, lifted, ordinary(scale_of(problem).unit))
-    units = reaches_of(problem)
-    units |= {q.name: ordinary(abs(float(problem.values(parameters)[q.name]))) for q in own.lifted}
+    own = Equations(problem, pattern, equalities, lifted, unit_near(scale_of(problem).unit))
+    units = proof_units(problem)
+    units |= {q.name: unit_near(abs(float(problem.values(parameters)[q.name]))) for q in own.lifted}
     units |= {n: own.unit**power for n, power in zip(own.of_pattern, pattern.powers, strict=True)}
     return replace(own, units=units)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import design_of
-from tmsopt.program.ipopt import polisher
+from tmsopt.program.ipopt import make_polisher
 from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, clip_to_box, same_objective
 
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
@@ -32,7 +32,7 @@ def accept_best(state: SearchState) -> SearchState:
 
 def check_end(state: SearchState, end: LocalEnd) -> CheckedEnd:
     """Polish an end under the limits that are active there, and recheck it in its cases."""
-    point = polisher(end.nlp)(end.run, end.nlp)
+    point = make_polisher(end.nlp)(end.run, end.nlp)
     parameters = state.problem.ordered(design_of(state.problem, point.x.tolist()))
     return CheckedEnd(end, point, parameters, recheck(state.problem, parameters, end.nlp.cases), state.tuning)
 

@@ -15,10 +15,10 @@ from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.validate import SMALLEST
-from tmsopt.program.formulate import design_of, matching
+from tmsopt.program.formulate import design_of, formulate_matching
 from tmsopt.program.nlp import NLP
-from tmsopt.program.options import Asked, Options, documents_options, options_of
-from tmsopt.program.starts import completions, spread
+from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
+from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain
 from tmsopt.search.local_search import solve_from
@@ -116,8 +116,8 @@ class Every(Tabular):
         return found | {"complete": self.complete, "undecided": len(proof.undecided) if proof else None}
 
 
-@documents_options(Asked, _DEFAULTS)
-def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Asked]) -> Every:
+@documents_options(CommonOptions, _DEFAULTS)
+def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[CommonOptions]) -> Every:
     """Find every design in the box with the located pattern, if the pattern leaves no freedom.
 
     Interval branch and prune proves which designs exist and that there is no other. If it takes too long, Newton's
@@ -146,7 +146,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
     if not is_number(seconds):
         raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
     nlp = _build_equations(problem)
-    state = SearchState(problem, problem, nlp, options_of(options, defaults=_DEFAULTS))
+    state = SearchState(problem, problem, nlp, make_options(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
     proof = completeness(problem, seconds, state.options.progress) if seconds > 0 else None
     proved_designs = proof.designs if proof else ()
@@ -188,10 +188,10 @@ def _search_starts(
     errors: list[dict[str, float]] = []
     hits: list[int] = []
     done = singular = crossings = 0
-    for design in spread(problem, state.options.seed):
+    for design in sample_box(problem, state.options.seed):
         if done >= starts or _is_covered(done, hits):
             break
-        ends = [find_zero(system, x) for x in completions(nlp, problem, design)]
+        ends = [find_zero(system, x) for x in complete_starts(nlp, problem, design)]
         if done % _IPOPT_EVERY == 0:
             local = solve_from(state, Start(design, near=False))
             ends.append((find_zero(system, local.run.x) or make_zero(system, local.run.x)) if local.feasible else None)
@@ -248,9 +248,9 @@ def _build_equations(problem: Posed) -> NLP:
         conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"
         message = f"{free} and {conditions} do not give isolated solutions; {advice}"
         raise InputError([Fault(message, ("parameters",))])
-    nlp = matching(problem)
-    if nlp.touches:
-        found = f"the constraints use {', '.join(nlp.touches)}, which only the roots define"
+    nlp = formulate_matching(problem)
+    if nlp.contacts:
+        found = f"the constraints use {', '.join(nlp.contacts)}, which only the roots define"
         accepted = "parameters, coefficients, and quantities with a formula in these"
         advice = "rewrite the constraints, or use solve, which finds one design and names other solutions"
         raise InputError([Fault(f"{found}; accepted: {accepted}; {advice}", ("constraints",))])

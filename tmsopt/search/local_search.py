@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.program.formulate import design_of
-from tmsopt.program.ipopt import Run, ipopt
+from tmsopt.program.ipopt import Run, make_ipopt
 from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import initial_point
 from tmsopt.records import Array
@@ -23,7 +23,7 @@ def solve_from(state: SearchState, start: Start) -> LocalEnd:
     exact = bool(nlp.cases) and nlp.exact
     best = run_once(state, start, "near" if start.near else "exact" if exact else "far")
     for again in range(tuning.restarts):
-        converged = best.feasible and best.run.status == "Solve_Succeeded" and not best.nlp.tangled(best.run.x)
+        converged = best.feasible and best.run.status == "Solve_Succeeded" and not best.nlp.has_split_double_root(best.run.x)
         exhausted = not best.feasible and again >= count_restarts(state)
         if converged or exhausted or not np.all(np.isfinite(best.run.x)):
             break
@@ -45,7 +45,7 @@ def count_restarts(state: SearchState) -> int:
 def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
     """The best end of IPOPT over the ways in which root quantities and kinks can be held at the start."""
     x = initial_point(state.nlp, state.part, start.design, settings == "near")
-    ways = islice(state.nlp.touchings(x), state.tuning.ways)
+    ways = islice(state.nlp.impose_contacts(x), state.tuning.ways)
     return min((_run_ipopt(state, start, x, way, settings) for way in ways), key=lambda end: end.rank)
 
 
@@ -63,9 +63,9 @@ def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
 
 def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
     """The best end over other ways of holding root quantities that are as close as the current one."""
-    for _ in range(state.tuning.exchanges if state.nlp.touches and best.feasible else 0):
+    for _ in range(state.tuning.exchanges if state.nlp.contacts and best.feasible else 0):
         x, held = best.run.x, _limits(best.nlp)
-        others = (way for way in state.nlp.touchings(x, state.tuning.meets) if _limits(way) != held)
+        others = (way for way in state.nlp.impose_contacts(x, state.tuning.meets) if _limits(way) != held)
         ends = [_run_ipopt(state, best.start, x, way, "near") for way in islice(others, 2 * state.tuning.ways)]
         other = min(ends, key=lambda end: end.rank, default=best)
         if not (other.feasible and other.objective < best.objective - state.tuning.same):
@@ -76,14 +76,14 @@ def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
 
 def _run_ipopt(state: SearchState, start: Start, x: Array, limits: NLP, settings: str) -> LocalEnd:
     """Run IPOPT once and judge its end."""
-    run = ipopt(state.nlp, state.options, settings)(x, limits)
-    f, rows = limits.at(run.x)
+    run = make_ipopt(state.nlp, state.options, settings)(x, limits)
+    f, rows = limits.evaluate(run.x)
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(f)):
         return LocalEnd(start, limits, run, math.inf, False)
     outside = np.maximum(np.array(limits.row_lower) - rows, rows - np.array(limits.row_upper)).clip(0)
     feasible = outside.max(initial=0.0) <= state.tuning.feasible and run.status != "Infeasible_Problem_Detected"
     # Rows that hold to 1e-12 may hide 1e-6 in a double root, whose square they constrain.
-    claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if limits.touches else 0.0
+    claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if limits.contacts else 0.0
     if not feasible or _is_spurious(state, limits, run):
         return LocalEnd(start, limits, run, f + claim, False)
     design = state.part.ordered(design_of(state.part, run.x.tolist()))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tmsopt.evaluation.bound import minimizes_abscissa, instant_bound
+from tmsopt.evaluation.bound import instant_bound, minimizes_abscissa
 from tmsopt.evaluation.recheck import Evaluation, recheck
 from tmsopt.evaluation.worst_case import Worst, find_worst_cases
 from tmsopt.problem.advice.remedies import Relaxation
@@ -15,10 +15,10 @@ from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import OtherBranch
-from tmsopt.program.formulate import abscissa, matching
-from tmsopt.program.ipopt import Point, gains
+from tmsopt.program.formulate import formulate_abscissa, formulate_matching
+from tmsopt.program.ipopt import Point, relaxation_gain
 from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import designs, initial_point
+from tmsopt.program.starts import choose_starts, initial_point
 from tmsopt.records import Array, Table
 from tmsopt.roots import Root
 from tmsopt.search.acceptance import claim_matches, has_converged, recheck_inside_box
@@ -88,7 +88,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
         notes += (f"{surplus} are inconsistent{_suggest_balance(problem, -counted.count)}",)
     branches: tuple[OtherBranch, ...] = ()
     if counted.kind == "square":
-        equations = nlp if not nlp.kinks else matching(problem) if problem.pattern else abscissa(problem)
+        equations = nlp if not nlp.kinks else formulate_matching(problem) if problem.pattern else formulate_abscissa(problem)
         branches = _find_other_branches(problem, equations, parameters)
     active = _find_active_limits(problem, nlp, trial.point)
     checked_cases = tuple(nlp.cases if cases is None else cases)
@@ -172,7 +172,7 @@ def _find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, flo
     active: dict[str, float] = {}
     if problem.objective is None:
         return active
-    sign, gain = problem.sign, gains(nlp, point)
+    sign, gain = problem.sign, relaxation_gain(nlp, point)
     rows = zip(nlp.rows, point.row_multipliers.tolist(), nlp.row_lower, nlp.row_upper, strict=True)
     inequalities: dict[str, list[int]] = {}
     for k, (row, multiplier, lower, upper) in enumerate(rows):
@@ -200,7 +200,7 @@ def _find_other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -
     of = problem.parameter_set
     branches: list[OtherBranch] = []
     known = [np.array([found[n] for n in problem.free])]
-    starts = (initial_point(nlp, problem, start) for start in designs(problem, 0, _BRANCH_STARTS))
+    starts = (initial_point(nlp, problem, start) for start in choose_starts(problem, 0, _BRANCH_STARTS))
     for x in find_solutions(nlp, starts, len(problem.free)):
         values = np.array([np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)])
         if any(np.abs(values - k).max() <= _SAME_BRANCH * (1 + np.abs(k).max()) for k in known):
@@ -213,7 +213,7 @@ def _find_other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -
 
 def _find_violated_limits(problem: Posed, nlp: NLP, x: Array) -> tuple[str, ...]:
     """Names of the bounds and inequality rows that a solution violates."""
-    values = (*x, *nlp.at(x)[1])
+    values = (*x, *nlp.evaluate(x)[1])
     lower, upper = (*nlp.lower, *nlp.row_lower), (*nlp.upper, *nlp.row_upper)
     names: dict[str, None] = {}
     for k, name in enumerate((*problem.free, *nlp.variables[len(problem.free) :], *nlp.rows)):

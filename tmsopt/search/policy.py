@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tmsopt.errors import Fault, InputError, input_error, short, suggest
-from tmsopt.program.formulate import middle
+from tmsopt.program.formulate import default_start
 from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
 from tmsopt.search.acceptance import is_better
@@ -120,7 +120,7 @@ def search(state: SearchState, policy: Policy) -> SearchState:
 def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most: int = 0) -> SearchState:
     """Solve from these starts until there are enough ends."""
     most = most or state.options.starts
-    whole = (replace(start, design={**middle(state.part), **start.design}) for start in starts)
+    whole = (replace(start, design={**default_start(state.part), **start.design}) for start in starts)
     try:
         for tried, start in enumerate((s for s in whole if not is_led(state, s)), start=1):
             state = replace(state, ends=(*state.ends, policy.local(state, start)))

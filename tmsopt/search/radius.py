@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tmsopt.boundaries.nearest import Nearest, Robustness, robustness_at
+from tmsopt.boundaries.nearest import Nearest, Robustness, find_stability_margins
 from tmsopt.problem.cases import Case, weight_of
 from tmsopt.problem.problem import Posed, radius_parameters
 from tmsopt.problem.quantities import RADIUS
-from tmsopt.program.formulate import formulate, middle
+from tmsopt.program.formulate import default_start, formulate
 from tmsopt.records import Array, Table
 from tmsopt.roots import is_stable
 from tmsopt.search.acceptance import accept_best, check_end
@@ -25,7 +25,7 @@ def climb(state: SearchState, start: Start) -> LocalEnd:
     """Climb from one design: add the nearest boundary points and solve again; an infeasible end if that fails."""
     problem, design, points = state.problem, start.design, list[Case]()
     listed = tuple(case for case in problem.cases if not case.direction)
-    around: Robustness | None = robustness_at(problem, problem.ordered(design))
+    around: Robustness | None = find_stability_margins(problem, problem.ordered(design))
     end = make_failed_end(start, state.nlp)
     for _ in range(state.tuning.climb_rounds):
         if around is None or not around.stable or _has_other_weights(problem, around):
@@ -57,7 +57,7 @@ def propose_climbs(state: SearchState) -> Iterator[Start]:
     limits = {name: text for name, text in problem.constraints.items() if RADIUS not in problem.conditions[name].names}
     asked = problem.derive(minimize="abscissa", maximize=None, constraints=limits)
     if problem.start or state.options.near:
-        yield Start({**middle(problem), **(state.options.near or {})})
+        yield Start({**default_start(problem), **(state.options.near or {})})
     box = draw_box(asked, state.options.seed, tuning)
     seen = box.draws.take_best(2 * tuning.estimated)
     if np.sum(seen.violation == 0) < tuning.estimated // 4:

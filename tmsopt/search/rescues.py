@@ -12,8 +12,8 @@ import numpy as np
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.models.user_spectrum import full_patterns
 from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.program.formulate import formulate, matching
-from tmsopt.program.starts import designs
+from tmsopt.program.formulate import formulate, formulate_matching
+from tmsopt.program.starts import choose_starts
 from tmsopt.search.acceptance import check_end, claim_matches, is_better, is_sound
 from tmsopt.search.local_search import run_once
 from tmsopt.search.outcome import KEPT, has_runaway_root, write_mass_advice
@@ -52,7 +52,7 @@ def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
     for pattern in full_patterns(part.model) if state.sample and not state.options.near else ():
         asked = part.derive(locate=pattern, **free)
         if degrees_of_freedom(asked).count >= 0 and state.sample:
-            own = replace(state.with_program(matching(asked)), problem=asked, part=asked)
+            own = replace(state.with_program(formulate_matching(asked)), problem=asked, part=asked)
             own = try_starts(own, propose_sample_starts(state.sample), few)
             leads += [Start(state.design_at(end)) for end in select_distinct_ends(own.ends)[: tuning.leads]]
     return leads
@@ -62,7 +62,7 @@ def can_have_positive_roots(state: SearchState) -> bool:
     """Whether the best design may have a positive real root, whose damping ratio −1 belongs to no sector."""
     if "damping_ratio" not in state.nlp.variables:
         return False
-    if state.best is None or "damping_ratio" in state.nlp.touches:  # the less of it the better, somewhere
+    if state.best is None or "damping_ratio" in state.nlp.contacts:  # the less of it the better, somewhere
         return True
     goal = state.problem.objective
     return not (goal and "damping_ratio" in goal.names) and state.best.checked.structure.abscissa > 0
@@ -71,15 +71,15 @@ def can_have_positive_roots(state: SearchState) -> bool:
 def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
     """Search with a damping ratio of −1, without a sector."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
-    few = (state.best and state.nlp.touches) or (state.problem.maximize or "").strip() == "damping_ratio"
+    few = (state.best and state.nlp.contacts) or (state.problem.maximize or "").strip() == "damping_ratio"
     return search_again(state, policy, nlp=nlp, most=state.tuning.fewer if few else 0)
 
 
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
     """Search for exceptional points from other starts, if the point nearest to the first start is only a crossing."""
     part = state.part
-    for design in designs(part, state.options.seed, state.tuning.chains):
-        nlp = matching(part.derive(minimize=None, maximize=None, start=design))
+    for design in choose_starts(part, state.options.seed, state.tuning.chains):
+        nlp = formulate_matching(part.derive(minimize=None, maximize=None, start=design))
         state = search_again(state, policy, [Start(design)], nlp)
         if state.best and is_sound(state.problem, state.best):
             break
@@ -231,7 +231,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
         if reached is None or not reached.objective < least:
             continue
         rows = [k for k, name in enumerate(nlp.rows) if name == "a0"]
-        singular = bool(nlp.at(reached.run.x)[1][rows].min() < tuning.singular)
+        singular = bool(nlp.evaluate(reached.run.x)[1][rows].min() < tuning.singular)
         if singular:
             lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
             own = state.with_program(replace(nlp, row_lower=lower))

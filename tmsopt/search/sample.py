@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
-from tmsopt.program.cube import Cube
-from tmsopt.program.judgement import Judged, judge
+from tmsopt.program.design_scores import DesignScores, score_designs
+from tmsopt.program.unit_box import UnitBox
 from tmsopt.records import Array
 from tmsopt.search.tuning import TUNING, Tuning
 
@@ -93,11 +93,11 @@ class Box:
         judged: their values, limit by limit.
     """
 
-    space: Cube
+    space: UnitBox
     seed: int
     scales: Array
     draws: DesignBatch
-    judged: Judged
+    judged: DesignScores
     tuning: Tuning = TUNING
 
     @property
@@ -111,7 +111,7 @@ class Box:
 
     def judge_points(self, u: Array) -> DesignBatch:
         """Judge points of shape (n, size)."""
-        return _make_batch(u, judge(self.problem, self.space.designs(u)), self.scales, self.tuning)
+        return _make_batch(u, score_designs(self.problem, self.space.designs(u)), self.scales, self.tuning)
 
     def design(self, batch: DesignBatch, row: int = 0) -> dict[str, float]:
         """The free parameters of one design."""
@@ -199,7 +199,7 @@ class Box:
         size = self.space.size
         ahead = np.where(u < 0.5, self.tuning.difference, -self.tuning.difference)
         moved = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * ahead[:, None]
-        judged = judge(self.problem, self.space.designs(moved.reshape(-1, size)))
+        judged = score_designs(self.problem, self.space.designs(moved.reshape(-1, size)))
         beyond = judged.beyond.reshape(len(judged.beyond), len(u), size + 1) / self.scales[:, None, None]
         violated = judged.equal[:, None] | (beyond[:, :, 0] > 0)
         target = np.where(violated, beyond[:, :, 0], 0.0)
@@ -255,9 +255,9 @@ def stream(seed: int, stage: str) -> np.random.Generator:
 
 def draw_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Box:
     """Draw and judge corners, a quasi-random sequence, and some of its points moved to faces."""
-    space = Cube(problem)
+    space = UnitBox(problem)
     u = _draw_points(space, seed, tuning)
-    judged = judge(problem, space.designs(u))
+    judged = score_designs(problem, space.designs(u))
     sizes = [np.abs(beyond[np.isfinite(beyond)]) for beyond in judged.beyond]
     medians = np.array([float(np.median(x)) if x.size else 0.0 for x in sizes])
     scales = np.where(medians > 0, medians, 1.0)
@@ -281,7 +281,7 @@ def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
     return Sample(box, refined.take(refined.order), bold.select_apart(tuning.bold, tuning.apart), spread, singular)
 
 
-def _draw_points(space: Cube, seed: int, tuning: Tuning) -> Array:
+def _draw_points(space: UnitBox, seed: int, tuning: Tuning) -> Array:
     """Points of the sample: a third near 0 in all parameters, a third in some; a few on faces."""
     problem, size = space.problem, space.size
     cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= 4 else tuning.slower)
@@ -291,13 +291,13 @@ def _draw_points(space: Cube, seed: int, tuning: Tuning) -> Array:
     u = (offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
     turn = np.arange(count)[:, None]
     beside = (turn % 3 == 1) | ((turn % 3 == 2) & (turn // 3 >> np.arange(size) & 1 == 1))
-    u = np.where(beside, space.drawn_beside_zero(u), u)
+    u = np.where(beside, space.sample_near_zero(u), u)
     u[:: tuning.faces] = np.clip(3 * u[:: tuning.faces] - 1, 0.0, 1.0)
     corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= tuning.corners else np.empty((0, size))
     return np.concatenate([np.full((1, size), 0.5), corners, u])
 
 
-def _make_batch(u: Array, judged: Judged, scales: Array, tuning: Tuning) -> DesignBatch:
+def _make_batch(u: Array, judged: DesignScores, scales: Array, tuning: Tuning) -> DesignBatch:
     objective = np.zeros(len(u)) if judged.worth is None else judged.worth
     excess = judged.excess / scales[:, None]
     violation = np.where(excess <= tuning.met, 0.0, excess).sum(axis=0)
@@ -307,7 +307,7 @@ def _make_batch(u: Array, judged: Judged, scales: Array, tuning: Tuning) -> Desi
 def _add_basins(box: Box, leaders: DesignBatch) -> DesignBatch:
     """The leaders refined, then the best designs of the basins that the sample shows, refined too."""
     tuning = box.tuning
-    rows, reach = find_basins(box.draws, *box.space.even(box.draws.u), tuning)
+    rows, reach = find_basins(box.draws, *box.space.even_near_zero(box.draws.u), tuning)
     count, start = len(leaders), leaders.join(box.draws.take(rows[: tuning.basins]))
     steps: list[float | Array] = [
         np.concatenate([np.full((count, 1, box.space.size), far), share * reach[: tuning.basins, None]])

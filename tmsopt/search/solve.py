@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Unpack
 
-from tmsopt.boundaries import is_exactly_multiple, stands_on
+from tmsopt.boundaries import find_edges, is_exactly_multiple
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
@@ -25,7 +25,7 @@ from tmsopt.problem.verdict.meetings import every_meeting
 from tmsopt.problem.verdict.stability import stability
 from tmsopt.problem.verdict.status import NotSolved
 from tmsopt.program.nlp import objective_size
-from tmsopt.program.options import DEFAULTS, AskedOfSolve, Options, documents_options, options_of
+from tmsopt.program.options import DEFAULTS, Options, SolveOptions, documents_options, make_options
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.records import Table
 from tmsopt.search.outcome import (
@@ -55,8 +55,8 @@ SearchedPart = tuple[SearchState, Outcome | None]
 _NEAR = 4  # starts near a design that branch and bound found, including this design
 
 
-@documents_options(AskedOfSolve, _ASKING)
-def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[AskedOfSolve]) -> Solution:
+@documents_options(SolveOptions, _ASKING)
+def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[SolveOptions]) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
     Ctrl-C stops the search and returns the best design so far, ``not_converged`` and `interrupted`; a second Ctrl-C
@@ -84,7 +84,7 @@ def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **opti
     """
     check_policy(policy)
     problem = as_solvable(problem)
-    solution = solve_any_status(problem, options_of(options, AskedOfSolve, _ASKING), policy=policy)
+    solution = solve_any_status(problem, make_options(options, SolveOptions, _ASKING), policy=policy)
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
@@ -302,7 +302,7 @@ def _assemble(
     name, worst = user_structure_name(problem.model, checked.structure.name), checked.worst.applied(parameters)
     whole = polynomial_structure(problem.model, name, numbers.roots).roots
     meetings = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
-    edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, meetings)
+    edges, certain = find_edges(problem, worst, checked.structure, optimal, numbers.abscissa, meetings)
     return Solution(
         problem=problem.problem,
         status=outcome.status,

@@ -6,7 +6,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from tmsopt.program.starts import designs
+from tmsopt.program.starts import choose_starts
 from tmsopt.search.sample import Sample, sample_box
 from tmsopt.search.state import LocalEnd, SearchState, Start
 from tmsopt.search.stopping import is_proven
@@ -29,7 +29,7 @@ def propose_starts(state: SearchState) -> Iterator[Start]:
     yield from (Start(design) for design in state.extra if state.holds(design))
     if state.sample:
         yield from propose_sample_starts(state.sample)
-    yield from (Start(design, near=False) for design in designs(part, state.options.seed, state.options.starts))
+    yield from (Start(design, near=False) for design in choose_starts(part, state.options.seed, state.options.starts))
 
 
 def propose_sample_starts(sample: Sample) -> Iterator[Start]:

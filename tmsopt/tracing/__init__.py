@@ -1,8 +1,8 @@
-"""Trace: sets of exceptional points as curves with events, domains of stability, the swallowtail.
+"""Traces sets of exceptional points as curves with events; domains of stability; the swallowtail.
 
-In: a problem whose pattern leaves one freedom. Out: `Trace` with `Branch`es, `Domain`, `Swallowtail`. Open `trace`
-first; `continuation` follows one curve, `seeds` finds where to begin, `events` locates what happens on it, `steering`
-lets a user follow one by hand.
+A pattern must leave one degree of freedom. `trace` finds every curve of it in the box as a `Branch`; `continuation`
+follows one curve, `seeds` finds points on new curves, `events` locates what happens on them, and `steering` lets a user
+follow a curve point by point.
 """
 
 import lazy_loader

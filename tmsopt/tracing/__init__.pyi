@@ -1,7 +1,7 @@
 from .branch import Branch as Branch, BranchPoint as BranchPoint, EventPoint as EventPoint, Trace as Trace
 from .continuation import (
-    CurvePoint as CurvePoint, End as End, both_ways as both_ways, curve as curve, follow as follow,
-    tangent_at as tangent_at, walk as walk,
+    CurvePoint as CurvePoint, End as End, compile_curve as compile_curve, compute_tangent as compute_tangent,
+    follow as follow, walk as walk, walk_both_ways as walk_both_ways,
 )
 from .domain import Domain as Domain, domain as domain
 from .events import Event as Event

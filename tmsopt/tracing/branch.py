@@ -20,9 +20,9 @@ class EventPoint:
 
     Attributes:
         name: ``EP4``, ``EP3``, ``2EP2``, ``double zero``, ``weave``, ``capsize``, ``fold``, ``constraint`` or ``end``,
-            or that of a `tmsopt.Event` of the user; one that stops a branch is at its end, and where the next begins.
-        detail: in words, e.g. which parameter folds or which limit ends the branch.
-        parameters: every parameter of the design there.
+            or the name of a user's `tmsopt.Event`; one that stops a branch is at its end, where the next one begins.
+        detail: in words, such as the parameter that folds or the limit that ends the branch.
+        parameters: every parameter of the point.
         index: row of the branch.
         residual: relative mismatch of the coefficients there.
 
@@ -52,14 +52,15 @@ class Branch(Tabular):
         tangent: free parameter → its derivative by the arclength.
         arclength: from the first point, with every free parameter measured in widths of its box.
         kinds: name of the root pattern at each point; 2EP2, EP4 and CEP2 on one curve.
-        stable: where the roots that the pattern does not tie to the imaginary axis lie left of it.
-        heavily_damped: where all roots are real and negative or tied to 0 by the pattern.
+        stable: where every root that the pattern does not place on the imaginary axis is left of it.
+        heavily_damped: where all roots are real and negative, or placed at 0 by the pattern.
         satisfied: where every inequality constraint of the problem holds.
         abscissa: largest real part of the roots, from the factors.
         events: in the order of the arclength.
         closed: whether the last point is the first.
-        residual: largest mismatch of a coefficient along the curve, relative to the terms that it is made of.
-        eigenfrequency: of a complex system the multiple one, as ``omega_re`` and ``omega_im``, in place of `unknowns`.
+        residual: largest mismatch of a coefficient along the curve, relative to its terms.
+        eigenfrequency: for a complex system, the multiple one as ``omega_re`` and ``omega_im``, printed instead of
+            `unknowns`.
 
     Example:
         >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
@@ -89,20 +90,22 @@ class Branch(Tabular):
         return len(self.arclength)
 
     @property
-    def told(self) -> Mapping[str, Array]:
-        """The unknowns of the pattern; of a complex system the multiple eigenfrequency, where it is one."""
+    def pattern_unknowns(self) -> Mapping[str, Array]:
+        """The unknowns of the pattern; for a complex system, the multiple eigenfrequency."""
         return self.unknowns if self.eigenfrequency is None else self.eigenfrequency
 
     def records(self) -> Iterable[dict[str, Any]]:
         """One record per point, as written to CSV."""
-        marks: dict[int, list[str]] = {}
+        events_at: dict[int, list[str]] = {}
         for event in self.events:
-            marks.setdefault(event.index, []).append(f"{event.name}: {event.detail}" if event.detail else event.name)
+            events_at.setdefault(event.index, []).append(
+                f"{event.name}: {event.detail}" if event.detail else event.name
+            )
         columns: dict[str, NDArray[Any]] = {
             "arclength": self.arclength,
             **self.parameters,
             **{f"d_{name}": column for name, column in self.tangent.items()},
-            **name_unknowns(self.pattern, self.told, self.parameters),
+            **name_unknowns(self.pattern, self.pattern_unknowns, self.parameters),
             "abscissa": self.abscissa,
             "kind": self.kinds,
             "stable": self.stable,
@@ -110,10 +113,10 @@ class Branch(Tabular):
             "constraints": self.satisfied,
         }
         for k, row in enumerate(zip(*(column.tolist() for column in columns.values()), strict=True)):
-            yield dict(zip(columns, row, strict=True)) | {"event": "; ".join(marks.get(k, []))}
+            yield dict(zip(columns, row, strict=True)) | {"event": "; ".join(events_at.get(k, []))}
 
     def to_json(self) -> dict[str, Any]:
-        """Columns and events; numbers that do not exist are null."""
+        """Columns and events; numbers that are not finite are null."""
         rows = list(self.records())
         return plain(self, "pattern closed") | {
             "points": len(self),
@@ -128,8 +131,8 @@ class Trace(Tabular):
     """Every branch of a pattern that was found in the box.
 
     Attributes:
-        starts: designs that the search for branches began from.
-        seconds: for the whole; `seconds_walking` for the points alone.
+        starts: number of designs from which branches were searched.
+        seconds: total time; `seconds_walking` is the time of the points alone.
 
     Example:
         >>> traced = tmsopt.trace("problems/ep_set.toml")
@@ -158,7 +161,7 @@ class Trace(Tabular):
 
     @property
     def varying(self) -> list[str]:
-        """The free parameters, those that stay the same on every branch last."""
+        """The free parameters; those that are constant on every branch come last."""
 
         def moves(name: str) -> bool:
             low, high = self.problem.free[name]
@@ -167,11 +170,11 @@ class Trace(Tabular):
         return sorted(self.problem.free, key=lambda name: not moves(name))
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The points of all branches, a column `branch` before the others."""
+        """The points of all branches, with a first column `branch`."""
         return ({"branch": k, **row} for k, branch in enumerate(self.branches) for row in branch.records())
 
     def write_csv(self, path: str | PathLike[str]) -> None:
-        """The same in a file.
+        """Write the records to a CSV file.
 
         Raises:
             OSError: when the file cannot be written.
@@ -192,17 +195,17 @@ class Trace(Tabular):
 
 @dataclass(frozen=True)
 class BranchPoint:
-    """A point of a curve that is followed by hand, with `continue_from`.
+    """A point of a curve that `continue_from` follows.
 
     Attributes:
-        parameters: every parameter of the design.
+        parameters: every parameter of the point.
         unknowns: factor coefficients of the pattern, by name.
         tangent: free parameter → its derivative by the arclength, in the direction of travel.
         arclength: from the first point, with every free parameter in widths of its box; negative behind it.
         kind: name of the root pattern, such as ``2EP2`` or ``CEP2`` on one curve.
-        stable: whether the roots that the pattern does not tie to the imaginary axis lie left of it.
+        stable: whether every root that the pattern does not place on the imaginary axis is left of it.
         abscissa: largest real part of the roots.
-        events: names of the events that are at this point; most points have none.
+        events: names of the events at this point; most points have none.
 
     Example:
         >>> point = next(tmsopt.continue_from("problems/ep_set.toml"))
@@ -224,17 +227,17 @@ class BranchPoint:
 
 
 def table_at(columns: Mapping[str, Array], row: int) -> Table[float]:
-    """The numbers in a row of columns."""
+    """One row of columns as a table."""
     return Table({name: float(column[row]) for name, column in columns.items()})
 
 
 def name_unknowns(pattern: str, unknowns: Mapping[str, Array], parameters: Iterable[str]) -> dict[str, Array]:
-    """Unknowns by names of their own: a parameter may have the name of one, such as a damping c."""
+    """Unknowns by unique names: one that a parameter has too is prefixed with the pattern."""
     return {f"{pattern}.{name}" if name in parameters else name: column for name, column in unknowns.items()}
 
 
 def kinds_along(branch: Branch) -> list[str]:
-    """The pattern of each point, a special point counted with the one before it."""
+    """The pattern at each point; a special point counts with the one before it."""
     special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
     kinds = [str(k) for k in branch.kinds]
     for row in sorted(special) if len(kinds) > 1 else ():

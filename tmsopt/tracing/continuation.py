@@ -1,9 +1,9 @@
 """Pseudo-arclength continuation of a smooth curve F(x) = 0, n equations in n + 1 variables.
 
-Keller's method: predict along the tangent, correct by Newton's method on F = 0 and a fixed arclength. Predictor,
-three corrections and the new tangent are one CasADi function of scalar operations, so that a point costs one call.
+Keller's method: predict along the tangent, then correct by Newton's method on F = 0 at a fixed arclength. One CasADi
+function of scalar operations holds the predictor, three corrections and the new tangent: a point costs one call.
 
-`follow` gives the points one by one: a consumer may stop, or turn round. A `Walk` is made from them.
+`follow` yields the points one by one; `walk` collects them.
 """
 
 import time
@@ -16,23 +16,23 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.records import Array
-from tmsopt.tracing.solving import MappedFunction, crossings, evaluated, rows_of
+from tmsopt.tracing.solving import MappedFunction, evaluate_rows, find_zeros, map_rows
 
-_CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
-_CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
-_COSINE = np.cos(0.15)  # of the angle between tangents: a sharper turn takes a smaller step
+_CONVERGED = 1e-8  # last Newton step, relative to the point; the remaining error is its square
+_CONTRACTION = 0.1  # largest ratio of the second Newton step to the first; above it the prediction was too far
+_COSINE = np.cos(0.15)  # of the largest angle between successive tangents
 _SMALLEST = 1e-12
 _GROWTH = 1.5
-_ROOM = 4.0  # steps of variables without a box, against those with one: nobody looks at their spacing
-_REMOTE = 100.0  # units of the scale beyond which points lie ever further apart, towards infinity
-_FAR = 1e6  # in units of the scale; further out the equations lose their digits
-_FADING = 1e5  # there a step that fails has lost them already: which one does is up to rounding, the limit is not
+_ROOM = 4.0  # steps of variables without a box are longer by this factor; their spacing does not matter
+_REMOTE = 100.0  # units of the scale above which the steps grow, towards infinity
+_FAR = 1e6  # units of the scale above which the equations lose their digits
+_FADING = 1e5  # above it a failed step means infinity: which step fails depends on rounding
 _SAME = 1e-7
-_EDGE = 1e-12  # of a variable of order 1: rounding beside a limit that a curve lies in
+_EDGE = 1e-12  # rounding of a variable of order 1 on a curve that lies in a limit
 CLOSED = "closed"
 SINGULAR = "singular: the curve branches or has no direction here"
 INFINITE = "a root goes to infinity: a0 vanishes"
-_ISOLATED = 1e-6  # singular values, relative to the largest, below which an equation has no influence
+_ISOLATED = 1e-6  # relative singular value below which the equations do not determine a direction
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class Curve:
         scale: units of the variables.
         lower, upper: limits of y, infinite where there are none.
         evaluate: y → F and its Jacobian in y.
-        advance: (y, t, s, origin) → next y, next t, and the numbers by which `_follow` judges them;
-            None where there are more equations than a curve has.
+        advance: (y, t, s, origin) → next y, next t, and the measures by which `follow` accepts the step; None for more
+            than n equations.
     """
 
     scale: Array
@@ -64,7 +64,7 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class End:
-    """Why a walk ended; `limit` is the variable that reached a limit."""
+    """Why a walk ended; `limit` is the index of the variable that reached a limit."""
 
     reason: str
     limit: int | None = None
@@ -72,7 +72,7 @@ class End:
 
 @dataclass(frozen=True)
 class Walk:
-    """Points y and unit tangents t of a curve, shape (points, n + 1), why it ends at either side, and what it took."""
+    """Points y and unit tangents t of a curve, shape (points, n + 1); why it ends on either side; the time taken."""
 
     y: Array
     t: Array
@@ -85,10 +85,10 @@ class Walk:
         return self.ends[1].reason == CLOSED
 
 
-def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
-    """Compile the curve equations(x) = 0 of a CasADi symbol x of n + 1 entries; limits are of x.
+def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
+    """Compile the curve equations(x) = 0 of a CasADi symbol x with n + 1 entries; limits are of x.
 
-    More equations than n leave points at most, which `Curve.evaluate` is enough to find.
+    More than n equations leave isolated points at most; for these `Curve.evaluate` suffices.
     """
     size, unit = x.numel(), ca.DM(scale)
     system = ca.Function("system", [x], [equations, ca.jacobian(equations, x)])
@@ -119,46 +119,46 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
     return Curve(scale, low, high, scaled, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
 
-def tangent_at(on: Curve, y: Array) -> Array:
+def compute_tangent(curve: Curve, y: Array) -> Array:
     """Unit tangent at a point of the curve.
 
     Raises:
         ValueError: where the equations do not determine a direction.
     """
-    jacobian = even = evaluated(on.evaluate, y[None])[1][0]
-    for axis in (0, 1):  # norms of 1: units, which differ by much beside infinity, do not make it look singular
-        norm = np.linalg.norm(even, axis=axis, keepdims=True)
-        even = even / np.where(norm > 0, norm, 1.0)
-    singular = np.linalg.svd(even, compute_uv=False)
+    jacobian = balanced = evaluate_rows(curve.evaluate, y[None])[1][0]
+    for axis in (0, 1):  # rows and columns of norm 1, since units differ much near infinity
+        norm = np.linalg.norm(balanced, axis=axis, keepdims=True)
+        balanced = balanced / np.where(norm > 0, norm, 1.0)
+    singular = np.linalg.svd(balanced, compute_uv=False)
     if singular[-1] <= _ISOLATED * singular[0]:
-        raise ValueError("the equations leave more than a curve here")
+        raise ValueError("the equations do not determine a direction here")
     return np.asarray(np.linalg.svd(jacobian)[2][-1])
 
 
-def follow(on: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
-    """The points after a start in the direction of its tangent, until a limit, a closed loop or infinity; then why."""
+def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
+    """Yield the points after a start along its tangent until a limit, a closed loop or infinity; then an `End`."""
 
     def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
         new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
         return new[0], tangent[0], *checks[0].tolist()
 
-    y, t, count, step_from = start.y, start.t, 1, MappedFunction(on.advance, 1)
+    y, t, count, step_from = start.y, start.t, 1, MappedFunction(curve.advance, 1)
     s, reach = step / 4, advance(y, t, 0.0)[6]
     while True:
         s = min(s, step * reach)
         while True:
             new, tangent, first, second, third, cosine, reach, slack, largest, far, ahead = advance(y, t, s)
             if third <= _CONVERGED and cosine >= _COSINE and (second <= _CONTRACTION * first or first < 1e-6):
-                break  # nan does not come here
+                break  # never for nan
             s /= 2
             if s < _SMALLEST:
                 yield End(INFINITE if np.abs(y).max() > _FADING else SINGULAR)
                 return
-        if count > 2 and 0 < ahead <= s and far <= 2 * s and _alike(advance(y, t, ahead)[0], start.y):
+        if count > 2 and 0 < ahead <= s and far <= 2 * s and _is_same_point(advance(y, t, ahead)[0], start.y):
             yield from (start, End(CLOSED))
             return
-        if slack < 0 and not _along(on, new, tangent):
-            yield from _at_limit(on, y, t, s, new)
+        if slack < 0 and not _runs_along_limit(curve, new, tangent):
+            yield from _stop_at_limit(curve, y, t, s, new)
             return
         yield CurvePoint(new, tangent)
         if largest > _FAR:
@@ -167,65 +167,67 @@ def follow(on: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
         y, t, s, count = new, tangent, s * _GROWTH, count + 1
 
 
-def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
-    """Follow the curve from y in the direction t until it ends, or there are `most` points."""
+def walk(curve: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
+    """Follow the curve from y in the direction t until it ends or has `most` points."""
     start = CurvePoint(y, t)
-    points: list[Any] = [start, *islice(follow(on, start, step), most - 1)]
+    points: list[Any] = [start, *islice(follow(curve, start, step), most - 1)]
     end = points.pop() if isinstance(points[-1], End) else End(f"stopped after {most} points")
     return Walk(np.array([p.y for p in points]), np.array([p.t for p in points]), (End("start"), end))
 
 
-def both_ways(on: Curve, y: Array, step: float, most: int) -> Walk | None:
-    """The whole curve through a point; None where it is no regular point of one."""
-    began = time.perf_counter()
+def walk_both_ways(curve: Curve, y: Array, step: float, most: int) -> Walk | None:
+    """The whole curve through a point; None if it is not a regular point of a curve."""
+    started = time.perf_counter()
     try:
-        t = tangent_at(on, y)
+        t = compute_tangent(curve, y)
     except ValueError:
         return None
-    whole = walk(on, y, t, step, most)
+    whole = walk(curve, y, t, step, most)
     if not whole.closed:
-        back = walk(on, y, -t, step, most)
+        back = walk(curve, y, -t, step, most)
         points, tangents = (np.concatenate(x) for x in ([back.y[:0:-1], whole.y], [-back.t[:0:-1], whole.t]))
         whole = Walk(points, tangents, (back.ends[1], whole.ends[1]))
-    return replace(whole, seconds=time.perf_counter() - began) if len(whole.y) > 2 else None
+    return replace(whole, seconds=time.perf_counter() - started) if len(whole.y) > 2 else None
 
 
-def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
-    """Points and tangents at arclengths s beyond points of the curve, a row each, s no more than a step."""
-    new, tangent, _ = rows_of(on.advance, y, t, s[:, None], y)
+def step_along(curve: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
+    """Points and tangents at arclengths s from points of the curve, row by row; |s| is at most a step."""
+    new, tangent, _ = map_rows(curve.advance, y, t, s[:, None], y)
     return new, tangent
 
 
-def contains(on: Curve, walked: Walk, y: Array) -> bool:
-    """Whether a point lies on a curve already walked."""
-    apart = np.linalg.norm(walked.y - y, axis=1)
-    k = int(np.argmin(apart))
-    if apart[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
+def is_on_walk(curve: Curve, walked: Walk, y: Array) -> bool:
+    """Whether a point lies on a curve that was walked."""
+    distances = np.linalg.norm(walked.y - y, axis=1)
+    k = int(np.argmin(distances))
+    if distances[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
         return False
-    new, _ = between(on, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
-    return _alike(new[0], y)
+    new, _ = step_along(curve, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
+    return _is_same_point(new[0], y)
 
 
-def _alike(y: Array, other: Array) -> bool:
-    """Whether points are one."""
+def _is_same_point(y: Array, other: Array) -> bool:
+    """Whether two points are equal up to rounding."""
     return bool(np.abs(y - other).max() <= _SAME * (1 + np.abs(other).max()))
 
 
-def _along(on: Curve, y: Array, t: Array) -> bool:
-    """Whether a curve that is beyond limits runs along them: it lies in an edge of the box, up to rounding."""
-    beyond = np.maximum(on.lower - y, y - on.upper)
-    over = beyond > 0
-    return bool(np.all(beyond[over] <= _EDGE) and np.all(np.abs(t[over]) <= _EDGE))
+def _runs_along_limit(curve: Curve, y: Array, t: Array) -> bool:
+    """Whether a curve outside the limits runs along one, up to rounding."""
+    outside = np.maximum(curve.lower - y, y - curve.upper)
+    violated = outside > 0
+    return bool(np.all(outside[violated] <= _EDGE) and np.all(np.abs(t[violated]) <= _EDGE))
 
 
-def _at_limit(on: Curve, y: Array, t: Array, s: float, beyond: Array) -> tuple[CurvePoint, End]:
-    """The first point before one that lies beyond limits, a step s further, that is on a limit, on it exactly."""
-    limits = np.clip(beyond, on.lower, on.upper)
-    k = np.flatnonzero(limits != beyond)
+def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outside: Array) -> tuple[CurvePoint, End]:
+    """The first point on a limit before one that is outside, a step s ahead; it lies on the limit exactly."""
+    limits = np.clip(outside, curve.lower, curve.upper)
+    k = np.flatnonzero(limits != outside)
     here, along = np.tile(y, (len(k), 1)), np.tile(t, (len(k), 1))
-    lengths = crossings(lambda r: between(on, here, along, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s))
-    lengths = np.nan_to_num(lengths)  # nan: it is beyond the limit already
+    lengths = find_zeros(
+        lambda r: step_along(curve, here, along, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s)
+    )
+    lengths = np.nan_to_num(lengths)  # nan: already outside
     first = k[np.argmin(lengths)]
-    (last,), (tangent,) = between(on, y[None], t[None], lengths.min(keepdims=True))
+    (last,), (tangent,) = step_along(curve, y[None], t[None], lengths.min(keepdims=True))
     last[first] = limits[first]
-    return CurvePoint(last, tangent), End("max" if beyond[first] > limits[first] else "min", int(first))
+    return CurvePoint(last, tangent), End("max" if outside[first] > limits[first] else "min", int(first))

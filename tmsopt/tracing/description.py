@@ -1,4 +1,4 @@
-"""From a walked curve to branches in the parameters of the problem, with what happens along them among their points."""
+"""Converts a walked curve to branches in the parameters of the problem, with the events among their points."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -13,74 +13,78 @@ from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of
 from tmsopt.tracing.branch import Branch, EventPoint, table_at
 from tmsopt.tracing.continuation import CLOSED, SINGULAR, End, Walk
-from tmsopt.tracing.equations import Traced, prepare
-from tmsopt.tracing.events import TOGETHER, Event, Found, insert, locate, refine
+from tmsopt.tracing.equations import TracedProblem, prepare_tracing
+from tmsopt.tracing.events import SAME_PLACE, Event, LocatedEvent, insert_events, locate_events, refine_walk
 from tmsopt.tracing.points import Points, roots_along
-from tmsopt.tracing.solving import projected
+from tmsopt.tracing.solving import project_rows
 
-_NEAR = 1e-3  # distance within which an EP4 is looked for near an EP3 and a 2EP2
-_LOW = 1e-2  # of the marks next to a place where they may touch 0: they grow with the square of a step of 0.1
-_EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
+_NEAR = 1e-3  # distance within which an EP4 is searched near an EP3 and a 2EP2
+_LOW = 1e-2  # marks below it may touch 0 nearby: they grow with the square of a step of 0.1
+_EXACT = 1e-13  # relative mismatch of a coefficient at an EP4: a few roundings
 _SAME_DESIGN = 1e-6
-"""Like `TOGETHER`, in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
-_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+"""Like `SAME_PLACE`, for the free parameters alone; the unknowns scatter where the equations are singular."""
+_FITTING = 1e-6  # largest mismatch of a coefficient at a point of a branch
 
-_SQUARE = 1e-9  # of a coefficient
+_SQUARE = 1e-9  # relative difference of c from b²/4 below which a quadratic factor has a double root
 
 _EP4 = Event("EP4", lambda points: points.residual)  # located by equations of its own
 
-Happened = tuple[int, Event]
-"""A row of a walk and what happens there."""
+RowEvent = tuple[int, Event]
+"""A row of a walk and the event there."""
 
 
-def describe(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
-    """A walked curve as one branch, or as several where events stop it, with its events among its points."""
-    walked, happened = find_events(ready, _trim(ready, walked), events)
-    if walked.closed and (stops := [row for row, event in happened if event.stop]):
-        first, around = stops[0], len(walked.y) - 1
-        y, t = (np.concatenate([column[first:], column[1 : first + 1]]) for column in (walked.y, walked.t))
-        walked = replace(walked, y=y, t=t)
-        happened = [((row - first) % around, event) for row, event in happened]
-        happened += [(around, event) for row, event in happened if row == 0]
-    why = {row: End(event.name) for row, event in happened if event.stop}
-    for low, high in pairwise(sorted({0, len(walked.y) - 1, *why})):
-        ends = why.get(low, walked.ends[0]), why.get(high, walked.ends[1])
-        part = Walk(walked.y[low : high + 1], walked.t[low : high + 1], ends)
-        yield make_branch(ready, part, [(row - low, event) for row, event in happened if low <= row <= high])
+def make_branches(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
+    """A walked curve as one branch, or as several if events stop it, with its events among its points."""
+    walk, row_events = find_events(traced, _trim_inexact_ends(traced, walk), events)
+    if walk.closed and (stops := [row for row, event in row_events if event.stop]):
+        first, around = stops[0], len(walk.y) - 1
+        y, t = (np.concatenate([column[first:], column[1 : first + 1]]) for column in (walk.y, walk.t))
+        walk = replace(walk, y=y, t=t)
+        row_events = [((row - first) % around, event) for row, event in row_events]
+        row_events += [(around, event) for row, event in row_events if row == 0]
+    stops_at = {row: End(event.name) for row, event in row_events if event.stop}
+    for low, high in pairwise(sorted({0, len(walk.y) - 1, *stops_at})):
+        ends = stops_at.get(low, walk.ends[0]), stops_at.get(high, walk.ends[1])
+        part = Walk(walk.y[low : high + 1], walk.t[low : high + 1], ends)
+        yield make_branch(traced, part, [(row - low, event) for row, event in row_events if low <= row <= high])
 
 
-def find_events(ready: Traced, walked: Walk, events: Sequence[Event]) -> tuple[Walk, list[Happened]]:
-    """A walk with its events among its points, and at which rows they are."""
-    walked = refine(ready, walked, events)
-    groups = _groups(_with_EP4(ready, walked, [*locate(ready, walked, events)]), len(ready.problem.free))
-    rows, walked = insert(walked, [group[0] for group in groups])
-    return walked, [(row, event) for row, group in zip(rows, groups, strict=True) for event in _named(group, events)]
+def find_events(traced: TracedProblem, walk: Walk, events: Sequence[Event]) -> tuple[Walk, list[RowEvent]]:
+    """The walk with its events among its points, and the rows of the events."""
+    walk = refine_walk(traced, walk, events)
+    groups = _group_events(
+        _add_exact_EP4(traced, walk, [*locate_events(traced, walk, events)]), len(traced.problem.free)
+    )
+    rows, walk = insert_events(walk, [group[0] for group in groups])
+    return walk, [
+        (row, event) for row, group in zip(rows, groups, strict=True) for event in _merge_events(group, events)
+    ]
 
 
-def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Branch:
-    """A walk in the parameters of the problem."""
-    problem, pattern, points = ready.problem, ready.pattern, Points(ready, walked.y, walked.t)
-    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a quadratic factor: exact, or it scatters by 1e-8
-        b, c = (points.x[:, ready.unknowns.stop - k] for k in (2, 1))
-        for row in {row for row, event in happened if "EP" in event.name}:
+def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent]) -> Branch:
+    """A walk as a branch in the parameters of the problem."""
+    problem, pattern, points = traced.problem, traced.pattern, Points(traced, walk.y, walk.t)
+    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a factor would scatter by 1e-8
+        b, c = (points.x[:, traced.unknowns.stop - k] for k in (2, 1))
+        for row in {row for row, event in row_events if "EP" in event.name}:
             c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE * abs(c[row]) else c[row]
     kinds = pattern.kind(points.unknowns)
     for name in points.special:
         kinds[:] = name
-    for row, event in happened:
+    for row, event in row_events:
         if event.name in pattern.marks or event.name == "EP4":
             kinds[row] = event.name
-    off, columns = points.residual, points.parameters
-    named = [(row, event.name, event.detail) for row, event in happened]
-    for row, end in () if walked.closed else zip((0, len(points) - 1), walked.ends, strict=True):
-        # a curve may be singular where roots meet and eigenvectors do not
+    residual, columns = points.residual, points.parameters
+    named = [(row, event.name, event.detail) for row, event in row_events]
+    for row, end in () if walk.closed else zip((0, len(points) - 1), walk.ends, strict=True):
+        # where roots meet but eigenvectors do not, the curve is singular
         crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
-        named.append((row, "end", CROSSING if crossed else describe_end(ready, end)))
-    found = [
-        EventPoint(name, detail, table_at(columns, row), row, float(off[row]))
+        named.append((row, "end", CROSSING if crossed else describe_end(traced, end)))
+    located = [
+        EventPoint(name, detail, table_at(columns, row), row, float(residual[row]))
         for row, name, detail in sorted(named, key=lambda n: n[0])
     ]
-    steps = np.diff(walked.y, axis=0)[:, : len(problem.free)]
+    steps = np.diff(walk.y, axis=0)[:, : len(problem.free)]
     return Branch(
         pattern=str(problem.locate),
         parameters=columns,
@@ -92,16 +96,16 @@ def make_branch(ready: Traced, walked: Walk, happened: Sequence[Happened]) -> Br
         heavily_damped=points.heavily_damped,
         satisfied=points.satisfied,
         abscissa=points["abscissa"],
-        events=tuple(found),
-        closed=walked.closed,
-        residual=float(np.max(off)),
+        events=tuple(located),
+        closed=walk.closed,
+        residual=float(np.max(residual)),
         eigenfrequency=_eigenfrequency(points),
     )
 
 
 def _eigenfrequency(points: Points) -> dict[str, Array] | None:
-    """Of a complex system ω = i s of a multiple root, of s² + bs + c less the carrier; None of a real one."""
-    carrier, pattern = points.ready.problem.model.carrier, points.ready.pattern
+    """The multiple eigenfrequency ω = i s of a complex system, minus the carrier; None for a real system."""
+    carrier, pattern = points.traced.problem.model.carrier, points.traced.pattern
     if carrier is None:
         return None
     if not pattern.form.startswith("CEP") or pattern.unknowns[:2] != ("b", "c"):
@@ -110,106 +114,107 @@ def _eigenfrequency(points: Points) -> dict[str, Array] | None:
     return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
 
 
-def _groups(found: Sequence[Found], free: int) -> list[list[Found]]:
-    """Events along the curve, those at one place together, the first of the list first: it says where that is."""
+def _group_events(located: Sequence[LocatedEvent], free: int) -> list[list[LocatedEvent]]:
+    """Events along the curve, grouped by place; the first of the list is first and gives the place."""
     groups: list[list[int]] = []
-    for k in sorted(range(len(found)), key=lambda k: (found[k].after, found[k].s)):
-        apart = np.abs(found[k].y - found[groups[-1][-1]].y) if groups else np.array([np.inf])
-        if apart.max() > TOGETHER * (1 + np.abs(found[k].y).max()) and apart[:free].max() > _SAME_DESIGN:
+    for k in sorted(range(len(located)), key=lambda k: (located[k].after, located[k].s)):
+        distance = np.abs(located[k].y - located[groups[-1][-1]].y) if groups else np.array([np.inf])
+        if distance.max() > SAME_PLACE * (1 + np.abs(located[k].y).max()) and distance[:free].max() > _SAME_DESIGN:
             groups.append([])
         groups[-1].append(k)
-    return [[found[k] for k in sorted(group)] for group in groups]
+    return [[located[k] for k in sorted(group)] for group in groups]
 
 
-def _named(group: Sequence[Found], events: Sequence[Event]) -> Iterator[Event]:
-    """What happens at one place: the most special event of the package, the others in its detail; then a user's."""
-    own = [f.event for f in group if f.event not in events]
-    if own:
-        names = {e.name for e in own}
-        name = "double zero" if {"weave", "capsize"} <= names else own[0].name
-        folds = dict.fromkeys(e.detail for e in own if e.name == "fold")
-        words = [f"beside an {higher}"] if (higher := _beside(name, names)) else []
-        for e in own:
+def _merge_events(group: Sequence[LocatedEvent], events: Sequence[Event]) -> Iterator[Event]:
+    """The events at one place: the most special package event, with the others in its detail; then the user's."""
+    package_events = [f.event for f in group if f.event not in events]
+    if package_events:
+        names = {e.name for e in package_events}
+        name = "double zero" if {"weave", "capsize"} <= names else package_events[0].name
+        folds = dict.fromkeys(e.detail for e in package_events if e.name == "fold")
+        words = [f"next to an {higher}"] if (higher := _find_higher_order(name, names)) else []
+        for e in package_events:
             if e.name != "fold" and ("EP" not in e.name or e.name == "EP2"):
                 words.append(e.detail if e.name == name else f"{e.name} {e.detail}".strip())
         if name == "EP3" and len(folds) > 1:
             words.append("cusp")
         elif folds:
             words.append(("" if name == "fold" else "fold in ") + ", ".join(folds))
-        yield replace(own[0], name=name, detail="; ".join(filter(None, dict.fromkeys(words))))
+        yield replace(package_events[0], name=name, detail="; ".join(filter(None, dict.fromkeys(words))))
     yield from (f.event for f in group if f.event in events)
 
 
-def _beside(name: str, names: set[str]) -> str:
-    """EP(k+1) where EPk and EP(k−1)+EP2, the two ways in which EP(k−1) comes near it, are at one place; else empty."""
+def _find_higher_order(name: str, names: set[str]) -> str:
+    """EP(k+1) if EPk and EP(k−1)+EP2 coincide, the two ways in which it unfolds into EP(k−1); else empty."""
     match = re.fullmatch(r"EP(\d+)", name)
     order = int(match[1]) if match else 0
     return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
 
 
 def _natural_tangent(points: Points) -> dict[str, Array]:
-    """Derivative of the free parameters by the arclength in widths of the box."""
-    problem, along = points.ready.problem, points.t * points.ready.on.scale / (points.speed[:, None] + 1e-300)
+    """Derivatives of the free parameters by the arclength in widths of the box."""
+    problem, along = points.traced.problem, points.t * points.traced.curve.scale / (points.speed[:, None] + 1e-300)
     of = problem.parameter_set
     columns = zip(problem.free, along.T, points.x.T, strict=False)
     return {n: dv / (1 + v**2) if of[n].tangent else dv for n, dv, v in columns}
 
 
-def _trim(ready: Traced, walked: Walk) -> Walk:
-    """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
+def _trim_inexact_ends(traced: TracedProblem, walk: Walk) -> Walk:
+    """The walk without end points near infinity whose parameters no longer fit the unknowns."""
     with np.errstate(all="ignore"):
-        good = np.flatnonzero(Points(ready, walked.y, walked.t).residual <= _FITTING)
-    if walked.closed or not good.size:
-        return walked
+        good = np.flatnonzero(Points(traced, walk.y, walk.t).residual <= _FITTING)
+    if walk.closed or not good.size:
+        return walk
     inside = slice(int(good[0]), int(good[-1]) + 1)
-    return replace(walked, y=walked.y[inside], t=walked.t[inside])
+    return replace(walk, y=walk.y[inside], t=walk.t[inside])
 
 
-def describe_end(ready: Traced, end: End) -> str:
+def describe_end(traced: TracedProblem, end: End) -> str:
     """Why a curve ends, in words."""
     if end.limit is None:
         return end.reason if end.reason != CLOSED else ""
-    free = list(ready.problem.free)
+    free = list(traced.problem.free)
     if end.limit < len(free):
         return f"{free[end.limit]}.{end.reason}"
-    name = ready.pattern.unknowns[end.limit - len(free)]
-    return ready.pattern.ends.get(name, "the other roots reach a limit of the search")
+    name = traced.pattern.unknowns[end.limit - len(free)]
+    return traced.pattern.ends.get(name, "the other roots reach a limit of the search")
 
 
-def _with_EP4(ready: Traced, walked: Walk, found: list[Found]) -> list[Found]:
-    """The events, each EP4 exact and first; where symmetry takes a curve through one, it is located to 1e-6 only.
+def _add_exact_EP4(traced: TracedProblem, walk: Walk, located: list[LocatedEvent]) -> list[LocatedEvent]:
+    """The events, each EP4 exact and first; symmetry can take a curve through one, which is then found to 1e-6 only.
 
-    On a curve of EP2 it is where EP3 and 2EP2 vanish at once: in a section through it they only touch 0.
+    On a curve of EP2, an EP4 is where the marks of EP3 and 2EP2 vanish at once; in a symmetric section they touch 0.
     """
-    near = [f for f in found if f.event.name == "EP4"]
-    if ready.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*ready.pattern.marks}:
-        _, whole = insert(walked, found)
-        points = Points(ready, whole.y, whole.t)
+    near = [f for f in located if f.event.name == "EP4"]
+    if traced.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*traced.pattern.marks}:
+        _, refined = insert_events(walk, located)
+        points = Points(traced, refined.y, refined.t)
         height = np.abs(points.mark("EP3")) + np.abs(points.mark("2EP2"))
         least = (height[1:-1] <= height[:-2]) & (height[1:-1] <= height[2:]) & (height[1:-1] < _LOW)
-        near += [Found(_EP4, whole.y[k], whole.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
-    return [*filter(None, (_exact_EP4(ready, walked, f) for f in near)), *found]
+        near += [LocatedEvent(_EP4, refined.y[k], refined.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
+    return [*filter(None, (_exact_EP4(traced, walk, f) for f in near)), *located]
 
 
-def _exact_EP4(ready: Traced, walked: Walk, found: Found) -> Found | None:
+def _exact_EP4(traced: TracedProblem, walk: Walk, located: LocatedEvent) -> LocatedEvent | None:
     """The EP4 next to an event, by its own equations; None if there is none."""
-    problem, pattern, scale = ready.problem, ready.pattern, ready.on.scale
-    free, special = len(problem.free), prepare(problem.derive(constraints={}), pattern_of("EP4", problem.model.degree))
-    start, unit = found.y * scale, special.on.scale
-    guess = _converted(pattern, start[ready.unknowns], special.pattern)
-    (end,) = projected(special.on.evaluate, np.array([[*start[:free], *guess]]) / unit, [None])
-    if not np.abs(end[:free] - found.y[:free]).max() <= _NEAR:  # nan where nothing is found
+    problem, pattern, scale = traced.problem, traced.pattern, traced.curve.scale
+    free, EP4 = len(problem.free), pattern_of("EP4", problem.model.degree)
+    at_EP4 = prepare_tracing(problem.derive(constraints={}), EP4)
+    start, unit = located.y * scale, at_EP4.curve.scale
+    guess = _convert_unknowns(pattern, start[traced.unknowns], at_EP4.pattern)
+    (end,) = project_rows(at_EP4.curve.evaluate, np.array([[*start[:free], *guess]]) / unit, [None])
+    if not np.abs(end[:free] - located.y[:free]).max() <= _NEAR:  # nan where nothing is found
         return None
-    if Points(special, end[None], found.t[None]).residual[0] > _EXACT:
+    if Points(at_EP4, end[None], located.t[None]).residual[0] > _EXACT:
         return None  # a section next to an EP4, not through it
-    exact = found.y.copy()
+    exact = located.y.copy()
     exact[:free] = end[:free]
-    exact[ready.unknowns] = _converted(special.pattern, (end * unit)[free:], pattern) / scale[ready.unknowns]
-    k = int(np.argmin(np.abs(walked.y - exact).max(axis=1)))
-    after = k if walked.t[k] @ (exact - walked.y[k]) >= 0 else max(k - 1, 0)
-    return Found(_EP4, exact, found.t, after, float(walked.t[after] @ (exact - walked.y[after])))
+    exact[traced.unknowns] = _convert_unknowns(at_EP4.pattern, (end * unit)[free:], pattern) / scale[traced.unknowns]
+    k = int(np.argmin(np.abs(walk.y - exact).max(axis=1)))
+    after = k if walk.t[k] @ (exact - walk.y[k]) >= 0 else max(k - 1, 0)
+    return LocatedEvent(_EP4, exact, located.t, after, float(walk.t[after] @ (exact - walk.y[after])))
 
 
-def _converted(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:
-    """Unknowns of another pattern, for the roots that this one has."""
+def _convert_unknowns(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:
+    """The unknowns of another pattern, for the same roots."""
     return np.array(other.guesses(roots_along(pattern.factors(list(unknowns)), 1)[0])[0])

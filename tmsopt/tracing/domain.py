@@ -1,7 +1,7 @@
 """The domains of asymptotic stability and of heavy damping in a plane, bounded by exact curves.
 
-A boundary is not read off a grid: each arc is a traced root pattern, cut where the other roots cease to be left of
-the imaginary axis, or real.
+Each arc of a boundary is a traced root pattern, not a contour of a grid. It is cut where the other roots are no longer
+left of the imaginary axis, or real.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,17 +19,17 @@ from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.sign_tests import nearest_pair_mean
 from tmsopt.tracing.branch import Branch, table_at
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
-from tmsopt.tracing.equations import coefficients
-from tmsopt.tracing.infinity import Infinity, through_infinity
-from tmsopt.tracing.points import on_axis, roots_along
+from tmsopt.tracing.equations import compute_coefficients
+from tmsopt.tracing.infinity import InfinityCurve, find_infinity_curves
+from tmsopt.tracing.points import is_on_axis, roots_along
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
-"""Widths of the box, a step, between the last point before infinity or a singular end and the corner it belongs to."""
+"""Largest distance, in widths of the box, from an end at infinity or a singular end to its corner."""
 
-_EDGE = 1e-9  # widths of the box: a branch that starts beside an edge, not in it, leaves it by more
+_EDGE = 1e-9  # widths of the box: largest distance from an edge of a branch that lies in it
 
-_BESIDE = 1e-4  # widths of the box from a curve to its sides, where damping outgrows rounding
+_OFFSET = 1e-4  # widths of the box from a curve to the designs that test its sides
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Arc:
 class Corner:
     """A point where arcs of a boundary meet or turn back: ``EP3`` is a cusp, ``2EP2`` a crossing.
 
-    ``infinity and weave`` is where a weave boundary runs into a0 = 0, ``infinity`` where two roots go there at once.
+    At ``infinity and weave`` a weave boundary meets a0 = 0; at ``infinity`` two roots go to infinity at once.
     """
 
     name: str
@@ -59,15 +59,14 @@ class Corner:
 
 @dataclass(frozen=True, repr=False)
 class Domain(Printable):
-    """Boundaries inside a box; where a domain leaves the box, its boundary ends at the edge. A boundary that
-    lies in an edge, such as that of designs without damping, is that edge and is left out.
+    """Boundaries inside a box. They end at its edges; a boundary that lies in an edge is left out.
 
     Attributes:
         stability: arcs that bound asymptotic stability.
         heavy_damping: arcs that bound the designs whose roots are all real and negative.
-        parting: arcs that part capsize from weave among the unstable designs: two positive real roots merge, or one
-            passes 0 or infinity, where no other root is real and positive.
-        corners: of the first two boundaries.
+        parting: arcs that separate capsize from weave among the unstable designs: two positive real roots merge, or
+            one passes 0 or infinity, while no other root is real and positive.
+        corners: corners of the first two boundaries.
 
     Example:
         >>> (corner,) = tmsopt.domain("problems/chart.toml").corners  # the tip of heavy damping, by the paper's law
@@ -93,7 +92,7 @@ def domain(
 ) -> Domain:
     """Boundaries of stability and of heavy damping in the plane of the two free parameters.
 
-    Constraints of the problem are left aside. `step`, `starts`, `seed` and `progress` are those of `trace`.
+    Constraints of the problem are ignored. `step`, `starts`, `seed` and `progress` are as in `trace`.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # heavily damped beyond the parabola c² = 4 k
@@ -106,49 +105,49 @@ def domain(
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
     bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
     traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in bounding)
-    found = {traced.pattern: [b for b in traced.branches if not _in_edge(b, plane)] for traced in traces}
+    found = {traced.pattern: [b for b in traced.branches if not _is_in_edge(b, plane)] for traced in traces}
     start_steps(progress, "looking for corners")
-    infinite = list(through_infinity(plane, step, starts, seed))
-    at_infinity = [c for curve in infinite for c in _changes(curve)]
+    infinite = list(find_infinity_curves(plane, step, starts, seed))
+    at_infinity = [c for curve in infinite for c in _list_changes(curve)]
 
     def arcs(names: Sequence[str], bounds: Callable[[Branch], Truth], beyond: str) -> tuple[Arc, ...]:
-        traced = (arc for n in names for b in found.get(n, ()) for arc in _pieces(b, bounds(b), plane, at_infinity))
-        runs = ((curve.parameters, *run) for curve in infinite for run in _runs(getattr(curve, beyond)))
+        traced = (arc for n in names for b in found.get(n, ()) for arc in _cut_arcs(b, bounds(b), plane, at_infinity))
+        runs = ((curve.parameters, *run) for curve in infinite for run in _find_runs(getattr(curve, beyond)))
         ends = (Arc("infinity", {n: x[start : stop + 1] for n, x in p.items()}) for p, start, stop in runs)
         return (*traced, *ends)
 
-    corners = [c for branches in found.values() for b in branches for c in _corners(b, plane)]
-    corners += [c for curve in infinite for c in _changes(curve, corners=True)]
+    corners = [c for branches in found.values() for b in branches for c in _list_corners(b, plane)]
+    corners += [c for curve in infinite for c in _list_changes(curve, corners=True)]
     return Domain(
-        stability=arcs(("weave", "capsize"), lambda b: _bounds(b, plane), "stable"),
-        heavy_damping=arcs(("EP2", "capsize"), lambda b: b.heavily_damped & _once(b), "heavily_damped"),
-        parting=arcs(("EP2", "capsize"), _parts, "parting"),
-        corners=tuple(_distinct(corners)),
+        stability=arcs(("weave", "capsize"), lambda b: _bounds_stability(b, plane), "stable"),
+        heavy_damping=arcs(("EP2", "capsize"), lambda b: b.heavily_damped & _is_drawn_here(b), "heavily_damped"),
+        parting=arcs(("EP2", "capsize"), _parts_instabilities, "parting"),
+        corners=tuple(_merge_corners(corners)),
     )
 
 
-def _in_edge(branch: Branch, problem: Posed) -> bool:
-    """Whether a branch lies in an edge of the box, which bounds the picture anyway: it has one side only."""
+def _is_in_edge(branch: Branch, problem: Posed) -> bool:
+    """Whether a branch lies in an edge of the box; it then bounds the picture anyway."""
     limits = ((branch.parameters[n], limit, np.ptp(ends)) for n, ends in problem.free.items() for limit in ends)
     return any(np.abs(column - limit).max() <= _EDGE * width for column, limit, width in limits)
 
 
-def _runs(inside: Truth) -> list[tuple[int, int]]:
-    """Begin and end of every run of truth."""
+def _find_runs(inside: Truth) -> list[tuple[int, int]]:
+    """Begin and end of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _changes(curve: Infinity, corners: bool = False) -> Iterator[Corner]:
-    """Points on a0 = 0 where another boundary comes in; only the corners of stability and of heavy damping, or all."""
-    for row, what in curve.changes.items():
+def _list_changes(curve: InfinityCurve, corners: bool = False) -> Iterator[Corner]:
+    """Points on a0 = 0 where another boundary meets it; `corners`: only those of stability or heavy damping."""
+    for row, event in curve.changes.items():
         if not corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
-            name, detail = (f"infinity and {what}", "a0 = 0") if what != "infinity" else ("infinity", "a0 = a1 = 0")
+            name, detail = (f"infinity and {event}", "a0 = 0") if event != "infinity" else ("infinity", "a0 = a1 = 0")
             yield Corner(name, detail, table_at(curve.parameters, row))
 
 
-def _pieces(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
-    """Runs of points that bound a domain; the events at their ends belong to them, and a corner beyond an end."""
+def _cut_arcs(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
+    """Runs of points that bound a domain, with the events at their ends and a corner beyond an end."""
     marked, beyond = inside.copy(), dict[int, Corner]()
     for event in branch.events:
         k = event.index
@@ -159,58 +158,58 @@ def _pieces(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence
             apart = [max(abs(here[n] - c.parameters[n]) / w for n, w in widths.items()) for c in at_infinity]
             if min(apart) <= _CLOSE:
                 beyond[k] = at_infinity[int(np.argmin(apart))]
-    for start, stop in _runs(marked):
+    for start, stop in _find_runs(marked):
         if stop - start > 1:
             before, after = ([beyond[k].parameters] if k in beyond else [] for k in (start, stop - 1))
             columns = {n: [p[n] for p in before] + [*branch.parameters[n][start:stop]] for n in problem.free}
             yield Arc(branch.pattern, {n: np.array(c + [p[n] for p in after]) for n, c in columns.items()})
 
 
-def _bounds(branch: Branch, problem: Posed) -> Truth:
-    """Where the other roots are stable, or on the axis too and the designs of one side alone stable.
+def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
+    """Where the other roots are stable, or on the axis with stable designs on one side only.
 
-    Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
+    If several pairs stay on the axis together, each on its curve, the curve of the fastest counts.
     """
     rest = pattern_of(problem.model, branch.pattern).remaining_factors(list(branch.unknowns.values()))
     z = roots_along(rest, len(branch))
-    tied = np.where(on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)  # of the fastest, squared
+    tied = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)  # of the fastest, squared
     if np.all(tied < 0):
         return branch.stable
     (x, dx, wide), (y, dy, high) = (
         (branch.parameters[n], branch.tangent[n] / (end - begin), end - begin)
         for n, (begin, end) in problem.free.items()
     )
-    offset = np.array([[-_BESIDE], [_BESIDE]]) / (np.hypot(dx, dy) + 1e-300)
+    offset = np.array([[-_OFFSET], [_OFFSET]]) / (np.hypot(dx, dy) + 1e-300)
     sides = dict(zip(problem.free, (x - offset * wide * dy, y + offset * high * dx), strict=True))
-    with np.errstate(all="ignore"):  # a side may lie beyond what the model is made for: nan is not stable
-        one, other = is_stable(coefficients(problem, sides))
+    with np.errstate(all="ignore"):  # outside the model's range nan is not stable
+        one, other = is_stable(compute_coefficients(problem, sides))
     fastest = (tied >= 0) & (branch.unknowns.get("W", np.inf) >= tied)
     return np.asarray(branch.stable | (fastest & (one != other)))
 
 
-def _parts(branch: Branch) -> Truth:
-    """Where one side has a positive real root and the other, unstable too, has none."""
-    rest = _rest(branch)
+def _parts_instabilities(branch: Branch) -> Truth:
+    """Where one side has a positive real root and the other, also unstable, has none."""
+    rest = _other_roots(branch)
     found = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
     if len(rest) > 1:
         found[found] = real_roots(np.stack(rest, axis=-1)[found])[1] == 0
     return np.asarray(found)
 
 
-def _rest(branch: Branch) -> list[Any]:
-    """The other roots of a curve of double roots or of roots 0, as one factor; [1] without any."""
+def _other_roots(branch: Branch) -> list[Any]:
+    """The other roots of a curve of double roots or of roots 0, as one factor; [1] if there are none."""
     return [np.ones(len(branch)), *(column for name, column in branch.unknowns.items() if name != "r")]
 
 
-def _once(branch: Branch) -> Truth:
-    """Where a curve of two double roots is met by the larger of them: the other draws the same curve again."""
+def _is_drawn_here(branch: Branch) -> Truth:
+    """Where a curve of two double roots is parametrised by the larger; the other draws the same curve again."""
     if not np.any(branch.kinds == "2EP2"):
         return np.ones(len(branch), dtype=bool)
-    r, other = branch.unknowns["r"], nearest_pair_mean(_rest(branch))
+    r, other = branch.unknowns["r"], nearest_pair_mean(_other_roots(branch))
     return np.asarray((branch.kinds != "2EP2") | (r - other >= -1e-12 * np.abs(other)))
 
 
-def _corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
+def _list_corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
     inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
     ends = pattern_of(problem.model, branch.pattern).ends.values()
@@ -221,8 +220,8 @@ def _corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 
 
-def _distinct(corners: Sequence[Corner]) -> list[Corner]:
-    """Each place once, with every name it has: where a weave arc meets a capsize arc, both end there."""
+def _merge_corners(corners: Sequence[Corner]) -> list[Corner]:
+    """Each place once, with all its names: weave and capsize arcs that meet both end there."""
     found: list[Corner] = []
     for corner in corners:
         for k, other in enumerate(found):

@@ -1,4 +1,4 @@
-"""A problem made ready to be traced: its pattern's equations as a curve, in units of its coefficients over the box."""
+"""The equations of a pattern as a compiled curve, with variables of order 1 over the box."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,57 +12,57 @@ from tmsopt.errors import input_error
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.evaluate import coefficients_of
 from tmsopt.problem.problem import Posed
-from tmsopt.program.formulate import matching, variables_of
+from tmsopt.program.formulate import formulate_matching, variables_of
 from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import completions, spread
+from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.records import Array, Truth
 from tmsopt.roots import Pattern
-from tmsopt.tracing.continuation import Curve, curve
-from tmsopt.tracing.solving import rows_of
+from tmsopt.tracing.continuation import Curve, compile_curve
+from tmsopt.tracing.solving import map_rows
 
-_SAMPLE = 32  # designs by which sizes are judged
+_SAMPLE = 32  # designs from which sizes of the unknowns are estimated
 _VANISHED = 1e-9
 
 
-def coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
+def compute_coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
     """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
     a = np.broadcast_arrays(*coefficients_of(problem, problem.ordered(columns)), next(iter(columns.values())))[:-1]
     return np.stack(a, axis=-1).astype(float)
 
 
 @dataclass(frozen=True)
-class Traced:
-    """A problem made ready for tracing one pattern.
+class TracedProblem:
+    """A problem prepared for tracing one pattern.
 
     Attributes:
         problem: with the pattern to locate and every constraint.
         unit: of the variables of the NLP, in natural units.
-        unknowns: where the unknowns of the pattern stand among the variables.
+        unknowns: indices of the pattern's unknowns among the variables.
     """
 
     problem: Posed
     pattern: Pattern
     nlp: NLP
-    on: Curve
+    curve: Curve
     unit: Array
     unknowns: slice
 
-    def leads(self, a: Array) -> Truth:
-        """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit; a of shape (…, n + 1)."""
+    def has_leading_coefficient(self, a: Array) -> Truth:
+        """Whether a0 is not negligible, for a of shape (…, n + 1): with a0 = a1 = … = 0 any factors fit."""
         size = np.abs(a) / self.nlp.unit ** np.arange(a.shape[-1])
         return np.asarray(size[..., 0] > _VANISHED * size.max(axis=-1))
 
-    def starts(self, design: Mapping[str, float], best: bool) -> list[Array]:
-        """All variables at a design, in units of the scale, for each guess of the unknowns; the best first if asked."""
-        every = [x * self.unit / self.on.scale for x in completions(self.nlp, self.problem, design)]
-        return sorted(every, key=lambda y: best and np.abs(rows_of(self.on.evaluate, y[None])[0]).max())
+    def list_starts(self, design: Mapping[str, float], best_first: bool) -> list[Array]:
+        """All variables at a design, in units of the scale, for each guess of the unknowns; sorted if `best_first`."""
+        every = [x * self.unit / self.curve.scale for x in complete_starts(self.nlp, self.problem, design)]
+        return sorted(every, key=lambda y: best_first and np.abs(map_rows(self.curve.evaluate, y[None])[0]).max())
 
 
-def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
-    """The equations of a pattern, by default the one that the problem locates, compiled for tracing."""
+def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedProblem:
+    """Compile the equations of a pattern, by default the one that the problem locates."""
     pattern, free = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
-    nlp = matching(problem.derive(constraints=equalities), pattern)
+    nlp = formulate_matching(problem.derive(constraints=equalities), pattern)
     unit, unknowns = np.ones(len(nlp.variables)), slice(free, free + len(pattern.unknowns))
     unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])  # of the NLP; x has natural units
     x = ca.SX.sym("x", len(unit))
@@ -70,7 +70,7 @@ def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
     rows = [g[k] for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
     if equalities and len(rows) != len(unit) - 1:
         names = ", ".join(equalities)
-        message = f"an equality of a root quantity cannot be traced along {pattern.name}; leave out {names}"
+        message = f"cannot trace {pattern.name} under an equality constraint on a root quantity; remove {names}"
         raise input_error(message, "constraints")
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     for k, name in enumerate(pattern.unknowns):
@@ -78,20 +78,22 @@ def prepare(problem: Posed, pattern: Pattern | None = None) -> Traced:
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = (next(completions(nlp, problem, design), None) for design in islice(spread(problem, 0), _SAMPLE))
-    if known := [guess for guess in sample if guess is not None]:
-        scale[free:] = (unit * np.clip(np.median(np.abs(known), axis=0), 0.1, 1e3))[free:]
-    return Traced(problem, pattern, nlp, curve(x, ca.vertcat(*rows), scale, lower, upper), unit, unknowns)
+    sample = (next(complete_starts(nlp, problem, design), None) for design in islice(sample_box(problem, 0), _SAMPLE))
+    if guesses := [guess for guess in sample if guess is not None]:
+        scale[free:] = (unit * np.clip(np.median(np.abs(guesses), axis=0), 0.1, 1e3))[free:]
+    return TracedProblem(
+        problem, pattern, nlp, compile_curve(x, ca.vertcat(*rows), scale, lower, upper), unit, unknowns
+    )
 
 
 def design_at(problem: Posed, x: Array) -> dict[str, Any]:
-    """Free parameters for traced variables, floats or columns."""
+    """Free parameters from traced variables, as floats or columns."""
     of = problem.parameter_set
     return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
 def limits_of(problem: Posed) -> tuple[Array, Array]:
-    """Least and greatest values of the traced variables that are free parameters."""
+    """Smallest and largest values of the traced variables that are free parameters."""
     sides = zip(*problem.free.values(), strict=True)
     low, high = (np.array(variables_of(problem, dict(zip(problem.free, side, strict=True)))) for side in sides)
     return low, high

@@ -1,7 +1,7 @@
-"""Events: functions of the points of a curve, whose zeros are located on the curve itself, to rounding.
+"""Events: functions of the points of a curve, whose zeros are located on the curve to rounding.
 
-What the package looks for and what a user looks for are `Event`s alike. Between two steps a function may have two
-zeros: where it comes near 0, `refine` adds the point at which it is nearest.
+Events of the package and of the user are treated alike. A function may have two zeros between two steps; where it comes
+near 0, `refine_walk` adds the point at which it is nearest.
 """
 
 import re
@@ -15,33 +15,33 @@ import numpy as np
 from tmsopt.errors import Fault, InputError, input_error, is_number, list_faults, short, suggest, text_faults
 from tmsopt.records import Array, Truth
 from tmsopt.roots.sign_tests import nearest_pair_mean
-from tmsopt.tracing.continuation import Curve, Walk, between
-from tmsopt.tracing.equations import Traced
-from tmsopt.tracing.points import NOTHING, Points, margins
-from tmsopt.tracing.solving import crossings
+from tmsopt.tracing.continuation import Curve, Walk, step_along
+from tmsopt.tracing.equations import TracedProblem
+from tmsopt.tracing.points import NOTHING, Points, axis_functions
+from tmsopt.tracing.solving import find_zeros
 
-TOGETHER = 1e-6
-"""Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""
+SAME_PLACE = 1e-6
+"""Events closer than this, in units of the scale, are at one place; each is located to 1e-12 or better."""
 
 CHANGES = "stability changes"
-"""Detail of the events that count only where they change it."""
+"""Detail of weave and capsize events, which count only where stability changes."""
 
 _OWN = r"weave|capsize|fold|constraint|end|(double|\d+-fold) zero|\d*C?EP\d\S*"  # names of events of the package
 _DIP = 0.5
-"""Share of a small value that a parabola must fall further by, for its least to be looked for between the steps."""
-_ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as beside a singular point it may
+"""A minimum between two steps is searched if a parabola falls by this share of the value there."""
+_ASTRAY = 2.0  # arclengths: a point further away lies on another curve, as may happen near a singular point
 _ROUNDING = 1e-14  # of a variable of order 1
 
 
 @dataclass(frozen=True)
 class Event:
-    """What to look for along a curve: a function that changes its sign there.
+    """A place on a curve where a function changes its sign.
 
     Attributes:
-        name: shown wherever the curve is, on one line.
-        function: of a point, to a number. The point is a mapping: ``p["Fr"]`` is a parameter of the problem, a
-            quantity of its model such as ``p["abscissa"]``, or an unknown of the pattern such as ``p["r"]``.
-        stop: whether a branch ends there. The curve beyond is another branch.
+        name: one line, shown wherever the curve is shown.
+        function: point → number. The point is a mapping: ``p["Fr"]`` is a parameter of the problem, ``p["abscissa"]`` a
+            quantity of its model, ``p["r"]`` an unknown of the pattern.
+        stop: whether the branch ends there. The curve after it is another branch.
         detail: words to show next to the name.
 
     Example:
@@ -62,8 +62,8 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Found:
-    """A zero of an event between two rows of a walk, an arclength s after the first of them."""
+class LocatedEvent:
+    """A zero of an event at an arclength s after the row `after` of a walk."""
 
     event: Event
     y: Array
@@ -73,10 +73,10 @@ class Found:
 
 
 def check_events(events: Any) -> list[Event]:
-    """The events that a user gave, as functions of many `Points`, like those of the package.
+    """The events of a user as functions of many `Points`, like those of the package.
 
     Raises:
-        InputError: for what is no list of events, and later, where a function raises or gives no finite number.
+        InputError: for anything but a list of events; later, where a function raises or returns no finite number.
     """
     faults = list_faults("events", events, "[tmsopt.Event('Fr is 3', lambda p: p['Fr'] - 3)]")
     for k, event in enumerate(() if faults else events):
@@ -87,34 +87,34 @@ def check_events(events: Any) -> list[Event]:
         elif wrong := text_faults(event.name, "events", f"{k}", "name"):
             faults += wrong
         elif re.fullmatch(_OWN, event.name):
-            message = f"found '{event.name}', which tmsopt calls an event of its own; accepted: another name"
+            message = f"found '{event.name}', the name of a built-in event; accepted: another name"
             faults.append(Fault(message, ("events", f"{k}", "name")))
     if faults:
         raise InputError(faults)
-    return [replace(event, function=partial(_each, event)) for event in events]
+    return [replace(event, function=partial(_evaluate_points, event)) for event in events]
 
 
-def _each(event: Event, points: Points) -> Array:
+def _evaluate_points(event: Event, points: Points) -> Array:
     """The function at every point; nan where there is no point."""
     exist = np.all(np.isfinite(points.x), axis=1)
-    return np.array([_value(event, _At(points, k)) if there else np.nan for k, there in enumerate(exist)])
+    return np.array([_evaluate_at(event, _PointView(points, k)) if there else np.nan for k, there in enumerate(exist)])
 
 
-def _value(event: Event, at: Mapping[str, float]) -> float:
+def _evaluate_at(event: Event, point: Mapping[str, float]) -> float:
     try:
-        value = event.function(at)
+        value = event.function(point)
         if is_number(value):
             return float(value)
-        what = f"the function gives {short(value)}"
+        what = f"the function returns {short(value)}"
     except Exception as error:
         what = f"the function raises {type(error).__name__}: {error}"
-    place = ", ".join(f"{name} = {at[name]:.6g}" for name in at)
+    place = ", ".join(f"{name} = {point[name]:.6g}" for name in point)
     raise input_error(f"{what} at {place}; accepted: a finite number at every point of the curve", "events", event.name)
 
 
 @dataclass(frozen=True)
-class _At(Mapping[str, float]):
-    """One of many points, as a user's function sees it; it lists the free parameters and knows all names."""
+class _PointView(Mapping[str, float]):
+    """One of many points, as a user's function sees it; iteration lists the free parameters."""
 
     points: Points
     row: int
@@ -125,76 +125,77 @@ class _At(Mapping[str, float]):
         return float(self.points[name][self.row])
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.points.ready.problem.free)
+        return iter(self.points.traced.problem.free)
 
     def __len__(self) -> int:
-        return len(self.points.ready.problem.free)
+        return len(self.points.traced.problem.free)
 
 
-def events_of(points: Points) -> Iterator[Event]:
-    """Everything that the package looks for along a curve."""
-    problem, pattern = points.ready.problem, points.ready.pattern
+def list_package_events(points: Points) -> Iterator[Event]:
+    """All events that the package locates along a curve."""
+    problem, pattern = points.traced.problem, points.traced.pattern
 
     def margin(number: int, k: int, points: Points) -> Any:
-        return margins(pattern.remaining_factors(points.unknowns)[number])[k]
+        return axis_functions(pattern.remaining_factors(points.unknowns)[number])[k]
 
     for name in pattern.marks:
         yield Event(name, partial(Points.mark, name=name))
     if pattern.form == "EP2" and "2EP2" in points.special:
-        # q(r) has a double zero where r is the double root of q
         yield Event("EP4", lambda p: p.unknowns[0] - nearest_pair_mean(pattern.factors(p.unknowns)[-1]))
     for number, factor in enumerate(pattern.remaining_factors(points.unknowns)):
-        for k in range(len(margins(factor))):  # the first quantity is the constant term
+        for k in range(len(axis_functions(factor))):  # the first function is the constant term
             yield Event("weave" if k else "capsize", partial(margin, number, k), detail=CHANGES)
     for k, parameter in enumerate(problem.free):
-        # by the arclength in the parameters: the unknowns may move much faster
+        # per arclength of the parameters, since the unknowns may move much faster
         yield Event("fold", partial(lambda k, p: p.t[:, k] / (p.speed + 1e-300), k), detail=parameter)
     for name, condition in problem.conditions.items():
         if not condition.equality:
             yield Event("constraint", partial(lambda c, p: c(p.values), condition), detail=name)
 
 
-def locate(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Iterator[Found]:
-    """Every zero of an event of the package, and of others, between the rows that show its change of sign."""
-    points, free = Points(ready, walked.y, walked.t), list(ready.problem.free)
-    for event, values in _live(points, events):
-        for found in locate_zeros(ready.on, walked, partial(Points, ready), event, values):
-            y, row = found.y, found.after
+def locate_events(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[LocatedEvent]:
+    """Every zero of an event between the rows that show its change of sign."""
+    points, free = Points(traced, walk.y, walk.t), list(traced.problem.free)
+    for event, values in _list_active(points, events):
+        for located in locate_zeros(traced.curve, walk, partial(Points, traced), event, values):
+            y, row = located.y, located.after
             changes = event.name not in ("weave", "capsize") or points.stable[row] != points.stable[row + 1]
-            if changes and (event.name != "fold" or _turns(walked, row, y, free.index(event.detail))):
-                yield found
+            if changes and (event.name != "fold" or _is_fold(walk, row, y, free.index(event.detail))):
+                yield located
 
 
 def locate_zeros(
-    on: Curve, walked: Walk, at: Callable[[Array, Array], Any], event: Event, values: Array
-) -> Iterator[Found]:
-    """Zeros of an event between rows where its values change sign; its function takes what `at` makes of y and t."""
-    rows = np.flatnonzero(has_turned(values))
-    here, along = walked.y[rows], walked.t[rows]
-    ends = np.sum(along * (walked.y[rows + 1] - here), axis=1)
+    curve: Curve, walk: Walk, make_points: Callable[[Array, Array], Any], event: Event, values: Array
+) -> Iterator[LocatedEvent]:
+    """Zeros of an event between rows with a change of sign; its function takes what `make_points` returns."""
+    rows = np.flatnonzero(has_sign_change(values))
+    here, along = walk.y[rows], walk.t[rows]
+    ends = np.sum(along * (walk.y[rows + 1] - here), axis=1)
     if rows.size:
-        s = crossings(lambda s: event.function(at(*between(on, here, along, s))), ends)
-        real = np.isfinite(s)  # else a jump through infinity, noise, or nan
-        found = zip(*between(on, here[real], along[real], s[real]), rows[real].tolist(), s[real].tolist(), strict=True)
-        for y, t, row, length in found:
-            if np.abs(y - walked.y[row]).max() <= _ASTRAY * length + TOGETHER:  # else on another curve
-                yield Found(event, y, t, row, length)
+        s = find_zeros(lambda s: event.function(make_points(*step_along(curve, here, along, s))), ends)
+        real = np.isfinite(s)  # else a pole, noise, or nan
+        located = zip(
+            *step_along(curve, here[real], along[real], s[real]), rows[real].tolist(), s[real].tolist(), strict=True
+        )
+        for y, t, row, length in located:
+            if np.abs(y - walk.y[row]).max() <= _ASTRAY * length + SAME_PLACE:  # else on another curve
+                yield LocatedEvent(event, y, t, row, length)
 
 
-def has_turned(value: Array) -> Truth:
-    """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
+def has_sign_change(value: Array) -> Truth:
+    """Where a sequence changes sign to the next entry; a 0 takes the sign before it, or else after it."""
     sign = np.sign(value)
     if (known := np.flatnonzero(sign)).size:
         sign = sign[known[np.maximum(np.searchsorted(known, range(len(sign)), side="right") - 1, 0)]]
     return np.asarray(sign[1:] * sign[:-1] < 0)
 
 
-def refine(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Walk:
-    """The walk with a point wherever an event comes nearest to 0 between two steps: two zeros then show two signs."""
-    steps = np.sum(walked.t[:-1] * np.diff(walked.y, axis=0), axis=1)
+def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Walk:
+    """The walk with added points where an event comes nearest to 0 between two steps, so that two zeros show."""
+    steps = np.sum(walk.t[:-1] * np.diff(walk.y, axis=0), axis=1)
     before, after = steps[:-1], steps[1:]
-    added: dict[tuple[int, float], Found] = {}
-    for event, value in _live(Points(ready, walked.y, walked.t), events):
+    minima: dict[tuple[int, float], LocatedEvent] = {}
+    for event, value in _list_active(Points(traced, walk.y, walk.t), events):
         side = np.sign(value[1:-1])
         left, here, right = side * value[:-2], side * value[1:-1], side * value[2:]
         with np.errstate(all="ignore"):  # slope and second derivative of the parabola through three values
@@ -202,43 +203,44 @@ def refine(ready: Traced, walked: Walk, events: Sequence[Event] = ()) -> Walk:
             slope, bend = (back * after + ahead * before) / (before + after), 2 * (ahead - back) / (before + after)
             dips = (here <= left) & (here <= right) & (bend > 0) & (slope**2 / (2 * bend) > _DIP * here)
         for k in np.flatnonzero(dips & (before > 0) & (after > 0) & (here > 0)).tolist():
-            row = walked.y[[k + 1]], walked.t[[k + 1]]
+            row = walk.y[[k + 1]], walk.t[[k + 1]]
 
             def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:
-                return sign * float(event.function(Points(ready, *between(ready.on, *row, np.array([s]))))[0])
+                return sign * float(event.function(Points(traced, *step_along(traced.curve, *row, np.array([s]))))[0])
 
-            from scipy.optimize import minimize_scalar  # a fifth of a second, paid only where it is needed
+            from scipy.optimize import minimize_scalar  # importing it takes 0.2 s
 
             least = minimize_scalar(height, bounds=(-before[k], after[k]), method="bounded", options={"xatol": 1e-14})
-            s, nearby = float(least.x), between(ready.on, *row, np.array([least.x]))
-            (y,), (t,) = between(ready.on, *nearby, np.zeros(1))  # once more: beside a singular point Newton is slow
+            s, nearby = float(least.x), step_along(traced.curve, *row, np.array([least.x]))
+            # again, since Newton's method converges slowly near singular points
+            (y,), (t,) = step_along(traced.curve, *nearby, np.zeros(1))
             if np.abs(y - row[0][0]).max() <= _ASTRAY * abs(s) and t @ row[1][0] > 0:
                 place = (k + 1, s) if s >= 0 else (k, before[k] + s)
-                added.setdefault(place, Found(event, y, t, *place))
-    return insert(walked, [added[place] for place in sorted(added)])[1]
+                minima.setdefault(place, LocatedEvent(event, y, t, *place))
+    return insert_events(walk, [minima[place] for place in sorted(minima)])[1]
 
 
-def insert(walked: Walk, found: Sequence[Found]) -> tuple[list[int], Walk]:
-    """Rows of what was found, in order, and the walk with it among its points."""
-    order = np.argsort([*range(len(walked.y)), *(f.after + 0.5 for f in found)], kind="stable")
-    y, t = np.array([*walked.y, *(f.y for f in found)]), np.array([*walked.t, *(f.t for f in found)])
-    return np.flatnonzero(order >= len(walked.y)).tolist(), replace(walked, y=y[order], t=t[order])
+def insert_events(walk: Walk, located: Sequence[LocatedEvent]) -> tuple[list[int], Walk]:
+    """The rows of the events, in order, and the walk with them among its points."""
+    order = np.argsort([*range(len(walk.y)), *(f.after + 0.5 for f in located)], kind="stable")
+    y, t = np.array([*walk.y, *(f.y for f in located)]), np.array([*walk.t, *(f.t for f in located)])
+    return np.flatnonzero(order >= len(walk.y)).tolist(), replace(walk, y=y[order], t=t[order])
 
 
-def _live(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Array]]:
+def _list_active(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Array]]:
     """The events whose functions are not 0 all along the curve, with their values."""
     special = points.special
-    for event in (*events_of(points), *events):
+    for event in (*list_package_events(points), *events):
         value = points.column(event.function(points))
         if event.name not in special and (event.name != "fold" or np.abs(value).max() > NOTHING):
             yield event, value
 
 
-def _turns(walked: Walk, i: int, y: Array, k: int) -> bool:
-    """Whether a variable has its neighbours, next or next but one, on one side of it by more than rounding.
+def _is_fold(walk: Walk, i: int, y: Array, k: int) -> bool:
+    """Whether the neighbours of a point, next or next but one, are on one side of it by more than rounding.
 
-    Where the equations are singular the tangent alone may say so.
+    The tangent alone is not reliable where the equations are singular.
     """
-    rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walked.y) - 1)
-    back, ahead = walked.y[rows, k] - y[k]
+    rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walk.y) - 1)
+    back, ahead = walk.y[rows, k] - y[k]
     return bool(np.any((back * ahead > 0) & (np.minimum(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])))))

@@ -13,19 +13,19 @@ from tmsopt.roots import lienard_chipart, roots
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.roots.sign_tests import CLOSED, opposite_roots_test
 from tmsopt.tracing.branch import name_unknowns
-from tmsopt.tracing.equations import Traced, design_at
+from tmsopt.tracing.equations import TracedProblem, design_at
 
-NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
+NOTHING = 1e-9  # a function below it all along the curve counts as 0 there
 
-_ROUNDED = 1e-14  # a tangent, its inverse and the scale, or a real part beside the modulus: some roundings
-_REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
+_ROUNDED = 1e-14  # a few roundings
+_REAL = 1e-6  # imaginary part of a real root, of |s|: rounding of 1e-15 moves double roots by its square root
 
 
 @dataclass(frozen=True)
 class Points:
     """Points y of a traced curve, in units of its scale, and its tangents t, both of shape (n, variables)."""
 
-    ready: Traced
+    traced: TracedProblem
     y: Array
     t: Array
 
@@ -35,30 +35,30 @@ class Points:
     @cached_property
     def x(self) -> Array:
         """The points in natural units."""
-        return np.asarray(self.y * self.ready.on.scale)
+        return np.asarray(self.y * self.traced.curve.scale)
 
     @property
     def unknowns(self) -> list[Array]:
-        """Those of the pattern, shape (n,) each."""
-        return list(self.x[:, self.ready.unknowns].T)
+        """The unknowns of the pattern, shape (n,) each."""
+        return list(self.x[:, self.traced.unknowns].T)
 
     @property
     def speed(self) -> Array:
-        """How fast the free parameters move along the curve, in units of the scale."""
-        return np.asarray(np.linalg.norm(self.t[:, : len(self.ready.problem.free)], axis=1))
+        """Speed of the free parameters along the curve, in units of the scale."""
+        return np.asarray(np.linalg.norm(self.t[:, : len(self.traced.problem.free)], axis=1))
 
     @cached_property
     def parameters(self) -> dict[str, Array]:
         """Every parameter of the problem, shape (n,) each."""
-        problem = self.ready.problem
-        free = {n: _within(v, *problem.free[n]) for n, v in design_at(problem, self.x).items()}
+        problem = self.traced.problem
+        free = {n: _clip_rounding(v, *problem.free[n]) for n, v in design_at(problem, self.x).items()}
         return {n: np.array(np.broadcast_to(v, len(self)), dtype=float) for n, v in problem.ordered(free).items()}
 
     @cached_property
     def values(self) -> Values:
-        """Quantities; those of the roots come from the factors, where multiple roots are exact."""
-        z = roots_along(self.ready.pattern.factors(self.unknowns), len(self))
-        problem = self.ready.problem
+        """Quantities; those of the roots come from the factors, in which multiple roots are exact."""
+        z = roots_along(self.traced.pattern.factors(self.unknowns), len(self))
+        problem = self.traced.problem
         return Values(problem.model, problem.parameter_set, self.parameters, extra=(NO_RADIUS,)).with_known(
             {
                 "abscissa": z.real.max(axis=-1),
@@ -73,53 +73,53 @@ class Points:
 
     @property
     def names(self) -> list[str]:
-        """What `__getitem__` takes."""
+        """Names that `__getitem__` accepts."""
         return [*self.values, *self.named_unknowns]
 
     @cached_property
     def named_unknowns(self) -> dict[str, Array]:
         """The unknowns by name."""
-        pattern = self.ready.pattern
+        pattern = self.traced.pattern
         return name_unknowns(pattern.name, dict(zip(pattern.unknowns, self.unknowns, strict=True)), self.parameters)
 
     @cached_property
     def stable(self) -> Truth:
-        """Where the other roots lie left of the imaginary axis by more than rounding; none count as stable."""
+        """Where all other roots, if any, are left of the imaginary axis by more than rounding."""
         return np.asarray(np.all(self._others.real < -_ROUNDED * np.abs(self._others), axis=-1))
 
     @property
     def heavily_damped(self) -> Truth:
-        """Where the other roots are real and negative, and the pattern has none but those."""
+        """Where all roots are real and the other ones negative."""
         real = np.all(np.abs(self._others.imag) <= _REAL * np.abs(self._others), axis=-1)
-        return np.asarray(self.stable & real & ("W" not in self.ready.pattern.unknowns))
+        return np.asarray(self.stable & real & ("W" not in self.traced.pattern.unknowns))
 
     @property
     def satisfied(self) -> Truth:
         """Where every inequality constraint holds."""
-        limits = [c for c in self.ready.problem.conditions.values() if not c.equality]
+        limits = [c for c in self.traced.problem.conditions.values() if not c.equality]
         held = [self.column(True), *(c.holds(self.column(c(self.values))) for c in limits)]
         return np.asarray(np.all(held, axis=0))
 
     @property
     def residual(self) -> Array:
-        """Largest mismatch of a coefficient, relative to the terms that it is made of."""
-        monic = self.ready.pattern.monic(self.unknowns)
+        """Largest mismatch of a coefficient, relative to its terms."""
+        monic = self.traced.pattern.monic(self.unknowns)
         a0 = self.column(self.values.coefficients[0])
         unit = self.column(mean_size(monic))
-        unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots come to 0, that of the curve
+        unit = np.maximum(unit, np.median(unit)) + 1e-300  # near roots 0, the unit of the whole curve
         pairs = enumerate(zip(self.values.coefficients, monic, strict=True))
         terms = [(a - a0 * c, np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k) for k, (a, c) in pairs]
-        # a size of 0: roots that are all 0
+        # a size is 0 if all roots are 0
         return np.asarray(np.max([np.abs(off) / np.where(size == 0, 1.0, size) for off, size in terms], axis=0))
 
     @property
     def special(self) -> list[str]:
-        """Special cases of the pattern that are met along the whole curve, up to rounding."""
-        return [name for name in self.ready.pattern.marks if np.median(np.abs(self.mark(name))) <= NOTHING]
+        """Special cases of the pattern that hold along the whole curve, up to rounding."""
+        return [name for name in self.traced.pattern.marks if np.median(np.abs(self.mark(name))) <= NOTHING]
 
     def mark(self, name: str) -> Array:
-        """What vanishes at a special case of the pattern."""
-        pattern = self.ready.pattern
+        """The function that vanishes at a special case of the pattern."""
+        pattern = self.traced.pattern
         return self.column(pattern.marks[name](pattern.scaled_unknowns(self.unknowns)))
 
     def column(self, value: Any) -> Array:
@@ -128,32 +128,32 @@ class Points:
 
     @cached_property
     def _others(self) -> Complex:
-        """The roots that the pattern does not tie."""
-        return roots_along(self.ready.pattern.remaining_factors(self.unknowns), len(self))
+        """The roots that the pattern leaves free."""
+        return roots_along(self.traced.pattern.remaining_factors(self.unknowns), len(self))
 
 
-def _within(v: Array, low: float, high: float) -> Array:
-    """A limit met exactly, where a tangent and its inverse have rounded past it."""
+def _clip_rounding(v: Array, low: float, high: float) -> Array:
+    """Values with rounding errors beyond a limit clipped to the limit."""
     limited = np.clip(v, low, high)
     return np.where(np.abs(v - limited) <= _ROUNDED * (1 + np.abs(v)), limited, v)
 
 
 def roots_along(factors: list[list[Any]], count: int) -> Complex:
-    """Roots of factors along a curve, shape (count, roots); nan where one is beyond doubles, as beside infinity."""
-    found = [np.zeros((count, 0), dtype=complex)]
+    """Roots of factors along a curve, shape (count, roots); nan where they overflow, near infinity."""
+    columns = [np.zeros((count, 0), dtype=complex)]
     for factor in factors:
         rows = np.stack([np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor], axis=-1)
-        known = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
-        found.append(np.full((count, len(factor) - 1), np.nan, dtype=complex))
-        found[-1][known] = roots(rows[known])
-    return np.concatenate(found, axis=-1)
+        finite = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
+        columns.append(np.full((count, len(factor) - 1), np.nan, dtype=complex))
+        columns[-1][finite] = roots(rows[finite])
+    return np.concatenate(columns, axis=-1)
 
 
-def on_axis(z: Complex) -> Truth:
-    """Which roots lie on the imaginary axis, up to rounding."""
+def is_on_axis(z: Complex) -> Truth:
+    """Whether roots are on the imaginary axis, up to rounding."""
     return np.asarray(np.abs(z.real) <= _ROUNDED * np.abs(z))
 
 
-def margins(factor: list[Any]) -> list[Any]:
-    """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
+def axis_functions(factor: list[Any]) -> list[Any]:
+    """Functions of which one vanishes when a root of the factor reaches the imaginary axis; the first for a root 0."""
     return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], opposite_roots_test(factor)]

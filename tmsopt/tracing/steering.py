@@ -1,4 +1,4 @@
-"""One curve followed by hand: an iterator of its points, which a user stops, turns round and listens to."""
+"""Follows one curve point by point: an iterator that a user can stop and turn around."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -8,11 +8,11 @@ from tmsopt.errors import input_error
 from tmsopt.problem import Solution
 from tmsopt.problem.files import Given, pose
 from tmsopt.tracing.branch import BranchPoint, table_at
-from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, follow, tangent_at
+from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, compute_tangent, follow
 from tmsopt.tracing.description import describe_end, find_events, make_branch
-from tmsopt.tracing.equations import Traced, prepare
-from tmsopt.tracing.events import TOGETHER, Event, check_events
-from tmsopt.tracing.seeds import seeds
+from tmsopt.tracing.equations import TracedProblem, prepare_tracing
+from tmsopt.tracing.events import SAME_PLACE, Event, check_events
+from tmsopt.tracing.seeds import find_seeds
 from tmsopt.tracing.trace import STARTS, STEP, check_options, locate_pattern
 
 
@@ -27,15 +27,15 @@ def continue_from(
     """Follow one curve of a pattern point by point, from a point near a design.
 
     Args:
-        problem: as for `trace`; of a solution, its design is where the curve begins.
+        problem: as for `trace`; the curve of a solution begins at its parameters.
         pattern: name; by default the one that the problem locates.
-        through: the design to begin near, a value for every free parameter; by default the one of a solution, or the
-            first from which the search of `trace` finds a point.
+        through: a point to begin near, with a value for every free parameter; by default the parameters of a solution,
+            or the first from which the search of `trace` finds a point.
         step: longest step, in widths of the box.
-        events: what to look for, besides the events that tmsopt knows.
+        events: events to locate in addition to the built-in ones.
 
     Raises:
-        InputError: as `trace`, and where no point of the pattern is found.
+        InputError: as for `trace`, and if no point of the pattern is found.
 
     Example:
         >>> fast = tmsopt.Event("Fr is 3", lambda p: p["Fr"] - 3)
@@ -48,28 +48,27 @@ def continue_from(
     """
     if through is None and isinstance(problem, Solution):
         through = {name: problem.parameters[name] for name in problem.problem.free}
-    posed, own = locate_pattern(pose(problem), pattern), check_events(events)
+    problem_with_pattern, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
     designs = [] if through is None else [through]
-    check_options(posed, step, through=designs)
-    ready = prepare(posed)
-    for _, points in seeds(ready, 0 if designs else STARTS, 0, designs, []):
+    check_options(problem_with_pattern, step, through=designs)
+    traced = prepare_tracing(problem_with_pattern)
+    for _, points in find_seeds(traced, 0 if designs else STARTS, 0, designs, []):
         for y in points:
             try:
-                return Continuation(ready, CurvePoint(y, tangent_at(ready.on, y)), step, own)
-            except ValueError:  # no regular point of a curve
+                return Continuation(traced, CurvePoint(y, compute_tangent(traced.curve, y)), step, checked_events)
+            except ValueError:  # not a regular point of a curve
                 continue
     near = "near the design" if designs else "in the box"
-    raise input_error(f"no point of {posed.locate} found {near}; give another one to begin at", "through")
+    raise input_error(f"no point of {problem_with_pattern.locate} found {near}; give another point to begin at", "through")
 
 
 class Continuation(Iterator[BranchPoint]):
     """Iterator of the points of one curve, events located among them; `continue_from` makes it.
 
-    It ends where the curve leaves the box, closes or has no direction, and at an event that stops it. Stop before by
-    asking for no more points.
+    It ends where the curve leaves the box, closes or has no direction, and at an event that stops it.
 
     Attributes:
-        end: in words, why there are no more points; empty while there are.
+        end: why there are no more points, in words; empty while there are more.
 
     Example:
         >>> curve = tmsopt.continue_from("problems/ep_set.toml", step=0.02)
@@ -86,8 +85,8 @@ class Continuation(Iterator[BranchPoint]):
 
     end: str
 
-    def __init__(self, ready: Traced, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
-        self._ready, self._step, self._events = ready, step, events
+    def __init__(self, traced: TracedProblem, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
+        self._traced, self._step, self._events = traced, step, events
         self._sign, self._arclength, self._last, self.end = 1, 0.0, start, ""
         self._points = self._follow(start, fresh=True)
 
@@ -95,26 +94,28 @@ class Continuation(Iterator[BranchPoint]):
         return next(self._points)
 
     def reverse(self) -> None:
-        """Turn round at the last point: the next one lies behind it."""
+        """Turn around at the last point; the next one lies behind it."""
         self._sign, self.end = -self._sign, ""
         self._points = self._follow(CurvePoint(self._last.y, -self._last.t), fresh=False)
 
     def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
-        """Points from the next on, or from the start on where it is `fresh`; then it is said why there are no more."""
+        """Yield the points after a start, or from it if `fresh`; then set `end`."""
         behind = [start]
-        for new in follow(self._ready.on, start, self._step):
+        for new in follow(self._traced.curve, start, self._step):
             if isinstance(new, End):
-                self.end = describe_end(self._ready, new) or CLOSED
+                self.end = describe_end(self._traced, new) or CLOSED
                 return
             y, t = (np.array([getattr(p, name) for p in (*behind, new)]) for name in "yt")
-            walked, happened = find_events(self._ready, Walk(y, t, (End(""), End(""))), self._events)
-            branch, arclength = make_branch(self._ready, walked, happened), self._arclength
-            first = int(np.flatnonzero(np.all(walked.y == behind[-1].y, axis=1))[-1])
-            for row in range(first + (not fresh), len(walked.y)):
-                events = [event for at, event in happened if at == row]
-                again = len(behind) == 1 and np.abs(walked.y[row] - start.y).max() <= TOGETHER  # it turned round there
-                if (events and not again) or row == len(walked.y) - 1 or (fresh and row == first):
-                    self._last = CurvePoint(walked.y[row], walked.t[row])
+            walk, row_events = find_events(self._traced, Walk(y, t, (End(""), End(""))), self._events)
+            branch, arclength = make_branch(self._traced, walk, row_events), self._arclength
+            first = int(np.flatnonzero(np.all(walk.y == behind[-1].y, axis=1))[-1])
+            for row in range(first + (not fresh), len(walk.y)):
+                events = [event for at, event in row_events if at == row]
+                is_repeated = (
+                    len(behind) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
+                )  # it turned around there
+                if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
+                    self._last = CurvePoint(walk.y[row], walk.t[row])
                     self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])
                     yield BranchPoint(
                         table_at(branch.parameters, row),

@@ -2,7 +2,7 @@
 
 In two of the parameters, here chi_B and T = tan λ_s, the coefficients are affine. A double root r at a given value of
 the third, Fr, is then two linear equations p(r) = p′(r) = 0, so (Fr, r) parametrises the whole surface. It turns back
-where the root is triple (EP3) and meets itself where a second pair is double (2EP2); cut there, every patch is smooth.
+where the root is triple (EP3) and crosses itself where a second pair is double (2EP2). Cut there, patches are smooth.
 """
 
 from collections.abc import Iterable
@@ -21,23 +21,23 @@ from tmsopt.records import Array, Printable, plain
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.sign_tests import double_root_test
 from tmsopt.tracing.branch import EventPoint, Trace
-from tmsopt.tracing.equations import coefficients, design_at, limits_of
-from tmsopt.tracing.events import has_turned
-from tmsopt.tracing.solving import crossings
+from tmsopt.tracing.equations import compute_coefficients, design_at, limits_of
+from tmsopt.tracing.events import has_sign_change
+from tmsopt.tracing.solving import find_zeros
 from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]
-"""A double root and what is there: an edge of the surface, or of the box."""
+"""A double root and the kind of edge there: of the surface, or of the box."""
 
-Parts = tuple[Array, Array, Array]
+AffineCoefficients = tuple[Array, Array, Array]
 """Coefficients A, B, C of a polynomial A + x B + y C, where x and y are the last two variables."""
 
 _LEAST = 4  # degree
 
 _SCAN = 2000
 _SAME = 1e-12  # widths of the box
-_BESIDE = np.array([1e-7, 4e-5, 1e-4, 1e-3, 4e-3, 0.012])
-_AROUND = np.concatenate([-_BESIDE[::-1], _BESIDE])
+_OFFSETS = np.array([1e-7, 4e-5, 1e-4, 1e-3, 4e-3, 0.012])
+_AROUND = np.concatenate([-_OFFSETS[::-1], _OFFSETS])
 """Rows on either side of a value of Fr where the number of edges changes."""
 
 
@@ -90,11 +90,11 @@ def swallowtail(
     """The surface of real negative double roots in the box of three free parameters: one, and an affine pair.
 
     Args:
-        problem: with Fr, chi_B and lambda_s free, or three parameters of another model of which the coefficients
-            are affine in the last two (their tangents, for angles).
-        rows, across: points along the first parameter, and along r between two edges.
-        starts: of the traces of its edges; see `trace`.
-        progress: called with a `tmsopt.Progress` now and then.
+        problem: with Fr, chi_B and lambda_s free, or three parameters of another model whose coefficients are affine
+            in the last two (in their tangents, for angles).
+        rows, across: number of points along the first parameter, and along r between two edges.
+        starts: starts of the traces of its edges; see `trace`.
+        progress: function called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for another number of free parameters, coefficients that are not affine in two of them, or a
@@ -110,114 +110,119 @@ def swallowtail(
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
     if plane.model.degree < _LEAST:
         message = (
-            f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_LEAST} or more, for a "
-            "swallowtail crosses itself where two double roots stand side by side; trace EP2 and EP3 instead"
+            f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_LEAST} or more, since a "
+            "swallowtail crosses itself at two double roots; trace EP2 and EP3 instead"
         )
         raise input_error(message, "model")
     if len(plane.free) != 3:
-        raise input_error(f"a surface takes three free parameters, and {len(plane.free)} are free", "parameters")
+        raise input_error(f"found {len(plane.free)} free parameters; accepted: 3 for a surface", "parameters")
     first, *pair = plane.free
     if not _is_affine(plane):
-        message = f"the coefficients are not affine in {' and '.join(pair)}; put two in which they are last"
+        message = f"the coefficients are not affine in {' and '.join(pair)}; list two last in which they are"
         raise input_error(message, "parameters")
     cusps, crossing = (trace(plane, name, starts=starts, progress=progress) for name in ("EP3", "2EP2"))
-    grid = _rows(plane, rows, (*cusps.events, *crossing.events))
+    grid = _choose_rows(plane, rows, (*cusps.events, *crossing.events))
     scan = np.union1d(
         -np.geomspace(1e3, 1e-3, _SCAN), [b.unknowns["r"][e.index] for b in cusps.branches for e in b.events]
     )
     cuts, steps = [], start_steps(progress, "cutting the surface", "row")
     for done, value in enumerate(grid.tolist(), 1):
-        cuts.append(_cuts(plane, value, scan[scan < 0]))
+        cuts.append(_find_cuts(plane, value, scan[scan < 0]))
         if steps:
             steps(done, len(grid))
     patches = []
-    # Neighbouring rows with the same cuts in the same order belong to one set of patches.
+    # neighbouring rows with the same cuts form one set of patches
     for _, run in groupby(range(len(grid)), key=lambda k: [[kind for _, kind in interval] for interval in cuts[k]]):
         inside = list(run)
         for intervals in zip(*(cuts[k] for k in inside), strict=True) if len(inside) > 1 else ():
             table = np.array([[r for r, _ in interval] for interval in intervals])
-            patches += [_patch(plane, grid[inside], left, right, across) for left, right in pairwise(table.T)]
+            patches += [_make_patch(plane, grid[inside], left, right, across) for left, right in pairwise(table.T)]
     return Swallowtail(plane.problem, (first, pair[0], pair[1]), tuple(patches), cusps, crossing)
 
 
-def _rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Array:
-    """Values of the first parameter: evenly spaced, and around each at which the number of edges changes."""
+def _choose_rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Array:
+    """Values of the first parameter: evenly spaced, with extra ones around each change of the number of edges."""
     name, (low, high) = next(iter(problem.free.items()))
     changes = [
         e.parameters[name] + _AROUND for e in events if e.name == "EP4" or (e.name == "fold" and name in e.detail)
     ]
     grid = np.unique(np.concatenate([np.linspace(low, high, count), *changes]))
     grid = grid[(grid >= low) & (grid <= high)]
-    return np.asarray(grid[np.append(True, np.diff(grid) > _SAME * (high - low))])  # an EP4 is on every edge
+    return np.asarray(
+        grid[np.append(True, np.diff(grid) > _SAME * (high - low))]
+    )  # an EP4 is an event of several traces
 
 
-def _polynomials(problem: Posed, x: Any) -> Array:
-    """Coefficients at variables x, tangents for angles, shape (designs, 3)."""
-    return coefficients(problem, design_at(problem, np.asarray(x)))
+def _compute_polynomials(problem: Posed, x: Any) -> Array:
+    """Coefficients at variables x, tangents for angles, shape (designs, n + 1)."""
+    return compute_coefficients(problem, design_at(problem, np.asarray(x)))
 
 
-def _parts(problem: Posed, first: float) -> Parts:
-    constant, one, other = _polynomials(problem, [(first, 0.0, 0.0), (first, 1.0, 0.0), (first, 0.0, 1.0)])
+def _split_affine(problem: Posed, first: float) -> AffineCoefficients:
+    constant, one, other = _compute_polynomials(problem, [(first, 0.0, 0.0), (first, 1.0, 0.0), (first, 0.0, 1.0)])
     return constant, one - constant, other - constant
 
 
 def _is_affine(problem: Posed) -> bool:
     first = float(np.mean(next(iter(problem.free.values()))))
-    A, B, C = _parts(problem, first)
+    A, B, C = _split_affine(problem, first)
     predicted = np.array([A + 2 * B + 3 * C, A - B + C / 2])
-    found = _polynomials(problem, [(first, 2.0, 3.0), (first, -1.0, 0.5)])
+    found = _compute_polynomials(problem, [(first, 2.0, 3.0), (first, -1.0, 0.5)])
     return bool(np.all(np.abs(found - predicted) <= 1e-9 * np.abs(predicted).max(axis=1, keepdims=True)))
 
 
-def _on_surface(parts: Parts, r: Array) -> tuple[Array, Array]:
+def _solve_double_root(affine: AffineCoefficients, r: Array) -> tuple[Array, Array]:
     """x and y for which r is a double root: p(r) = p′(r) = 0 by Cramer's rule."""
-    (A, B, C), (dA, dB, dC) = ([np.polyval(p, r) for p in parts], [np.polyval(np.polyder(p), r) for p in parts])
+    (A, B, C), (dA, dB, dC) = ([np.polyval(p, r) for p in affine], [np.polyval(np.polyder(p), r) for p in affine])
     with np.errstate(all="ignore"):
         size = B * dC - C * dB
         return (C * dA - A * dC) / size, (A * dB - B * dA) / size
 
 
-def _cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
-    """For each interval of r inside the box, ascending: its ends, and the edges between them; `scan` has values of r.
+def _find_cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
+    """For each interval of r inside the box, ascending: its ends and the edges between them; `scan` holds values of r.
 
-    Edges are zeros along r: of the slack to the box, of the other roots' polynomial at r (EP3), of its discriminant.
+    Edges are zeros along r of the slack to the box, of the other roots' polynomial at r (EP3), and of its
+    discriminant (2EP2).
     """
-    parts, (low, high) = _parts(problem, first), (limit[1:, None] for limit in limits_of(problem))
+    affine, (low, high) = _split_affine(problem, first), (limit[1:, None] for limit in limits_of(problem))
 
     def tests(r: Array) -> list[Array]:
-        x = np.stack(_on_surface(parts, r))
+        x = np.stack(_solve_double_root(affine, r))
         least = np.min(np.minimum(x - low, high - x) / (high - low), axis=0)
-        rest = _divided(_divided(parts[0][:, None] + np.tensordot(np.stack(parts[1:]), x, (0, 0)), r), r)
+        rest = _divide(_divide(affine[0][:, None] + np.tensordot(np.stack(affine[1:]), x, (0, 0)), r), r)
         return [np.where(np.isfinite(least), least, -1.0), np.polyval(rest, r), double_root_test(list(rest))]
 
     cuts: list[Cut] = []
     values = tests(scan)
     for k, kind in enumerate(("box", "EP3", "2EP2")):
-        rows = np.flatnonzero(has_turned(values[k]))
+        rows = np.flatnonzero(has_sign_change(values[k]))
         value = partial(lambda k, here, s: tests(here + s)[k], k, scan[rows])
-        cuts += [(float(r), kind) for r in scan[rows] + crossings(value, np.diff(scan)[rows])]
+        cuts += [(float(r), kind) for r in scan[rows] + find_zeros(value, np.diff(scan)[rows])]
     ends = [r for r in (scan[0], scan[-1]) if values[0][r == scan][0] > 0]
     cuts = sorted([*cuts, *((float(r), "box") for r in ends)])
     boxes = [k for k, (_, kind) in enumerate(cuts) if kind == "box"]
     return [cuts[i : j + 1] for i, j in zip(boxes[::2], boxes[1::2], strict=True)]
 
 
-def _divided(p: Array, r: Array) -> Array:
-    """Quotient of polynomials by s − r, coefficients first: Horner's rule."""
+def _divide(p: Array, r: Array) -> Array:
+    """Quotients of polynomials by s − r, coefficients first, by Horner's rule."""
     rows = [p[0]]
     for row in p[1:-1]:
         rows.append(row + rows[-1] * r)
     return np.stack(rows)
 
 
-def _patch(problem: Posed, grid: Array, left: Array, right: Array, across: int) -> Patch:
+def _make_patch(problem: Posed, grid: Array, left: Array, right: Array, across: int) -> Patch:
     share = (1 - np.cos(np.linspace(0, np.pi, across))) / 2  # crowds at the edges, where the surface turns
     r = left[:, None] + (right - left)[:, None] * share
-    pairs = [_on_surface(_parts(problem, first), row) for first, row in zip(grid.tolist(), r, strict=True)]
+    pairs = [
+        _solve_double_root(_split_affine(problem, first), row) for first, row in zip(grid.tolist(), r, strict=True)
+    ]
     x = np.stack([np.broadcast_to(grid[:, None], r.shape), *np.array(pairs).transpose(1, 0, 2)], axis=-1)
     points = design_at(problem, x.reshape(-1, 3))
     middle = len(grid) // 2, across // 2
-    p, root = _polynomials(problem, [x[middle]])[0], r[middle]
+    p, root = _compute_polynomials(problem, [x[middle]])[0], r[middle]
     quotient = np.polydiv(p, np.array([1.0, -2 * root, root * root]))[0]  # by (s − r)²: the other roots
-    damped = bool(is_stable(quotient) and real_roots(quotient)[0] == len(quotient) - 1)
-    return Patch({n: column.reshape(r.shape) for n, column in points.items()}, r, damped)
+    heavily_damped = bool(is_stable(quotient) and real_roots(quotient)[0] == len(quotient) - 1)
+    return Patch({n: column.reshape(r.shape) for n, column in points.items()}, r, heavily_damped)

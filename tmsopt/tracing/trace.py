@@ -27,10 +27,10 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.continuation import Walk
-from tmsopt.tracing.description import describe
-from tmsopt.tracing.equations import prepare
+from tmsopt.tracing.description import make_branches
+from tmsopt.tracing.equations import prepare_tracing
 from tmsopt.tracing.events import Event, check_events
-from tmsopt.tracing.seeds import beyond_infinity, missed, seeds, walk_new
+from tmsopt.tracing.seeds import find_beyond_infinity, find_missed, find_seeds, walk_new_curves
 
 STARTS = 48
 STEP = 0.005
@@ -49,22 +49,22 @@ def trace(
     events: Sequence[Event] = (),
     progress: Listener | None = None,
 ) -> Trace:
-    """Every branch of a pattern in the box of the free parameters, one more of which is free than the pattern ties.
+    """Every branch of a pattern in the box; one more parameter must be free than the pattern has conditions.
 
     Args:
         pattern: name; by default the one that the problem locates.
         step: longest step, in widths of the box.
-        starts: designs from which branches are looked for. With two free parameters and one condition (EP2, weave,
-            capsize) a grid of 256 × 256 designs, of 96 × 96 above degree 4, shows what they missed; otherwise the
-            search ends when so many in a row find nothing new, and a branch far from all of them can be missed.
-        most: points of a branch in one direction.
-        through: designs (values of every free parameter, in the box) to begin at, before the others.
-        events: what to look for along the branches, besides the events that tmsopt knows.
-        progress: called with a `tmsopt.Progress` now and then.
+        starts: number of designs from which branches are searched. With two free parameters and one condition (EP2,
+            weave, capsize) a grid of 256 × 256 designs, 96 × 96 above degree 4, finds those they missed. Otherwise
+            the search ends when this many in a row find nothing new; a branch far from all of them can be missed.
+        most: largest number of points of a branch in one direction.
+        through: points in the box (values of every free parameter) to begin at, before the others.
+        events: events to locate in addition to the built-in ones.
+        progress: function called with a `tmsopt.Progress` now and then.
 
     Raises:
-        InputError: for an unknown pattern, when the equations do not leave a curve, for options out of range, or where
-            the function of an event raises or gives no finite number.
+        InputError: for an unknown pattern, equations that do not leave a curve, options out of range, or an event whose
+            function raises or returns no finite number.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # EP2 where c² = 4 k
@@ -74,38 +74,44 @@ def trace(
 
     More: docs/how_to/tracing.md
     """
-    began = time.perf_counter()
-    problem, own = locate_pattern(pose(problem), pattern), check_events(events)
+    started = time.perf_counter()
+    problem, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
     counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _FEWEST, None)
     check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
-    ready = prepare(problem)
+    traced = prepare_tracing(problem)
     walks: list[Walk] = []
     tried = 0
 
     def points() -> Iterator[list[Array]]:
         nonlocal tried
-        for source in (seeds(ready, starts, seed, through, walks), missed(ready, walks), beyond_infinity(ready, walks)):
+        for source in (
+            find_seeds(traced, starts, seed, through, walks),
+            find_missed(traced, walks),
+            find_beyond_infinity(traced, walks),
+        ):
             for count, found in source:
                 tried = max(tried, count)
                 if steps:
                     steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
                 yield found
 
-    walk_new(ready.on, points(), (step, most), walks)
-    with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
-        branches = [b for w in walks for b in describe(ready, w, own) if b.residual <= _MET]  # not where it is nan
+    walk_new_curves(traced.curve, points(), (step, most), walks)
+    with np.errstate(all="ignore"):  # values near infinity may not be finite
+        branches = [
+            b for w in walks for b in make_branches(traced, w, checked_events) if b.residual <= _FITTING
+        ]  # never for nan
     branches.sort(key=lambda b: -float(b.arclength[-1]))
-    seconds = time.perf_counter() - began
+    seconds = time.perf_counter() - started
     return Trace(problem.problem, str(problem.locate), tuple(branches), tried, seconds, sum(w.seconds for w in walks))
 
 
 def locate_pattern(problem: Posed, name: str | None) -> Posed:
-    """The problem with the pattern as its only question, checked to leave a curve."""
+    """The problem with the pattern as its only objective, checked to leave one degree of freedom."""
     name = name or problem.locate
     names = patterns_of(problem.model)
     if name is None:
-        message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(names)}"
+        message = f"no pattern to trace; name one, or set locate in the problem. accepted: {' '.join(names)}"
         raise input_error(message, "objective", "locate")
     try:
         name = pattern_of(problem.model, str(name)).name
@@ -113,8 +119,8 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
         why = "" if str(error).endswith("is no pattern") else f": {error}"
         message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
         raise input_error(message, "objective", "locate") from error
-    asked = problem.derive(locate=name, minimize=None, maximize=None)
-    count = degrees_of_freedom(asked)
+    question = problem.derive(locate=name, minimize=None, maximize=None)
+    count = degrees_of_freedom(question)
     if count.count != 1:
         free, needed = ", ".join(problem.free) or "none", count.conditions + 1
         advice = (
@@ -124,11 +130,11 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
         )
         conditions = f"{count.conditions} condition{'s' * (count.conditions != 1)}"
         message = (
-            f"a curve of {name} takes {needed} free parameters ({conditions} and one to move along), "
-            f"and {count.free} {'is' if count.free == 1 else 'are'} free ({free}); {advice}"
+            f"a curve of {name} needs {needed} free parameters ({conditions} and one to move along), "
+            f"found {count.free} ({free}); {advice}"
         )
         raise input_error(message, "parameters")
-    return asked
+    return question
 
 
 def check_options(
@@ -138,7 +144,7 @@ def check_options(
     through: Any = (),
     progress: Any = None,
 ) -> None:
-    """What is wrong with options: counts by name, value, least and most.
+    """Check options: counts by name, value, least and most.
 
     Raises:
         InputError: with all faults.
@@ -163,8 +169,8 @@ def check_options(
 
 
 STEPS = (1e-6, 0.1)
-"""Least and greatest longest step."""
+"""Smallest and largest `step`."""
 
 _DESIGN = "{'Fr': 1.2, 'mu': 0.1}"
 _FEWEST = 4  # points that make a curve with tangents
-_MET = 1e-3  # mismatch of the coefficients beyond which a curve is none of the pattern
+_FITTING = 1e-3  # largest mismatch of the coefficients on a curve of the pattern

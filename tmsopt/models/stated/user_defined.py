@@ -12,7 +12,16 @@ import flint
 import numpy as np
 
 from tmsopt.algebra.balls import DIGITS
-from tmsopt.algebra.formula import Formula, Node, UnsupportedOperation, constant, fold, formula, nodes_from_casadi, symbol
+from tmsopt.algebra.formula import (
+    Formula,
+    Node,
+    UnsupportedOperation,
+    constant,
+    fold,
+    formula,
+    nodes_from_casadi,
+    symbol,
+)
 from tmsopt.algebra.identity import Field
 from tmsopt.algebra.kinds import BALLS, NODES, values
 from tmsopt.errors import short

@@ -6,7 +6,7 @@ from dataclasses import replace
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.verdict.meetings import nearest_crossing
-from tmsopt.program.formulate import formulate, middle
+from tmsopt.program.formulate import default_start, formulate
 from tmsopt.progress import begin
 from tmsopt.search.outcome import (
     Outcome,
@@ -34,7 +34,7 @@ def explain_infeasible(problem: Posed, states: Sequence[SearchState], policy: Po
     begin(options.progress, "searching for the smallest change of limits", "start")
     designs = [design for state in states for design in state.designs]
     relaxation = relax(problem, options, designs)
-    design = clip_to_box(problem, relaxation.parameters if relaxation else middle(problem))
+    design = clip_to_box(problem, relaxation.parameters if relaxation else default_start(problem))
     none = f"none of {tried} starts"
     if relaxation is None or relaxation.amounts:
         status, note = "infeasible", f"{none} satisfies all constraints"

@@ -17,7 +17,7 @@ from tmsopt.problem.advice.remedies import Relaxation
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import formulate
-from tmsopt.program.nlp import NLP, AddedVariable, name_of
+from tmsopt.program.nlp import NLP, AddedVariable, variable_name
 from tmsopt.program.options import Options
 from tmsopt.records import Table
 from tmsopt.search.policy import disable_stopping, run_nested
@@ -287,7 +287,7 @@ def _build_elastic_program(wide: Posed, cases: Sequence[Case], limits: Sequence[
     """Minimise Σ slack/scale with each limit moved by its slack, all others kept."""
     nlp = formulate(wide, cases, elastic=True)
     names = [limit.name for limit in limits]
-    inputs = [symbol(name_of(k)) for k in range(len(nlp.variables) + len(limits))]
+    inputs = [symbol(variable_name(k)) for k in range(len(nlp.variables) + len(limits))]
     x, slack = inputs[: len(nlp.variables)], inputs[len(nlp.variables) :]
     _, *g = fold(nlp.formula, {n: symbol(n) for n in nlp.formula.names}, NODES)
     rows: list[tuple[str, Any, float, float]] = []

@@ -1,4 +1,4 @@
-"""A design, the weights of changes to it, and the polynomials around it."""
+"""A design, the weights of its changes, and the polynomials around it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from tmsopt.boundaries.axis import edges_at
-from tmsopt.boundaries.boundaries import terms
+from tmsopt.boundaries.boundaries import measure_terms
 from tmsopt.errors import Fault, InputError, is_number, suggest
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
 from tmsopt.records import Array, Numbers
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
-_NOTHING = 1e-12  # of a free parameter's range: what is smaller is 0 but for rounding
-_OPEN = 1e-6  # of the size of the parameter: how near an end that its range excludes it may come
+_NOTHING = 1e-12  # of a free parameter's range: a smaller value counts as 0
+_OPEN = 1e-6  # of the size of the parameter: smallest distance from an end that its range excludes
 
 
 @dataclass(frozen=True)
@@ -25,21 +25,21 @@ class WeightedDesign:
 
     Attributes:
         parameters: every parameter of the problem's set.
-        weights: parameter → change that counts as 1; the others stay.
+        weights: parameter → change that counts as 1; parameters without weight stay fixed.
     """
 
     problem: Posed
     parameters: Numbers
     weights: Numbers
 
-    def displaced(self, u: Any) -> dict[str, Any]:
+    def displace(self, u: Any) -> dict[str, Any]:
         """Every parameter for displacements: one number, array or symbol per weight."""
-        moved = {n: self.parameters[n] + weight * u[k] for k, (n, weight) in enumerate(self.weights.items())}
-        return {**self.parameters, **moved}
+        displaced = {n: self.parameters[n] + weight * u[k] for k, (n, weight) in enumerate(self.weights.items())}
+        return {**self.parameters, **displaced}
 
     def design(self, u: Array) -> dict[str, float]:
-        """The parameters at a displacement; one at the end of its range is exactly there."""
-        at = self.displaced(u)
+        """The parameters at a displacement, inside their ranges and exactly at an end that is reached."""
+        at = self.displace(u)
         for k, n in enumerate(self.weights):
             r = self.problem.parameter_set[n].range
             at[n] = min(max(float(at[n]), r.lower), r.upper)
@@ -54,12 +54,12 @@ class WeightedDesign:
 
     @cached_property
     def upper(self) -> Array:
-        """Displacements to their upper ends."""
+        """Displacements to the upper ends."""
         return self._ends[:, 1]
 
     @cached_property
     def _ends(self) -> Array:
-        """A little inside a range that excludes its ends."""
+        """Displacements to the ends, slightly inside a range that excludes them."""
         found = []
         for n, weight in self.weights.items():
             allowed, value = self.problem.parameter_set[n].range, self.parameters[n]
@@ -68,116 +68,118 @@ class WeightedDesign:
             found.append((min(ends[0], 0.0), max(ends[1], 0.0)))
         return np.array(found)
 
-    def along(self, directions: Array, t: Array) -> Array:
-        """Displacements t · direction, inside the ranges."""
+    def clip_rays(self, directions: Array, t: Array) -> Array:
+        """Displacements t · direction, clipped to the ranges."""
         return np.clip(t[..., None] * directions, self.lower, self.upper)
 
     def coefficients(self, u: Array) -> Array:
         """Displacements of shape (…, n) → coefficients of shape (…, degree + 1).
 
-        In the unit of time and the size in which the design's own are near 1.
+        Time and size are scaled so that the coefficients of the design itself are near 1.
         """
         with np.errstate(all="ignore"):
-            a = self.problem.model.coefficients(self.displaced(np.moveaxis(u, -1, 0)), self.problem.parameter_set)
+            a = self.problem.model.coefficients(self.displace(np.moveaxis(u, -1, 0)), self.problem.parameter_set)
             return np.stack(np.broadcast_arrays(*a, u[..., 0])[:-1], axis=-1) / self.scale
 
     @cached_property
     def stable(self) -> bool:
         """Whether all roots are left of the imaginary axis."""
-        return bool(is_stable(self._own))
+        return bool(is_stable(self._scaled))
 
     @cached_property
-    def stands_on(self) -> tuple[str, ...]:
-        """The boundaries of stability that the design is on as far as rounding tells."""
+    def edges(self) -> tuple[str, ...]:
+        """The stability boundaries that the design is on up to rounding."""
         return edges_at(self.problem, self.parameters)
 
     @cached_property
     def heavily_damped(self) -> bool:
         """Whether all roots are real and negative, multiple ones included."""
-        degree = len(self._own) - 1
-        return self.on_edge or bool(self._own[0] != 0 and real_roots(self._own)[0] == degree)
+        degree = len(self._scaled) - 1
+        return self.is_on_damping_edge or bool(self._scaled[0] != 0 and real_roots(self._scaled)[0] == degree)
 
     @cached_property
-    def on_edge(self) -> bool:
-        """Whether all roots are real and negative and two of them equal, decided by coefficients."""
-        if self._own[0] == 0 or not self.stable:
+    def is_on_damping_edge(self) -> bool:
+        """Whether all roots are real and negative and two are equal, decided by coefficients."""
+        if self._scaled[0] == 0 or not self.stable:
             return False
-        found = multiple_real_roots(self._own, STRUCTURE_TOLERANCE)
+        found = multiple_real_roots(self._scaled, STRUCTURE_TOLERANCE)
         return found is not None and all(r.re < 0 for r in found)
 
     @cached_property
     def sizes(self) -> Array:
-        """Size of the terms of each coefficient: an equation between coefficients is judged by it."""
-        return terms(self._own) if self._own.any() else np.ones(len(self._own))
+        """Size of the terms of each coefficient, by which equations between coefficients are judged."""
+        return measure_terms(self._scaled) if self._scaled.any() else np.ones(len(self._scaled))
 
     @cached_property
-    def _own(self) -> Array:
-        return self._unscaled / self.scale
+    def _scaled(self) -> Array:
+        return self._raw / self.scale
 
     @cached_property
     def scale(self) -> Array:
-        """Size of each coefficient in that unit of time."""
-        a = self._unscaled
+        """Size of each coefficient in the design's unit of time."""
+        a = self._raw
         unit = abs(a[-1] / a[0]) ** (1 / (len(a) - 1)) if a[0] and a[-1] else 1.0
         powers = unit ** np.arange(len(a))
         return np.asarray(powers * (float(np.abs(a / powers).max()) or 1.0))
 
     @cached_property
-    def _unscaled(self) -> Array:
+    def _raw(self) -> Array:
         return np.array(self.problem.model.coefficients(self.parameters, self.problem.parameter_set), dtype=float)
 
 
-def placed(problem: Posed, parameters: Numbers, weights: Numbers | None) -> WeightedDesign:
+def weight_design(problem: Posed, parameters: Numbers, weights: Numbers | None) -> WeightedDesign:
     """A design with checked parameters and weights.
 
     Raises:
-        InputError: listing everything that is wrong.
+        InputError: with all faults.
     """
     faults = [*parameter_faults(problem, parameters)]
     faults += [] if weights is None else _weight_faults(problem, weights)
     if faults:
         raise InputError(faults)
     own = {n: float(parameters[n]) for n in problem.parameter_set.names}
-    given = relative(problem, own) if weights is None else weights
+    given = default_weights(problem, own) if weights is None else weights
     return WeightedDesign(problem, own, {n: float(given[n]) for n in own if given.get(n, 0.0) > 0})
 
 
-def relative(problem: Posed, parameters: Numbers) -> dict[str, float]:
-    """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, 1 without one."""
-    of = problem.parameter_set
+def default_weights(problem: Posed, parameters: Numbers) -> dict[str, float]:
+    """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, else 1."""
+    parameter_set = problem.parameter_set
     weights = {}
     widths = {n: high - low for n, (low, high) in problem.free.items()}
     sizes = {n: abs(x) if abs(x) > _NOTHING * widths.get(n, 0.0) else 0.0 for n, x in parameters.items()}
-    for p in (p for p in of.parameters if p.may_change(sizes[p.name])):
-        alike = [sizes[q.name] for q in of.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
+    for p in (p for p in parameter_set.parameters if p.may_change(sizes[p.name])):
+        alike = [sizes[q.name] for q in parameter_set.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
         weights[p.name] = sizes[p.name] or max(alike, default=0.0) or 1.0
     return weights
 
 
 def parameter_faults(problem: Posed, parameters: Numbers) -> Iterator[Fault]:
-    """What is wrong with the parameters of a design."""
-    of = problem.parameter_set
+    """Faults in the parameters of a design."""
+    parameter_set = problem.parameter_set
     for name in parameters:
-        if name not in of.names:
-            yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameters", name))
-    for name in of.names:
+        if name not in parameter_set.names:
+            yield Fault(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", ("parameters", name))
+    for name in parameter_set.names:
         key = ("parameters", name)
         if name not in parameters:
             yield Fault("missing; give a value for every parameter", key)
         elif not is_number(parameters[name]):
             yield Fault(f"found {parameters[name]!r}; accepted: a finite number", key)
-        elif parameters[name] not in of[name].range:
-            yield Fault(f"found {parameters[name]:.6g}; {of[name].meaning} is {of[name].range}", key)
+        elif parameters[name] not in parameter_set[name].range:
+            yield Fault(
+                f"found {parameters[name]:.6g}; {parameter_set[name].meaning} is {parameter_set[name].range}", key
+            )
 
 
 def _weight_faults(problem: Posed, weights: Numbers) -> Iterator[Fault]:
-    of = problem.parameter_set
+    parameter_set = problem.parameter_set
     for name, weight in weights.items():
         key = ("weights", name)
-        if name not in of.names:
-            yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", key)
+        if name not in parameter_set.names:
+            yield Fault(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", key)
         elif not is_number(weight) or weight < 0:
-            yield Fault(f"found {weight!r}; accepted: a number above 0, or 0 for a parameter that stays", key)
+            yield Fault(f"found {weight!r}; accepted: a number above 0, or 0 for a parameter that stays fixed", key)
     if not any(is_number(w) and w > 0 for w in weights.values()):
-        message = f"no weight is above 0; give one to a parameter that may change: {' '.join(of.names)}"
+        message = f"no weight is above 0; give a positive weight to at least one of: {' '.join(parameter_set.names)}"
         yield Fault(message, ("weights",))

@@ -1,4 +1,4 @@
-"""The box of a problem as a unit cube, in which designs are drawn and told apart."""
+"""The box of a problem scaled to a unit cube, in which designs are drawn and compared."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 
-_STEEP = 7.0  # half of the scale beside zero sees the inner 3 % of a range, its inner tenth the inner 2e-3
-_DECADES = 100.0  # ratio of the ends of a range beyond which its values are spread by their logarithms
+_STEEP = 7.0  # the inner half of the scale near 0 covers 3 % of a range, its inner tenth 2e-3
+_DECADES = 100.0  # ratio of the ends of a range above which its scale is logarithmic
 
 
 @dataclass(frozen=True)
-class Cube:
-    """The box of a problem as a unit cube: tangents and, over decades, logarithms evenly spread."""
+class UnitBox:
+    """The box of a problem as a unit cube; angles scale by their tangent, ranges over decades by their logarithm."""
 
     problem: Posed
 
@@ -42,29 +42,29 @@ class Cube:
             found.append((x - lower) / (upper - lower))
         return np.asarray(np.clip(found, 0.0, 1.0))
 
-    def even(self, u: Array) -> tuple[Array, Array]:
-        """Points on a scale between the cube's own and x = b sinh(c y)/sinh(c), which sees values beside zero.
+    def even_near_zero(self, u: Array) -> tuple[Array, Array]:
+        """Move points to a scale that resolves values near 0, and return the slopes of that map.
 
-        And its slopes there.
+        The scale is halfway between the cube's own and x = b sinh(c y)/sinh(c).
         """
         rows, size, ends = self._zeros
-        moved, slopes = u.copy(), np.ones_like(u)
+        changed, slopes = u.copy(), np.ones_like(u)
         x = (self._ends[2] + self._ends[3] * u)[..., rows]
-        moved[..., rows] = (u[..., rows] + (np.arcsinh(x / size) - ends[0]) / (ends[1] - ends[0])) / 2
+        changed[..., rows] = (u[..., rows] + (np.arcsinh(x / size) - ends[0]) / (ends[1] - ends[0])) / 2
         slopes[..., rows] = (1 + self._ends[3][rows] / np.hypot(x, size) / (ends[1] - ends[0])) / 2
-        return np.clip(moved, 0.0, 1.0), slopes
+        return np.clip(changed, 0.0, 1.0), slopes
 
-    def drawn_beside_zero(self, u: Array) -> Array:
-        """Points that are as even on the scale x = b sinh(c y)/sinh(c) as `u` in the cube, in ranges with 0 in them."""
+    def sample_near_zero(self, u: Array) -> Array:
+        """Spread points along x = b sinh(c y)/sinh(c) in each range that contains 0."""
         rows, size, ends = self._zeros
-        moved = u.copy()
+        changed = u.copy()
         x = size * np.sinh(ends[0] + (ends[1] - ends[0]) * u[..., rows])
-        moved[..., rows] = np.clip((x - self._ends[2][rows]) / self._ends[3][rows], 0.0, 1.0)
-        return moved
+        changed[..., rows] = np.clip((x - self._ends[2][rows]) / self._ends[3][rows], 0.0, 1.0)
+        return changed
 
     @cached_property
     def _zeros(self) -> tuple[NDArray[np.int_], Array, Array]:
-        """Which parameters have 0 in their range; the unit of their scale, and its ends, shape (2, number)."""
+        """Parameters whose range contains 0; the unit of their scale, and its ends, shape (2, number)."""
         plain = np.array([stretch is np.positive for stretch, _ in self._scales], dtype=bool)
         rows = np.flatnonzero(plain & (self._ends[0] <= 0) & (self._ends[1] >= 0))
         ends = self._ends[:2][:, rows]
@@ -73,14 +73,14 @@ class Cube:
 
     @cached_property
     def _ends(self) -> Array:
-        """Lower and upper ends; the lower ones and the widths, stretched. Shape (4, size)."""
+        """Lower and upper ends; the scaled lower ends and widths. Shape (4, size)."""
         plain = np.array([*self.problem.free.values()]).reshape(-1, 2)
         ends = np.array([stretch(e) for (stretch, _), e in zip(self._scales, plain, strict=True)]).reshape(-1, 2)
         return np.stack([*plain.T, ends[:, 0], ends[:, 1] - ends[:, 0]])
 
     @cached_property
     def _scales(self) -> list[tuple[np.ufunc, np.ufunc]]:
-        """For each parameter the function that spreads its values evenly, and the inverse."""
+        """For each parameter, the function that spreads its values evenly, and the inverse."""
         scales = list[tuple[np.ufunc, np.ufunc]]()
         for name, (lower, upper) in self.problem.free.items():
             if self.problem.parameter_set[name].tangent:

@@ -11,7 +11,7 @@ import tmsopt
 from tmsopt.evaluation import recheck
 from tmsopt.models import from_coefficients
 
-judgement = import_module("tmsopt.program.judgement")
+design_scores = import_module("tmsopt.program.design_scores")
 rechecking = import_module("tmsopt.evaluation.recheck")
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
@@ -42,7 +42,7 @@ def problem(**asked):
 
 
 def judged(stated, drawn):
-    return judgement.judge(stated, {n: np.array([d[n] for d in drawn]) for n in stated.free})
+    return design_scores.score_designs(stated, {n: np.array([d[n] for d in drawn]) for n in stated.free})
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_
         minimize="abscissa + x",
         constraints={"decay": "abscissa <= -0.5", "own": "x == 4", "all": "x - y >= 2"},
     ).posed
-    found = judgement.judge(stated, {"x": np.array([3.0, 4.0, 6.0])})
+    found = design_scores.score_designs(stated, {"x": np.array([3.0, 4.0, 6.0])})
     # The objective: x is 1 more at worst, beside the worst abscissa.
     assert found.worth == pytest.approx([4.0, 4.0, 4.0], abs=1e-12)
     assert found.excess == pytest.approx(np.array([[0.5, 0, 0], [1.0, 0, 2.0], [2.0, 1.0, 0]]), abs=1e-12)
@@ -95,7 +95,9 @@ def test_of_an_equality_the_difference_alone_counts():
     """Of s² + x s − 1, one root of which is positive, the damping ratio is −1 whatever x is; no abscissa is added."""
     model = from_coefficients([1, x, -1])
     stated = tmsopt.Problem(model, free={"x": (0.0, 1.0)}, constraints={"flat": "0.3 == damping_ratio"}).posed
-    assert judgement.judge(stated, {"x": np.array([0.0, 0.5])}).beyond[0] == pytest.approx([1.3, 1.3], abs=1e-12)
+    assert design_scores.score_designs(stated, {"x": np.array([0.0, 0.5])}).beyond[0] == pytest.approx(
+        [1.3, 1.3], abs=1e-12
+    )
 
 
 def test_a_design_without_motion_is_none():
@@ -104,7 +106,9 @@ def test_a_design_without_motion_is_none():
     stated = tmsopt.Problem(
         model, free={"x": (-1.0, 1.0), "y": (0.0, 1.0)}, minimize="x", constraints={"own": "y <= 2"}
     ).posed
-    found = judgement.judge(stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])})
+    found = design_scores.score_designs(
+        stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])}
+    )
     assert np.isfinite(found.worth).tolist() == [False, False, True, False]
     assert found.excess.tolist() == [[np.inf, np.inf, 0.0, np.inf]]
     assert set(recheck(stated, {"x": 0.0, "y": 1.0}).violations) == {"a0"}
