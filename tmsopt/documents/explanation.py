@@ -7,8 +7,8 @@ from itertools import takewhile
 from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, Response
 from tmsopt.analysis.diagnosis import Diagnosis
 from tmsopt.analysis.explain import Explanation
-from tmsopt.analysis.optimality import OnLine, Optimality
-from tmsopt.analysis.rounding import ALONE, Rounded
+from tmsopt.analysis.optimality import Optimality, RightmostRoot
+from tmsopt.analysis.rounding import ALONE, RoundedDesign
 from tmsopt.analysis.splitting import DEVIATION, Law
 from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Sentence, TableBlock, count_of
 from tmsopt.documents.design_rows import frequency_of, times_of
@@ -78,25 +78,25 @@ def rounding_line(found: Explanation) -> str:
     return f"{'; '.join(parts)}{needs}"
 
 
-def _is_kept(row: Rounded, found: Explanation) -> bool:
+def _is_kept(row: RoundedDesign, found: Explanation) -> bool:
     return _is_near(row, found) and not row.violations
 
 
-def _is_near(row: Rounded, found: Explanation) -> bool:
+def _is_near(row: RoundedDesign, found: Explanation) -> bool:
     """Whether decay and objective are about what they were."""
     good = row.loss <= max(_SHARE * abs(found.abscissa), _NIL)
     off = abs(row.objective - found.value)  # nan where none was asked, or it takes a search
     return good and not off > max(_SHARE * abs(found.value), _NIL)
 
 
-def _benefit(row: Rounded, found: Explanation) -> str:
+def _benefit(row: RoundedDesign, found: Explanation) -> str:
     if found.abscissa >= -_NIL:
         return f"move the rightmost root by {row.loss:.2g}" if row.loss > _NIL else "change next to nothing"
     share = min(math.floor(round(100 * row.realised / found.abscissa, 6)), 100)
     return f"keep {share} % of the decay"
 
 
-def _cost(row: Rounded, found: Explanation) -> str:
+def _cost(row: RoundedDesign, found: Explanation) -> str:
     """What digits that are not enough do."""
     if found.abscissa < -_NIL and row.realised >= 0:
         return "make it unstable"
@@ -116,7 +116,7 @@ def rounding_grid(found: Explanation) -> TableBlock:
     return TableBlock(rows if known else [(*row[:4], *row[5:]) for row in rows], "What rounding does")
 
 
-def _row(which: str, to: str, row: Rounded) -> tuple[str, ...]:
+def _row(which: str, to: str, row: RoundedDesign) -> tuple[str, ...]:
     ratio, loss = _seen(row.damping_ratio), _seen(row.loss)
     abscissa = str(Cell(row.realised, error=_ROUNDED))
     return which, to, abscissa, f"{loss:.2g}", f"{ratio:.4g}", ", ".join(row.violations)
@@ -150,7 +150,7 @@ def optimality_blocks(found: Optimality) -> Blocks:
         yield TableBlock((head, *map(_root_row, found.roots)), "Multipliers")
 
 
-def _root_row(root: OnLine) -> tuple[str, ...]:
+def _root_row(root: RightmostRoot) -> tuple[str, ...]:
     place = _place(root.re, root.im, 5)
     if (omega := root.eigenfrequency) is not None:
         place = frequency_of(omega.real, omega.imag, 5)

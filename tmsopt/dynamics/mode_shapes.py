@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.analysis import diagnosed
+from tmsopt.analysis import diagnose_roots
 from tmsopt.dynamics.system import ANGLES, coordinates_of, matrices_of
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.problem import Posed
@@ -70,7 +70,7 @@ def mode_shapes(
     model, of = problem.model, problem.parameter_set
     pencil = matrices_of(model)(of.native(parameters))
     names = coordinates_of(model, pencil)
-    chains = diagnosed(model, of, parameters, structure)
+    chains = diagnose_roots(model, of, parameters, structure)
     if model.double is not None:  # −[[J, R], [−R, J]]
         n = len(names)
         pencil = [np.eye(n), pencil[1][:n, :n] - 1j * pencil[1][:n, n:]]

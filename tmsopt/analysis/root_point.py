@@ -1,4 +1,4 @@
-"""A multiple root and its parameters, to as many digits as they can be met to, and the polynomial about it."""
+"""A multiple root and the parameters at which it exists, to many digits, and the polynomial about it."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,37 +15,41 @@ from tmsopt.records import Numbers
 from tmsopt.roots.polynomial import characteristic_polynomial
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
-_CAP = 64  # orders of a power series, of which FLINT keeps 10 if not told
-_ROUNDING = 2.0**-50  # relative, of a parameter: that of a double, and of the few operations it may have gone through
-_NEAR = 1e-3  # of the range of a parameter: what is smaller may be meant to be 0, and is met to less than its digits
-_ZERO = 1e-12  # of the size of a parameter: a change relative to so little is none
-_FARTHEST = 0.01  # of a parameter's size, or of its range where it is 0: a point beyond is another one
-_SLOW = 0.9  # of the residual before: a step that leaves more ends the search
-_RANKS = (1e-3, 1e-7, 1e-12)  # relative singular values of directions in which nothing is moved: the best counts
-_MET = 2.0**-200  # relative: conditions that are met to all digits
-_LAST = 4  # times the last step, which where conditions are singular is as long as what is left
+_CAP = 64  # orders of a power series; FLINT keeps 10 by default
+_ROUNDING = 2.0**-50  # relative rounding of a parameter: a double after a few operations
+_NEAR = 1e-3  # share of a range below which a parameter may stand for 0, and its size is the width of the range
+_ZERO = 1e-12  # share of a size below which a parameter changes absolutely, not relatively
+_FARTHEST = 0.01  # largest move of a parameter relative to its size; farther points are other points
+_SLOW = 0.9  # ratio of successive residuals above which the iteration ends
+_RANKS = (
+    1e-3,
+    1e-7,
+    1e-12,
+)  # relative singular values below which directions are dropped; the best of the three counts
+_CONVERGED = 2.0**-200  # relative residual of conditions that hold to all digits
+_LAST = 4  # error relative to the last step; with singular conditions that step is as long as the error
 
 Polynomial = Callable[[Mapping[str, Any]], list[Any]]
-"""Values of parameters, balls or series of these → coefficients, descending."""
+"""Values of parameters (balls or series) → coefficients, descending."""
 
 
 @dataclass(frozen=True)
-class Meeting:
-    """A multiple root where it is met.
+class RootPoint:
+    """A multiple root and the parameters at which it exists.
 
     Attributes:
-        polynomial: whose roots the user reads: of a complex H det (s + iH), without carrier and conjugates.
-        values: parameter → its middle.
-        doubt: parameter → how far the true one may be off: its rounding, or what could not be polished.
-        sizes: parameter → its size; of one that is 0 the width of its range, and 0 of one that is fixed.
-        free: parameters that may be moved first.
+        polynomial: the polynomial with the user's roots; for a complex H det (s + iH), without carrier and conjugates.
+        values: parameter → its midpoint.
+        doubt: parameter → its error: rounding, or the residual of the refinement.
+        sizes: parameter → its size; where the parameter is 0, the width of its range, or 0 if it is fixed.
+        free: parameters that are refined first.
         s: the root, without a radius.
         real: whether the root and the coefficients are real.
         geometric: number of independent eigenvectors.
         unit: size of the roots about it.
-        off: relative size of what is left of the conditions for the root.
-        width: how far the root may be off, in its unit.
-        moving: parameters that are moved with the root, so that all conditions are met; none where its place alone is.
+        off: relative residual of the conditions for the root.
+        width: error of the root, in its unit.
+        moving: parameters refined together with the root; empty where only the root is.
     """
 
     polynomial: Polynomial
@@ -63,24 +67,24 @@ class Meeting:
     moving: Sequence[str] = ()
 
     def relative(self, name: str) -> bool:
-        """Whether changes of a parameter are relative to its value; of one that is 0 they are absolute."""
+        """Whether changes of a parameter are relative to its value; they are absolute where it is 0."""
         return bool(abs(self.values[name]) > max(2 * self.doubt[name], _ZERO * self.sizes[name]))
 
     def step(self, name: str) -> Any:
-        """The change of a parameter that ε = 1 stands for."""
+        """The change of a parameter for ε = 1."""
         return self.values[name] if self.relative(name) else flint.arb(1)
 
-    def changed(self, name: str, by: Any, doubt: bool = False) -> list[Any]:
-        """Coefficients for a change of one parameter.
+    def perturb(self, name: str, by: Any, doubt: bool = False) -> list[Any]:
+        """Coefficients of the polynomial after a change of one parameter.
 
         Args:
-            doubt: whether parameters are as wide as their doubt.
+            doubt: whether parameters are balls with their doubt as radius.
         """
         values = {n: flint.arb(x, self.doubt[n]) if doubt else x for n, x in self.values.items()}
         return self.polynomial({**values, name: values[name] + by})
 
-    def own(self, scale: Any = 1) -> list[Any]:
-        """The same of its own polynomial."""
+    def expand(self, scale: Any = 1) -> list[Any]:
+        """Coefficients in t of the unperturbed polynomial."""
         return self.taylor(self.polynomial(self.values), scale)
 
     def taylor(self, coefficients: Sequence[Any], scale: Any = 1, doubt: bool = False) -> list[Any]:
@@ -94,7 +98,7 @@ class Meeting:
 
 
 @contextmanager
-def many_digits() -> Iterator[None]:
+def high_precision() -> Iterator[None]:
     """The precision of a diagnosis, and all orders of power series."""
     cap, flint.ctx.cap = flint.ctx.cap, _CAP
     try:
@@ -104,62 +108,62 @@ def many_digits() -> Iterator[None]:
         flint.ctx.cap = cap
 
 
-def pencil_of(model: Model, of: ParameterSet, values: Mapping[str, Any]) -> tuple[Matrix, ...]:
-    """Matrices of the matrix polynomial with these roots, in descending powers; of a complex H those of s + iH."""
+def evaluate_pencil(model: Model, of: ParameterSet, values: Mapping[str, Any]) -> tuple[Matrix, ...]:
+    """Matrices of the matrix polynomial with these roots, in descending powers; for a complex H of s + iH."""
     native = of.native(values)
     if model.double is None:
         assert model.pencil is not None
         return model.pencil(native)
-    one, found = model.double(native)  # of the double, I and −[[J, R], [−R, J]]
+    one, found = model.double(native)  # real form: I and −[[J, R], [−R, J]]
     n = len(found) // 2
-    both = [[_complex(row[j]) - flint.acb(0, 1) * _complex(row[n + j]) for j in range(n)] for row in found[:n]]
+    both = [[_to_complex(row[j]) - flint.acb(0, 1) * _to_complex(row[n + j]) for j in range(n)] for row in found[:n]]
     return [row[:n] for row in one[:n]], both
 
 
-def met(
+def refine_root(
     model: Model,
     of: ParameterSet,
     design: Numbers,
     widths: Numbers,
     s: complex,
     multiplicity: int,
-) -> Meeting:
-    """A root where it is stored, its place alone made exact: there the derivative before the first that stays is 0."""
+) -> RootPoint:
+    """A multiple root of the stored parameters: the zero of the derivative of order multiplicity − 1."""
     sizes = {n: width if abs(x) <= _NEAR * (width := widths.get(n, 0.0)) else abs(x) for n, x in design.items()}
     values = {n: flint.arb(exact(x)) for n, x in design.items()}
     doubt = {n: _ROUNDING * x for n, x in sizes.items()}
     real = model.double is None and s.imag == 0
 
     def polynomial(values: Mapping[str, Any]) -> list[Any]:
-        """The one whose roots the user reads."""
+        """The polynomial with the user's roots."""
         if model.double is None:
             return model.coefficients(values, of)
-        return characteristic_polynomial([[-x for x in row] for row in pencil_of(model, of, values)[1]])
+        return characteristic_polynomial([[-x for x in row] for row in evaluate_pencil(model, of, values)[1]])
 
-    found = Meeting(polynomial, values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
-    return _improved(replace(found, unit=max(_size(found), abs(s)) or 1.0))
+    found = RootPoint(polynomial, values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
+    return _improve(replace(found, unit=max(_root_bound(found), abs(s)) or 1.0))
 
 
-def polished(found: Meeting, geometric: int) -> Meeting:
-    """The nearest point at which the root is met, by Gauss and Newton's steps in parameters and root.
+def refine_point(found: RootPoint, geometric: int) -> RootPoint:
+    """The nearest point at which the root is multiple, by Gauss-Newton steps in parameters and root.
 
-    The conditions: p and its derivatives below the multiplicity are 0 at the root and, with g independent eigenvectors,
-    so are all derivatives of p in s and a parameter of an order below g.
+    The conditions: p and its derivatives below the multiplicity are 0 at the root. With g independent eigenvectors, all
+    derivatives of p in s and a parameter of order below g are 0 as well.
     """
     every = [n for n, size in found.sizes.items() if size > 0]
-    best = _improved(replace(found, geometric=geometric, moving=[n for n in every if n in found.free]))
-    return best if best.off < _MET else _improved(replace(best, moving=every))
+    best = _improve(replace(found, geometric=geometric, moving=[n for n in every if n in found.free]))
+    return best if best.off < _CONVERGED else _improve(replace(best, moving=every))
 
 
-def _improved(start: Meeting) -> Meeting:
-    """With conditions met better by what may be moved; the place alone where nothing may."""
-    best, lead = start, abs(start.own()[start.multiplicity]).mid()
+def _improve(start: RootPoint) -> RootPoint:
+    """Refine the root, and the moving parameters, until the conditions hold or stop improving."""
+    best, lead = start, abs(start.expand()[start.multiplicity]).mid()
     left = _conditions(best, lead)
     off = _norm(left)
     while 2.0 ** (-2 * _BITS // 3) < off < np.inf:
         tried = []
         for step in _steps(best, left, lead):
-            at = _moved(best, step)
+            at = _apply_step(best, step)
             if all(abs(at.values[n] - start.values[n]) <= _FARTHEST * start.sizes[n] for n in start.moving):
                 tried.append((_norm(new := _conditions(at, lead)), at, new, step))
         new_off, at, new, step = min(tried, key=lambda each: each[0], default=(off, best, left, []))
@@ -169,49 +173,49 @@ def _improved(start: Meeting) -> Meeting:
         doubt = {n: max(_ROUNDING, lengths.get(n, 0.0)) * x for n, x in start.sizes.items()}
         width = max(_ROUNDING, _LAST * float(abs(step[-1])), float(new_off))
         best, off, left = replace(at, doubt=doubt, width=width), new_off, new
-    parts, least = (best.s.real, best.s.imag), best.unit * best.width  # what is 0 but for rounding is 0
+    parts, least = (best.s.real, best.s.imag), best.unit * best.width  # parts within rounding of 0 become 0
     return replace(best, off=float(off), s=flint.acb(*(flint.arb(0) if abs(x) <= least else x for x in parts)))
 
 
-def _conditions(at: Meeting, lead: Any) -> list[Any]:
-    """What must be 0, relative; of a place alone what makes it the mean of the roots that nearly meet."""
+def _conditions(at: RootPoint, lead: Any) -> list[Any]:
+    """Relative residuals; for a root alone, the condition that it is the mean of the roots that nearly meet."""
     k, g = at.multiplicity, at.geometric
-    found = at.own()[0 if at.moving else k - 1 : k]
+    found = at.expand()[0 if at.moving else k - 1 : k]
     for name in at.values if at.moving and g > 1 else ():
-        series = at.changed(name, flint.arb_series([0, at.sizes[name] or 1], prec=g))
+        series = at.perturb(name, flint.arb_series([0, at.sizes[name] or 1], prec=g))
         for m in range(1, g):
-            found += at.taylor(order(series, m))[: g - m]
+            found += at.taylor(coefficients_of_order(series, m))[: g - m]
     return [x / lead for x in found]
 
 
-def _steps(at: Meeting, left: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
-    """Least-squares steps: of parameters in their sizes, then of the root in its unit."""
+def _steps(at: RootPoint, left: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
+    """Least-squares steps: parameters relative to their sizes, then the root in its unit."""
     small, count = flint.arb(2) ** (-_BITS // 3), len(at.moving)
     size = max(abs(x) for x in left).mid()
     columns = []
     for shift in np.eye(count + 1).tolist():
-        ahead = _conditions(_moved(at, [small * x for x in shift]), lead)
+        ahead = _conditions(_apply_step(at, [small * x for x in shift]), lead)
         columns.append([(a - b) / small for a, b in zip(ahead, left, strict=True)])
     if not at.real:
         columns.append([flint.acb(0, 1) * x for x in columns[-1]])
-    matrix = np.array([[middle(x) for x in column] for column in columns]).T
-    right = np.array([middle(x / size) for x in left])
+    matrix = np.array([[midpoint(x) for x in column] for column in columns]).T
+    right = np.array([midpoint(x / size) for x in left])
     J, r = (np.concatenate([x.real, x.imag]) for x in (matrix, right))
-    for rank in _RANKS if np.isfinite(J).all() else ():  # where conditions are singular their slopes vanish too
+    for rank in _RANKS if np.isfinite(J).all() else ():  # singular conditions have vanishing slopes
         found = np.linalg.lstsq(J, -r, rcond=rank)[0]
         yield [*(size * float(x) for x in found[:count]), size * flint.acb(*found[count:].tolist())]
 
 
-def _moved(at: Meeting, step: Sequence[Any]) -> Meeting:
+def _apply_step(at: RootPoint, step: Sequence[Any]) -> RootPoint:
     moved = {n: (at.values[n] + at.sizes[n] * x).mid() for n, x in zip(at.moving, step, strict=False)}
     s = at.s + at.unit * step[-1]
     return replace(at, values={**at.values, **moved}, s=flint.acb(s.real.mid(), s.imag.mid()))
 
 
-def _size(at: Meeting) -> float:
-    """A bound on the roots, of the sizes of coefficients, as each parameter changes by a half of its size."""
-    each = (at.polynomial(at.values), *(at.changed(n, flint.arb(x / 2 or 1)) for n, x in at.sizes.items()))
-    ratios = (abs(middle(flint.acb(x) / c[0])) ** (1 / k) for c in each for k, x in enumerate(c[1:], start=1))
+def _root_bound(at: RootPoint) -> float:
+    """A bound on the roots from the coefficients, as each parameter changes by half its size."""
+    each = (at.polynomial(at.values), *(at.perturb(n, flint.arb(x / 2 or 1)) for n, x in at.sizes.items()))
+    ratios = (abs(midpoint(flint.acb(x) / c[0])) ** (1 / k) for c in each for k, x in enumerate(c[1:], start=1))
     return max(filter(np.isfinite, ratios), default=0.0)
 
 
@@ -220,17 +224,17 @@ def _norm(left: Sequence[Any]) -> Any:
     return max((x.mid() for x in sizes), default=flint.arb(0)) if all(x.is_finite() for x in sizes) else np.inf
 
 
-def order(series: Sequence[Any], m: int) -> list[Any]:
-    """The coefficients of ε to a power."""
+def coefficients_of_order(series: Sequence[Any], m: int) -> list[Any]:
+    """The coefficients of ε^m."""
     return [
         c[m] if isinstance(c, flint.arb_series | flint.acb_series) else flint.acb(c if m == 0 else 0) for c in series
     ]
 
 
-def _complex(x: Any) -> Any:
+def _to_complex(x: Any) -> Any:
     return flint.acb_series(x) if isinstance(x, flint.arb_series) else flint.acb(flint.arb(x))
 
 
-def middle(x: Any) -> complex:
-    """The middle of a complex ball."""
+def midpoint(x: Any) -> complex:
+    """The midpoint of a complex ball."""
     return complex(float(x.real.mid()), float(x.imag.mid()))
