@@ -166,10 +166,10 @@ def _check_together(row: int | None, scheduler: str | None, workers: int | None,
 def _planned(asked: "Study | Sampling") -> "Study":
     """The study, with the design of a Monte Carlo one solved first."""
     from tmsopt import NotSolved
-    from tmsopt.studies import planned
+    from tmsopt.studies import plan_study
 
     try:
-        return planned(asked, shown())
+        return plan_study(asked, shown())
     except NotSolved as error:
         click.echo(f"there is no design to draw around: {error}", err=True)
         sys.exit(BAD_INPUT)
@@ -179,7 +179,7 @@ def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, An
     """The study with its rows, and whether it was stopped on the way."""
     from tmsopt import run_study
     from tmsopt.executor import EngineError
-    from tmsopt.studies import stored
+    from tmsopt.studies import read_results
 
     there: list[float] = []  # rows, when it began
 
@@ -195,7 +195,7 @@ def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, An
     except KeyboardInterrupt:
         if not there:  # before the first row
             raise
-        return replace(stored(asked, path), found=int(there[0])), True
+        return replace(read_results(asked, path), found=int(there[0])), True
     except EngineError as error:
         click.echo(f"{error}; the rows solved so far are in {path}", err=True)
         sys.exit(BAD_INPUT)
