@@ -107,7 +107,7 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
 
 def diagnose_roots(
     model: Model,
-    of: ParameterSet,
+    parameter_set: ParameterSet,
     design: Numbers,
     structure: Structure,
     free: Mapping[str, tuple[float, float]] | None = None,
@@ -119,28 +119,30 @@ def diagnose_roots(
     """
     widths, found = {n: b - a for n, (a, b) in (free or {}).items()}, []
 
-    def find_chains(at: RootPoint) -> Jordan | None:
+    def find_chains(point: RootPoint) -> Jordan | None:
         """Jordan structure by the ranks of the matrices; None without matrices, or if they are singular for every s."""
         if model.pencil is None:
             return None
-        matrices = evaluate_pencil(model, of, at.values)
+        matrices = evaluate_pencil(model, parameter_set, point.values)
         threshold = max(_RANK, _TIMES * math.sqrt(structure.distance))
-        return jordan(matrices, at.s, at.multiplicity, threshold) if is_regular(matrices, at.s, threshold) else None
+        if not is_regular(matrices, point.s, threshold):
+            return None
+        return jordan(matrices, point.s, point.multiplicity, threshold)
 
     with high_precision():
         for root in user_roots(model, structure.roots):
             k = root.multiplicity
             if k == 1 or (root.im < 0 and model.double is None):
                 continue
-            stored = refine_root(model, of, design, widths, complex(root.re, root.im), k)
+            stored = refine_root(model, parameter_set, design, widths, complex(root.re, root.im), k)
             as_stored = find_chains(stored)
-            at = refine_point(stored, as_stored.geometric if as_stored else 1)
-            exact, g = find_chains(at), at.geometric
+            point = refine_point(stored, as_stored.geometric if as_stored else 1)
+            exact, g = find_chains(point), point.geometric
             verdict = exact if as_stored and exact and exact.geometric == as_stored.geometric else as_stored
             partial = verdict.partial if verdict else (k,)
             kind = "semisimple" if g == k else "defective" if g == 1 else "partly defective"
-            ordered = tuple(sorted((compute_response(at, name) for name in of.names), key=_sensitivity))
-            s = midpoint(at.s)
+            ordered = tuple(sorted((compute_response(point, name) for name in parameter_set.names), key=_sensitivity))
+            s = midpoint(point.s)
             omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
             distance = structure.distance
             found.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))

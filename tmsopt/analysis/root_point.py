@@ -108,9 +108,9 @@ def high_precision() -> Iterator[None]:
         flint.ctx.cap = cap
 
 
-def evaluate_pencil(model: Model, of: ParameterSet, values: Mapping[str, Any]) -> tuple[Matrix, ...]:
+def evaluate_pencil(model: Model, parameter_set: ParameterSet, values: Mapping[str, Any]) -> tuple[Matrix, ...]:
     """Matrices of the matrix polynomial with these roots, in descending powers; for a complex H of s + iH."""
-    native = of.native(values)
+    native = parameter_set.native(values)
     if model.double is None:
         assert model.pencil is not None
         return model.pencil(native)
@@ -122,7 +122,7 @@ def evaluate_pencil(model: Model, of: ParameterSet, values: Mapping[str, Any]) -
 
 def refine_root(
     model: Model,
-    of: ParameterSet,
+    parameter_set: ParameterSet,
     design: Numbers,
     widths: Numbers,
     s: complex,
@@ -137,8 +137,9 @@ def refine_root(
     def polynomial(values: Mapping[str, Any]) -> list[Any]:
         """The polynomial with the user's roots."""
         if model.double is None:
-            return model.coefficients(values, of)
-        return characteristic_polynomial([[-x for x in row] for row in evaluate_pencil(model, of, values)[1]])
+            return model.coefficients(values, parameter_set)
+        _, negative = evaluate_pencil(model, parameter_set, values)
+        return characteristic_polynomial([[-x for x in row] for row in negative])
 
     found = RootPoint(polynomial, values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
     return _improve(replace(found, unit=max(_root_bound(found), abs(s)) or 1.0))
@@ -163,40 +164,40 @@ def _improve(start: RootPoint) -> RootPoint:
     while 2.0 ** (-2 * _BITS // 3) < off < np.inf:
         tried = []
         for step in _steps(best, left, lead):
-            at = _apply_step(best, step)
-            if all(abs(at.values[n] - start.values[n]) <= _FARTHEST * start.sizes[n] for n in start.moving):
-                tried.append((_norm(new := _conditions(at, lead)), at, new, step))
-        new_off, at, new, step = min(tried, key=lambda each: each[0], default=(off, best, left, []))
+            point = _apply_step(best, step)
+            if all(abs(point.values[n] - start.values[n]) <= _FARTHEST * start.sizes[n] for n in start.moving):
+                tried.append((_norm(new := _conditions(point, lead)), point, new, step))
+        new_off, point, new, step = min(tried, key=lambda each: each[0], default=(off, best, left, []))
         if not new_off < _SLOW * off:
             break
         lengths = {n: _LAST * abs(float(x)) for n, x in zip(start.moving, step, strict=False)}
         doubt = {n: max(_ROUNDING, lengths.get(n, 0.0)) * x for n, x in start.sizes.items()}
         width = max(_ROUNDING, _LAST * float(abs(step[-1])), float(new_off))
-        best, off, left = replace(at, doubt=doubt, width=width), new_off, new
+        best, off, left = replace(point, doubt=doubt, width=width), new_off, new
     parts, least = (best.s.real, best.s.imag), best.unit * best.width  # parts within rounding of 0 become 0
     return replace(best, off=float(off), s=flint.acb(*(flint.arb(0) if abs(x) <= least else x for x in parts)))
 
 
-def _conditions(at: RootPoint, lead: Any) -> list[Any]:
+def _conditions(point: RootPoint, lead: Any) -> list[Any]:
     """Relative residuals; for a root alone, the condition that it is the mean of the roots that nearly meet."""
-    k, g = at.multiplicity, at.geometric
-    found = at.expand()[0 if at.moving else k - 1 : k]
-    for name in at.values if at.moving and g > 1 else ():
-        series = at.perturb(name, flint.arb_series([0, at.sizes[name] or 1], prec=g))
+    k, g = point.multiplicity, point.geometric
+    found = point.expand()[0 if point.moving else k - 1 : k]
+    for name in point.values if point.moving and g > 1 else ():
+        series = point.perturb(name, flint.arb_series([0, point.sizes[name] or 1], prec=g))
         for m in range(1, g):
-            found += at.taylor(coefficients_of_order(series, m))[: g - m]
+            found += point.taylor(coefficients_of_order(series, m))[: g - m]
     return [x / lead for x in found]
 
 
-def _steps(at: RootPoint, left: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
+def _steps(point: RootPoint, left: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
     """Least-squares steps: parameters relative to their sizes, then the root in its unit."""
-    small, count = flint.arb(2) ** (-_BITS // 3), len(at.moving)
+    small, count = flint.arb(2) ** (-_BITS // 3), len(point.moving)
     size = max(abs(x) for x in left).mid()
     columns = []
     for shift in np.eye(count + 1).tolist():
-        ahead = _conditions(_apply_step(at, [small * x for x in shift]), lead)
+        ahead = _conditions(_apply_step(point, [small * x for x in shift]), lead)
         columns.append([(a - b) / small for a, b in zip(ahead, left, strict=True)])
-    if not at.real:
+    if not point.real:
         columns.append([flint.acb(0, 1) * x for x in columns[-1]])
     matrix = np.array([[midpoint(x) for x in column] for column in columns]).T
     right = np.array([midpoint(x / size) for x in left])
@@ -206,15 +207,15 @@ def _steps(at: RootPoint, left: Sequence[Any], lead: Any) -> Iterator[list[Any]]
         yield [*(size * float(x) for x in found[:count]), size * flint.acb(*found[count:].tolist())]
 
 
-def _apply_step(at: RootPoint, step: Sequence[Any]) -> RootPoint:
-    moved = {n: (at.values[n] + at.sizes[n] * x).mid() for n, x in zip(at.moving, step, strict=False)}
-    s = at.s + at.unit * step[-1]
-    return replace(at, values={**at.values, **moved}, s=flint.acb(s.real.mid(), s.imag.mid()))
+def _apply_step(point: RootPoint, step: Sequence[Any]) -> RootPoint:
+    moved = {n: (point.values[n] + point.sizes[n] * x).mid() for n, x in zip(point.moving, step, strict=False)}
+    s = point.s + point.unit * step[-1]
+    return replace(point, values={**point.values, **moved}, s=flint.acb(s.real.mid(), s.imag.mid()))
 
 
-def _root_bound(at: RootPoint) -> float:
+def _root_bound(point: RootPoint) -> float:
     """A bound on the roots from the coefficients, as each parameter changes by half its size."""
-    each = (at.polynomial(at.values), *(at.perturb(n, flint.arb(x / 2 or 1)) for n, x in at.sizes.items()))
+    each = (point.polynomial(point.values), *(point.perturb(n, flint.arb(x / 2 or 1)) for n, x in point.sizes.items()))
     ratios = (abs(midpoint(flint.acb(x) / c[0])) ** (1 / k) for c in each for k, x in enumerate(c[1:], start=1))
     return max(filter(np.isfinite, ratios), default=0.0)
 

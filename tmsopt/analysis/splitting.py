@@ -61,29 +61,29 @@ class Response:
     unresolved: int = 0
 
 
-def compute_response(at: RootPoint, name: str) -> Response:
+def compute_response(point: RootPoint, name: str) -> Response:
     """Response of a multiple root to a parameter, at the precision of `high_precision`."""
-    k, relative = at.multiplicity, at.relative(name)
-    terms = _terms(at, name)
+    k, relative = point.multiplicity, point.relative(name)
+    terms = _terms(point, name)
     if terms is None:
         return Response(name, relative, (), 0, k)
     found, unmoved = find_branches(terms)
-    laws = [law for branch in found if (law := _confirm(at, name, branch))]
-    if unmoved and not _has_fixed_roots(at, name, found, unmoved):
+    laws = [law for branch in found if (law := _confirm(point, name, branch))]
+    if unmoved and not _has_fixed_roots(point, name, found, unmoved):
         unmoved = 0
     left = k - unmoved - sum(law.branches.roots for law in laws)
     return Response(name, relative, tuple(laws), unmoved, left)
 
 
-def _terms(at: RootPoint, name: str) -> list[list[complex]] | None:
+def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
     """terms[m][j] of ε^m t^j, with t in the root's unit and 0 where rounding allows it; None where undefined.
 
     With g independent eigenvectors, p is to leading order the determinant of a g × g matrix that vanishes at the root,
     so terms of total order below g are 0.
     """
-    k, g = at.multiplicity, at.geometric
-    series = at.perturb(name, flint.arb_series([0, at.step(name)], prec=2 * k + 1), doubt=True)
-    rows = [at.taylor(coefficients_of_order(series, m), doubt=True)[: k + 1] for m in range(2 * k + 1)]
+    k, g = point.multiplicity, point.geometric
+    series = point.perturb(name, flint.arb_series([0, point.step(name)], prec=2 * k + 1), doubt=True)
+    rows = [point.taylor(coefficients_of_order(series, m), doubt=True)[: k + 1] for m in range(2 * k + 1)]
     if not all(x.is_finite() for row in rows for x in row) or rows[0][k].contains(0):
         return None
     rows[0][:k] = [flint.acb(0)] * k
@@ -93,28 +93,28 @@ def _terms(at: RootPoint, name: str) -> list[list[complex]] | None:
     ]
 
 
-def _confirm(at: RootPoint, name: str, branch: Branches) -> Law | None:
+def _confirm(point: RootPoint, name: str, branch: Branches) -> Law | None:
     """The law with its range of validity, if the roots obey it at changes of both signs and two sizes; else None."""
-    ends = [_validity_range(at, name, branch, sign) for sign in (-1, 1)]
+    ends = [_validity_range(point, name, branch, sign) for sign in (-1, 1)]
     if any(high < 10**_SCALES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
-    of_s = replace(branch, constants=tuple(c * at.unit**branch.denominator for c in branch.constants))
+    of_s = replace(branch, constants=tuple(c * point.unit**branch.denominator for c in branch.constants))
     return Law(of_s, ends[0][1], ends[1][1], max(low for low, _ in ends))
 
 
-def _validity_range(at: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
+def _validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
     """The least and the largest sampled |ε| between which the roots obey the law; (0, 0) if nowhere."""
 
     def holds(eps: float) -> bool:
         predicted = branch.shifts(sign * eps)
         scale = max(map(abs, predicted))
-        shifted = _local_coefficients(at, name, sign * eps, scale)
+        shifted = _local_coefficients(point, name, sign * eps, scale)
         # A polynomial in 1/t: its largest roots are sought, and companion eigenvalues give these to all digits.
-        row = np.array([midpoint(c / shifted[at.multiplicity].abs_upper()) for c in shifted])
+        row = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
         row[np.cumsum(np.abs(row)) <= _SLOWER * np.abs(row).sum()] = 0  # roots that are far slower
         return _deviation(predicted, scale, row) <= DEVIATION
 
-    visible = _CLEAR * _root_scatter(at)
+    visible = _CLEAR * _root_scatter(point)
     decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > visible]
     low = next((m for m in decades if holds(10.0**m)), None)
     if low is None:
@@ -127,18 +127,18 @@ def _validity_range(at: RootPoint, name: str, branch: Branches, sign: int) -> tu
     return least, next(filter(holds, reached), 10.0 ** (first - 1))
 
 
-def _has_fixed_roots(at: RootPoint, name: str, moved: Sequence[Branches], unmoved: int) -> bool:
+def _has_fixed_roots(point: RootPoint, name: str, moved: Sequence[Branches], unmoved: int) -> bool:
     """Whether this many roots stay as a parameter changes, by Rouché's theorem at a few changes."""
 
     def count_roots(eps: float, radius: float) -> int | None:
         """Number of roots within a radius; None where no term outweighs all others there."""
-        terms = [abs(x) for x in _local_coefficients(at, name, eps, radius)]
+        terms = [abs(x) for x in _local_coefficients(point, name, eps, radius)]
         return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
 
     def radii(eps: float) -> list[float]:
         """Radii, in the root's unit, that should contain the fixed roots only."""
         if not moved:
-            return [max(small, _SCATTER * _root_scatter(at)) for small in _SMALL]
+            return [max(small, _SCATTER * _root_scatter(point)) for small in _SMALL]
         least = min(abs(t) for branch in moved for t in branch.shifts(eps))
         return [small * least for small in (*_SMALL, *_WIDE)]
 
@@ -146,17 +146,17 @@ def _has_fixed_roots(at: RootPoint, name: str, moved: Sequence[Branches], unmove
     return all(any(count_roots(sign * eps, radius) == unmoved for radius in radii(eps)) for eps, sign in changes)
 
 
-def _local_coefficients(at: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
+def _local_coefficients(point: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
     """Coefficients in t of the perturbed polynomial, corrected for the residual of the unperturbed multiple root."""
-    perturbed = at.taylor(at.perturb(name, eps * at.step(name)), scale)
-    own = at.expand(scale)
-    return [a - b if j < at.multiplicity else a for j, (a, b) in enumerate(zip(perturbed, own, strict=True))]
+    perturbed = point.taylor(point.perturb(name, eps * point.step(name)), scale)
+    own = point.expand(scale)
+    return [a - b if j < point.multiplicity else a for j, (a, b) in enumerate(zip(perturbed, own, strict=True))]
 
 
-def _root_scatter(at: RootPoint) -> float:
+def _root_scatter(point: RootPoint) -> float:
     """Distance between the roots that nearly meet, in their unit."""
-    k = at.multiplicity
-    terms = [midpoint(x) for x in at.expand()[: k + 1]]
+    k = point.multiplicity
+    terms = [midpoint(x) for x in point.expand()[: k + 1]]
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 

@@ -121,21 +121,21 @@ def growth(
     start_steps(progress, "following the roots")
     if not (end is None or (is_number(end) and end != 0)):
         raise refusal(f"found {short(end)}; accepted: a number other than 0", "end")
-    of, parameters, name = _find_parameter(design, over)
+    parameter_set, parameters, name = _find_parameter(design, over)
     model = design.problem.model
-    known = f"{name}_c" in model.quantity_names(of)
-    at, critical = parameters[name], float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
+    known = f"{name}_c" in model.quantity_names(parameter_set)
+    at, critical = parameters[name], float(Values(model, parameter_set, parameters)[f"{name}_c"]) if known else math.nan
     speed = name in SPEEDS
     low, high = _default_range(design, name, end, at)
 
     def coefficients(x: Array) -> Array:
         """Of shape (n, degree + 1)."""
-        a = model.coefficients({**parameters, name: x}, of)
+        a = model.coefficients({**parameters, name: x}, parameter_set)
         return np.stack(np.broadcast_arrays(*a, x)[:-1], axis=-1).astype(float)
 
     is_open, is_polynomial = speed and end is None, True
     try:
-        a = coefficients_over(design.problem.posed, of, parameters, name)
+        a = coefficients_over(design.problem.posed, parameter_set, parameters, name)
         crossed = find_crossings(a, low, math.inf if is_open else high)
     except InputError:
         is_open = is_polynomial = False
@@ -159,7 +159,11 @@ def growth(
         inside = is_stable(c)
         stable = tuple(_find_runs(values, inside, events))
         heavily_damped = tuple(_find_runs(values, inside & np.all(found.imag == 0, axis=-1), ()))
-    rate = None if of.rate is None else np.zeros(values.shape) + of.rate({**parameters, name: values})
+    rate = (
+        None
+        if parameter_set.rate is None
+        else np.zeros(values.shape) + parameter_set.rate({**parameters, name: values})
+    )
     many = [c.at for c in events if _has_many_roots(c.kind)] + [at] * _has_many_roots(design.structure)
     followed = follow_modes(
         values, found, at, many, bicycle=is_bicycle(model) and model.degree == _BICYCLE, speed=speed
@@ -170,7 +174,7 @@ def growth(
             replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in followed
         )
     return Growth(
-        of[name],
+        parameter_set[name],
         values,
         found,
         critical,

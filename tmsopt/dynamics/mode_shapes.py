@@ -67,10 +67,10 @@ def compute_mode_shapes(
     Args:
         rate: the unit of rates in 1/s.
     """
-    model, of = problem.model, problem.parameter_set
-    pencil = matrices_of(model)(of.native(parameters))
+    model, parameter_set = problem.model, problem.parameter_set
+    pencil = matrices_of(model)(parameter_set.native(parameters))
     names = coordinates_of(model, pencil)
-    chains = diagnose_roots(model, of, parameters, structure)
+    chains = diagnose_roots(model, parameter_set, parameters, structure)
     if model.double is not None:  # −[[J, R], [−R, J]]
         n = len(names)
         pencil = [np.eye(n), pencil[1][:n, :n] - 1j * pencil[1][:n, n:]]

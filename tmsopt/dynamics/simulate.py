@@ -172,8 +172,8 @@ def simulate(
     disturbance = parse_disturbance(system, given)
     found: Structure = asked.values(own)["structure"]
     structure = user_structure(asked.model, found)
-    of = asked.parameter_set
-    rate = 1.0 if of.rate is None else float(of.rate(own))
+    parameter_set = asked.parameter_set
+    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(own))
     x = disturbance.state(system)
     stable = _is_stable(asked, found)
     decays, ending, motion = _choose_duration(system, x, structure, stable, rate, seconds, bool(noise))

@@ -130,17 +130,17 @@ def speeds(
     """
     whole = pose(problem if problem is not None and isinstance(design, Mapping) else design)
     asked = whole.nominal
-    of = asked.parameter_set
-    name = parameter if parameter is not None else speed_of(of)
+    parameter_set = asked.parameter_set
+    name = parameter if parameter is not None else speed_of(parameter_set)
     if name is None:
         message = f"the model '{asked.model.name}' has no speed; name the parameter that varies, "
-        message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(of.names)}"
+        message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(parameter_set.names)}"
         raise refusal(message, "parameter")
-    if name not in of.names:
-        raise refusal(f"unknown parameter '{name}'; {suggest(name, of.names)}", "parameter")
+    if name not in parameter_set.names:
+        raise refusal(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", "parameter")
     own = parameters_of(design, whole, name, progress)
     start_steps(progress, "isolating speeds")
-    allowed = of[name].range
+    allowed = parameter_set[name].range
     try:
         lower, upper = map(float, asked.free.get(name, (allowed.lower, allowed.upper)) if between is None else between)
         if not -math.inf < lower < upper:
@@ -148,7 +148,9 @@ def speeds(
     except (TypeError, ValueError):
         message = f"found {short(between)}; accepted: a smaller and a larger number, `--between LOW,HIGH`"
         raise refusal(message, "between") from None
-    found = user_crossings(asked.model, find_crossings(coefficients_over(asked, of, own, name), lower, upper))
+    found = user_crossings(
+        asked.model, find_crossings(coefficients_over(asked, parameter_set, own, name), lower, upper)
+    )
     return Speeds(asked.problem, name, Table(own), lower, upper, **vars(found))
 
 
@@ -159,26 +161,28 @@ def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
         InputError: if the coefficients are not polynomials in the speed.
     """
     asked = design.problem.posed.nominal
-    of, name = asked.parameter_set, speed_of(asked.parameter_set)
-    if name is None or not math.isfinite(of[name].range.lower):
+    parameter_set, name = asked.parameter_set, speed_of(asked.parameter_set)
+    if name is None or not math.isfinite(parameter_set[name].range.lower):
         return None
-    a, ends = coefficients_over(asked, of, design.parameters, name), of[name].range
+    a, ends = coefficients_over(asked, parameter_set, design.parameters, name), parameter_set[name].range
     return find_crossings(a, ends.lower, ends.upper, bands_alone=True).stable
 
 
-def speed_of(of: ParameterSet) -> str | None:
+def speed_of(parameter_set: ParameterSet) -> str | None:
     """The parameter of a set that is a speed: in m/s, or the Froude number."""
-    return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
+    return next((p.name for p in parameter_set.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def coefficients_over(problem: Posed, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+def coefficients_over(
+    problem: Posed, parameter_set: ParameterSet, own: Mapping[str, float], name: str
+) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:
         InputError: if they are not polynomials.
     """
     nodes = {**problem.as_nodes(own), name: symbol(name)}
-    at = problem.model.algebraic(of.native({n: nodes[n] for n in of.names}))
+    at = problem.model.algebraic(parameter_set.native({n: nodes[n] for n in parameter_set.names}))
     try:
         with flint.ctx.workdps(DIGITS):
             over = fold(formula(at.values()), {name: flint.arb_poly([0, 1])}, BALLS)

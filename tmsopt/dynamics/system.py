@@ -86,8 +86,8 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     Raises:
         InputError: without matrices, or if the mass matrix is singular.
     """
-    model, of = problem.model, problem.parameter_set
-    native = of.native(parameters)
+    model, parameter_set = problem.model, problem.parameter_set
+    native = parameter_set.native(parameters)
     pencil = matrices_of(model)(native)
     n = len(pencil[0])
     scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
@@ -110,8 +110,8 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
 
 def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
     """The system with the path as two more states and the torques of a controller as rows, in the user's units."""
-    of = problem.parameter_set
-    native = of.native(parameters)
+    parameter_set = problem.parameter_set
+    native = parameter_set.native(parameters)
     feedback = problem.model.feedback(native) if problem.model.feedback else None
     lagged, driven = feedback is not None and feedback.lag is not None, dict[str, int]()
     if feedback is not None:
@@ -130,8 +130,8 @@ def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[s
         gains = np.hstack([np.array(feedback.gains, dtype=float), np.zeros((2, 2))])
         rows |= {name: -gains[k] for name, k in driven.items()}
     jumps = np.linalg.inv(mass)
-    rate = 1.0 if of.rate is None else float(of.rate(parameters))
-    torque = 1.0 if of.torque is None else float(of.torque(parameters))
+    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
+    torque = 1.0 if parameter_set.torque is None else float(parameter_set.torque(parameters))
     length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
     kinds = (  # names, scale, and units of dimensionless and SI parameters
         (("t",), 1.0, ("√(w/g)", "s")),
@@ -152,5 +152,5 @@ def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[s
         Table({name: one[name] * row / states for name, row in rows.items()}),
         Table(impulses),
         v * rate * length,
-        Table({name: either[of.rate is not None] for each, _, either in kinds for name in each}),
+        Table({name: either[parameter_set.rate is not None] for each, _, either in kinds for name in each}),
     )

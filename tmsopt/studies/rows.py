@@ -260,8 +260,8 @@ class RowTable(Sequence[Row]):
     def __repr__(self) -> str:
         return f"RowTable({len(self)})"
 
-    def _rows(self, at: slice) -> list[Row]:
-        columns = [self.column(head, at).tolist() for head in self.headers]
+    def _rows(self, place: slice) -> list[Row]:
+        columns = [self.column(head, place).tolist() for head in self.headers]
         rows = []
         for values in zip(*columns, strict=True):
             row: dict[str, Any] = {name: {} for name in PREFIXES}
@@ -286,26 +286,26 @@ class RowTable(Sequence[Row]):
         column = self.column(head)
         return np.where(column.mask, np.nan, column.data) if column.mask.any() else column.data
 
-    def column(self, head: str, at: slice = slice(None)) -> Any:
+    def column(self, head: str, place: slice = slice(None)) -> Any:
         """One column, or a slice of it, as a masked array; a row without a value is masked."""
-        (name, key), numbers, study = self.headers[head], self.numbers[at], self.study
-        values = self._kept[head][at] if head in self._kept else np.full(len(numbers), np.nan)
+        (name, key), numbers, study = self.headers[head], self.numbers[place], self.study
+        values = self._kept[head][place] if head in self._kept else np.full(len(numbers), np.nan)
         absent: Any = False
         match name:
             case "seed":
                 values = column_of([study.seed_of(number) for number in numbers.tolist()], int)
             case "cause":
-                values = self._causes[at]
+                values = self._causes[place]
             case "stable":
-                ideal, realised = self._kept["abscissa"][at], self._kept["abscissa_realised"][at]
+                ideal, realised = self._kept["abscissa"][place], self._kept["abscissa_realised"][place]
                 values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)
             case "varied" | "parameters":
                 varied = key in study.columns
                 given = np.asarray(study.columns[key])[numbers] if varied else study.problem.fixed.get(key, np.nan)
                 values = np.where(np.isnan(values), given, values)
-                absent = self._unsolved[at] & (name == "parameters")
+                absent = self._unsolved[place] & (name == "parameters")
             case "reports":
-                absent = self._unsolved[at]
+                absent = self._unsolved[place]
             case "laws" | "violations":
                 absent = np.isnan(values)
         return np.ma.array(values, mask=absent)
