@@ -14,7 +14,7 @@ from tmsopt.errors import InputError
 from tmsopt.files import from_json, write_atomic, write_csv, write_text
 from tmsopt.plots import chart_figure, save
 from tmsopt.records import Table
-from tmsopt.studies import FORMATS, Row, RowTable, export, part_of
+from tmsopt.studies import FORMATS, Row, RowTable, batch_rows, export
 
 posix = pytest.mark.skipif(os.name != "posix", reason="devices, pipes and limits of POSIX")
 
@@ -25,7 +25,7 @@ def plane():
 
 
 FAILED = [Row(k, 0, Table({"mu": 0.1}), "failed", cause=f"{k} " * 500) for k in range(100)]
-ROWS = RowTable(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1] * 100}), [part_of(FAILED)])
+ROWS = RowTable(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1] * 100}), [batch_rows(FAILED)])
 WRITERS = {
     "a.txt": lambda path, _: write_text(path, "a line\n" * 10_000),
     "a.csv": lambda path, _: write_csv(path, [{"x": k, "y": 0.1} for k in range(10_000)], {"x": "m"}),

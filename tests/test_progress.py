@@ -7,7 +7,7 @@ import pytest
 
 import tmsopt
 from tmsopt.progress import Steps, start_steps
-from tmsopt.studies import planned
+from tmsopt.studies import plan_study
 
 PLANE = tmsopt.load("problems/chart.toml")
 EP4 = tmsopt.load("problems/ep4.toml")
@@ -36,7 +36,7 @@ VERBS = [
     ("following the front", lambda **told: tmsopt.pareto("problems/pareto.toml", points=2, **told)),
     ("solving rows", lambda **told: tmsopt.run_study(STUDY, **told)),
     ("solving rows", lambda **told: tmsopt.run_study(DRAWN, **told)),
-    ("searching", lambda **told: planned(DRAWN, **told)),
+    ("searching", lambda **told: plan_study(DRAWN, **told)),
     ("drawing designs", lambda **told: tmsopt.monte_carlo(optimum(), 20, tolerances={"mu": 0.01}, **told)),
     ("moving limits", lambda **told: tmsopt.explain("problems/realistic.toml", **told)),
     ("judging the optimum", lambda **told: tmsopt.optimality(optimum(), **told)),

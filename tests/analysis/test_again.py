@@ -4,7 +4,7 @@ import pytest
 
 import tmsopt
 from tmsopt import Problem, models
-from tmsopt.analysis import moved
+from tmsopt.analysis import move_limit
 
 OSCILLATOR = models.from_coefficients(["1", "2 + x/1000", "2 + y/1000"], name="oscillator")
 
@@ -16,7 +16,7 @@ def test_gains_are_those_of_a_search_of_each_moved_problem(name):
     levers = [lever for lever in tmsopt.explain(solution).levers if lever.step]
     assert levers
     for lever in levers:
-        again = tmsopt.solve(moved(solution.problem.posed, lever.name, lever.step), starts=8)
+        again = tmsopt.solve(move_limit(solution.problem.posed, lever.name, lever.step), starts=8)
         assert lever.resolved == pytest.approx(abs(again.value - solution.value), abs=1e-8)
         assert lever.structure == again.structure
 

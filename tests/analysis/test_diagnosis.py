@@ -16,7 +16,7 @@ from helpers.oracles import polynomial_60, roots_60
 from mpmath import mp
 
 import tmsopt
-from tmsopt.analysis import Response, diagnosed
+from tmsopt.analysis import Response, diagnose_roots
 from tmsopt.cli import every as main
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices, tms
 from tmsopt.roots import jordan, structure
@@ -82,7 +82,7 @@ def diagnosis_of(model, **design):
     """The one multiple root of a design of a model's first parameter set."""
     of = model.sets[0]
     found = structure([float(c) for c in model.coefficients(design, of)], 1e-11)
-    (diagnosis,) = diagnosed(model, of, design, found)
+    (diagnosis,) = diagnose_roots(model, of, design, found)
     return diagnosis
 
 
@@ -207,7 +207,7 @@ def test_a_crossing_that_is_met_to_less_than_its_digits_moves_linearly():
     model = from_hamiltonian([["d", "k"], ["k", "-d"]]).within({"d": (-1, 1), "k": (-1, 1)})
     at = {"d": -6.5e-10, "k": -3.1e-10}
     found = structure([float(c) for c in model.coefficients(at)], 1e-12)
-    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"d": (-1, 1), "k": (-1, 1)})
+    (diagnosis,) = diagnose_roots(model, model.sets[0], at, found, {"d": (-1, 1), "k": (-1, 1)})
     assert (diagnosis.kind, diagnosis.eigenfrequency) == ("semisimple", 0)
     for answer in diagnosis.responses:
         (law,) = answer.laws
@@ -221,7 +221,7 @@ def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly():
     model = from_matrices([[m, 0], [0, 1]], [[c, 0], [0, c]], [[k1, 0], [0, k2]])
     at = {"m": 1.0, "c": 0.1, "k1": 2.0, "k2": 2.0000009}
     found = structure([float(x) for x in model.coefficients(at)], 1e-12)
-    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"k2": (1, 3)})
+    (diagnosis,) = diagnose_roots(model, model.sets[0], at, found, {"k2": (1, 3)})
     assert diagnosis.im == pytest.approx(sqrt(2 - 0.0025), rel=1e-14)
     (law,) = response(diagnosis, "k2").laws
     assert (str(law.branches.exponent), law.branches.roots, response(diagnosis, "k2").unmoved) == ("1", 1, 1)
@@ -233,7 +233,7 @@ def test_a_singular_exceptional_point_moves_linearly():
     model = from_hamiltonian([["a + 1j*b", 1], [0, 0]]).within({"a": (-1, 1), "b": (-1, 1)})
     at = {"a": 5.2e-8, "b": 6e-30}
     found = structure([float(c) for c in model.coefficients(at)], 1e-12)
-    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"a": (-1, 1), "b": (-1, 1)})
+    (diagnosis,) = diagnose_roots(model, model.sets[0], at, found, {"a": (-1, 1), "b": (-1, 1)})
     assert (diagnosis.geometric, diagnosis.eigenfrequency) == (1, 0)
     for answer in diagnosis.responses:
         (law,) = answer.laws

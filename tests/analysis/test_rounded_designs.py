@@ -9,7 +9,7 @@ import pytest
 
 import tmsopt
 from tmsopt import Problem, models
-from tmsopt.analysis import rounded, rounded_designs
+from tmsopt.analysis import list_rounded_designs, round_design
 from tmsopt.evaluation import find_worst_cases, realised_abscissa, recheck
 from tmsopt.problem import unit_of
 from tmsopt.roots import exact_roots
@@ -100,7 +100,7 @@ def one_by_one(solution, row):
 
 @pytest.mark.slow
 def test_at_once_they_are_those_of_one_by_one(solution):
-    alone, together = rounded_designs(solution)
+    alone, together = list_rounded_designs(solution)
     assert [row.digits for row in together] == [2, 3, 4, 6]
     found = [*alone.values(), *together]
     for row in found:
@@ -126,7 +126,7 @@ def test_a_limit_is_violated_by_as_much_as_in_the_recheck():
     problem = replace(tmsopt.load("problems/ep4.toml"), constraints={"speed": "(Fr - 2.2004)**4 <= 0"})
     solution = replace(tmsopt.solve("problems/ep4.toml"), problem=problem)
     solution = replace(solution, parameters={**solution.parameters, "Fr": 2.2004})
-    for row in rounded(solution, [(["Fr"], digits) for digits in (2, 3, 5)]):
+    for row in round_design(solution, [(["Fr"], digits) for digits in (2, 3, 5)]):
         checked = recheck(problem.posed, {**solution.parameters, "Fr": float(row.written["Fr"])})
         assert dict(row.violations) == dict(checked.amounts)
         assert dict(row.violations) == ({"speed": pytest.approx(4e-4**4, rel=1e-9)} if row.digits < 4 else {})
@@ -137,7 +137,7 @@ def test_what_has_no_motion_is_judged_too():
     quartic = models.from_coefficients(["m - 0.25", "4", "6 + 0*m", "4", "1"], name="lead")
     problem = Problem(quartic, free={"m": (0.2, 2.0)}, minimize="(m - 0.2500001)**2")
     solution = tmsopt.solve(problem, throw=False)
-    _, together = rounded_designs(solution)
+    _, together = list_rounded_designs(solution)
     row = together[0]
     assert dict(row.written) == {"m": "0.25"}
     assert row.realised == pytest.approx(-0.5, rel=1e-15)  # 4 s³ + 6 s² + 4 s + 1 = (2 s + 1)(2 s² + 2 s + 1)

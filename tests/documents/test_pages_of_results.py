@@ -353,7 +353,7 @@ def test_the_explorer_opens_at_what_was_found(name):
 
 def test_how_good_a_design_is_begins_with_the_proof():
     (answer,) = re.findall(r'<section id="answer".*?</section>', written("design"), re.DOTALL)
-    assert "<dt>proof</dt><dd>no design in the box decays faster" in answer
+    assert "<dt>proof</dt><dd>no design within the limits decays faster" in answer
 
 
 def test_designs_of_a_chart():

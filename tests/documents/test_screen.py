@@ -145,7 +145,7 @@ def test_a_proof_names_the_designs_that_it_is_about():
     problem = replace(tmsopt.load("problems/ep4.toml"), minimize="Fr", constraints={"fast": "abscissa <= -0.5"})
     design = tmsopt.solve(problem)
     told = str(replace(design, bound=replace(design.bound, value=design.value, gap=0.0, proven=True)))
-    assert "proof: no design in the box within the limits has a lesser Fr" in told
+    assert "proof: no design within the limits has a smaller Fr" in told
 
 
 def test_a_located_root_that_is_not_rightmost_is_one_root():
@@ -222,9 +222,9 @@ def test_how_near_a_design_comes_is_said_of_its_worst_case():
 
 def test_a_proof_that_was_tried_in_vain_is_told_so():
     design = tmsopt.solve("problems/realistic.toml")
-    assert "proof: none that this is the best; --certify proves it, or finds better" in design.report()
+    assert "proof: not proved to be the best; --certify" in design.report()
     tried = replace(design, bound=replace(design.bound, solver="SCIP", seconds=19.8))
-    assert "proof: none that this is the best in 20 s of SCIP; --certify 40 goes on" in tried.report()
+    assert "proof: not proved to be the best after 20 s of SCIP; --certify 40" in tried.report()
 
 
 def test_a_pattern_that_is_missed_is_called_one_whatever_its_name():

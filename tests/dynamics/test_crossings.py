@@ -6,7 +6,7 @@ import re
 import pytest
 
 import tmsopt
-from tmsopt.dynamics import crossings, stable_speeds
+from tmsopt.dynamics import find_crossings, stable_speeds
 from tmsopt.models import from_matrices
 
 
@@ -22,7 +22,7 @@ def _speeds(free, between, *, A=None, M=None, D=None, K=None):
 def test_a_rigid_body_mode_does_not_hide_an_exceptional_point():
     """Masses 1 and 2, spring 3, damper d: s² (2s² + 3d s + 9) has a double root −3d/4 where d² = 8."""
     free = [[2], [0, 3], [9], [0], [0]]
-    found = crossings(free, 0, 10)
+    found = find_crossings(free, 0, 10)
     (ep2,) = found.found
     assert (ep2.kind, ep2.root.multiplicity) == ("EP2", 2)
     assert ep2.at == pytest.approx(2 * math.sqrt(2), rel=1e-15)
@@ -32,7 +32,7 @@ def test_a_rigid_body_mode_does_not_hide_an_exceptional_point():
 
 def test_pt_symmetric_trimer():
     """A = [[g, −1, 0], [1, 0, −1], [0, 1, −g]]: s (s² + 2 − g²), on the axis below g = √2, a triple root 0 there."""
-    found = crossings([[1], [0], [2, 0, -1], [0]], 0, 5)
+    found = find_crossings([[1], [0], [2, 0, -1], [0]], 0, 5)
     assert {(c.kind, c.root.re, c.root.im, c.root.multiplicity, c.changes) for c in found.found} == {
         ("capsize", 0, 0, 3, True),
         ("EP3", 0, 0, 3, True),
@@ -44,7 +44,7 @@ def test_pt_symmetric_trimer():
 
 def test_gyroscopic_stabilisation():
     """s⁴ + (Ω² − 3) s² + 2: pairs ±iω meet at Ω = 1 + √2 and are simple above; below √2 − 1 all roots are real."""
-    found = crossings([[1], [0], [-3, 0, 1], [0], [2]], 0, 5)
+    found = find_crossings([[1], [0], [-3, 0, 1], [0], [2]], 0, 5)
     assert [(c.kind, c.root.multiplicity, c.changes) for c in found.found] == [
         ("EP2", 2, False),
         ("EP2", 2, False),
@@ -57,20 +57,22 @@ def test_gyroscopic_stabilisation():
 
 def test_factors_that_are_mirrored_or_repeated_beside_others():
     """(s² + 1)(s + y)(s + 2): one pair stays on the axis, marginally stable from y = 0. (s² + y s + 1)² (s + 3)."""
-    found = crossings([[1], [2, 1], [1, 2], [2, 1], [0, 2]], -1, 5)
+    found = find_crossings([[1], [2, 1], [1, 2], [2, 1], [0, 2]], -1, 5)
     assert [(c.at, c.kind, c.root.re) for c in found.found] == [(0, "capsize", 0), (2, "EP2", -2)]
     assert (found.always, found.marginal) == (("weave",), ((0, 5),))
-    squared = crossings([[1], [3, 2], [2, 6, 1], [6, 2, 3], [1, 6], [3]], 0, 3)
+    squared = find_crossings([[1], [3, 2], [2, 6, 1], [6, 2, 3], [1, 6], [3]], 0, 3)
     (met,) = [c for c in squared.found if c.kind == "EP4"]
     assert (met.at, met.root.re) == (2, -1)
     assert (squared.always, squared.stable) == (("EP2",), ((0, 3),))
-    oscillators = crossings([[1], [0], [0, 2], [0], [0, 0, 1]], -1, 1)  # (s² + y)²: they drift, not marginally stable
+    oscillators = find_crossings(
+        [[1], [0], [0, 2], [0], [0, 0, 1]], -1, 1
+    )  # (s² + y)²: they drift, not marginally stable
     assert (oscillators.marginal, oscillators.always) == ((), ("weave", "EP2"))
 
 
 def test_a_leading_coefficient_that_is_0_for_every_value():
     """0 s² + s + y: a root at infinity, another 0 at y = 0."""
-    found = crossings([[0], [1], [0, 1]], -1, 1)
+    found = find_crossings([[0], [1], [0, 1]], -1, 1)
     assert [(c.at, c.kind) for c in found.found] == [(0, "capsize")]
     assert found.always == ("infinity",)
 

@@ -15,7 +15,7 @@ from scipy.linalg import eig
 
 import tmsopt
 from tmsopt.cli import every as main
-from tmsopt.dynamics import shaken, stationary
+from tmsopt.dynamics import simulate_noise, stationary_covariance
 from tmsopt.models import canonical, from_matrices, whipple
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -131,9 +131,11 @@ def test_an_oscillator_in_noise_has_the_variance_of_the_closed_form():
     """q″ + c q′ + k q = σ ẇ: var q = σ²/(2 c k), var q′ = σ²/(2 c), uncorrelated."""
     c, k, sigma = 0.3, 2.0, 1.7
     A, force = np.array([[0, 1], [-k, -c]]), np.array([0, sigma])
-    assert stationary(A, force) == pytest.approx(np.diag([sigma**2 / (2 * c * k), sigma**2 / (2 * c)]), abs=1e-13)
+    assert stationary_covariance(A, force) == pytest.approx(
+        np.diag([sigma**2 / (2 * c * k), sigma**2 / (2 * c)]), abs=1e-13
+    )
     count = 20_000  # each 20 decay times apart, so that they are independent: the step is exact, however long
-    path = shaken(A, np.zeros(2), force, 20 * 2 / c, count, seed=1)[1:]
+    path = simulate_noise(A, np.zeros(2), force, 20 * 2 / c, count, seed=1)[1:]
     off = 5 * math.sqrt(2 / count)  # five standard deviations of a variance
     assert path.var(axis=0) == pytest.approx([sigma**2 / (2 * c * k), sigma**2 / (2 * c)], rel=off)
 

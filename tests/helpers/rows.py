@@ -8,7 +8,7 @@ import pytest
 from tmsopt.errors import InputError
 from tmsopt.problem import load
 from tmsopt.records import Table
-from tmsopt.studies import Row, Study, part_of
+from tmsopt.studies import Row, Study, batch_rows
 
 STUDY = Study(
     load(Path(__file__).parents[2] / "problems" / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7
@@ -27,7 +27,7 @@ def row(number, study=STUDY, **given):
 
 def part(*rows):
     """Rows as a store takes them."""
-    return part_of(rows)
+    return batch_rows(rows)
 
 
 def faults(call, *given, **options):

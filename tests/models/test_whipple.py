@@ -17,7 +17,7 @@ from mpmath import mp
 import tmsopt
 from tmsopt import laws
 from tmsopt.cli import every as main
-from tmsopt.dynamics import crossings
+from tmsopt.dynamics import find_crossings
 from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, to_si, whipple
 from tmsopt.roots import exact_roots, quadratic_pencil
 
@@ -233,7 +233,7 @@ def test_speeds_of_skates_are_those_of_the_paper():
 def test_crossings_of_small_polynomials():
     """s² + y s + 1 = 0: double roots at y = ±2, the axis at 0. s² + y: mirrored for every y, a double root 0 at 0."""
     one, y = [1], [0, 1]
-    found = crossings([one, y, one], -5, 5)
+    found = find_crossings([one, y, one], -5, 5)
     assert [(c.at, c.kind, c.root.re, c.root.im) for c in found.found] == [
         (-2, "EP2", 1, 0),
         (0, "weave", 0, 1),
@@ -241,18 +241,18 @@ def test_crossings_of_small_polynomials():
     ]
     assert found.stable == ((0, 5),)
     assert found.heavily_damped == ((2, 5),)
-    mirrored = crossings([one, [0], y], -1, math.inf)
+    mirrored = find_crossings([one, [0], y], -1, math.inf)
     assert mirrored.always == ("weave",)
     assert {c.kind for c in mirrored.found} == {"capsize", "EP2"}
     # (s² + 2s + 5)² + y: complex pairs that meet; y s + 1: a root that comes back from infinity
-    meeting = crossings([one, [4], [14], [20], [25, 1]], -1, 1)
+    meeting = find_crossings([one, [4], [14], [20], [25, 1]], -1, 1)
     assert [(c.kind, c.root.re, c.root.im, c.root.multiplicity) for c in meeting.found] == [("CEP2", -1, 2, 2)]
-    assert [(c.at, c.kind) for c in crossings([y, one], -1, 1).found] == [(0, "infinity")]
+    assert [(c.at, c.kind) for c in find_crossings([y, one], -1, 1).found] == [(0, "infinity")]
 
 
 def test_crossings_left_of_another_root_change_no_stability():
     """(s² + y s + 1)(s − 3): the root 3 is right of all, and is double at y = −10/3; −3 mirrors it at y = 10/3."""
-    found = crossings([[1], [-3, 1], [1, -3], [-3]], -5, 5)
+    found = find_crossings([[1], [-3, 1], [1, -3], [-3]], -5, 5)
     assert [(c.at, c.kind, c.rightmost, c.changes) for c in found.found] == [
         (-10 / 3, "EP2", True, False),
         (-2, "EP2", False, False),
@@ -260,7 +260,7 @@ def test_crossings_left_of_another_root_change_no_stability():
         (2, "EP2", False, False),
     ]
     assert found.stable == ()
-    assert [c.rightmost for c in crossings([[1], [0, 1], [1]], -5, 5).found] == [True, True, True]
+    assert [c.rightmost for c in find_crossings([[1], [0, 1], [1]], -5, 5).found] == [True, True, True]
 
 
 def test_what_speeds_refuses():

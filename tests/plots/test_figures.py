@@ -23,8 +23,8 @@ from tmsopt.paper import (
     experimental,
     heavy_section,
     multiple_roots,
-    normalised,
-    optimised,
+    normalise_quartics,
+    optimised_benchmark,
     sketch,
     spire,
     spire_faces,
@@ -82,7 +82,7 @@ def test_designs_are_the_printed_ones():
             "lambda_s": math.pi / 36,
         }
     )
-    p = optimised().parameters
+    p = optimised_benchmark().parameters
     assert [p["Fr"], p["mu"], p["lambda_s"], p["chi_B"]] == pytest.approx(
         [2.337214017, 20.84626701, 0.8514403685, 1.19], rel=5e-10
     )
@@ -109,7 +109,7 @@ def random_designs():
         }
 
 
-@pytest.mark.parametrize("p", [benchmark().parameters, optimised().parameters, *random_designs()])
+@pytest.mark.parametrize("p", [benchmark().parameters, optimised_benchmark().parameters, *random_designs()])
 def test_drawn_geometry_is_that_of_the_equations(p):
     ax, near = axes(), axes()
     draw_bicycle(sketch(p), ax)
@@ -143,7 +143,7 @@ def test_growth_figure_shows_both_bicycles():
     critical, best = (
         next(line.get_xdata()[0] for line in right.lines if line.get_linestyle() == style) for style in ("--", ":")
     )
-    p = optimised().parameters
+    p = optimised_benchmark().parameters
     others = {name: value for name, value in p.items() if name != "Fr"}
     assert critical == pytest.approx(float(weave_Fr_60(**others)), rel=1e-12)
     assert best == pytest.approx(2.337214017, rel=5e-10)
@@ -298,7 +298,7 @@ def heavy_exact(A1, A2, A3):
 def test_scaling_keeps_the_roots():
     a = np.random.default_rng(1).normal(size=(200, 5))
     a[:, 4] = np.abs(a[:, 4]) * np.sign(a[:, 0])
-    for c, scaled in zip(a, normalised(a), strict=True):
+    for c, scaled in zip(a, normalise_quartics(a), strict=True):
         original = np.poly(np.roots(np.concatenate([[1.0], scaled, [1.0]])) * (c[4] / c[0]) ** 0.25)
         assert original == pytest.approx(c / c[0], rel=1e-9, abs=1e-9)  # companion roots, away from multiple ones
 

@@ -14,7 +14,7 @@ from helpers.rows import faults
 from tmsopt import Problem, load, models
 from tmsopt.files import format_header, write_csv
 from tmsopt.records import Table
-from tmsopt.studies import FORMATS, Row, RowTable, Study, check_export, export, header, part_of
+from tmsopt.studies import FORMATS, Row, RowTable, Study, batch_rows, check_export, export, header
 
 SPECIAL = (
     0.1,
@@ -41,7 +41,7 @@ def table_of(*rows, problem=LIMITED):
     for row in rows:
         for name, value in row.varied.items():
             columns[name][row.number] = value
-    return RowTable(Study(problem, columns or {"mu": [0.1]}, report=["Fr / Fr_c"]), [part_of(rows)])
+    return RowTable(Study(problem, columns or {"mu": [0.1]}, report=["Fr / Fr_c"]), [batch_rows(rows)])
 
 
 def solved(number, x=0.1, **varied):
@@ -217,7 +217,7 @@ def test_files_that_cannot_be_written(tmp_path):
     assert "accepted: a file name ending in .csv, .parquet, .nc" in faults(export, ROWS, tmp_path / "rows.xls")
     assert "does not exist" in faults(check_export, tmp_path / "no" / "rows.csv")
     (tmp_path / "folder.csv").mkdir()
-    assert "no regular file" in faults(export, ROWS, tmp_path / "folder.csv")
+    assert "not a regular file" in faults(export, ROWS, tmp_path / "folder.csv")
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
@@ -243,7 +243,7 @@ def test_no_cell_of_a_csv_is_a_formula(first, tmp_path):
     model = models.from_coefficients(["1", "mu"])
     problem = Problem(model, {"mu": 1.0}, minimize="mu")
     one = broken(0, cause=name, structure=name, objective=-1.5, host=name, abscissa=-2.0)
-    export(RowTable(Study(problem, {"mu": [0.2]}), [part_of([one])]), tmp_path / "rows.csv")
+    export(RowTable(Study(problem, {"mu": [0.2]}), [batch_rows([one])]), tmp_path / "rows.csv")
     found, quoted = read_csv(tmp_path / "rows.csv"), f"'{name}".replace("\r", "\n")
     assert found["cause"] == found["structure"] == found["host"] == [quoted]
     assert (found["objective"], found["abscissa"]) == (["-1.5"], ["-2.0"])

@@ -15,11 +15,11 @@ import pytest
 from helpers.rows import assert_same
 
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
-from tmsopt.documents import describe_row
+from tmsopt.documents import row_sentence
 from tmsopt.errors import InputError
 from tmsopt.evaluation import LAWS, evaluate_columns, law_rows
 from tmsopt.plots import draw_histogram
-from tmsopt.studies import RowTable, Solver, open_store, part_of, solve_row, summary, view_store
+from tmsopt.studies import RowTable, Solver, batch_rows, open_store, solve_row, summarise, view_store
 
 judge = import_module("tmsopt.studies.solving")
 SOLVES = import_module("tmsopt.studies.monte_carlo")
@@ -79,8 +79,8 @@ STUDIES = {
 @pytest.mark.parametrize("name", STUDIES)
 def test_rows_judged_at_once_are_those_of_one_by_one(name):
     study = STUDIES[name]()
-    assert judge.applies(study)
-    at_once = RowTable(study, list(judge.judged(study, np.arange(len(study)))))
+    assert judge.can_evaluate(study)
+    at_once = RowTable(study, list(judge.evaluate_rows(study, np.arange(len(study)))))
     assert len(at_once) > 0.4 * len(study) or name == "very near EP4"  # where doubles settle nothing
     solver = Solver(study)
     assert_same(at_once, [solver((row.number,))[0] for row in at_once])
@@ -93,7 +93,7 @@ def test_rows_do_not_depend_on_others():
     for size in (1, 7, 64):
         for first in range(0, 300, 100 if size == 1 else size):
             numbers = np.arange(first, min(first + size, 300))
-            some = RowTable(study, list(judge.judged(study, numbers)))
+            some = RowTable(study, list(judge.evaluate_rows(study, numbers)))
             assert_same(some, [whole[row.number] for row in some])
     assert_same([solve_row(study, 17).row], [whole[17]])
 
@@ -109,7 +109,7 @@ def test_what_is_searched_or_listed_is_not_judged_at_once():
         replace(study.problem, tolerances={"mu": 0.01}),
         replace(study.problem, minimize=None, maximize="radius"),
     ):
-        assert not judge.applies(Study(problem, {"Fr": [2.0, 2.1]}))
+        assert not judge.can_evaluate(Study(problem, {"Fr": [2.0, 2.1]}))
     assert evaluate_columns(study.problem.posed, {"Fr": np.array([2.0])}) is not None
 
 
@@ -117,14 +117,14 @@ def test_columns_and_summary_are_those_of_the_rows():
     """Whether parameters and causes follow from the study, or are kept with every row."""
     for study in (own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}), built(50, report=["Fr_c"])):
         quick = run_study(study).rows
-        slow = RowTable(study, [part_of(list(quick))])
+        slow = RowTable(study, [batch_rows(list(quick))])
         assert quick == slow == tuple(quick)
         for name in quick.headers:
             one, other = quick.column(name), slow.column(name)
             np.testing.assert_array_equal(one.mask, other.mask, name)
             np.testing.assert_array_equal(one.compressed(), other.compressed(), name)
             assert one.dtype == other.dtype
-        assert str(summary(quick)) == str(summary(slow))
+        assert str(summarise(quick)) == str(summarise(slow))
         assert quick[3:5] == (quick[3], quick[4])
         assert quick[-1].number == len(study) - 1
 
@@ -137,10 +137,10 @@ def test_a_store_gives_back_the_same_rows(tmp_path):
     for rows in (kept.rows, again.rows):
         assert_same(rows, plain.rows)
     with open_store(path, study) as store:
-        assert store.done().tolist() == list(range(60))
+        assert store.numbers().tolist() == list(range(60))
         assert sum(session["rows"] for session in store.sessions()) == 60
         store.forget([3, 4])
-        store.add(part_of([kept.rows[4]]))
+        store.add(batch_rows([kept.rows[4]]))
     part = run_study(study, path)
     assert (part.found, part.solved) == (59, 1)
     assert_same(part.rows, plain.rows)
@@ -176,7 +176,7 @@ def test_kill_9_loses_no_block_and_doubles_none(tmp_path):
             os.kill(process.pid, signal.SIGKILL)
         process.communicate()
         with view_store(path) as store:
-            done = store.done()
+            done = store.numbers()
             assert len(done) == sum(session["rows"] for session in store.sessions())
         assert len(done) >= int(lines[-1] or 0)
         had.append(len(done))
@@ -196,7 +196,7 @@ def test_what_is_judged_is_called_feasible_and_not_optimal(study):
     assert row.solution is not None
     told = [
         results.report(),
-        describe_row(study, row.row),
+        row_sentence(study, row.row),
         row.solution.report(),
         repr(results),
         repr(row.solution),

@@ -23,19 +23,19 @@ from tmsopt.studies import (
     Share,
     Span,
     Study,
-    blocks,
+    batch_rows,
+    compute_yield,
     definition,
     grid,
     latin_hypercube,
     load_study,
     monte_carlo,
     over_grid,
-    part_of,
-    planned,
+    plan_study,
     read_csv,
     sobol,
     sobol_note,
-    yield_of,
+    split_into_blocks,
 )
 
 PROBLEM = tmsopt.Problem(
@@ -189,7 +189,7 @@ def test_grid_is_walked_one_step_in_one_axis_at_a_time(sizes, size, shuffler):
     names = ("mu", "chi_H", "zeta_B", "decay.limit")
     axes = {name: shuffler.sample(range(50), n) for name, n in zip(names, sizes, strict=False)}
     study = over_grid(PROBLEM, axes)
-    cut = blocks(study, size)
+    cut = split_into_blocks(study, size)
     order = [row for block in cut for row in block]
     assert sorted(order) == list(range(len(study)))
     assert all(len(block) == size for block in cut[:-1])
@@ -204,14 +204,14 @@ def test_other_rows_follow_a_hilbert_curve(axes):
     points = list(itertools.product(*(range(n) for n in axes.values())))
     random.Random(0).shuffle(points)
     study = Study(PROBLEM, dict(zip(axes, np.array(points, float).T, strict=True)))
-    changed, largest = steps(study, [row for block in blocks(study) for row in block])
+    changed, largest = steps(study, [row for block in split_into_blocks(study) for row in block])
     assert (set(changed), largest) == ({1}, 1)
 
 
 def test_blocks_of_rows_that_are_all_alike_or_many():
-    assert blocks(Study(PROBLEM, {"mu": [0.1] * 5}), 2) == [(0, 1), (2, 3), (4,)]
+    assert split_into_blocks(Study(PROBLEM, {"mu": [0.1] * 5}), 2) == [(0, 1), (2, 3), (4,)]
     study = Study(PROBLEM, sobol(dict.fromkeys(("mu", "chi_H", "Fr.min"), (0.1, 1)), 2**15, seed=1))
-    order = np.concatenate(blocks(study))
+    order = np.concatenate(split_into_blocks(study))
     assert np.array_equal(np.sort(order), np.arange(2**15))
     walk = np.diff(np.array([np.asarray(c) for c in study.columns.values()])[:, order] / 0.9, axis=1)
     assert np.linalg.norm(walk, axis=0).mean() < 1.5 * 2**-5  # a cube for every row has sides of 2^-5
@@ -310,7 +310,7 @@ def test_column_cannot_be_changed():
         ({"report": ["nu_H >= 1"]}, ["is a comparison"]),
         ({"method": "grdi"}, ["did you mean 'grid'"]),
         ({"grid_shape": {"mu": 3}}, ["'mu': 3} for 2 rows"]),
-        ({"grid_shape": {"chi_H": 2}}, ["chi_H", "each column in turn: mu"]),
+        ({"grid_shape": {"chi_H": 2}}, ["chi_H", "each column", "(mu)"]),
         (
             {"columns": {"mu": [1, 2, 1, 2], "chi_H": [1, 1, 2, 2]}, "grid_shape": {"mu": 2, "chi_H": 2}},
             ["'chi_H': 2} for 4 rows", "last axis fastest"],
@@ -446,7 +446,7 @@ grid  | ["nu_H", "2*Fr_c"] => "nu_H"               | 8  | nu_H; a list of expres
 grid  | 2*Fr_c => 2*Frc                            | 8  | Frc; did you mean
 grid  | seed = 3 => method = "gird"                | 5  | gird; did you mean 'grid'
 grid  | seed = 3 => rows = 3                       | 5  | rows does not go with method = "grid"
-grid  | seed = 3 => csv = "r.csv"                  | 5  | it is for csv
+grid  | seed = 3 => csv = "r.csv"                  | 5  | accepted for csv
 grid  | # end => [tolerances]\nmu = 0.01           | 15 | monte_carlo
 grid  | zeta_H => zeta_h                           | 12 | zeta_h; did you mean 'zeta_H'
 grid  | zeta_H => Fr                               | 12 | Fr is free; Fr.min
@@ -477,7 +477,7 @@ drawn | # end => chi_b = 1                         | 6  | chi_b; did you mean 'c
 drawn | # end => chi_B = "5 kg"                    | 6  | kg
 drawn | # end => chi_B = 0                         | 6  | 0; greater than 0
 drawn | rows = 8 => rows = 8\ndistribution = "gauss" | 5 | gauss; uniform normal
-drawn | rows = 8 => rows = 8\nwarm = true          | 5  | nothing is free
+drawn | rows = 8 => rows = 8\nwarm = true          | 5  | no free parameters
 drawn | # end => mu = 0.1\n[vary]\nmu = [1]        | 7  | [vary] does not go with
 """
 """File, what is changed in it, line at fault, words that the message must contain."""
@@ -634,9 +634,9 @@ def test_monte_carlo_is_reproducible_and_longer_ones_begin_alike(design):
 def test_monte_carlo_plans_from_its_problem(design):
     tolerances = dict(design.problem.tolerances)
     sampling = Sampling(design.problem.posed.nominal, 20, seed=1, tolerances=tolerances)
-    assert planned(sampling).columns == monte_carlo(design, 20, seed=1).columns
+    assert plan_study(sampling).columns == monte_carlo(design, 20, seed=1).columns
     study = Study(PROBLEM, ABOUT)
-    assert planned(study) is study
+    assert plan_study(study) is study
     with pytest.raises(tmsopt.NotSolved):
         monte_carlo(replace(design, status="infeasible"), 20)
 
@@ -675,12 +675,12 @@ def test_yield_counts_rows_by_what_they_are():
     kinds = [("optimal", -1.0), ("optimal", 0.5), ("infeasible", -2.0), ("infeasible", math.nan), ("failed", math.nan)]
     study = Study(PROBLEM, {"mu": [0.1] * 5})
     rows = [Row(k, 0, Table(), status, abscissa=abscissa) for k, (status, abscissa) in enumerate(kinds)]
-    found = yield_of(RowTable(study, [part_of(rows)]))
+    found = compute_yield(RowTable(study, [batch_rows(rows)]))
     assert (found.stable, found.feasible, found.good) == (Share(2, 4), Share(2, 4), Share(1, 4))
     assert found.failed == 1
     assert dict(found.abscissa) == {"0.05": -2.0, "0.25": -2.0, "0.5": -1.0, "0.75": 0.5, "0.95": math.inf}
     assert json.loads(json.dumps(found.to_json(), allow_nan=False))["stable"]["share"] == 0.5
-    assert math.isnan(yield_of(RowTable(study, [])).stable.share)
+    assert math.isnan(compute_yield(RowTable(study, [])).stable.share)
 
 
 # The studies in problems/
@@ -690,7 +690,7 @@ def test_yield_counts_rows_by_what_they_are():
     ("name", "rows"), [("study_sway", 15), ("study_heights", 32), ("study_decay", 31), ("study_built", 500)]
 )
 def test_rows_of_the_studies_in_the_repository(name, rows):
-    study = planned(load_study(hunt.PROBLEMS / f"{name}.toml"))
+    study = plan_study(load_study(hunt.PROBLEMS / f"{name}.toml"))
     assert (len(study), study.notes) == (rows, ())
     for row in range(0, rows, 7):
         study.row_problem(row)
@@ -698,7 +698,7 @@ def test_rows_of_the_studies_in_the_repository(name, rows):
 
 def test_what_study_built_promises():
     """By eigenvalues of the rows; a design that is a little off has simple roots, good to 1e-8."""
-    study = planned(load_study(hunt.PROBLEMS / "study_built.toml"))
+    study = plan_study(load_study(hunt.PROBLEMS / "study_built.toml"))
     fixed = {name: np.asarray(value) for name, value in study.problem.fixed.items()}
     found = hunt.abscissa({**fixed, **{name: np.asarray(column) for name, column in study.columns.items()}})
     assert np.median(found) == pytest.approx(-1.36, abs=0.005)

@@ -22,7 +22,7 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
 from tmsopt.records import Table
-from tmsopt.studies import RowTable, Study, check_same, open_store, run_study, stored, view_store
+from tmsopt.studies import RowTable, Study, check_same, open_store, read_results, run_study, view_store
 
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 OLD = Path(__file__).parent / "stores"
@@ -31,7 +31,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POS
 
 def rows_of(path, study=STUDY):
     with view_store(path) as opened:
-        return list(RowTable(study, opened.parts()))
+        return list(RowTable(study, opened.read_batches()))
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ with open_store(path, STUDY) as opened:
     print(os.getpid(), flush=True)
     if task == "hold":
         time.sleep(60)
-    number = len(opened.done())
+    number = len(opened.numbers())
     while True:
         batch = [row(n) for n in range(number, number + random.randint(1, 20))]
         opened.add(part(*batch))
@@ -92,7 +92,7 @@ def test_no_acknowledged_row_is_lost_by_kill_9(path):
             printed = process.stdout.read().split("\n")[:-1]  # the last line may be cut off
         acknowledged = int(printed[-1]) if printed else acknowledged
         with view_store(path) as opened:
-            done = opened.done().tolist()
+            done = opened.numbers().tolist()
             assert len(done) >= acknowledged
             assert done == list(range(len(done)))  # batches are kept as a whole or not at all
             assert [s["ended"] for s in opened.sessions()] == [None] * len(opened.sessions())
@@ -107,9 +107,9 @@ def test_reading_while_another_process_writes(path):
         for _ in range(5):
             acknowledged = int(process.stdout.readline())
             with view_store(path) as opened:
-                there = len(opened.done())
+                there = len(opened.numbers())
                 assert there >= acknowledged
-                assert len(RowTable(STUDY, opened.parts())) >= there
+                assert len(RowTable(STUDY, opened.read_batches())) >= there
 
 
 def test_a_second_writer_is_refused_until_the_first_is_gone(path):
@@ -124,7 +124,7 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(path):
             opened.add(part(row(0)))
             assert str(os.getpid()) in faults(open_store, path, STUDY)  # within one process too
     with open_store(path, STUDY) as opened:
-        assert opened.done().tolist() == [0]
+        assert opened.numbers().tolist() == [0]
     assert [p.name for p in path.parent.iterdir()] == [path.name]  # one plain file, which can be copied
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         assert connection.execute("SELECT number, status, abscissa FROM rows").fetchall() == [(0, "optimal", -1.0)]
@@ -173,7 +173,7 @@ def test_a_row_is_never_overwritten_and_may_be_forgotten(path):
         opened.add(part(row(1), row(2)))
         opened.add(part(row(1, seconds=9.0, host="elsewhere"), row(3)))
         opened.add(part())
-        assert opened.done().tolist() == [1, 2, 3]
+        assert opened.numbers().tolist() == [1, 2, 3]
         assert opened.sessions()[0]["rows"] == 3
         opened.forget([2])
     assert rows_of(path) == [row(1), row(3)]
@@ -231,7 +231,7 @@ def test_the_store_of_a_changed_study_is_refused(path, change, line):
     assert "--store" in message
     assert path.read_bytes() == before
     with open_store(path, SMALL) as opened:
-        assert opened.done().tolist() == [0]
+        assert opened.numbers().tolist() == [0]
 
 
 def test_fresh_moves_aside_and_never_deletes(path):
@@ -240,12 +240,12 @@ def test_fresh_moves_aside_and_never_deletes(path):
             assert opened.warnings == (
                 (f"moved the old store to {path.with_name(f'study.{number}.sqlite')}",) * (number > 0)
             )
-            assert opened.done().size == 0
+            assert opened.numbers().size == 0
             opened.add(part(row(number)))
     for name, number in (("study.1.sqlite", 0), ("study.2.sqlite", 1), ("study.sqlite", 2)):
         with view_store(path.with_name(name)) as opened:
             assert opened.about()["seed"] == number
-            assert opened.done().tolist() == [number]
+            assert opened.numbers().tolist() == [number]
     assert len(list(path.parent.iterdir())) == 3
 
 
@@ -256,9 +256,9 @@ def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path):
         process.wait()
     assert path.with_name("study.sqlite-wal").exists()
     with open_store(path, STUDY, fresh=True) as opened:
-        assert opened.done().size == 0
+        assert opened.numbers().size == 0
     with view_store(path.with_name("study.1.sqlite")) as opened:
-        assert len(opened.done()) >= acknowledged
+        assert len(opened.numbers()) >= acknowledged
 
 
 def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path):
@@ -268,7 +268,7 @@ def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path):
         process.wait()
     path.unlink()
     with open_store(path, STUDY) as opened:
-        assert opened.done().size == 0
+        assert opened.numbers().size == 0
     assert path.with_name("study.1.sqlite-wal").exists()
 
 
@@ -299,10 +299,10 @@ def newer_store(path):
 @pytest.mark.parametrize(
     ("make", "expected"),
     [
-        (lambda path: path.write_bytes(random.Random(1).randbytes(5000)), "is no store of tmsopt"),
-        (lambda path: path.write_text("[parameters]\n"), "is no store of tmsopt"),
-        (lambda path: path.write_bytes(b""), "is no store of tmsopt"),
-        (other_database, "is no store of tmsopt"),
+        (lambda path: path.write_bytes(random.Random(1).randbytes(5000)), "is not a store of tmsopt"),
+        (lambda path: path.write_text("[parameters]\n"), "is not a store of tmsopt"),
+        (lambda path: path.write_bytes(b""), "is not a store of tmsopt"),
+        (other_database, "is not a store of tmsopt"),
         (newer_store, "its schema is 4, this version reads up to 3"),
     ],
 )
@@ -317,13 +317,13 @@ def test_a_file_that_is_no_store_is_not_touched(path, make, expected):
 
 
 def test_places_where_no_store_can_be(tmp_path):
-    assert "no regular file" in faults(open_store, tmp_path, STUDY)
+    assert "not a regular file" in faults(open_store, tmp_path, STUDY)
     assert "does not exist" in faults(open_store, tmp_path / "no" / "a.sqlite", STUDY)
     assert "no such file" in faults(view_store, tmp_path / "a.sqlite")
     assert "name" in faults(open_store, tmp_path / ("x" * 300), STUDY)
     if sys.platform == "linux":
         assert "written" in faults(open_store, "/proc/a.sqlite", STUDY)
-        assert "no regular file" in faults(open_store, "/dev/null", STUDY)
+        assert "not a regular file" in faults(open_store, "/dev/null", STUDY)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -362,11 +362,11 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script, path):
     def read_whole():
         check_same(path, STUDY)
         with view_store(path) as opened:
-            opened.about(), opened.sessions(), opened.parts()
+            opened.about(), opened.sessions(), opened.read_batches()
 
     def go_on():
         with open_store(path, STUDY) as opened:
-            opened.parts()
+            opened.read_batches()
 
     with open_store(path, STUDY) as opened:
         opened.add(part(row(0)))
@@ -376,7 +376,7 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script, path):
         assert "--fresh" in message
         assert len(message) < 2000
     with open_store(path, STUDY, fresh=True) as opened:
-        assert opened.done().size == 0
+        assert opened.numbers().size == 0
     assert sorted(p.name for p in path.parent.iterdir()) == ["study.1.sqlite", "study.sqlite"]
 
 
@@ -413,10 +413,10 @@ def test_a_full_disk_costs_no_row_that_was_acknowledged(path):
             assert "disk" in str(error)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        assert opened.done().tolist() == list(range(acknowledged))
+        assert opened.numbers().tolist() == list(range(acknowledged))
         opened.add(part(row(acknowledged)))
     with view_store(path) as opened:
-        assert opened.done().tolist() == list(range(acknowledged + 1))
+        assert opened.numbers().tolist() == list(range(acknowledged + 1))
 
 
 # Stores of tmsopt 1.1, whose rows were exported by it: solved ones of schema 1, and judged ones of schema 2
@@ -460,7 +460,7 @@ def test_a_store_of_version_1_is_read_exported_and_goes_on(name, path, tmp_path)
     study, exported = STUDIES[name], tmp_path / "rows.csv"
     shutil.copy(OLD / f"{name}.sqlite", path)
     before = path.read_bytes()
-    stored(study, path).export(exported)
+    read_results(study, path).export(exported)
     assert_same_table(exported, OLD / f"{name}.csv")
     assert path.read_bytes() == before
     again = run_study(study, path, workers=1)
@@ -491,6 +491,6 @@ def test_a_damaged_store_of_version_1_is_refused(path):
         shutil.copy(OLD / f"{name}.sqlite", path)
         spoil(path, script)
         before = path.read_bytes()
-        for call in (lambda: stored(STUDIES[name], path), lambda: open_store(path, STUDIES[name])):  # noqa: B023
+        for call in (lambda: read_results(STUDIES[name], path), lambda: open_store(path, STUDIES[name])):  # noqa: B023
             assert "is damaged" in faults(call)
         assert path.read_bytes() == before

@@ -33,15 +33,15 @@ from tmsopt.studies import (
     RowTable,
     Solver,
     Study,
+    batch_rows,
     load_study,
     monte_carlo,
     open_store,
     over_grid,
-    part_of,
+    read_results,
     run_study,
     solve_row,
-    stored,
-    summary,
+    summarise,
     view_store,
 )
 
@@ -128,7 +128,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         run_study(GRID, path, workers=1, progress=interrupt)
     with view_store(path) as store:
-        assert store.done().tolist() == [0, 1, 2]
+        assert store.numbers().tolist() == [0, 1, 2]
     resumed = run_study(GRID, path, workers=1)
     assert resumed.solved == 3
     assert sorted(tried) == list(range(6))
@@ -159,7 +159,7 @@ def test_failures_are_rows_with_a_cause():
     assert "1.5" in rows[1].cause
     assert "trail" in rows[2].cause
     assert rows[2].violations["trail"] > 0
-    told = summary(rows)
+    told = summarise(rows)
     assert dict(told.counts) == {"optimal": 1, "infeasible": 1, "failed": 1}
     assert told.best == rows[0]
     assert sum(told.causes.values()) == 2
@@ -187,7 +187,7 @@ def test_rows_are_drawn_around_a_design():
         lone = solve(Problem(model=tms, fixed=dict(row.parameters)))
         assert row.abscissa == pytest.approx(lone.abscissa, rel=1e-9)
         assert row.abscissa > design.abscissa  # EP4 is the best of all
-    told = summary(rows).product
+    told = summarise(rows).product
     assert told is not None
     assert told.stable.count == 5
 
@@ -199,12 +199,12 @@ def test_a_summary_of_rows_is_what_its_numbers_are_by_definition():
     study = over_grid(EP4, {"mu": [0.1] * 7})
     causes = ("a by 0.1", "a by 2e-05", "b by 3")
     made += [row_of(4 + k, study, status="infeasible", abscissa=math.nan, cause=c) for k, c in enumerate(causes)]
-    told = summary(RowTable(study, [part_of(made)]))
+    told = summarise(RowTable(study, [batch_rows(made)]))
     assert (told.spread["objective"], told.spread["abscissa"]) == ((1.0, 2.5, 7.0), (-5.0, -3.5, 1.0))
     assert (told.best.number, told.stable, dict(told.laws)) == (1, 3, {"w01": 1e-3})
     assert dict(told.causes) == {"a": 2, "b by 3": 1}
     greatest = over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1] * 7})
-    assert summary(RowTable(greatest, [part_of(made)])).best.number == 3
+    assert summarise(RowTable(greatest, [batch_rows(made)])).best.number == 3
 
 
 @pytest.mark.slow
@@ -261,7 +261,7 @@ def test_the_best_valley_is_kept(asked, sign, most):
     assert sum(row.warm for row in rows) >= 10
     for row, mu in zip(rows, values, strict=True):
         assert sign * row.objective == pytest.approx(min(0.1 * mu, 0.1 * (1 - mu), most), abs=1e-12)
-    best = summary(rows).best
+    best = summarise(rows).best
     assert best is not None
     assert best.objective == pytest.approx(0.0, abs=1e-12)
 
@@ -307,7 +307,7 @@ def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_pat
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 10).tolist()}, warm=True)
     whole = run_study(study, workers=1).rows
     with open_store(tmp_path / "s.sqlite", study) as store:
-        store.add(part_of(whole[:4]))
+        store.add(batch_rows(whole[:4]))
     resumed = run_study(study, tmp_path / "s.sqlite", workers=1)
     assert resumed.solved == 6
     assert_same(resumed.rows, whole)
@@ -334,7 +334,7 @@ def test_a_row_that_ends_its_worker_costs_itself_alone(warm, monkeypatch, tmp_pa
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 6).tolist()}, warm=warm)
     notes = []
     run_study(study, tmp_path / "s.sqlite", workers=2, note=notes.append)
-    rows = stored(study, tmp_path / "s.sqlite").rows
+    rows = read_results(study, tmp_path / "s.sqlite").rows
     assert [row.status for row in rows] == ["optimal"] * 3 + ["quarantined"] + ["optimal"] * 2
     assert rows[3].cause == "ended its worker twice (signal 9)"
     assert notes == ["row 3 is quarantined"]
@@ -397,7 +397,7 @@ def test_the_command_solves_stores_and_shows_rows(file):
     assert "grid over zeta_B (2) × zeta_H (3): 6 rows; 6 optimal" in again.stdout
 
     row = command(file, "--row", 4, "--json")
-    kept = stored(load_study(file), "heights.sqlite").rows[4].to_json()
+    kept = read_results(load_study(file), "heights.sqlite").rows[4].to_json()
     solved = json.loads(row.stdout)
     assert_same([Row.from_json(solved)], [Row.from_json(kept)])
     assert solved["solution"]["parameters"] == pytest.approx(kept["parameters"], rel=1e-9)
@@ -465,7 +465,7 @@ def test_a_killed_command_goes_on(file, ending):
         if store.exists():
             try:
                 with view_store(store) as opened:
-                    kept = set(opened.done().tolist())
+                    kept = set(opened.numbers().tolist())
             except InputError:
                 continue  # being made
     process.send_signal(ending)
@@ -477,11 +477,11 @@ def test_a_killed_command_goes_on(file, ending):
         data = json.loads(answer)
         assert data["run"] == {"store": str(store), "rows_found": 0, "interrupted": True}
         assert kept <= {row["number"] for row in data["table"]}
-    before = {row.number: row for row in stored(load_study(file), store).rows}
+    before = {row.number: row for row in read_results(load_study(file), store).rows}
     assert kept <= before.keys()
     assert len(before) < 36
     assert command(file, "--workers", 2).exit_code == 0
-    rows = stored(load_study(file), store).rows
+    rows = read_results(load_study(file), store).rows
     assert [row.number for row in rows] == list(range(36))
     assert all(rows[n] == row for n, row in before.items())  # seconds too: they were not solved again
 
@@ -491,10 +491,10 @@ def test_rows_that_a_study_cannot_have_are_refused(number, tmp_path):
     """In a store from somebody else: before anything is solved, and where its rows are shown."""
     study, path = over_grid("problems/ep4.toml", {"mu": [0.1, 0.2]}), tmp_path / "s.sqlite"
     with open_store(path, study) as store:
-        store.add(part_of([Row(n, 1, Table({"mu": 0.2}), "failed") for n in (1, number)]))
+        store.add(batch_rows([Row(n, 1, Table({"mu": 0.2}), "failed") for n in (1, number)]))
     told = []
-    for call in (lambda: stored(study, path), lambda: run_study(study, path, progress=told.append)):
-        with pytest.raises(InputError, match=f"row {number} is not of this study"):
+    for call in (lambda: read_results(study, path), lambda: run_study(study, path, progress=told.append)):
+        with pytest.raises(InputError, match=f"row {number} does not belong to this study"):
             call()
     assert {t.what for t in told} == {"waiting for the store", "reading the store"}
 
@@ -502,8 +502,8 @@ def test_rows_that_a_study_cannot_have_are_refused(number, tmp_path):
 def test_what_a_row_says_is_printable(tmp_path):
     study = over_grid("problems/ep4.toml", {"mu": [0.1]})
     with open_store(tmp_path / "s.sqlite", study) as store:
-        store.add(part_of([Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")]))
-    assert "\ufffd[31mred\ufffd" in str(stored(study, tmp_path / "s.sqlite"))
+        store.add(batch_rows([Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")]))
+    assert "\ufffd[31mred\ufffd" in str(read_results(study, tmp_path / "s.sqlite"))
 
 
 # By the clock

@@ -1,6 +1,6 @@
-"""What an answer means: is it optimal, what limits cost, what rounding does, how multiple roots split.
+"""Analysis of a solution: local optimality, the value of limits, the effect of rounding, splitting of multiple roots.
 
-In: a solution. Out: an `Explanation` and a `Diagnosis` of each multiple root, as data; `tmsopt.documents` shows them.
+In: a solution. Out: an `Explanation`, and a `Diagnosis` of each multiple root, as data; `tmsopt.documents` shows them.
 Open `explain` first, then `diagnosis`.
 """
 

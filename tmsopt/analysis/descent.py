@@ -1,7 +1,7 @@
-"""A better design beside one that is not minimal: along the way that its conditions leave open, kept to exactly.
+"""A better design near one that is not minimal, found along its feasible direction of descent.
 
-A straight line in the parameters will not do: beside a root of multiplicity m it strays from the factors by ε², which
-throws a root off by ε^(2/m). The way is followed by Newton's method on what is held.
+A straight line in the parameters is not enough: near a root of multiplicity m it violates the factors by ε², which
+moves a root by ε^(2/m). Newton's method on the active rows keeps to the curve.
 """
 
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tmsopt.analysis.conditions import Conditions, curved
+from tmsopt.analysis.conditions import Conditions, curvature_sign
 from tmsopt.analysis.program import LocalProgram
 from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.recheck import recheck
@@ -17,19 +17,19 @@ from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import design_of
 from tmsopt.records import Array, Table
 
-_FIRST = 0.05  # of the sizes of the variables: the longest step
-_SHORTER = 4.0
-_STEPS = 9  # the shortest is 7e-7 of the sizes
-_NEWTON = 12
-_BETTER = 1e-9  # of the objective: what a feasible point may owe to rounding
+_FIRST = 0.05  # longest step, relative to the sizes of the variables
+_RATIO = 4.0  # of successive steps
+_STEPS = 9  # the shortest step is 7e-7 of the sizes
+_ITERATIONS = 12  # of Newton's method
+_BETTER = 1e-9  # smallest improvement, relative to the objective, that rounding does not explain
 
 
 @dataclass(frozen=True)
-class Better:
+class BetterDesign:
     """A design with a better objective, rechecked.
 
     Attributes:
-        order: whether the way falls to first order, or by its curvature.
+        order: 1 if the objective decreases to first order, 2 if by curvature.
     """
 
     parameters: Table[float]
@@ -37,42 +37,41 @@ class Better:
     order: int
 
 
-def better(program: LocalProgram, found: Conditions, solution: Solution) -> Better | None:
-    """The design after the longest step downhill that improves; None where none does."""
-    problem, order = program.problem, 2 if curved(found.curvature) < 0 else 1
-    judged = solution.abscissa if minimizes_abscissa(problem) else solution.value
-    for x in _along(program, found, both=order == 2):
+def find_better_design(program: LocalProgram, found: Conditions, solution: Solution) -> BetterDesign | None:
+    """The design after the longest step downhill that improves; None without one."""
+    problem, order = program.problem, 2 if curvature_sign(found.curvature) < 0 else 1
+    reference = solution.abscissa if minimizes_abscissa(problem) else solution.value
+    for x in _downhill_points(program, found, both=order == 2):
         at = dict(zip(program.variables, x.tolist(), strict=True))
         moved = design_of(problem, [at.get(n, 0.0) for n in problem.free])
         moved |= {n: solution.parameters[n] for n in problem.free if n not in at}
         checked = recheck(problem, parameters := problem.ordered(moved))
-        value = (
-            max(checked.objective, checked.realised) if minimizes_abscissa(problem) else checked.objective
-        )  # true as stored, too
-        if not checked.violations and problem.sign * (judged - value) > _BETTER * (1 + abs(judged)):
-            return Better(Table(parameters), value, order)
+        # the stored doubles must be better too
+        value = max(checked.objective, checked.realised) if minimizes_abscissa(problem) else checked.objective
+        if not checked.violations and problem.sign * (reference - value) > _BETTER * (1 + abs(reference)):
+            return BetterDesign(Table(parameters), value, order)
     return None
 
 
-def _along(program: LocalProgram, found: Conditions, both: bool) -> Iterator[Array]:
-    """Points on the way, the farthest first."""
-    jacobian = program.at(program.x)[2]
-    signed = np.array([held.signed for held in program.held])
+def _downhill_points(program: LocalProgram, found: Conditions, both: bool) -> Iterator[Array]:
+    """Points along the direction of descent, the farthest first."""
+    jacobian = program.evaluate(program.x)[2]
+    signed = np.array([row.signed for row in program.rows])
     direction = found.downhill / np.abs(found.downhill / program.sizes).max()
     for k in range(_STEPS):
         for side in (1.0, -1.0) if both else (1.0,):
-            step = _FIRST / _SHORTER**k * side * direction
+            step = _FIRST / _RATIO**k * side * direction
             target = np.where(signed, np.maximum(jacobian @ step, 0.0), 0.0)
-            x = _corrected(program, program.x + step, target)
+            x = _restore_rows(program, program.x + step, target)
             if x is not None:
                 yield x
 
 
-def _corrected(program: LocalProgram, x: Array, target: Array) -> Array | None:
-    """The nearest point at which what is held has given values, by Newton's method; None where it fails."""
+def _restore_rows(program: LocalProgram, x: Array, target: Array) -> Array | None:
+    """The nearest point at which the active rows have the target values, by Newton's method; None where it fails."""
     start = x
-    for _ in range(_NEWTON):
-        _, h, jacobian, _ = program.at(x)
+    for _ in range(_ITERATIONS):
+        _, h, jacobian, _ = program.evaluate(x)
         if not np.all(np.isfinite(jacobian)):
             return None
         step = np.linalg.lstsq(jacobian * program.sizes, target - h, rcond=1e-12)[0] * program.sizes

@@ -1,4 +1,4 @@
-"""What a multiple root is: its multiplicities and Jordan chains, and how its parts move when a parameter changes."""
+"""Diagnosis of a multiple root: multiplicities, Jordan chains, and how it splits when a parameter changes."""
 
 import math
 from collections.abc import Mapping
@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.analysis.meeting import Meeting, many_digits, met, middle, pencil_of, polished
-from tmsopt.analysis.splitting import DEVIATION, Law, Response, response
+from tmsopt.analysis.root_point import RootPoint, evaluate_pencil, high_precision, midpoint, refine_point, refine_root
+from tmsopt.analysis.splitting import DEVIATION, Law, Response, compute_response
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.files import Given
@@ -18,24 +18,24 @@ from tmsopt.roots import Root, Structure, backward_error
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.search.solve import solve_if_needed
 
-_RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance
-_TIMES = 10.0  # likewise, times the root of the distance from the structure
+_RANK = 1e-7  # relative singular value that counts as 0
+_TIMES = 10.0  # or this times √distance: near a semisimple root a singular value is the root of the distance
 
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis(Printable):
-    """A multiple root of a design; of a complex pair, the one in the upper half-plane.
+    """A multiple root of a design, or the upper root of a multiple complex pair.
 
     Attributes:
         re, im: the root.
-        algebraic: how many roots it stands for.
-        geometric: number of independent eigenvectors; of a polynomial without matrices 1.
-        partial: lengths of the Jordan chains, longest first; none if the ranks contradict each other.
-        kind: ``defective`` for one chain, ``semisimple`` for chains of length 1, ``partly defective`` between.
+        algebraic: algebraic multiplicity.
+        geometric: number of independent eigenvectors; 1 for a polynomial without matrices.
+        partial: lengths of the Jordan chains, longest first; empty if the ranks contradict each other.
+        kind: ``defective`` for one chain, ``semisimple`` for chains of length 1, ``partly defective`` otherwise.
         jordan: the singular values behind the verdict; None without matrices.
-        distance: relative change of the coefficients from the design's to those with the structure.
-        responses: most sensitive parameter first.
-        eigenfrequency: of a complex system ω = i s.
+        distance: relative change of the coefficients from the design to the nearest polynomial with the structure.
+        responses: one for each parameter, the most sensitive first.
+        eigenfrequency: ω = i s for a complex system, else None.
 
     Example:
         >>> (found,) = tmsopt.diagnose("problems/ep4.toml")
@@ -57,7 +57,7 @@ class Diagnosis(Printable):
     eigenfrequency: complex | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; numbers that only describe have 6 digits."""
+        """Plain data for ``json.dumps``; descriptive numbers have 6 digits."""
         return {
             **plain(self, "re im"),
             **(plain(self, "eigenfrequency") if self.eigenfrequency is not None else {}),
@@ -74,15 +74,15 @@ class Diagnosis(Printable):
 
 
 def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagnosis, ...]:
-    """Diagnosis of every multiple root of a design, rightmost first; none if all roots are simple.
+    """Diagnose every multiple root of a design, rightmost first; empty if all roots are simple.
 
-    The algebraic multiplicity is that of the solution's structure. The geometric and partial multiplicities are ranks
-    of the model's matrices at the root of the nearest polynomial with that structure. How the root splits follows from
-    that polynomial with the exact changes of the coefficients that a parameter makes: c = −k! ∂p/∂θ / p⁽ᵏ⁾ of
-    s = s0 + (c ε)^(1/k), or Newton's polygon where that vanishes; the law is then set beside the roots themselves.
+    The structure of the solution gives the algebraic multiplicity. Ranks of the model's matrices, at the root of the
+    nearest polynomial with that structure, give the geometric and partial multiplicities. The splitting follows from
+    the exact change of that polynomial with a parameter: s = s0 + (c ε)^(1/k) with c = −k! ∂p/∂θ / p⁽ᵏ⁾, or Newton's
+    polygon where c vanishes. Each law is confirmed by the roots themselves.
 
     Args:
-        design: a solution; or a problem or its file, solved first.
+        design: a solution, or a problem or its file, which is solved first.
         progress: called with a `tmsopt.Progress` now and then.
 
     Example:
@@ -96,55 +96,61 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
     start_steps(progress, "splitting roots")
     problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
-    values, told = problem.values(parameters), solution.of_polynomial
+    values, ideal = problem.values(parameters), solution.of_polynomial
     found = values["structure"]
     assert isinstance(found, Structure)
-    if found.name != told.name:  # the doubles stand a little aside, to keep a limit
-        z = np.array([complex(r.re, r.im) for r in told.roots for _ in range(r.multiplicity)])
-        found = replace(told, distance=float(backward_error([float(c) for c in values.coefficients], z)))
-    return diagnosed(problem.model, problem.parameter_set, parameters, found, problem.free)
+    if found.name != ideal.name:  # the stored doubles are slightly off, so that they satisfy a limit
+        z = np.array([complex(r.re, r.im) for r in ideal.roots for _ in range(r.multiplicity)])
+        found = replace(ideal, distance=float(backward_error([float(c) for c in values.coefficients], z)))
+    return diagnose_roots(problem.model, problem.parameter_set, parameters, found, problem.free)
 
 
-def diagnosed(
+def diagnose_roots(
     model: Model,
-    of: ParameterSet,
+    parameter_set: ParameterSet,
     design: Numbers,
     structure: Structure,
     free: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[Diagnosis, ...]:
-    """The same for any design of a model whose roots have a structure; free = ranges beside which it may be 0."""
+    """Diagnose the multiple roots of a design whose roots have a known structure.
+
+    Args:
+        free: ranges of free parameters; a value that is tiny compared with its range may stand for 0.
+    """
     widths, found = {n: b - a for n, (a, b) in (free or {}).items()}, []
 
-    def ranks(at: Meeting) -> Jordan | None:
-        """Jordan structure by the matrices; None without them, or if they are singular for every s."""
+    def find_chains(point: RootPoint) -> Jordan | None:
+        """Jordan structure by the ranks of the matrices; None without matrices, or if they are singular for every s."""
         if model.pencil is None:
             return None
-        matrices = pencil_of(model, of, at.values)
+        matrices = evaluate_pencil(model, parameter_set, point.values)
         threshold = max(_RANK, _TIMES * math.sqrt(structure.distance))
-        return jordan(matrices, at.s, at.multiplicity, threshold) if is_regular(matrices, at.s, threshold) else None
+        if not is_regular(matrices, point.s, threshold):
+            return None
+        return jordan(matrices, point.s, point.multiplicity, threshold)
 
-    with many_digits():
+    with high_precision():
         for root in user_roots(model, structure.roots):
             k = root.multiplicity
             if k == 1 or (root.im < 0 and model.double is None):
                 continue
-            stored = met(model, of, design, widths, complex(root.re, root.im), k)
-            as_stored = ranks(stored)
-            at = polished(stored, as_stored.geometric if as_stored else 1)
-            exact, g = ranks(at), at.geometric
+            stored = refine_root(model, parameter_set, design, widths, complex(root.re, root.im), k)
+            as_stored = find_chains(stored)
+            point = refine_point(stored, as_stored.geometric if as_stored else 1)
+            exact, g = find_chains(point), point.geometric
             verdict = exact if as_stored and exact and exact.geometric == as_stored.geometric else as_stored
             partial = verdict.partial if verdict else (k,)
             kind = "semisimple" if g == k else "defective" if g == 1 else "partly defective"
-            ordered = tuple(sorted((response(at, name) for name in of.names), key=_sensitivity))
-            s = middle(at.s)
+            ordered = tuple(sorted((compute_response(point, name) for name in parameter_set.names), key=_sensitivity))
+            s = midpoint(point.s)
             omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
             distance = structure.distance
             found.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))
     return tuple(found)
 
 
-def _sensitivity(response: Response) -> tuple[float, float]:
-    first = response.laws[0].branches if response.laws else None
+def _sensitivity(answer: Response) -> tuple[float, float]:
+    first = answer.laws[0].branches if answer.laws else None
     return (float(first.exponent), -first.size) if first else (math.inf, 0.0)
 
 

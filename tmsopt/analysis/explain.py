@@ -1,13 +1,13 @@
-"""What an optimum means: which limits it leans on and what they are worth, and how much rounding it bears."""
+"""Explanation of an optimum: its active limits and their value, its optimality, and the effect of rounding."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from tmsopt.analysis.limits import Lever, levers
+from tmsopt.analysis.limits import Lever, find_levers
 from tmsopt.analysis.optimality import Optimality, optimality
-from tmsopt.analysis.rounding import Rounded, rounded_designs
-from tmsopt.analysis.summary import summary, warnings
+from tmsopt.analysis.rounding import RoundedDesign, list_rounded_designs
+from tmsopt.analysis.summary import list_warnings, summarise
 from tmsopt.problem.files import Given
 from tmsopt.problem.solution import Bound
 from tmsopt.progress import Listener, start_steps
@@ -17,19 +17,18 @@ from tmsopt.search.solve import solve_if_needed
 
 @dataclass(frozen=True, repr=False)
 class Explanation(Tabular):
-    """What `explain` has to say of a solution.
+    """Explanation of a solution.
 
     Attributes:
         summary: one sentence: the structure on the rightmost line, and how good the design is.
-        structure: of the design, as in the solution.
-        bound: of the design, as in the solution.
+        structure, bound: as in the solution.
         optimality: whether the design is a local optimum, by the multipliers of its factors.
-        levers: the limits that bind, the most valuable first; empty unless the design is optimal.
-        rounding: free parameter → the design with it alone rounded to 3 digits.
+        levers: the active limits, the most valuable first; empty unless the design is optimal.
+        rounding: free parameter → the design with this parameter alone rounded to 3 digits.
         precision: the design with all free parameters rounded to 2, 3, 4 and 6 digits.
-        goal: what was optimised, or the pattern that was located; empty where nothing was asked.
-        abscissa, value: of the design, and of its objective.
-        warnings: arbitrary bounds that the design leans on, bounds touched for nothing, parameters without effect.
+        goal: the objective or the located pattern; empty without one.
+        abscissa, value: abscissa of the design, and value of its objective.
+        warnings: arbitrary active bounds, bounds touched without a gain, parameters without effect.
 
     Example:
         >>> explained = tmsopt.explain("problems/ep4.toml", resolve=False)
@@ -44,8 +43,8 @@ class Explanation(Tabular):
     bound: Bound
     optimality: Optimality
     levers: tuple[Lever, ...]
-    rounding: Table[Rounded]
-    precision: tuple[Rounded, ...]
+    rounding: Table[RoundedDesign]
+    precision: tuple[RoundedDesign, ...]
     warnings: tuple[str, ...]
     goal: str
     abscissa: float
@@ -53,12 +52,12 @@ class Explanation(Tabular):
 
     @property
     def worst(self) -> str:
-        """The parameter whose rounding costs most; empty where none costs anything."""
-        losing = {name: row.loss for name, row in self.rounding.items() if row.loss > 0}
-        return max(losing, key=losing.__getitem__, default="")
+        """The parameter whose rounding loses most; empty if none loses anything."""
+        losses = {name: row.loss for name, row in self.rounding.items() if row.loss > 0}
+        return max(losses, key=losses.__getitem__, default="")
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The limits that bind, one a row."""
+        """The active limits, one per row."""
         return (lever.to_json() for lever in self.levers)
 
     def to_json(self) -> dict[str, Any]:
@@ -68,31 +67,31 @@ class Explanation(Tabular):
 
 
 def explain(design: Given, *, resolve: bool = True, progress: Listener | None = None) -> Explanation:
-    """Say what a solution means; of one that is not optimal, what can be said.
+    """Explain a solution; one that is not optimal gets fewer facts.
 
     Args:
-        resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
+        resolve: check each multiplier by solving again, from the optimum, with its limit moved; some 30 ms each.
         progress: called with a `tmsopt.Progress` now and then.
 
     Example:
         >>> print(tmsopt.explain("problems/ep4.toml").summary)
-        four roots meet in one (EP4): no design in the box decays faster (proven)
+        four roots meet in one (EP4): no design within the limits decays faster (proved)
 
     More: docs/how_to/report.md
     """
     solution = solve_if_needed(design, progress)
     steps = start_steps(progress, "moving limits" if resolve else "weighing limits", "limit")
     problem = solution.problem.posed
-    alone, together = rounded_designs(solution) if not solution.violations else (Table[Rounded](), ())
+    alone, together = list_rounded_designs(solution) if not solution.violations else (Table[RoundedDesign](), ())
     return Explanation(
-        summary=summary(solution),
+        summary=summarise(solution),
         structure=solution.structure,
         bound=solution.bound,
         optimality=optimality(solution),
-        levers=levers(solution, resolve, steps),
+        levers=find_levers(solution, resolve, steps),
         rounding=alone,
         precision=together,
-        warnings=warnings(solution),
+        warnings=list_warnings(solution),
         goal=problem.goal or (problem.locate or "").strip(),
         abscissa=solution.abscissa,
         value=solution.value,

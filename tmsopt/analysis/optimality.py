@@ -1,17 +1,16 @@
-"""Why a design is a local optimum, and not only an exceptional point: multipliers of its factors and limits.
+"""Local optimality of a design by the multipliers of its factors and limits.
 
-Minimise γ subject to p(t + γ; θ) = a0(θ) ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, and to the limits on θ. The factors of the
-roots on the rightmost line stand at their bounds (`tmsopt.analysis.program` says which those are, however
-a multiple root is shared out), and the conditions are
+The program minimises γ subject to p(t + γ; θ) = a0(θ) ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, and to the limits on θ. The
+factors of the roots on the rightmost line are at their bounds (see `tmsopt.analysis.program`). The conditions are
 
-    first order     ∇f = Σ yᵢ ∇hᵢ over all that is held at 0, with yᵢ ≥ 0 where hᵢ may become positive;
-    vertex          where the ∇hᵢ of equalities and of positive yᵢ span all variables, nothing else is needed: the
-                    design is a strict minimum, and the objective grows at least in proportion to the distance;
-    second order    elsewhere the Hessian of f − y·h must be positive along what these leave free.
+    first order     ∇f = Σ yᵢ ∇hᵢ over all active rows hᵢ = 0, with yᵢ ≥ 0 where hᵢ may become positive;
+    vertex          if the ∇hᵢ of equalities and of positive yᵢ span all variables, the design is a strict minimum,
+                    and the objective grows at least in proportion to the distance;
+    second order    otherwise the Hessian of f − y·h must be positive on the null space of these rows.
 
-In p(t + γ) only c₁ depends on γ to first order, by its multiplicity m, so the multipliers of the c₁ add up to Σ m y = 1
-for the abscissa: −1/m is what Burke and Overton (2001) find for its subgradients, with Re c₂ to be weighed by a number
-that is not negative, and free weights for the others. Where a4/a0 is given, an EP4 at −ω has yₖ = 1/(4 ωᵏ⁻¹).
+In p(t + γ) only c₁ depends on γ to first order, with the factor m, the multiplicity of the root. The multipliers of the
+c₁ therefore satisfy Σ m y = 1 for the abscissa. Burke and Overton (2001) find the same −1/m for its subgradients, with
+a weight ≥ 0 for Re c₂ and free weights for the others. For given a4/a0, an EP4 at −ω has yₖ = 1/(4 ωᵏ⁻¹).
 """
 
 import math
@@ -21,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.analysis.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
-from tmsopt.analysis.descent import Better, better
-from tmsopt.analysis.program import LocalProgram, NotCovered, program
+from tmsopt.analysis.conditions import POSITIVE, STATIONARY, Conditions, curvature_sign, evaluate_conditions
+from tmsopt.analysis.descent import BetterDesign, find_better_design
+from tmsopt.analysis.program import LocalProgram, NotCovered, build_program
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.dependence import demands_heavy_damping
 from tmsopt.problem.files import Given
@@ -38,21 +37,21 @@ from tmsopt.search.solve import solve_if_needed
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
 
-_MET = 1e-7
-"""Part of a row's size by which what is held may be off 0: a constraint counts as met within 1e-9 of its sides."""
+_TOLERANCE = 1e-7
+"""Largest value of an active row, relative to its size; a constraint counts as satisfied within 1e-9 of its sides."""
 
 
 @dataclass(frozen=True)
-class OnLine:
-    """A root on the rightmost line, a complex pair by its upper one, and the multipliers of its factors.
+class RightmostRoot:
+    """A root on the rightmost line, or the upper one of a complex pair, with the multipliers of its factors.
 
     Attributes:
-        share: part of the abscissa that hangs on it; all of them add up to 1.
-        beta: rise of the objective per unit of a βᵢ, which moves roots left of the line.
-        kappa: likewise of what moves a multiple root apart along the line: κᵢ of a real one, (κ₁ − κ₂)²/(16 ω²) of
-            a complex one; nan for a simple root.
-        ties: likewise of the other coefficients, of either sign, for they must stay 0.
-        eigenfrequency: of a complex system ω = i s.
+        share: its share of the abscissa; the shares of all roots on the line add up to 1.
+        beta: increase of the objective per unit of a βᵢ, which moves roots left of the line.
+        kappa: increase per unit of the coefficient that splits a multiple root along the line: κᵢ of a real root,
+            (κ₁ − κ₂)²/(16 ω²) of a complex one; nan for a simple root.
+        ties: increase per unit of each further coefficient; these stay 0, so either sign is possible.
+        eigenfrequency: ω = i s for a complex system, else None.
     """
 
     re: float
@@ -72,22 +71,22 @@ class OnLine:
 
 @dataclass(frozen=True, repr=False)
 class Optimality(Printable):
-    """Whether a design is a local optimum.
+    """Local optimality of a design.
 
     Attributes:
-        verdict: ``strict minimum`` (of a maximised objective, maximum), ``not minimal``, ``undecided`` or
+        verdict: ``strict minimum`` (maximum of a maximised objective), ``not minimal``, ``undecided`` or
             ``not covered``.
         reason: the verdict in a sentence.
-        order: derivatives that decide, 1 or 2; 0 where nothing is decided.
-        goal: what is judged, such as ``abscissa``.
-        roots: those on the rightmost line, with the multipliers of their factors; none where it is not stationary.
-        limits: constraint or bound → gain per unit that it is relaxed, as ``Solution.active``; likewise.
-        unknowns: free parameters that matter, and the abscissa.
-        conditions: coefficients of factors and limits that are held.
-        residual: part of the gradient that the multipliers do not explain.
-        curvature: least curvature along what is not held, as a share of the largest; nan at a vertex.
-        idle: free parameters without any part in it.
-        better: of a design that is not minimal, one nearby that is better, rechecked.
+        order: order of the derivatives that decide, 1 or 2; 0 if undecided.
+        goal: the objective, such as ``abscissa``.
+        roots: roots on the rightmost line, with the multipliers of their factors; empty if not stationary.
+        limits: constraint or bound → gain per unit of relaxation, as in ``Solution.active``; empty if not stationary.
+        unknowns: number of free parameters with an effect, plus one for the abscissa.
+        conditions: number of active coefficients of factors and active limits.
+        residual: share of the gradient that the multipliers do not explain.
+        curvature: least curvature in the null space of the conditions, relative to the largest; nan at a vertex.
+        idle: free parameters without an effect.
+        better: a better design nearby, rechecked, if the verdict is ``not minimal``.
         better_value: its objective.
 
     Example:
@@ -102,7 +101,7 @@ class Optimality(Printable):
     reason: str
     order: int = 0
     goal: str = ""
-    roots: tuple[OnLine, ...] = ()
+    roots: tuple[RightmostRoot, ...] = ()
     limits: Table[float] = field(default_factory=Table)
     unknowns: int = 0
     conditions: int = 0
@@ -121,12 +120,12 @@ class Optimality(Printable):
 
 
 def optimality(design: Given, *, progress: Listener | None = None) -> Optimality:
-    """Judge a design by the first- and, where needed, second-order conditions on its factors.
+    """Judge a design by the first-order and, where needed, second-order conditions on its factors.
 
-    Of a pattern that was located without an objective the abscissa is judged, within the box and the constraints.
+    For a pattern that was located without an objective, the abscissa is judged within the ranges and constraints.
 
     Args:
-        design: a solution; or a problem or its file, solved first.
+        design: a solution, or a problem or its file, which is solved first.
         progress: called with a `tmsopt.Progress` now and then.
 
     Example:
@@ -138,40 +137,40 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     solution = solve_if_needed(design, progress)
     start_steps(progress, "judging the optimum")
     try:
-        problem = _judged(solution)
-        around = program(problem, solution)
+        problem = _problem_to_judge(solution)
+        program = build_program(problem, solution)
     except NotCovered as error:
         return Optimality(NOT_COVERED, str(error))
-    found = conditions(around)
-    bearing = sum(y for y, h in zip(found.scaled, around.held, strict=True) if h.name == "c1")
-    if not found.downhill.any() and not bearing > POSITIVE:
-        return Optimality(NOT_COVERED, "the objective does not fall with the abscissa")
-    beyond = better(around, found, solution) if found.downhill.any() else None
-    verdict, order, reason = _verdict(solution, around, found, beyond)
+    found = evaluate_conditions(program)
+    weight = sum(y for y, h in zip(found.scaled, program.rows, strict=True) if h.name == "c1")
+    if not found.downhill.any() and not weight > POSITIVE:
+        return Optimality(NOT_COVERED, "the objective does not decrease with the abscissa")
+    better = find_better_design(program, found, solution) if found.downhill.any() else None
+    verdict, order, reason = _verdict(solution, program, found, better)
     stationary = found.residual <= STATIONARY
-    unknowns, count = _counts(around)
+    unknowns, count = _count_unknowns(program)
     return Optimality(
         verdict=verdict,
         reason=reason,
         order=order,
         goal=problem.goal,
-        roots=_on_line(around, found) if stationary else (),
-        limits=Table(_limits(solution, around, found) if stationary else {}),
+        roots=_rightmost_roots(program, found) if stationary else (),
+        limits=Table(_limit_gains(solution, program, found) if stationary else {}),
         unknowns=unknowns,
         conditions=count,
         residual=found.residual,
         curvature=found.curvature,
-        idle=around.idle,
-        better=beyond.parameters if beyond else Table(),
-        better_value=beyond.value if beyond else math.nan,
+        idle=program.idle,
+        better=better.parameters if better else Table(),
+        better_value=better.value if better else math.nan,
     )
 
 
-def _judged(solution: Solution) -> Posed:
-    """The problem whose optimum the design may be.
+def _problem_to_judge(solution: Solution) -> Posed:
+    """The problem of which the design may be an optimum.
 
     Raises:
-        NotCovered: with the reason why there is none.
+        NotCovered: if there is none, with the reason.
     """
     problem = solution.problem.posed
     if not problem.free:
@@ -179,9 +178,9 @@ def _judged(solution: Solution) -> Posed:
     if solution.status != "optimal":
         raise NotCovered("the design is not a solution")
     if problem.scenarios or problem.tolerances:
-        raise NotCovered("the worst of several cases is minimised, and these conditions are those of one design")
+        raise NotCovered("the problem minimises the worst of several cases, and these conditions cover only one")
     if problem.asks_radius:
-        raise NotCovered("the robustness radius is asked for")
+        raise NotCovered("the problem uses the robustness radius")
     if problem.locate and problem.objective is not None:
         raise NotCovered(f"the objective is optimised over the designs with {problem.locate}, whatever their abscissa")
     if solution.structure == "undecided":
@@ -189,104 +188,111 @@ def _judged(solution: Solution) -> Posed:
     if problem.locate:
         problem = problem.derive(locate=None, minimize="abscissa")
     if demands_heavy_damping(problem):
-        raise NotCovered("heavy damping is asked for, which holds the roots on the real line as well")
+        raise NotCovered("the problem requires heavy damping, which also keeps the roots real")
     nlp = formulate(problem)
     if set(nlp.contacts) & set(ROOT_NAMES):
         raise NotCovered(
-            "an objective or constraint asks for a large abscissa, a small damping ratio or a high frequency"
+            "an objective or constraint favours a large abscissa, a small damping ratio or a high frequency"
         )
     x = initial_point(nlp, problem, solution.parameters)
     if "abscissa" in nlp.variables:
         x[nlp.variables.index("abscissa")] = solution.abscissa / nlp.unit
     rows = nlp.evaluate(nlp.set_kinks(x))[1]
-    if any(np.sort(rows[list(kink.rows)])[1] <= _MET for kink in nlp.kinks if not kink.quotient):
-        raise NotCovered("two sides of an abs, min or max meet there")
+    if any(np.sort(rows[list(kink.rows)])[1] <= _TOLERANCE for kink in nlp.kinks if not kink.quotient):
+        raise NotCovered("an abs, min or max has its kink there")
     return problem
 
 
 def _verdict(
-    solution: Solution, around: LocalProgram, found: Conditions, beyond: Better | None
+    solution: Solution, program: LocalProgram, found: Conditions, better: BetterDesign | None
 ) -> tuple[str, int, str]:
-    """Verdict, derivatives that decide it, and the sentence."""
-    problem, name = around.problem, f"this {solution.structure} is"
+    """Verdict, order of the derivatives that decide it, and the sentence."""
+    problem, name = program.problem, f"this {solution.structure} is"
     extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {problem.goal}"
-    extreme += ", which was not asked for" if solution.problem.locate else ""
-    if beyond is not None:
-        return NOT_MINIMAL, beyond.order, f"{name} no {extreme}: {_pays(around, found)}; {_way(solution, beyond)}"
-    if doubt := _doubt(around, found):
-        return UNDECIDED, 0, f"not decided whether {name} a {extreme}: {doubt}"
-    unknowns, count = _counts(around)
-    held = f"{count} condition{'s that bind leave' if count != 1 else ' that binds leaves'}"
-    idle = f"; without effect: {', '.join(around.idle)}" if around.idle else ""
+    extreme += ", though this was not asked for" if solution.problem.locate else ""
+    if better is not None:
+        reason = f"{_describe_descent(program, found)}; {_describe_better_design(solution, better)}"
+        return NOT_MINIMAL, better.order, f"{name} no {extreme}: {reason}"
+    if doubt := _find_doubt(program, found):
+        return UNDECIDED, 0, f"undecided whether {name} a {extreme}: {doubt}"
+    unknowns, count = _count_unknowns(program)
+    active = f"{count} active condition{'s leave' if count != 1 else ' leaves'}"
+    idle = f"; without effect: {', '.join(program.idle)}" if program.idle else ""
     if np.isnan(found.curvature):
-        return STRICT, 1, f"{name} a strict {extreme}: {held} none of the {unknowns} unknowns free to move{idle}"
+        return STRICT, 1, f"{name} a strict {extreme}: {active} none of the {unknowns} unknowns free{idle}"
     bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
-    free = f"{held} some of the {unknowns} unknowns free to move"
-    return STRICT, 2, f"{name} a strict {extreme}: {free}, and along these it curves {bend}{idle}"
+    free = f"{active} some of the {unknowns} unknowns free"
+    return STRICT, 2, f"{name} a strict {extreme}: {free}, along which the objective curves {bend}{idle}"
 
 
-def _doubt(around: LocalProgram, found: Conditions) -> str:
-    """Why nothing is decided where no better design was found; empty where the conditions decide."""
+def _find_doubt(program: LocalProgram, found: Conditions) -> str:
+    """Why the conditions do not decide although no better design was found; empty where they decide."""
     if found.residual > STATIONARY or (found.downhill.any() and np.isnan(found.curvature)):
-        return f"nothing that binds holds {found.residual:.1g} of its gradient, yet no better design was found downhill"
-    left, sizes = np.abs(around.at(around.x)[1]), np.array([h.size for h in around.held])
+        return f"{_describe_residual(found)}, but no better design was found downhill"
+    left, sizes = np.abs(program.evaluate(program.x)[1]), np.array([h.size for h in program.rows])
     off = float(np.divide(left, sizes, out=np.zeros_like(left), where=sizes > 0).max(initial=0.0))
-    if off > _MET:
-        return f"what is held is met to {off:.1g} only"
-    loose = [h for h, firm in zip(around.held, found.firm, strict=True) if h.name == "c2" and not firm]
-    if any(around.line[h.cluster].multiplicity > 3 for h in loose):
-        return "to first order nothing keeps a multiple root together"  # then c₄ ≤ c₂² may outweigh it
-    if curved(found.curvature) <= 0 and not np.isnan(found.curvature):
-        return f"along what is left free it {'gains' if curved(found.curvature) else 'is flat'} to second order"
+    if off > _TOLERANCE:
+        return f"the active conditions hold only to {off:.1g}"
+    loose = [h for h, firm in zip(program.rows, found.firm, strict=True) if h.name == "c2" and not firm]
+    if any(program.line[h.cluster].multiplicity > 3 for h in loose):
+        return "no first-order condition keeps a multiple root together"  # c₄ ≤ c₂² may then outweigh c₂
+    if curvature_sign(found.curvature) <= 0 and not np.isnan(found.curvature):
+        change = "improves" if curvature_sign(found.curvature) else "is flat"
+        return f"along the free directions the objective {change} to second order"
     return ""
 
 
-def _counts(around: LocalProgram) -> tuple[int, int]:
-    """Free parameters that matter and the abscissa; what is held, less the equations that define other variables."""
-    unknowns = sum(name in around.problem.free for name in around.variables) + 1
-    return unknowns, len(around.held) - (len(around.x) - unknowns)
+def _describe_residual(found: Conditions) -> str:
+    return f"the active conditions do not balance {found.residual:.1g} of the gradient"
 
 
-def _pays(around: LocalProgram, found: Conditions) -> str:
-    """What pays, to first order or by its curvature."""
-    if curved(found.curvature) < 0:
-        return "stationary, but second derivatives let it improve along what binds"
+def _count_unknowns(program: LocalProgram) -> tuple[int, int]:
+    """Parameters with an effect plus the abscissa; active rows, less the equations that define other variables."""
+    unknowns = sum(name in program.problem.free for name in program.variables) + 1
+    return unknowns, len(program.rows) - (len(program.x) - unknowns)
+
+
+def _describe_descent(program: LocalProgram, found: Conditions) -> str:
+    """How the objective improves, to first order or by its curvature."""
+    if curvature_sign(found.curvature) < 0:
+        return "it is stationary, but second derivatives let it improve along the active conditions"
     if not found.independent or found.residual > STATIONARY:
-        return f"nothing that binds holds {found.residual:.1g} of its gradient"
-    held = zip(around.held, found.scaled, strict=True)
-    ways = {"c1": "move roots left of the others", "c2": "part a multiple root"}
-    paying = [ways.get(h.name, f"leave the limit {h.name}") for h, y in held if h.signed and y < -POSITIVE]
-    return f"it pays to {' and to '.join(dict.fromkeys(paying))}"
+        return _describe_residual(found)
+    ways = {"c1": "roots move left of the others", "c2": "a multiple root splits"}
+    scaled = zip(program.rows, found.scaled, strict=True)
+    listed = [ways.get(h.name, f"the design moves away from {h.name}") for h, y in scaled if h.signed and y < -POSITIVE]
+    return f"it improves if {' and if '.join(dict.fromkeys(listed))}"
 
 
-def _way(solution: Solution, beyond: Better) -> str:
-    """The better design by what changes most."""
-    now, then = solution.parameters, beyond.parameters
+def _describe_better_design(solution: Solution, better: BetterDesign) -> str:
+    """The parameters that change, and the better objective."""
+    now, then = solution.parameters, better.parameters
     parts = [f"{n} {then[n]:.6g}" for n in solution.problem.free if abs(then[n] - now[n]) > 1e-9 * abs(now[n])]
-    return f"{', '.join(parts)} gives {beyond.value:.6g}"
+    return f"{', '.join(parts)} gives {better.value:.6g}"
 
 
-def _on_line(around: LocalProgram, found: Conditions) -> tuple[OnLine, ...]:
-    """The roots on the line with their multipliers."""
-    listed, held = [], list(zip(around.held, found.multipliers.tolist(), strict=True))
-    model = around.problem.model
-    total = sum(around.line[h.cluster].multiplicity * y for h, y in held if h.name == "c1")
-    for k, root in enumerate(around.line):
-        own = {h.name: y for h, y in held if h.cluster == k}
+def _rightmost_roots(program: LocalProgram, found: Conditions) -> tuple[RightmostRoot, ...]:
+    """The roots on the rightmost line with their multipliers."""
+    listed, rows = [], list(zip(program.rows, found.multipliers.tolist(), strict=True))
+    model = program.problem.model
+    total = sum(program.line[h.cluster].multiplicity * y for h, y in rows if h.name == "c1")
+    for k, root in enumerate(program.line):
+        own = {h.name: y for h, y in rows if h.cluster == k}
         first, second = own.pop("c1"), own.pop("c2", math.nan)
         share = root.multiplicity * first / total if total else math.nan
-        beta = first / 2 if root.im else first  # β moves two roots of a pair, by half of it
-        # of a complex system the user reads the conjugate
+        beta = first / 2 if root.im else first  # β moves both roots of a pair by β/2
+        # the user's root of a complex system is the conjugate
         (shown,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
         omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [shown]))
-        listed.append(OnLine(shown.re, shown.im, root.multiplicity, share, beta, second, tuple(own.values()), *omega))
+        ties = tuple(own.values())
+        listed.append(RightmostRoot(shown.re, shown.im, root.multiplicity, share, beta, second, ties, *omega))
     return tuple(listed)
 
 
-def _limits(solution: Solution, around: LocalProgram, found: Conditions) -> Mapping[str, float]:
-    """Gain of the objective per unit that a limit is relaxed; of an equality, change per unit added on the right."""
-    problem, limits = around.problem, dict[str, float]()
-    for h, y, firm in zip(around.held, found.multipliers.tolist(), found.firm, strict=True):
+def _limit_gains(solution: Solution, program: LocalProgram, found: Conditions) -> Mapping[str, float]:
+    """Gain of the objective per unit of relaxation; for an equality, change per unit added to the right-hand side."""
+    problem, limits = program.problem, dict[str, float]()
+    for h, y, firm in zip(program.rows, found.multipliers.tolist(), found.firm, strict=True):
         if h.name in problem.constraints:
             limits[h.name] = y if h.signed else problem.sign * y
         elif h.signed and h.cluster < 0 and firm and (name := h.name.rsplit(".", 1)[0]) in problem.free:

@@ -1,19 +1,20 @@
-"""The smooth program around a design: its roots on the rightmost line as factors, and all that is held at a limit.
+"""The smooth program around a design: factors for the roots on the rightmost line, and all active limits.
 
 About the line Re s = γ the polynomial splits into factors without common roots,
 
     p(t + γ; θ) = a0(θ) · q₁(t) ⋯ q_k(t) · r(t),
 
-one factor q of degree m for each m-fold root on the line, and r for the roots left of it. Its coefficients are smooth
-functions of θ and γ, also where the roots are not, for the Jacobian of a product in its factors is regular as long
-as they have no common root. With tᵐ + c₁ tᵐ⁻¹ + … + c_m for a real root, and the same in t − iω with complex c (c₁
-real, which fixes ω) for a complex one, a root stands on the line where c = 0, and no root passes it only if
+with one factor q of degree m for each m-fold root on the line, and r for the roots left of it. The coefficients of the
+factors are smooth functions of θ and γ even where the roots are not, because the Jacobian of a product with respect to
+its factors is regular as long as they have no common root. Write q = tᵐ + c₁ tᵐ⁻¹ + … + c_m for a real root, and the
+same in t − iω with complex c (and real c₁, which fixes ω) for a complex root. The roots are on the line where c = 0,
+and none passes it only if
 
-    c₁ ≥ 0 (roots move left),  Re c₂ ≥ 0 (roots move apart along the line),  Im c₂ = c₃ = … = 0 to first order,
+    c₁ ≥ 0 (roots move left),  Re c₂ ≥ 0 (roots split along the line),  Im c₂ = c₃ = … = 0 to first order,
 
-because |Im c₂| ≤ c₁ √Re c₂ and c₃ ≤ c₁ c₂: of the other coefficients a change ε would send a root ε^(1/m) to the
-right. For EP4 as two factors t² + βᵢ t + κᵢ these are c₁ = β₁ + β₂ and c₂ = κ₁ + κ₂ + β₁β₂, so βᵢ and κᵢ have the
-multipliers of c₁ and c₂, whichever way a multiple root is shared out between factors.
+because |Im c₂| ≤ c₁ √Re c₂ and c₃ ≤ c₁ c₂: a change ε of another coefficient would move a root by ε^(1/m) to the right.
+For EP4 as two factors t² + βᵢ t + κᵢ we have c₁ = β₁ + β₂ and c₂ = κ₁ + κ₂ + β₁β₂. So βᵢ and κᵢ have the multipliers
+of c₁ and c₂, however the multiple root is divided between factors.
 """
 
 from collections.abc import Sequence
@@ -31,25 +32,25 @@ from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import Root, product, shift
 
-_ACTIVE = 2e-9  # slack, relative to 1 + |limit|, up to which a constraint is held: twice what a feasible point may have
-_AT = 1e-12  # likewise of a bound, relative to its size and the width of its range
+_ACTIVE = 2e-9  # largest slack of an active constraint, relative to 1 + |limit|: twice the tolerance of feasibility
+_AT = 1e-12  # largest distance of an active bound, relative to its size and the width of its range
 _LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact structure
-_ROOT_ROWS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)  # rows of factors, which this program has of its own
+_ROOT_ROWS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)  # rows of factors, which this program replaces
 
 
 class NotCovered(ValueError):
-    """A question that the conditions on the factors do not answer, with the reason."""
+    """The conditions on the factors do not cover this design; the text is the reason."""
 
 
 @dataclass(frozen=True)
-class Held:
-    """Something that is 0 at the design.
+class ActiveRow:
+    """An expression that is 0 at the design.
 
     Attributes:
-        name: of a constraint or bound, ``roots`` for an equation of the factors, ``c1 …`` for a coefficient.
+        name: a constraint, a bound, ``roots`` for an equation of the factors, or ``c1 …`` for a coefficient.
         signed: whether it may become positive; otherwise it stays 0.
-        cluster: number of the root on the line whose factor it belongs to; −1 for other things.
-        size: its natural size, for comparison with others.
+        cluster: index of the root on the line to whose factor it belongs; −1 for other rows.
+        size: its natural size.
     """
 
     name: str
@@ -60,70 +61,70 @@ class Held:
 
 @dataclass(frozen=True)
 class LocalProgram:
-    """minimise f(x) with h(x) = 0 or ≥ 0, at a point where all of h is 0.
+    """Minimise f(x) subject to h(x) = 0 or ≥ 0, at a point where h = 0.
 
     Attributes:
-        problem: whose objective is f.
-        variables: names; the free parameters that matter first, each as itself or as its tangent.
+        problem: the problem with the objective f.
+        variables: names, the free parameters with an effect first, each as itself or as its tangent.
         x: the point.
         sizes: natural size of each variable.
-        held: what the rows of h are.
+        rows: one for each component of h.
         functions: (x, y) → ∇f, h, ∂h/∂x and the Hessian of f − y·h.
-        line: the roots on the rightmost line, complex pairs by their upper root.
-        idle: free parameters without any part in the program.
+        line: the roots on the rightmost line, and the upper root of each complex pair there.
+        idle: free parameters without an effect.
     """
 
     problem: Posed
     variables: tuple[str, ...]
     x: Array
     sizes: Array
-    held: tuple[Held, ...]
+    rows: tuple[ActiveRow, ...]
     functions: ca.Function = field(repr=False)
     line: tuple[Root, ...]
     idle: tuple[str, ...]
 
-    def at(self, x: Array, y: Array | None = None) -> tuple[Array, Array, Array, Array]:
+    def evaluate(self, x: Array, y: Array | None = None) -> tuple[Array, Array, Array, Array]:
         """∇f, h, ∂h/∂x, and the Hessian of f − y·h."""
-        found = self.functions(x, np.zeros(len(self.held)) if y is None else y)
+        found = self.functions(x, np.zeros(len(self.rows)) if y is None else y)
         gradient, h, jacobian, hessian = (part.full() for part in found)
         return gradient.ravel(), h.ravel(), jacobian, hessian
 
 
-def program(problem: Posed, solution: Solution) -> LocalProgram:
-    """The program of a problem at a design, from the roots of its structure; none is computed again.
+def build_program(problem: Posed, solution: Solution) -> LocalProgram:
+    """The program of a problem at a design, built from the roots of its structure without computing any root.
 
     Raises:
-        NotCovered: where the damping ratio binds, or the abscissa does not.
+        NotCovered: if the damping ratio or frequency is active, or the abscissa is not.
     """
     nlp, values, free = formulate_abscissa(problem), problem.values(solution.parameters), problem.free
     values = values.with_known({"abscissa": solution.abscissa})
     units = {"abscissa": nlp.unit, ANGULAR_FREQUENCY: nlp.unit}
     at = dict(zip(free, variables_of(problem, solution.parameters), strict=True))
-    for n in nlp.variables[len(free) :]:  # nan for a coefficient of a factor, which this program does not use
+    for n in nlp.variables[len(free) :]:  # nan for the coefficients of factors, which are not used here
         at[n] = float(values[n]) / units.get(n, 1.0) if n in values else np.nan
     x = {n: ca.SX.sym(n) for n in at}
     every = ca.vertcat(*x.values())
     f, g = nlp.symbolic(every)
     reached = nlp.evaluate(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
-    tied = {n: _rows_of(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
-    # what is the greatest of several, and here the constant one of them
+    tied = {n: _defining_rows(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
+    # a maximum whose constant argument is the largest one here
     steady = [n for n, rows in tied.items() if all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in rows)]
     f, g = ca.substitute([f, g], [x[n] for n in steady], [ca.SX(at[n]) for n in steady])
     build = _Builder()
     for k, name in enumerate(nlp.rows):
         if name in problem.constraints and ca.depends_on(g[k], every):
-            build.hold_row(nlp, k, g, reached)
+            build.add_nlp_row(nlp, k, g, reached)
     needed = [n for n in x if n == "abscissa"]
     for _ in nlp.lifts:
-        binding = ca.vertcat(f, *build.rows)
+        binding = ca.vertcat(f, *build.expressions)
         for n in [n for n in x if n not in free and n not in needed and ca.depends_on(binding, x[n])]:
             needed.append(n)
-            for k in _rows_of(nlp, n):
-                build.hold_row(nlp, k, g, reached)
-    if beyond := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed]:
-        raise NotCovered(f"the {beyond[0]} binds, which the conditions on the abscissa do not cover")
-    if not (needed and ca.depends_on(ca.vertcat(f, *build.rows), x["abscissa"])):
-        raise NotCovered("the abscissa does not bind, so the roots have no part in this optimum")
+            for k in _defining_rows(nlp, n):
+                build.add_nlp_row(nlp, k, g, reached)
+    if active := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed]:
+        raise NotCovered(f"the {active[0]} is active, which the conditions on the abscissa do not cover")
+    if not (needed and ca.depends_on(ca.vertcat(f, *build.expressions), x["abscissa"])):
+        raise NotCovered("the abscissa is not active, so this optimum does not depend on the roots")
     roots = solution.of_polynomial.roots
     size = max(float(np.hypot(r.re, r.im)) for r in roots)
     near = 0.0 if solution.of_polynomial.name in ("pair", "real") else _LINE * size
@@ -132,21 +133,21 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
     design = {n: ca.atan(x[n]) if problem.parameter_set[n].tangent else x[n] for n in free}
     a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
     lead = abs(float(values.coefficients[0]))
-    build.hold_factors(a, lead, size, nlp.unit * x["abscissa"], line, [r for r in roots if r not in right])
-    binding = ca.vertcat(f, *build.rows)
+    build.add_factors(a, lead, size, nlp.unit * x["abscissa"], line, [r for r in roots if r not in right])
+    binding = ca.vertcat(f, *build.expressions)
     idle = tuple(n for n in free if not ca.depends_on(binding, x[n]))
     variables = []
     for n in (n for n in x if (n in free and n not in idle) or n in needed):
         own = size / nlp.unit if n == "abscissa" else max(abs(at[n]), 1e-3)
         if n in free:
             low, high = (float(np.tan(e)) if problem.parameter_set[n].tangent else e for e in free[n])
-            own = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range beyond 1 says nothing
+            own = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range wider than 1 is no measure of size
             for end, limit, side in zip(("min", "max"), free[n], (1, -1), strict=True):
                 if abs(solution.parameters[n] - limit) <= _AT * (abs(limit) + np.ptp(free[n])):
-                    build.hold(Held(f"{n}.{end}", True), side * (x[n] - at[n]))
+                    build.add_row(ActiveRow(f"{n}.{end}", True), side * (x[n] - at[n]))
         variables.append((n, x[n], at[n], own))
     names, symbols, point, sizes = zip(*variables, *build.unknowns, strict=True)
-    z, h = ca.vertcat(*symbols), ca.vertcat(*build.rows)
+    z, h = ca.vertcat(*symbols), ca.vertcat(*build.expressions)
     y = ca.SX.sym("y", h.numel())
     parts = [ca.gradient(f, z), h, ca.jacobian(h, z), ca.hessian(f - ca.dot(y, h), z)[0]]
     return LocalProgram(
@@ -154,69 +155,69 @@ def program(problem: Posed, solution: Solution) -> LocalProgram:
         variables=names,
         x=np.array(point),
         sizes=np.array(sizes),
-        held=tuple(build.held),
-        functions=ca.Function("held", [z, y], [ca.densify(part) for part in parts]),
+        rows=tuple(build.rows),
+        functions=ca.Function("program", [z, y], [ca.densify(part) for part in parts]),
         line=line,
         idle=idle,
     )
 
 
-def _rows_of(nlp: NLP, name: str) -> list[int]:
-    """Rows that tie a lifted quantity to the parameters; a constant piece of it, which has a leeway, does not."""
-    tied = enumerate(zip(nlp.rows, nlp.row_lower, strict=True))
-    return [k for k, (row, lower) in tied if row == name and row not in _ROOT_ROWS and lower == 0]
+def _defining_rows(nlp: NLP, name: str) -> list[int]:
+    """Rows that define an added variable by the parameters; a constant argument of a maximum has slack and does not."""
+    rows = enumerate(zip(nlp.rows, nlp.row_lower, strict=True))
+    return [k for k, (row, lower) in rows if row == name and row not in _ROOT_ROWS and lower == 0]
 
 
 class _Builder:
-    """Collects what is held, and the coefficients of the factors: name, symbol, value, size of each."""
+    """Collects active rows with their expressions, and the coefficients of factors: name, symbol, value, size."""
 
     def __init__(self) -> None:
-        self.held: list[Held] = []
-        self.rows: list[Any] = []
+        self.rows: list[ActiveRow] = []
+        self.expressions: list[Any] = []
         self.unknowns: list[tuple[str, Any, float, float]] = []
 
-    def hold(self, held: Held, expression: Any) -> None:
-        self.held.append(held)
-        self.rows.append(expression)
+    def add_row(self, row: ActiveRow, expression: Any) -> None:
+        self.rows.append(row)
+        self.expressions.append(expression)
 
-    def hold_row(self, nlp: NLP, k: int, g: Any, reached: Array) -> None:
-        """A row of the NLP, if it is an equality or holds with equality."""
+    def add_nlp_row(self, nlp: NLP, k: int, g: Any, reached: Array) -> None:
+        """Add a row of the NLP if it is an equality or active."""
         name, lower, upper = nlp.rows[k], nlp.row_lower[k], nlp.row_upper[k]
         for end, side in ((lower, 1), (upper, -1)):
             if np.isfinite(end) and (lower == upper or abs(reached[k] - end) <= _ACTIVE * (1 + abs(end))):
-                self.hold(Held(name, lower != upper), side * (g[k] - end))
+                self.add_row(ActiveRow(name, lower != upper), side * (g[k] - end))
                 return
 
-    def unknown(self, name: str, value: float, size: float) -> Any:
+    def add_unknown(self, name: str, value: float, size: float) -> Any:
         self.unknowns.append((name, ca.SX.sym(name), value, size))
         return self.unknowns[-1][1]
 
-    def hold_factors(
+    def add_factors(
         self, a: Sequence[Any], lead: float, size: float, gamma: Any, line: Sequence[Root], others: Sequence[Root]
     ) -> None:
-        """p(t + γ) = a0 · ∏ q · r with the roots of the structure as the values of the unknowns; `lead` is |a0|."""
+        """Add p(t + γ) = a0 · ∏ q · r; the given roots fix the values of the unknowns. `lead` is |a0|."""
         factors = []
         for j, root in enumerate(line):
 
-            def zero(name: str, k: int, signed: bool, j: int = j) -> Any:
-                symbol = self.unknown(f"{name}.{j}", 0.0, size**k)
-                self.hold(Held(name, signed, j, size**k), symbol)
+            def add_coefficient(name: str, k: int, signed: bool, j: int = j) -> Any:
+                symbol = self.add_unknown(f"{name}.{j}", 0.0, size**k)
+                self.add_row(ActiveRow(name, signed, j, size**k), symbol)
                 return symbol
 
-            omega = self.unknown(f"omega.{j}", root.im, size) if root.im else 0
+            omega = self.add_unknown(f"omega.{j}", root.im, size) if root.im else 0
             re, im = [1], [0]
             for k in range(1, root.multiplicity + 1):  # Horner's rule in t − iω
                 re, im = (
                     [x + omega * y for x, y in zip([*re, 0], [0, *im], strict=True)],
                     [y - omega * x for x, y in zip([0, *re], [*im, 0], strict=True)],
                 )
-                re[-1] += zero(f"c{k}", k, k <= 2)
-                im[-1] += zero(f"im c{k}", k, False) if root.im and k > 1 else 0
+                re[-1] += add_coefficient(f"c{k}", k, k <= 2)
+                im[-1] += add_coefficient(f"im c{k}", k, False) if root.im and k > 1 else 0
             pair = [x + y for x, y in zip(product(re, re), product(im, im), strict=True)]
             factors.append(pair if root.im else re)
         rest = [complex(r.re, r.im) - line[0].re for r in others for _ in range(r.multiplicity)]
         monic = np.atleast_1d(np.poly(rest)).real.tolist()
-        factors.append([1, *(self.unknown(f"r{k}", monic[k], size**k) for k in range(1, len(monic)))])
-        moved, matched = shift(a, gamma), product(*factors)
-        for k in range(1, len(moved)):
-            self.hold(Held("roots", False, size=lead * size**k), moved[k] - a[0] * matched[k])
+        factors.append([1, *(self.add_unknown(f"r{k}", monic[k], size**k) for k in range(1, len(monic)))])
+        shifted, multiplied = shift(a, gamma), product(*factors)
+        for k in range(1, len(shifted)):
+            self.add_row(ActiveRow("roots", False, size=lead * size**k), shifted[k] - a[0] * multiplied[k])

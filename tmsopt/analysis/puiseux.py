@@ -9,15 +9,15 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-_SAME = 1e-9  # relative to the terms of a coefficient, up to which an edge is the power of a linear polynomial
+_SAME = 1e-9  # relative difference of coefficients up to which an edge counts as the power of a linear polynomial
 
 
 @dataclass(frozen=True)
 class Branches:
-    """Roots s0 + t that leave a multiple root s0 alike: t^denominator = constant · ε^numerator, to leading order.
+    """Roots s0 + t that leave a multiple root s0 by one law: t^denominator = constant · ε^numerator, to leading order.
 
     Attributes:
-        roots: how many.
+        roots: number of roots.
         constants: one for each cycle of `denominator` roots.
     """
 
@@ -28,16 +28,16 @@ class Branches:
 
     @property
     def exponent(self) -> Fraction:
-        """Of ε."""
+        """Exponent of ε."""
         return Fraction(self.numerator, self.denominator)
 
     @property
     def size(self) -> float:
-        """The largest |t| is this times |ε| to the exponent."""
+        """The largest |t| divided by |ε| to the exponent."""
         return float(max(abs(c) for c in self.constants) ** (1 / self.denominator))
 
     def shifts(self, eps: float) -> list[complex]:
-        """Every t for a real ε, to leading order."""
+        """All t for a real ε, to leading order."""
         found: list[complex] = []
         for constant in self.constants:
             first = (complex(constant) * eps**self.numerator) ** (1 / self.denominator)
@@ -45,11 +45,11 @@ class Branches:
         return found
 
 
-def branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], int]:
-    """Branches of Σ terms[m][j] ε^m t^j = 0 that start at t = 0, fastest first, and how many roots do not move.
+def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], int]:
+    """Branches of Σ terms[m][j] ε^m t^j = 0 that start at t = 0, fastest first, and the number of unmoved roots.
 
-    terms[0][j] is 0 for all j below the multiplicity, which is the last j. What is 0 must be 0 exactly. Roots that do
-    not move in the orders given are counted as unmoved.
+    The last j is the multiplicity, and terms[0][j] is 0 for all j below it. Zeros must be exact. Roots that do not move
+    in the given orders count as unmoved.
     """
     k = len(terms[0]) - 1
     first = {j: next((m for m, row in enumerate(terms) if row[j] != 0), None) for j in range(k + 1)}
@@ -65,11 +65,11 @@ def branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], 
         q = width // gcd(width, drop)
         polynomial = [complex(terms[m1 - i * q * drop // width][j1 + i * q]) for i in reversed(range(width // q + 1))]
         found.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
-    return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0] if hull else k  # all roots 0, whatever changes
+    return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0] if hull else k
 
 
 def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
-    """Roots of the polynomial of an edge; of the power of a linear one, as where all roots move alike, their mean."""
+    """Roots of the polynomial of an edge; for the power of a linear polynomial their mean, k times."""
     k = len(polynomial) - 1
     mean = -polynomial[1] / (k * polynomial[0])
     power = polynomial[0] * np.poly(np.full(k, mean))

@@ -1,4 +1,4 @@
-"""What rounding the parameters of a design does to its roots, in exact arithmetic."""
+"""The effect of rounded parameters on the roots of a design, in exact arithmetic."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,25 +24,25 @@ ALONE = 3
 DIGITS = (2, 3, 4, 6)
 """Significant digits to which all parameters are rounded together."""
 
-_SAME = 1e-15  # relative change that is no rounding: a degree or two written as radians
+_SAME = 1e-15  # relative change that is not rounding, as of a degree or two in radians
 _DEGREE = math.pi / 180
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
-_WORKING = 140  # decimal digits of the exact numbers
+_DECIMALS = 140  # decimal digits of the exact numbers
 
 
 @dataclass(frozen=True)
-class Rounded:
+class RoundedDesign:
     """A design with parameters rounded to significant digits, in the unit in which each is reported.
 
     Attributes:
         digits: significant digits.
         written: rounded parameter → the decimal number with its unit, e.g. ``23.5 deg``.
-        realised: abscissa of the decimals, exact to double precision; the other parameters as stored. With scenarios
-            or tolerances, its worst over whole bands and tolerance boxes.
-        loss: realised minus ideal abscissa of the design.
-        damping_ratio: of the rounded design, likewise.
-        objective: value of the objective expression; nan without one.
-        violations: constraint or bound that the rounding violates → by how much, in its own units (rad, SI).
+        realised: abscissa of the decimals, exact to double precision, with the other parameters as stored. With
+            scenarios or tolerances, the worst over all bands and tolerance boxes.
+        loss: realised abscissa minus the ideal abscissa of the design.
+        damping_ratio: damping ratio of the rounded design, the worst one as well.
+        objective: value of the objective; nan without one.
+        violations: constraint or bound that the rounding violates → amount, in its own unit (rad, SI).
     """
 
     digits: int
@@ -59,40 +59,40 @@ class Rounded:
         return {"abscissa_realised" if name == "realised" else name: value for name, value in found.items()}
 
 
-def rounded_designs(solution: Solution) -> tuple[Table[Rounded], tuple[Rounded, ...]]:
-    """Each free parameter rounded alone, unless it is no longer than that, and all together, to ever more digits."""
+def list_rounded_designs(solution: Solution) -> tuple[Table[RoundedDesign], tuple[RoundedDesign, ...]]:
+    """Each free parameter rounded alone, unless it has no more digits, and all together to increasing digits."""
     names = list(solution.problem.free)
-    alone = [n for n in names if not _short(solution, n)]
-    found = rounded(solution, [*(([n], ALONE) for n in alone), *((names, digits) for digits in DIGITS if names)])
+    alone = [n for n in names if not _is_short(solution, n)]
+    found = round_design(solution, [*(([n], ALONE) for n in alone), *((names, digits) for digits in DIGITS if names)])
     return Table(dict(zip(alone, found, strict=False))), found[len(alone) :]
 
 
-def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) -> tuple[Rounded, ...]:
-    """A design with some of its parameters rounded, for each choice of these and of significant digits."""
+def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) -> tuple[RoundedDesign, ...]:
+    """The design with some parameters rounded, for each choice (names, significant digits)."""
     problem, found = solution.problem.posed, []
-    with flint.ctx.workdps(_WORKING), np.errstate(all="ignore"):  # what has no value is nan or inf
+    with flint.ctx.workdps(_DECIMALS), np.errstate(all="ignore"):  # undefined values become nan or inf
         for names, digits in choices:
             units = {n: unit_of(problem, n) for n in names}
-            written = {n: _decimal(solution, n, unit, digits) for n, unit in units.items()}
-            design = {**solution.parameters, **{n: _exact(text, units[n]) for n, text in written.items()}}
+            written = {n: _format_decimal(solution, n, unit, digits) for n, unit in units.items()}
+            design = {**solution.parameters, **{n: _parse_exact(text, units[n]) for n, text in written.items()}}
             values, violated = recheck_exactly(problem, design, _cases(solution, design))
             abscissa, roots = float(values["abscissa"]), values["structure"].roots
             has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
-            row = Rounded(
+            row = RoundedDesign(
                 digits=digits,
                 written=Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()}),
                 realised=abscissa,
                 loss=abscissa - solution.abscissa,
                 damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # not with a root at infinity
                 objective=float(problem.objective(values)) if problem.objective else math.nan,
-                violations=Table(violated | _beyond_box(problem, design)),
+                violations=Table(violated | _range_violations(problem, design)),
             )
             found.append(row)
     return tuple(found)
 
 
 def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
-    """The listed cases, the worst of the unrounded design and those of the rounded one."""
+    """The listed cases, the worst case of the unrounded design and the worst cases of the rounded one."""
     problem = solution.problem.posed
     cases = [*problem.cases, *filter(None, [solution.worst])]
     if problem.scenarios or problem.tolerances:
@@ -100,8 +100,8 @@ def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
     return cases
 
 
-def _beyond_box(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
-    """Ends of ranges that a design is beyond, by how much."""
+def _range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
+    """Ends of ranges that a design exceeds → amount."""
     return {
         f"{name}.{end}": amount
         for name, ends in problem.free.items()
@@ -110,25 +110,25 @@ def _beyond_box(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def _short(solution: Solution, name: str) -> bool:
-    """Whether a parameter has no more digits than it is rounded to alone."""
+def _is_short(solution: Solution, name: str) -> bool:
+    """Whether rounding a parameter alone leaves it unchanged."""
     value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
-    return abs(float(_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _SAME * abs(value)
+    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _SAME * abs(value)
 
 
-def _decimal(solution: Solution, name: str, unit: Unit, digits: int) -> str:
-    """A parameter in its reported unit, as a decimal of so many significant digits, inwards at an end of its range."""
+def _format_decimal(solution: Solution, name: str, unit: Unit, digits: int) -> str:
+    """A parameter in its reported unit as a decimal, rounded inwards at an end of its range."""
     value = solution.parameters[name] / unit.one
     low, high = (end / unit.one for end in solution.problem.free.get(name, (-math.inf, math.inf)))
     text = f"{value:#.{digits}g}".removesuffix(".")
     step = Decimal((0, (1,), int(Decimal(text).as_tuple().exponent)))
-    for beyond, move in ((float(text) - high, -step), (low - float(text), step)):
-        if beyond > FEASIBLE * max(1.0, abs(value)):
-            text = str(Decimal(text) + move)
+    for excess, change in ((float(text) - high, -step), (low - float(text), step)):
+        if excess > FEASIBLE * max(1.0, abs(value)):
+            text = str(Decimal(text) + change)
     return text
 
 
-def _exact(text: str, unit: Unit) -> flint.arb:
+def _parse_exact(text: str, unit: Unit) -> flint.arb:
     """The decimal in the parameter's own unit, at the precision of the context."""
     if unit.one == _DEGREE:
         return flint.arb(text) * flint.arb.pi() / 180

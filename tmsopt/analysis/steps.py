@@ -1,4 +1,4 @@
-"""Steps in the unit that a problem was written in: 1 deg of tilt, 1 cm of length, 1 km/h of speed."""
+"""Steps in the unit in which a problem is written: 1 deg of tilt, 1 cm of length, 1 km/h of speed."""
 
 import math
 from collections.abc import Iterator
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from tmsopt.models import Range
 from tmsopt.problem.unit_system import Unit
 
-_PART = 0.01  # of a number without a natural unit
-_SMALLEST = 1e-9  # of the natural step: closer to the physical end a limit has nowhere to go
-_TINY = 1e-9  # a limit so small has no size of its own
+_PART = 0.01  # step relative to the size of a number without a natural unit
+_SMALLEST = 1e-9  # smallest step, relative to the natural one; a limit closer to its physical end cannot move
+_TINY = 1e-9  # a smaller limit counts as 0, and its size as 1
 _LARGEST = {"rad": 0.2, "m": 0.05, "m/s": 0.2}
-"""Largest natural step as a part of the size of what is moved."""
+"""Unit → largest natural step, relative to the size of the moved number."""
 
 _NATURAL = {"rad": math.pi / 180, "m": 1e-2, "m/s": 1 / 3.6}
-"""The natural step of what is in a unit."""
+"""Unit → natural step."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class LimitStep:
     """A change of a limit.
 
     Attributes:
-        size: in the unit of the parameter, positive.
-        text: in the unit that the problem was written in, e.g. ``1 deg``.
+        size: positive, in the unit of the parameter.
+        text: in the unit in which the problem is written, e.g. ``1 deg``.
     """
 
     size: float
@@ -31,17 +31,22 @@ class LimitStep:
 
 
 def natural_step(unit: Unit, kept: str, size: float) -> LimitStep:
-    """The natural step for something of a unit, kept in another, and a size, e.g. the limit or the width of its box."""
+    """The natural step for a number of a size, such as the limit or the width of its range.
+
+    Args:
+        unit: in which the problem is written.
+        kept: the unit in which the number is stored.
+    """
     return next(_steps(unit, kept, size))
 
 
 def step_within(unit: Unit, kept: str, size: float, limit: float, direction: float, allowed: Range) -> LimitStep | None:
-    """The largest natural step that keeps a moved limit physically possible; None at a physical end."""
+    """The largest natural step that keeps the moved limit physical; None at a physical end."""
     return next((step for step in _steps(unit, kept, size) if limit + direction * step.size in allowed), None)
 
 
 def _steps(unit: Unit, kept: str, size: float) -> Iterator[LimitStep]:
-    """Ever smaller steps, from the natural one down."""
+    """Steps from the natural one down."""
     size = abs(size) if abs(size) > _TINY else 1.0
     largest = _one_two_five(_NATURAL.get(kept, _PART * size) / unit.one)
     while kept in _NATURAL and largest * unit.one > _LARGEST[kept] * size:
@@ -53,7 +58,7 @@ def _steps(unit: Unit, kept: str, size: float) -> Iterator[LimitStep]:
 
 
 def _one_two_five(x: float) -> float:
-    """The number 1, 2 or 5 times a power of ten nearest to x by ratio."""
+    """The number 1, 2 or 5 times a power of ten that is nearest to x by ratio."""
     decade = math.floor(math.log10(x))
     choices = [k * 10.0**d for d in (decade, decade + 1) for k in (1, 2, 5)]
     nearest = min(choices, key=lambda c: abs(math.log(c / x)))

@@ -1,4 +1,4 @@
-"""A solution in words: its structure, how good it is, and what a reader must be warned of."""
+"""A solution in words: its structure, its quality, and warnings."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -15,143 +15,140 @@ from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
 
 _ROOTS = {q.name for q in ROOT_QUANTITIES}
-_PARTS = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: a change along it shows at one of these
+_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: the points at which an effect is looked for
 _UNCHANGED = 1e-13  # relative: rounding of a few operations
 _AT = 1e-12  # relative distance to a bound that counts as touching it
 
 
-def summary(solution: Solution) -> str:
+def summarise(solution: Solution) -> str:
     """Structure and quality of a solution in one sentence."""
     if solution.status == "infeasible":
         names = ", ".join(solution.violations) or "something"
         if not solution.problem.free:
-            return f"the design as given violates {names}"
-        return f"no design in the box was found that meets all that is asked; the nearest one violates {names}"
+            return f"the given design violates {names}"
+        return f"no design was found that meets every limit; the nearest one violates {names}"
     words = describe_user_structure(solution.problem.model, solution.structure, solution.abscissa > 0)
     if solution.status != "optimal":
-        return f"{words}; the search did not converge, so a better design may be near"
-    return f"{words}: {_quality(solution)}"
+        return f"{words}; the search did not converge, so a better design may exist nearby"
+    return f"{words}: {_describe_quality(solution)}"
 
 
-def warnings(solution: Solution) -> tuple[str, ...]:
-    """Arbitrary bounds that the design leans on, bounds touched for nothing, parameters without effect."""
+def list_warnings(solution: Solution) -> tuple[str, ...]:
+    """Active bounds that are arbitrary, bounds touched without a gain, parameters without effect."""
     if solution.status == "infeasible":
         return ()
     problem = solution.problem.posed
-    idle = {name: _idle(solution, name) for name in problem.free}
+    idle = {name: _idle_warning(solution, name) for name in problem.free}
     return (
-        *_timeless(problem),
-        *_leaning(solution),
+        *_abscissa_warning(problem),
+        *_active_bound_warning(solution),
         *filter(None, idle.values()),
-        *(text for name in problem.free if not idle[name] for text in _touching(solution, name)),
+        *(text for name in problem.free if not idle[name] for text in _touched_bound_warnings(solution, name)),
     )
 
 
-def none_of(problem: Posed) -> str:
-    """Of whom it is said that none is better: the designs that a proof is about."""
-    located = f" with {problem.locate}" if problem.locate else ""
-    return f"no design{located} in the box{' within the limits' if problem.constraints else ''}"
+def no_design(problem: Posed) -> str:
+    """The subject of a sentence that excludes the designs of a problem."""
+    return f"no design{f' with {problem.locate}' if problem.locate else ''} within the limits"
 
 
-def faster_than(solution: Solution) -> str:
-    """What a design of a lesser abscissa does; on the edge the abscissa does not tell how they grow."""
-    if solution.stability.on_edge:
-        return "has a lesser abscissa"
-    return "decays faster" if solution.abscissa < 0 else "grows more slowly"
-
-
-def _quality(solution: Solution) -> str:
+def describe_better(solution: Solution, goal: str) -> str:
+    """The predicate of a sentence about a better design: that it decays faster, or has a smaller or larger goal."""
     problem, bound = solution.problem.posed, solution.bound
-    text = problem.goal
-    if not problem.free:
-        return "the design as given, with nothing free"
-    if not text:
-        count = solution.freedom.count
-        left = f"; {count} more parameters are free than that takes" if count > 0 else ""
-        return f"a design with {problem.locate}, as asked{left}"
     by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
-    if bound.proven and text == "abscissa":
-        return f"{none_of(problem)} {faster_than(solution)}{by} (proven)"
+    if goal != "abscissa" or problem.sense == "maximize" or solution.stability.on_edge:
+        return f"has a {'larger' if problem.sense == 'maximize' else 'smaller'} {goal}{by}"
+    return f"{'decays faster' if solution.abscissa < 0 else 'grows more slowly'}{by}"
+
+
+def _describe_quality(solution: Solution) -> str:
+    problem, bound, goal = solution.problem.posed, solution.bound, solution.problem.posed.goal
+    if not problem.free:
+        return "the given design, with nothing free"
+    if not goal:
+        count = solution.freedom.count
+        surplus = f"; {count} more parameters are free than the pattern needs" if count > 0 else ""
+        return f"a design with {problem.locate}, as asked{surplus}"
     if bound.proven:
-        return f"{none_of(problem)} has a {'greater' if problem.sense == 'maximize' else 'lesser'} {text}{by} (proven)"
-    tried = ", ".join([*solution.starts.sureness, "not proven"])
+        return f"{no_design(problem)} {describe_better(solution, goal)} (proved)"
+    sureness = ", ".join([*solution.starts.sureness, "not proved"])
     if math.isfinite(bound.value):
         side = "above" if problem.sense == "maximize" else "below"
-        quantity = "an abscissa" if text == "abscissa" else f"a value of {text}"
-        return f"{tried}; {none_of(problem)} has {quantity} {side} {bound.value:.6g}, which leaves {bound.gap:.2g} open"
-    end = "greatest" if problem.sense == "maximize" else "least"
-    return f"the {end} {text} found is {unit_of(problem, text).show(solution.value, 6)}, {tried}"
+        quantity = "an abscissa" if goal == "abscissa" else f"a value of {goal}"
+        return f"{sureness}; {no_design(problem)} has {quantity} {side} {bound.value:.6g}, gap {bound.gap:.2g}"
+    end = "largest" if problem.sense == "maximize" else "smallest"
+    return f"the {end} {goal} found is {unit_of(problem, goal).show(solution.value, 6)}, {sureness}"
 
 
-def _timeless(problem: Posed) -> Iterator[str]:
-    """That an abscissa is counted in a unit of time that the search may change."""
+def _abscissa_warning(problem: Posed) -> Iterator[str]:
+    """Warns that the unit of the abscissa depends on a free parameter."""
     free = [name for name in ("w", "g") if name in problem.free]
     if free and problem.parameter_set.root_unit == "√(g/w)" and "abscissa" in (problem.minimize or ""):
-        advice = 'the fastest decay in seconds is maximize = "decay_rate"'
-        yield f"abscissa is counted per √(g/w), and {' and '.join(free)} may vary: {advice}"
+        advice = 'for the fastest decay in seconds write maximize = "decay_rate"'
+        yield f"the abscissa has the unit √(g/w), which varies with {' and '.join(free)}: {advice}"
 
 
-def _leaning(solution: Solution) -> Iterator[str]:
-    """Active bounds that are no physical ends."""
+def _active_bound_warning(solution: Solution) -> Iterator[str]:
+    """Active bounds that are not physical."""
     problem = solution.problem.posed
     bounds = (f"{name}.{end}" for name in problem.free for end in ("min", "max"))
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
     if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
-        named = ", ".join(f"{bound} = {_limit(problem, bound)}" for bound in arbitrary)
-        yield f"the optimum leans on {named}: widen what is arbitrary, and state what is real as a constraint"
+        listed = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
+        yield f"these limits are active: {listed}; relax the arbitrary ones, and write the real ones as constraints"
 
 
-def _limit(problem: Posed, bound: str) -> str:
+def _describe_bound(problem: Posed, bound: str) -> str:
     name, end = bound.rsplit(".", 1)
     return unit_of(problem, name).show(problem.free[name][end == "max"], 10)
 
 
-def _touching(solution: Solution, name: str) -> Iterator[str]:
+def _touched_bound_warnings(solution: Solution, name: str) -> Iterator[str]:
     problem, x = solution.problem.posed, solution.parameters[name]
     for end, limit in zip(("min", "max"), problem.free[name], strict=True):
         bound = f"{name}.{end}"
         if bound not in solution.active and abs(x - limit) <= _AT * max(abs(limit), _AT):
-            gains = "gains nothing to first order" if problem.objective else "was not asked for"
-            yield f"{name} is at {bound} = {_limit(problem, bound)}, though moving that bound {gains}"
+            why = "relaxing it gains nothing to first order" if problem.objective else "nothing was optimised"
+            yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {why}"
 
 
-def _idle(solution: Solution, name: str) -> str:
-    """What there is to say of a parameter without effect on what is asked; empty for one with an effect."""
+def _idle_warning(solution: Solution, name: str) -> str:
+    """A warning for a parameter without effect on goal and limits; empty for one with an effect."""
     problem = solution.problem.posed
     lower, upper = problem.free[name]
-    points = [solution.parameters[name], *(lower + part * (upper - lower) for part in _PARTS)]
+    points = [solution.parameters[name], *(lower + share * (upper - lower) for share in _SHARES)]
     conditions = problem.conditions
-    asked: dict[Any, Expression] = {**conditions, **({None: problem.objective} if problem.objective else {})}
-    rows = [_signature(problem, {**solution.parameters, name: x}, asked.values()) for x in points]
-    roots_move = _varies([monic for monic, _ in rows])
+    expressions: dict[Any, Expression] = {**conditions, **({None: problem.objective} if problem.objective else {})}
+    rows = [_signature(problem, {**solution.parameters, name: x}, expressions.values()) for x in points]
+    roots_move = _is_varying([monic for monic, _ in rows])
     affected = [
         n
-        for k, (n, e) in enumerate(asked.items())
-        if _varies([[values[k]] for _, values in rows]) or (roots_move and not _ROOTS.isdisjoint(e.names))
+        for k, (n, e) in enumerate(expressions.items())
+        if _is_varying([[values[k]] for _, values in rows]) or (roots_move and not _ROOTS.isdisjoint(e.names))
     ]
     if (problem.locate and roots_move) or None in affected:
         return ""
-    what = " and ".join(filter(None, (problem.locate, problem.goal)))
     if any(n in solution.active or conditions[n].equality for n in affected):
-        return ""  # it moves the optimum through a constraint that binds
-    ends = " … ".join(_limit(problem, f"{name}.{end}") for end in ("min", "max"))
-    kept = f" that keeps {', '.join(affected)}" if affected else ""
-    return f"{name} has no effect on {what} here: any value in {ends}{kept} serves as well"
+        return ""  # it moves the optimum through an active constraint
+    goals = " and ".join(filter(None, (problem.locate, problem.goal)))
+    ends = " to ".join(_describe_bound(problem, f"{name}.{end}") for end in ("min", "max"))
+    kept = f" that satisfies {', '.join(affected)}" if affected else ""
+    return f"{name} has no effect on {goals} here: any value from {ends}{kept} works"
 
 
 def _signature(
-    problem: Posed, parameters: dict[str, float], asked: Iterable[Expression]
+    problem: Posed, parameters: dict[str, float], expressions: Iterable[Expression]
 ) -> tuple[list[float], list[float]]:
-    """Monic coefficients, and expressions with the roots held: what they read beside the roots."""
+    """Monic coefficients, and the values of expressions at fixed root quantities."""
     values = problem.values(problem.ordered(parameters))
     a = np.array([float(c) for c in values.coefficients])
     values = values.with_known(dict.fromkeys(_ROOTS, 0.5))
     with np.errstate(all="ignore"):
-        return list(a / a[0]), [float(e(values)) for e in asked]
+        return list(a / a[0]), [float(e(values)) for e in expressions]
 
 
-def _varies(rows: list[list[float]]) -> bool:
-    """Whether any column of rows changes by more than rounding; one that does not exist counts as a change."""
+def _is_varying(rows: list[list[float]]) -> bool:
+    """Whether any column changes by more than rounding; a value that does not exist counts as a change."""
     table = np.array(rows)
     if not np.all(np.isfinite(table)):
         return True

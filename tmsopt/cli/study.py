@@ -99,7 +99,7 @@ class StudyCommand(WithPage, WithPlot, OnFile):
     def _solve_rows(self, study: tmsopt.Study, path: Path) -> "tuple[Results, bool]":
         """The study with its rows, and whether it was stopped on the way."""
         from tmsopt.executor import EngineError
-        from tmsopt.studies import stored
+        from tmsopt.studies import read_results
 
         done: list[float] = []  # rows, at each report of progress
         listener = progress_listener()
@@ -116,7 +116,7 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         except KeyboardInterrupt:
             if not done:  # before the first row
                 raise
-            return replace(stored(study, path), found=int(done[0])), True
+            return replace(read_results(study, path), found=int(done[0])), True
         except EngineError as error:
             click.echo(f"{error}; the rows solved so far are in {path}", err=True)
             sys.exit(BAD_INPUT)
@@ -151,10 +151,10 @@ class StudyCommand(WithPage, WithPlot, OnFile):
 
 def _plan_rows(stated: tmsopt.Study | tmsopt.Sampling) -> tmsopt.Study:
     """The study with its rows; the design of a Monte Carlo one is solved first."""
-    from tmsopt.studies import planned
+    from tmsopt.studies import plan_study
 
     try:
-        return planned(stated, progress_listener())
+        return plan_study(stated, progress_listener())
     except tmsopt.NotSolved as error:
         click.echo(f"there is no design to draw around: {error}", err=True)
         sys.exit(BAD_INPUT)

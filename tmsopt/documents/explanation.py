@@ -7,8 +7,8 @@ from itertools import takewhile
 from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, Response
 from tmsopt.analysis.diagnosis import Diagnosis
 from tmsopt.analysis.explain import Explanation
-from tmsopt.analysis.optimality import OnLine, Optimality
-from tmsopt.analysis.rounding import ALONE, Rounded
+from tmsopt.analysis.optimality import Optimality, RightmostRoot
+from tmsopt.analysis.rounding import ALONE, RoundedDesign
 from tmsopt.analysis.splitting import DEVIATION, Law
 from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Sentence, TableBlock, count_things
 from tmsopt.documents.design_rows import format_frequency, format_multiplicity
@@ -78,25 +78,25 @@ def describe_rounding(found: Explanation) -> str:
     return f"{'; '.join(parts)}{needs}"
 
 
-def _is_kept(row: Rounded, found: Explanation) -> bool:
+def _is_kept(row: RoundedDesign, found: Explanation) -> bool:
     return _is_near(row, found) and not row.violations
 
 
-def _is_near(row: Rounded, found: Explanation) -> bool:
+def _is_near(row: RoundedDesign, found: Explanation) -> bool:
     """Whether decay and objective are about what they were."""
     good = row.loss <= max(_SHARE * abs(found.abscissa), _NIL)
     off = abs(row.objective - found.value)  # nan where none was asked, or it takes a search
     return good and not off > max(_SHARE * abs(found.value), _NIL)
 
 
-def _describe_benefit(row: Rounded, found: Explanation) -> str:
+def _describe_benefit(row: RoundedDesign, found: Explanation) -> str:
     if found.abscissa >= -_NIL:
         return f"move the rightmost root by {row.loss:.2g}" if row.loss > _NIL else "change next to nothing"
     share = min(math.floor(round(100 * row.realised / found.abscissa, 6)), 100)
     return f"keep {share} % of the decay"
 
 
-def _describe_cost(row: Rounded, found: Explanation) -> str:
+def _describe_cost(row: RoundedDesign, found: Explanation) -> str:
     """What digits that are not enough do."""
     if found.abscissa < -_NIL and row.realised >= 0:
         return "make it unstable"
@@ -116,7 +116,7 @@ def tabulate_rounding(found: Explanation) -> TableBlock:
     return TableBlock(rows if known else [(*row[:4], *row[5:]) for row in rows], "What rounding does")
 
 
-def _list_rounded(which: str, to: str, row: Rounded) -> tuple[str, ...]:
+def _list_rounded(which: str, to: str, row: RoundedDesign) -> tuple[str, ...]:
     ratio, loss = _drop_noise(row.damping_ratio), _drop_noise(row.loss)
     abscissa = str(Cell(row.realised, error=_ROUNDED))
     return which, to, abscissa, f"{loss:.2g}", f"{ratio:.4g}", ", ".join(row.violations)
@@ -150,7 +150,7 @@ def explain_optimality(found: Optimality) -> Blocks:
         yield TableBlock((head, *map(_list_root, found.roots)), "Multipliers")
 
 
-def _list_root(root: OnLine) -> tuple[str, ...]:
+def _list_root(root: RightmostRoot) -> tuple[str, ...]:
     place = _format_place(root.re, root.im, 5)
     if (omega := root.eigenfrequency) is not None:
         place = format_frequency(omega.real, omega.imag, 5)

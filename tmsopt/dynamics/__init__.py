@@ -1,6 +1,6 @@
-"""A design in motion: every speed at which its motion changes, growth rates over speed, what it does after a push.
+"""Dynamics of a design: critical speeds, growth rates over speed, and motion after a push.
 
-In: a design, and a parameter that varies or what sets the design moving. Out: `Speeds` and `Growth`, none missed,
+In: a design, and a parameter that varies or a disturbance. Out: `Speeds` and `Growth`, which miss no critical speed,
 and a `Simulation`. Open `speeds` first, then `simulate`.
 """
 

@@ -1,9 +1,9 @@
-"""Where the roots of a polynomial in s that depends on y meet, or meet the imaginary axis: all such places, exactly.
+"""All values of y at which roots of a polynomial in s meet or cross the imaginary axis, exactly.
 
-The coefficients are polynomials with rational coefficients in that number y. A root 0, a root at infinity, a pair ± iω
-and a multiple root are then roots of polynomials in y: of aₙ, of a0, of the resultant of the even and the odd part, and
-of the discriminant. These are isolated in ball arithmetic, so that none is missed, however close to another. Factors
-that hold for every y, such as a root 0, are split off before.
+The coefficients are rational polynomials in y. A root 0, a root at infinity, a pair ± iω and a multiple root occur at
+roots of polynomials in y: of aₙ, of a0, of the resultant of the even and the odd part, and of the discriminant. Ball
+arithmetic isolates these roots, so none is missed, however close to another. Factors that are present for every y,
+such as a root 0, are split off first.
 """
 
 import math
@@ -25,12 +25,12 @@ Polynomial = Sequence[Any]
 """Coefficients in y, exact fractions, ascending."""
 
 DIGITS = 120
-"""Of y: a k-fold root then scatters by 1e-120/k."""
+"""Decimal digits of y; a k-fold root then scatters by 10^(−120/k)."""
 
 _RING = flint.fmpq_mpoly_ctx.get(["s", "y"], "lex")
 _S, _Y = _RING.gens()
-_SAME = 1e-12  # relative to the largest root: difference of two that are one; a k-fold one scatters by 1e-120/k
-_NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
+_SAME = 1e-12  # distance, relative to the largest root, below which two roots count as one
+_NOTHING = flint.fmpq(1, 10**90)  # coefficient, relative to the largest, that counts as 0
 
 Stretch = tuple[float, float]
 """Two ends of a band."""
@@ -38,15 +38,15 @@ Stretch = tuple[float, float]
 
 @dataclass(frozen=True)
 class Crossing:
-    """A place where roots meet, or meet the imaginary axis.
+    """A value of y at which roots meet or cross the imaginary axis.
 
     Attributes:
         at: y.
-        kind: ``capsize`` (a root 0), ``weave`` (a pair ± iω), ``infinity`` (a root there), ``EP2``, ``EP3``, … (a real
-            k-fold root) or ``CEP2``, … (a k-fold pair).
-        root: the root of it, with its multiplicity; the upper one of a pair. Of ``infinity`` without meaning.
-        rightmost: whether no root is right of it.
-        changes: whether the polynomial is stable, or marginally so, on one side of it and not on the other.
+        kind: ``capsize`` (a root 0), ``weave`` (a pair ± iω), ``infinity`` (a root at infinity), ``EP2``, ``EP3``, …
+            (a real k-fold root) or ``CEP2``, … (a k-fold pair).
+        root: the root with its multiplicity, or the upper one of a pair; meaningless for ``infinity``.
+        rightmost: whether no other root is further right.
+        changes: whether the polynomial is stable, or marginally stable, on exactly one side.
     """
 
     at: float
@@ -58,18 +58,17 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Crossings:
-    """Every place in a range of y.
+    """All crossings in a range of y.
 
     Attributes:
         found: in ascending order.
-        stable: bands with all Re s < 0, and whether each is known to begin or end at an end of the range is plain
-            from its ends being those.
+        stable: bands with all Re s < 0, cut off at the ends of the range.
         heavily_damped: bands with all s real and negative.
-        always: what holds for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root other than 0),
-            ``capsize`` (a root 0), ``infinity``.
-        marginal: bands with no root right of the axis, those on it simple; a root 0 that is there for every y is left
-            aside. Empty where nothing holds for every y.
-        zeros: multiplicity of the root 0 that is there for every y.
+        always: kinds present for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root other than
+            0), ``capsize`` (a root 0), ``infinity``.
+        marginal: bands with no root right of the axis and simple roots on it, apart from a root 0 that is present for
+            every y. Empty if `always` is.
+        zeros: multiplicity of the root 0 that is present for every y.
     """
 
     found: tuple[Crossing, ...]
@@ -80,27 +79,33 @@ class Crossings:
     zeros: int = 0
 
 
-def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_alone: bool = False) -> Crossings:
-    """All crossings with lower < y < upper, in exact numbers; without an upper end where that is inf.
+def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_alone: bool = False) -> Crossings:
+    """All crossings with lower < y < upper, in exact numbers; upper may be inf.
 
     Args:
-        coefficients: of the polynomial in s, descending, each a polynomial in y.
-        bands_alone: what roots do where bands end, which takes most of the time, is not looked at.
+        coefficients: coefficients of the polynomial in s, descending, each a polynomial in y.
+        bands_alone: skip the crossings themselves, which take most of the time.
     """
     lower, upper = rational(lower), None if upper == math.inf else rational(upper)
     p = _bivariate([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
-    a, split = _rows(p), _split(p)
-    places = {kind: _real_places(q, lower, upper) for kind, q in _conditions(a, split).items() if not q.is_zero()}
+    a, split = _rows(p), _split_factors(p)
+    places = {
+        kind: _isolate_real_roots(q, lower, upper)
+        for kind, q in _event_polynomials(a, split).items()
+        if not q.is_zero()
+    }
     marks = sorted({y for ys in places.values() for y in ys})
     cells = list(_cells(marks, lower, upper))
-    stable, damped = zip(*(_state(_at(a, middle)) for _, _, middle in cells), strict=True)
+    stable, damped = zip(*(_classify(_evaluate_at(a, middle)) for _, _, middle in cells), strict=True)
     lasting = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
-    marginal = [any(lasting.values()) and _marginal(split, middle) for _, _, middle in cells]
+    marginal = [any(lasting.values()) and _is_marginal(split, middle) for _, _, middle in cells]
     kept = [held or on for held, on in zip(stable, marginal, strict=True)]
     changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
     always = {"infinity": len(a) < len(coefficients)} | lasting
     named = {} if bands_alone else places
-    here = ((y, each) for y in marks for kind, ys in named.items() if y in ys for each in _named(a, split, kind, y))
+    here = (
+        (y, each) for y in marks for kind, ys in named.items() if y in ys for each in _find_events(a, split, kind, y)
+    )
     return Crossings(
         tuple(Crossing(float(y), *each, changed[float(y)]) for y, each in here),
         _bands(cells, stable),
@@ -112,7 +117,7 @@ def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_
 
 
 def user_crossings(model: Model, found: Crossings) -> Crossings:
-    """Crossings of the polynomial as the user reads them: of a complex system those of its eigenfrequencies."""
+    """Crossings in the user's terms: for a complex system those of its eigenfrequencies."""
     if model.carrier is None:
         return found
     own = tuple(
@@ -125,15 +130,15 @@ def user_crossings(model: Model, found: Crossings) -> Crossings:
 
 @dataclass(frozen=True)
 class _Split:
-    """A polynomial p(s, y) = s^zeros · (factors), each part a list of coefficients in y, descending in s.
+    """The factors of p(s, y) = s^zeros · (factors), each a list of coefficients in y, descending in s.
 
     Attributes:
-        zeros: multiplicity of the root 0 that is there for every y.
-        mirrored: product of the different factors that are even in s: their roots are s and −s.
-        rest: product of the other factors; it shares no root with its mirror image for every y.
-        once: s (if it divides p), mirrored and rest: p without its repetitions.
-        repeated: whether a factor other than s is there more than once.
-        repeats_mirrored: whether one of those that are even is.
+        zeros: multiplicity of the root 0 for every y.
+        mirrored: product of the distinct factors that are even in s, with roots s and −s.
+        rest: product of the other distinct factors.
+        once: s (if it divides p) times mirrored times rest: p without repeated factors.
+        repeated: whether a factor other than s is repeated.
+        repeats_mirrored: whether an even factor is repeated.
     """
 
     zeros: int
@@ -144,7 +149,7 @@ class _Split:
     repeats_mirrored: bool
 
 
-def _split(p: Any) -> _Split:
+def _split_factors(p: Any) -> _Split:
     zeros = int(min(power for power, _ in p.monoms()))
     p /= _S**zeros
     factors = [(f, times) for f, times in p.factor_squarefree()[1] if f.degrees()[0] > 0]
@@ -155,8 +160,8 @@ def _split(p: Any) -> _Split:
     return _Split(zeros, _rows(mirrored), rest, single, any(times > 1 for _, times in factors), repeats_mirrored)
 
 
-def _conditions(a: Sequence[Any], split: _Split) -> dict[str, Any]:
-    """Polynomials in y that vanish where something happens."""
+def _event_polynomials(a: Sequence[Any], split: _Split) -> dict[str, Any]:
+    """Polynomials in y whose roots are the crossings of each kind."""
     even, odd = (_bivariate(split.rest[::-1][k::2]) for k in (0, 1))
     once = _bivariate(split.once[::-1])
     return {
@@ -180,45 +185,44 @@ def _rows(p: Any) -> list[Any]:
     return rows
 
 
-def _at(rows: Sequence[Any], y: Any) -> list[Any]:
-    """Coefficients for a y."""
+def _evaluate_at(rows: Sequence[Any], y: Any) -> list[Any]:
     return [row(y) for row in rows]
 
 
-def _real_places(polynomial: Any, lower: Any, upper: Any | None) -> list[Any]:
-    """Different real roots between two ends, as fractions that are right to the digits carried."""
+def _isolate_real_roots(polynomial: Any, lower: Any, upper: Any | None) -> list[Any]:
+    """Distinct real roots between two ends, as fractions correct to `DIGITS`."""
     with flint.ctx.workdps(DIGITS):
         real = [rational(z.real) for z, _ in polynomial.numer().complex_roots() if z.imag == 0]
     return sorted(y for y in real if y > lower and (upper is None or y < upper))
 
 
-def _marginal(split: _Split, y: Any) -> bool:
-    """Whether no root is right of the axis, and those on it are simple, between two places; roots 0 aside."""
-    rest, mirrored = _at(split.rest, y), _at(split.mirrored, y)
-    if split.repeats_mirrored or not _state(rest)[0]:
+def _is_marginal(split: _Split, y: Any) -> bool:
+    """Whether no root is right of the axis and those on it are simple, apart from roots 0."""
+    rest, mirrored = _evaluate_at(split.rest, y), _evaluate_at(split.mirrored, y)
+    if split.repeats_mirrored or not _classify(rest)[0]:
         return False
     return all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
 
 
-def _named(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
-    """What is at a place: kind, root, whether rightmost. A mirrored pair that is real is nothing."""
+def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
+    """Kind, root and whether it is rightmost, for each crossing at y; a mirrored real pair is none."""
     if kind == "infinity":
         yield kind, Root(math.nan, 0.0), False
         return
-    coefficients = _finite_part(_at(a, y))
-    size = _size(a, y, coefficients)
-    roots = _grouped(coefficients, size)
+    coefficients = _finite_part(_evaluate_at(a, y))
+    size = _root_bound(a, y, coefficients)
+    roots = _cluster_roots(coefficients, size)
     line = max((r.re for r in roots), default=math.nan)
 
-    def within(part: Sequence[Any], root: Root) -> int:
-        """How often a root is one of a part."""
-        own = _grouped(_finite_part(_at(part, y)), size)
+    def count_roots(part: Sequence[Any], root: Root) -> int:
+        """Multiplicity of a root in a factor."""
+        own = _cluster_roots(_finite_part(_evaluate_at(part, y)), size)
         return sum(o.multiplicity for o in own if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME * size)
 
     holds: dict[str, Callable[[Root], bool]] = {
         "capsize": lambda r: r.re == r.im == 0,
-        "weave": lambda r: r.re == 0 < r.im and within(split.rest, r) > 0,
-        "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and within(split.once, r) > 1,
+        "weave": lambda r: r.re == 0 < r.im and count_roots(split.rest, r) > 0,
+        "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and count_roots(split.once, r) > 1,
     }
     for root in filter(holds[kind], roots):
         name = f"{'CEP' if root.im else 'EP'}{root.multiplicity}" if kind == "EP2" else kind
@@ -226,22 +230,22 @@ def _named(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple
 
 
 def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
-    """Without leading coefficients that are 0 but for the digits of y: their roots are at infinity."""
+    """The coefficients without leading zeros (within the digits of y), whose roots are at infinity."""
     largest = max(abs(c) for c in coefficients)
     first = next((k for k, c in enumerate(coefficients) if abs(c) > _NOTHING * largest), len(coefficients) - 1)
     return coefficients[first:]
 
 
-def _size(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
-    """A bound of the roots that is not 0 where they all come to 0: from the terms in y, which do not cancel."""
+def _root_bound(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
+    """A bound on the roots from the terms in y, which do not cancel, so it is positive even if all roots are 0."""
     terms = [flint.fmpq_poly([*map(abs, c.coeffs())])(abs(y)) for c in a[len(a) - len(coefficients) :]]
     lead = abs(coefficients[0])
     ratios = ((k, t / lead) for k, t in enumerate(terms) if k and t != 0)
     return max((float((flint.arb(ratio) ** (flint.arb(1) / k)).mid()) for k, ratio in ratios), default=1.0)
 
 
-def _grouped(coefficients: Sequence[Any], size: float) -> list[Root]:
-    """Roots of a polynomial that is known to many digits, those that are one to a few of these as one."""
+def _cluster_roots(coefficients: Sequence[Any], size: float) -> list[Root]:
+    """Roots of a polynomial with `DIGITS` digits; scattered ones are merged into a multiple root."""
     left = list(exact_roots(coefficients, DIGITS)) if len(coefficients) > 1 else []
     groups: list[Root] = []
     while left:
@@ -253,7 +257,7 @@ def _grouped(coefficients: Sequence[Any], size: float) -> list[Root]:
     return groups
 
 
-def _state(coefficients: Sequence[Any]) -> tuple[bool, bool]:
+def _classify(coefficients: Sequence[Any]) -> tuple[bool, bool]:
     """Whether a polynomial is stable, and whether it is heavily damped, in exact numbers."""
     sign = 1 if coefficients[0] > 0 else -1
     if coefficients[0] == 0 or not all(x > 0 for x in lienard_chipart([sign * c for c in coefficients])):
@@ -262,7 +266,7 @@ def _state(coefficients: Sequence[Any]) -> tuple[bool, bool]:
 
 
 def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
-    """The gaps between marks: both ends, and a number between them."""
+    """Gaps between marks: both ends, and a number between them."""
     for low, high in pairwise([lower, *marks, upper]):
         if high is None:
             yield float(low), math.inf, low + 1 + abs(low)
@@ -271,7 +275,7 @@ def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tupl
 
 
 def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Stretch, ...]:
-    """Neighbouring gaps in which something holds, as one. It may fail at a mark between them, in one point."""
+    """Gaps that are inside, with adjacent ones merged even if the single point between them is not inside."""
     bands: list[Stretch] = []
     for (low, high, _), holds in zip(cells, inside, strict=True):
         if holds and bands and bands[-1][1] == low:

@@ -1,4 +1,4 @@
-"""x′ = A x by matrix exponentials, which are smooth where eigenvectors merge: nothing here needs an eigenvector."""
+"""Solutions of x′ = A x by matrix exponentials, which need no eigenvectors and are smooth at exceptional points."""
 
 import math
 from itertools import accumulate
@@ -9,7 +9,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from tmsopt.records import Array
 
 
-def sampled(A: Array, x: Array, step: float, count: int) -> Array:
+def sample_motion(A: Array, x: Array, step: float, count: int) -> Array:
     """e^(A k h) x for k = 0 … count − 1, shape (count, n), by one exponential and its squares."""
     found = np.asarray(x, dtype=float)[None]
     power = expm(A * step)
@@ -19,17 +19,17 @@ def sampled(A: Array, x: Array, step: float, count: int) -> Array:
     return found[:count]
 
 
-def at_times(A: Array, x: Array, times: Array) -> Array:
-    """e^(A t) x at any few times, shape (len(times), n)."""
+def evaluate_motion(A: Array, x: Array, times: Array) -> Array:
+    """e^(A t) x at a few arbitrary times, shape (len(times), n)."""
     found: Array = expm(A * np.asarray(times)[:, None, None]) @ x
     return found
 
 
-def shaken(A: Array, x: Array, force: Array, step: float, count: int, seed: int) -> Array:
-    """A path of dx = A x dt + b dW at the times k h, b the `force`: no step is too long, for each is exact.
+def simulate_noise(A: Array, x: Array, force: Array, step: float, count: int, seed: int) -> Array:
+    """A path of dx = A x dt + b dW at the times k h, with b = `force`; each step is exact, however long.
 
-    The covariance Q(h) = ∫ e^(As) b bᵀ e^(Aᵀs) ds from 0 to h is a block of one exponential (Van Loan 1978), of a part
-    of the step in which e^(−As) does not grow, and Q(2s) = Q(s) + e^(As) Q(s) e^(Aᵀs).
+    The covariance Q(h) = ∫ e^(As) b bᵀ e^(Aᵀs) ds from 0 to h is a block of one exponential (Van Loan 1978). It is
+    computed for a fraction of the step in which e^(−As) does not grow, then Q(2s) = Q(s) + e^(As) Q(s) e^(Aᵀs).
     """
     n = len(A)
     halvings = max(0, math.ceil(math.log2(np.linalg.norm(A, 2) * step + 1e-300)))
@@ -46,6 +46,6 @@ def shaken(A: Array, x: Array, force: Array, step: float, count: int, seed: int)
     return np.array([*accumulate(steps, lambda state, jump: forward @ state + jump, initial=x)])
 
 
-def stationary(A: Array, force: Array) -> Array:
-    """The covariance Σ of x in the long run of dx = A x dt + b dW: A Σ + Σ Aᵀ + b bᵀ = 0; A must be stable."""
+def stationary_covariance(A: Array, force: Array) -> Array:
+    """The stationary covariance Σ of dx = A x dt + b dW from A Σ + Σ Aᵀ + b bᵀ = 0; A must be stable."""
     return np.asarray(solve_continuous_lyapunov(A, -np.outer(force, force)), dtype=float)

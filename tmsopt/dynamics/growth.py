@@ -1,4 +1,4 @@
-"""Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
+"""Roots of a design over its speed or another parameter, with its stable and heavily damped values."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.dynamics.crossings import Crossing, Crossings, Stretch, crossings, user_crossings
-from tmsopt.dynamics.modes import Mode, modes
+from tmsopt.dynamics.crossings import Crossing, Crossings, Stretch, find_crossings, user_crossings
+from tmsopt.dynamics.modes import Mode, follow_modes
 from tmsopt.dynamics.speeds import coefficients_over, speed_of
 from tmsopt.dynamics.system import is_bicycle
 from tmsopt.errors import InputError, input_error, is_number, short, suggest
@@ -28,10 +28,10 @@ SPEEDS = ("Fr", "v")
 
 _BICYCLE = 4  # degree of a bicycle whose modes have names
 _POINTS = 801
-_HALVINGS = 60  # of a step of the grid, to rounding
+_HALVINGS = 60  # of a step of the grid, down to rounding
 _CROWD = np.linspace(-1, 1, 301) ** 5
-_MARGIN = 1.25  # times the last event
-_FAR = 3  # times the design and all that meets the axis: beyond, roots that meet are not waited for
+_MARGIN = 1.25  # end of the range relative to the last event
+_FAR = 3  # farthest meeting of roots that is shown, relative to the design and the last axis crossing
 
 
 @dataclass(frozen=True, repr=False)
@@ -40,20 +40,20 @@ class Growth(Tabular):
 
     Attributes:
         over: the parameter.
-        values: of it, ascending, shape (n,).
-        roots: shape (n, degree), of a complex H s = −i ω, shape (n, size of H); columns are not modes, for modes cannot
-            be told apart at an exceptional point.
-        critical: critical value that the model knows, such as Fr_c, nan if there is none.
+        values: its values, ascending, shape (n,).
+        roots: shape (n, degree); for a complex H s = −i ω, shape (n, size of H). Columns are not modes, because modes
+            are not distinct at an exceptional point.
+        critical: critical value known to the model, such as Fr_c; nan without one.
         design: value of the design.
         structure: structure of its rightmost roots.
-        stable, heavily_damped: bands of values with all Re s < 0; with all s real and negative. Exact where the
-            coefficients are polynomials in the parameter; else `stable` by halving, the other from point to point.
-        problem: that the design solves; its parameters, where `over` is one of them, have the units of its file.
-        modes: the roots again, each followed from meeting to meeting, with a name.
-        events: where roots cross the axis or meet, exact; where the coefficients are no polynomials in `over`, those
-            where stability changes alone.
-        rate: how many 1/s a rate of 1 is, for each value; None without a unit of time.
-        multiple: multiple roots of the design, which its numbers give to half of their digits or less.
+        stable, heavily_damped: bands of values with all Re s < 0, and with all s real and negative. Exact where the
+            coefficients are polynomials in the parameter; else `stable` by bisection, and the other from the grid.
+        problem: the problem that the design solves; `over`, if one of its parameters, has the unit of its file.
+        modes: the roots again, as named modes between the places where roots meet.
+        events: values at which roots cross the axis or meet, exact; where the coefficients are no polynomials in
+            `over`, only changes of stability.
+        rate: the unit of rates in 1/s, for each value; None without a unit of time.
+        multiple: multiple roots of the design, which its doubles give to half of their digits at most.
 
     Example:
         >>> bands = tmsopt.growth("problems/whipple_benchmark.toml").stable
@@ -78,7 +78,7 @@ class Growth(Tabular):
     multiple: tuple[Root, ...] = ()
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The roots at each value, one a row."""
+        """The roots, one row per value."""
         names = [f"{part}_{k}" for k in range(1, self.roots.shape[1] + 1) for part in ("re", "im")]
         parts = np.stack([self.roots.real, self.roots.imag], axis=-1).reshape(len(self.values), -1)
         for value, row in zip(self.values.tolist(), parts.tolist(), strict=True):
@@ -94,16 +94,16 @@ class Growth(Tabular):
 def growth(
     design: Given, end: float | None = None, over: str | None = None, *, progress: Listener | None = None
 ) -> Growth:
-    """Roots over a parameter, all else as designed.
+    """Roots over one parameter, with all others as in the design.
 
-    Points crowd around the design and where roots meet: there they move like a fractional power of the parameter.
+    Points are dense around the design and where roots meet, because roots move there like a fractional power.
 
     Args:
-        design: a solution, or a problem or its file, solved first.
-        end: of a range that begins at 0; by default of a speed a little beyond the last weave, capsize or meeting of
-            roots (one that is farther than 3 times all else is left out), or for another parameter its box if it is
-            free, and else up to twice the design's value.
-        over: a parameter of the problem or a native one; by default the speed, or the first free one.
+        design: a solution, or a problem or its file, which is solved first.
+        end: end of a range that begins at 0. The default for a speed is a little beyond the last weave, capsize or
+            meeting of roots (a meeting 3 times farther than all else is left out). The default for another parameter
+            is its range if it is free, else twice the design's value.
+        over: a parameter of the problem or a native one; by default the speed, or else the first free one.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
@@ -121,54 +121,60 @@ def growth(
     start_steps(progress, "following the roots")
     if not (end is None or (is_number(end) and end != 0)):
         raise input_error(f"found {short(end)}; accepted: a number other than 0", "end")
-    of, parameters, name = _written(design, over)
+    parameter_set, parameters, name = _find_parameter(design, over)
     model = design.problem.model
-    known = f"{name}_c" in model.quantity_names(of)
-    at, critical = parameters[name], float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
+    known = f"{name}_c" in model.quantity_names(parameter_set)
+    at, critical = parameters[name], float(Values(model, parameter_set, parameters)[f"{name}_c"]) if known else math.nan
     speed = name in SPEEDS
-    low, high = _ends(design, name, end, at)
+    low, high = _default_range(design, name, end, at)
 
     def coefficients(x: Array) -> Array:
         """Of shape (n, degree + 1)."""
-        a = model.coefficients({**parameters, name: x}, of)
+        a = model.coefficients({**parameters, name: x}, parameter_set)
         return np.stack(np.broadcast_arrays(*a, x)[:-1], axis=-1).astype(float)
 
     is_open, is_polynomial = speed and end is None, True
     try:
-        a = coefficients_over(design.problem.posed, of, parameters, name)
-        met = crossings(a, low, math.inf if is_open else high)
+        a = coefficients_over(design.problem.posed, parameter_set, parameters, name)
+        crossed = find_crossings(a, low, math.inf if is_open else high)
     except InputError:
         is_open = is_polynomial = False
-        met = Crossings(tuple(_changes(coefficients, np.linspace(low, high, _POINTS))), (), ())
-    met = user_crossings(model, met)
+        crossed = Crossings(tuple(_find_stability_changes(coefficients, np.linspace(low, high, _POINTS))), (), ())
+    crossed = user_crossings(model, crossed)
     if is_open:
-        high = _last(met.found, at)
-    events = tuple(c for c in met.found if low < c.at < high)
+        high = _last_event(crossed.found, at)
+    events = tuple(c for c in crossed.found if low < c.at < high)
     centres = [at, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
     grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
     values = grid[(grid > low if speed else grid >= low) & (grid <= high)]
 
     c = coefficients(values)
-    shown = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity can be shown
-    values, c = values[shown], c[shown]
+    finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity
+    values, c = values[finite], c[finite]
     found = roots(c)
     if is_polynomial:
-        stable, heavily_damped = _within(met.stable, low, high), _within(met.heavily_damped, low, high)
+        stable, heavily_damped = _clip_bands(crossed.stable, low, high), _clip_bands(crossed.heavily_damped, low, high)
     else:
         inside = is_stable(c)
-        stable = tuple(_runs(values, inside, events))
-        heavily_damped = tuple(_runs(values, inside & np.all(found.imag == 0, axis=-1), ()))
-    rate = None if of.rate is None else np.zeros(values.shape) + of.rate({**parameters, name: values})
-    many = [c.at for c in events if _crowded(c.kind)] + [at] * _crowded(design.structure)
-    followed = modes(values, found, at, many, bicycle=is_bicycle(model) and model.degree == _BICYCLE, speed=speed)
+        stable = tuple(_find_runs(values, inside, events))
+        heavily_damped = tuple(_find_runs(values, inside & np.all(found.imag == 0, axis=-1), ()))
+    rate = (
+        None
+        if parameter_set.rate is None
+        else np.zeros(values.shape) + parameter_set.rate({**parameters, name: values})
+    )
+    many = [c.at for c in events if _has_many_roots(c.kind)] + [at] * _has_many_roots(design.structure)
+    followed = follow_modes(
+        values, found, at, many, bicycle=is_bicycle(model) and model.degree == _BICYCLE, speed=speed
+    )
     if model.carrier is not None:
         found = user_root_array(model, found)
         followed = tuple(
             replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in followed
         )
     return Growth(
-        of[name],
+        parameter_set[name],
         values,
         found,
         critical,
@@ -184,8 +190,8 @@ def growth(
     )
 
 
-def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
-    """The parameters of a design in the set that has the one asked for, and its name."""
+def _find_parameter(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
+    """The parameter set that has the parameter, the design in that set, and the name."""
     problem = design.problem.posed
     own, native = problem.parameter_set, problem.model.sets[0]
     if over is None:
@@ -198,7 +204,7 @@ def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str
     raise input_error(f"found '{over}'; {suggest(over, accepted)}", "over")
 
 
-def _ends(design: Solution, name: str, end: float | None, at: float) -> Stretch:
+def _default_range(design: Solution, name: str, end: float | None, at: float) -> Stretch:
     if end is not None:
         return min(end, 0.0), max(end, 0.0)
     if name in SPEEDS:
@@ -207,25 +213,25 @@ def _ends(design: Solution, name: str, end: float | None, at: float) -> Stretch:
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
-def _last(found: Sequence[Crossing], at: float) -> float:
-    """The end of a range of speeds that shows all that happens."""
+def _last_event(found: Sequence[Crossing], at: float) -> float:
+    """The end of a range of speeds that shows all events."""
     crossed = max((c.at for c in found if c.kind in ("weave", "capsize", "infinity")), default=0.0)
     near = _FAR * max(at, crossed, 0.5)
     last = max((c.at for c in found if c.at <= near), default=0.0)
     return _MARGIN * max(last, crossed, at) if last else 2 * max(at, 0.5)
 
 
-def _within(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
+def _clip_bands(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
     return tuple((max(a, low), min(b, high)) for a, b in bands if a < high and b > low)
 
 
-def _crowded(structure: str) -> bool:
-    """Whether more than two roots meet at a design."""
+def _has_many_roots(structure: str) -> bool:
+    """Whether more than two roots meet in a structure."""
     return "EP" in structure and structure != "EP2"
 
 
-def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:
-    """Where stability begins or ends between points of a grid, by halving."""
+def _find_stability_changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:
+    """Changes of stability between points of a grid, by bisection."""
     inside = is_stable(coefficients(grid))
     k = np.flatnonzero(inside[1:] != inside[:-1])
     low, high = grid[k], grid[k + 1]
@@ -233,14 +239,14 @@ def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Cr
         middle = (low + high) / 2
         same = is_stable(coefficients(middle)) == inside[k]
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    for at, there in zip(high.tolist(), coefficients(high), strict=True):
-        if np.all(np.isfinite(there)) and there[0] != 0:  # no pole nor root at infinity, where nothing crosses the axis
-            omega = abs(min(roots(there).tolist(), key=lambda z: abs(z.real)).imag)
+    for at, a in zip(high.tolist(), coefficients(high), strict=True):
+        if np.all(np.isfinite(a)) and a[0] != 0:  # nothing crosses the axis at a pole or with a root at infinity
+            omega = abs(min(roots(a).tolist(), key=lambda z: abs(z.real)).imag)
             yield Crossing(at, "weave" if omega else "capsize", Root(0.0, omega), rightmost=True, changes=True)
 
 
-def _runs(values: Array, inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
-    """First and last value of each run of points in which something holds, up to events between these and the next."""
+def _find_runs(values: Array, inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
+    """First and last value of each run of points inside, extended to events before the next point outside."""
     changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
     padded = np.concatenate([values[:1], values, values[-1:]])
     for k, m in changes.reshape(-1, 2):

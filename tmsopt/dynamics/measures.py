@@ -1,4 +1,4 @@
-"""What an engineer reads off a motion: peak, overshoot, settling time, refined so that no step of a grid is in them."""
+"""Peak, overshoot and settling time of a motion, refined between the points of the grid."""
 
 import math
 from dataclasses import dataclass
@@ -10,28 +10,31 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from tmsopt.dynamics.flow import at_times, sampled
+from tmsopt.dynamics.flow import evaluate_motion, sample_motion
 from tmsopt.records import Array, plain
 
 SETTLED = 0.02
 """Share of the peak within which a motion counts as settled."""
 
-FINEST, _LEAST, MOST = 24, 1024, 2**19  # points of a period of the fastest oscillation; points of a grid
-_EARLY = 256  # further points before the first of the grid, where fast roots die out
-_NEAR = 0.95  # of the largest sample: a peak between samples may be that much larger
+FINEST, _LEAST, MOST = (
+    24,
+    1024,
+    2**19,
+)  # points per period of the fastest oscillation; fewest and most points
+_EARLY = 256  # additional points in the first step, in which fast roots decay
+_NEAR = 0.95  # share of the largest sample that a sample near the true peak exceeds
 
 
 @dataclass(frozen=True)
 class Measure:
-    """Of one coordinate or torque over a whole motion; nan where there is no such number.
+    """Measures of one coordinate or torque over a whole motion; nan where a number does not exist.
 
     Attributes:
         name: such as ``delta``.
-        peak: the value that is largest in size, with its sign.
-        at: when that is.
-        overshoot: after it, the largest excursion to the other side of 0, as a share of the peak; 0 if none.
-        settling: from when on it stays within 2 % of its peak; nan where it does not, as of a design that is not
-            stable.
+        peak: the value of largest size, with its sign.
+        at: time of the peak.
+        overshoot: largest later excursion to the other side of 0, as a share of the peak; 0 if none.
+        settling: time from which it stays within 2 % of the peak; nan if it does not, as for an unstable design.
     """
 
     name: str
@@ -46,16 +49,16 @@ class Measure:
 
 
 @dataclass(frozen=True)
-class Watched:
-    """A motion at times that miss nothing: 24 in a period of the fastest oscillation, and closer ones at the start."""
+class SampledMotion:
+    """A motion at dense times: 24 in a period of the fastest oscillation, and more at the start."""
 
     A: Array
     times: Array
     states: Array
 
 
-def grid(A: Array, x: Array, end: float, fastest: float, largest: float) -> Watched:
-    """The motion up to a time.
+def sample_grid(A: Array, x: Array, end: float, fastest: float, largest: float) -> SampledMotion:
+    """Sample the motion up to a time.
 
     Args:
         fastest: greatest |Im s|.
@@ -63,76 +66,78 @@ def grid(A: Array, x: Array, end: float, fastest: float, largest: float) -> Watc
     """
     count = int(min(max(FINEST * fastest * end / (2 * math.pi), _LEAST), MOST)) + 1
     step = end / (count - 1)
-    times, states = np.linspace(0.0, end, count), sampled(A, x, step, count)
+    times, states = np.linspace(0.0, end, count), sample_motion(A, x, step, count)
     if largest * step > 0.1:
         early = np.geomspace(0.01 / largest, step, _EARLY, endpoint=False)
         times = np.concatenate([times[:1], early, times[1:]])
-        states = np.concatenate([states[:1], at_times(A, x, early), states[1:]])
-    return Watched(A, times, states)
+        states = np.concatenate([states[:1], evaluate_motion(A, x, early), states[1:]])
+    return SampledMotion(A, times, states)
 
 
-def measured(name: str, row: Array, on: Watched, settles: bool) -> Measure:
+def measure_output(name: str, row: Array, motion: SampledMotion, settles: bool) -> Measure:
     """The measures of the output c x; Brent's method on the exact motion between two points of the grid.
 
     Args:
         settles: whether the motion dies out within the grid.
     """
-    slopes = on.states @ on.A.T @ row
-    output = _Output(on, row, on.states @ row, np.flatnonzero(slopes[:-1] * slopes[1:] < 0))
-    at, peak = max((output.largest(sign) for sign in (1.0, -1.0)), key=lambda each: abs(each[1]))
-    overshoot = max(0.0, -output.largest(-math.copysign(1.0, peak), at)[1] / peak) if peak else 0.0
-    return Measure(name, peak, at, overshoot, output.settling(SETTLED * abs(peak)) if settles else math.nan)
+    slopes = motion.states @ motion.A.T @ row
+    output = _Output(motion, row, motion.states @ row, np.flatnonzero(slopes[:-1] * slopes[1:] < 0))
+    at, peak = max((output.find_extreme(sign) for sign in (1.0, -1.0)), key=lambda each: abs(each[1]))
+    overshoot = max(0.0, -output.find_extreme(-math.copysign(1.0, peak), at)[1] / peak) if peak else 0.0
+    return Measure(name, peak, at, overshoot, output.settling_time(SETTLED * abs(peak)) if settles else math.nan)
 
 
 @dataclass(frozen=True)
 class _Output:
-    """An output c x at the points of a grid, and the points between which and the next it turns."""
+    """An output c x on a grid; `turns` are the indices of points after which it has an extremum."""
 
-    on: Watched
+    motion: SampledMotion
     row: Array
     values: Array
     turns: NDArray[np.intp]
 
-    def largest(self, sign: float, since: float = 0.0) -> tuple[float, float]:
-        """Time and value of the greatest sign · c x: at a point of the grid, or at a turn, found exactly."""
-        on, turns = self.on, self.turns[self.on.times[self.turns + 1] > since]
-        values = sign * np.where(on.times >= since, self.values, 0.0)
+    def find_extreme(self, sign: float, since: float = 0.0) -> tuple[float, float]:
+        """Time and value of the largest sign · c x, at a point of the grid or at an exact extremum."""
+        motion, turns = self.motion, self.turns[self.motion.times[self.turns + 1] > since]
+        values = sign * np.where(motion.times >= since, self.values, 0.0)
         best = int(np.argmax(values))
-        found = [(float(on.times[best]), sign * float(values[best]))]
+        found = [(float(motion.times[best]), sign * float(values[best]))]
         near = np.maximum(values[turns], values[turns + 1]) >= _NEAR * values[best]
-        found += [self.turn(k) for k in turns[near] if values[best] > 0]
+        found += [self.find_turn(k) for k in turns[near] if values[best] > 0]
         return max(found, key=lambda each: sign * each[1])
 
-    def turn(self, k: int) -> tuple[float, float]:
-        """Time and value where c x turns between two points of the grid."""
-        A, state, time = self.on.A, self.on.states[k], self.on.times[k]
-        own = _zero(partial(_after, A, state, A.T @ self.row), self.on.times[k + 1] - time)
-        return float(time + own), _after(A, state, self.row, own)
+    def find_turn(self, k: int) -> tuple[float, float]:
+        """Time and value of the extremum of c x after point k of the grid."""
+        A, state, time = self.motion.A, self.motion.states[k], self.motion.times[k]
+        own = _find_zero(partial(_output_after, A, state, A.T @ self.row), self.motion.times[k + 1] - time)
+        return float(time + own), _output_after(A, state, self.row, own)
 
-    def settling(self, within: float) -> float:
-        """When |c x| was above the limit for the last time; nan where it still is at the end."""
-        on, sizes = self.on, np.abs(self.values)
+    def settling_time(self, within: float) -> float:
+        """Time at which |c x| is above the limit for the last time; nan if it still is at the end."""
+        motion, sizes = self.motion, np.abs(self.values)
         above = np.flatnonzero(sizes > within)
         if not above.size:
             return 0.0
         last = int(above[-1])
         if last == len(sizes) - 1:
             return math.nan
-        begin, state, end = on.times[last], on.states[last], on.times[last + 1]
+        begin, state, end = motion.times[last], motion.states[last], motion.times[last + 1]
         for k in (k for k in self.turns if k >= last and max(sizes[k : k + 2]) > _NEAR * within):
-            at, value = self.turn(k)
+            at, value = self.find_turn(k)
             if abs(value) > within:
-                begin, state, end = at, expm(on.A * (at - on.times[k])) @ on.states[k], on.times[k + 1]
+                begin, state, end = at, expm(motion.A * (at - motion.times[k])) @ motion.states[k], motion.times[k + 1]
         sign = math.copysign(1.0, float(self.row @ state))
-        return float(begin + _zero(lambda s: sign * _after(on.A, state, self.row, s) - within, end - begin))
+        return float(
+            begin + _find_zero(lambda s: sign * _output_after(motion.A, state, self.row, s) - within, end - begin)
+        )
 
 
-def _after(A: Array, x: Array, row: Array, time: float) -> float:
+def _output_after(A: Array, x: Array, row: Array, time: float) -> float:
     return float(row @ (expm(A * time) @ x))
 
 
-def _zero(function: Any, end: float) -> float:
-    """Of a function that changes its sign between 0 and `end`; the end that is nearer 0 where rounding hides that."""
+def _find_zero(function: Any, end: float) -> float:
+    """Zero of a function that changes sign between 0 and `end`; if rounding hides that, the end with smaller value."""
     first, last = function(0.0), function(end)
     if first * last >= 0:
         return 0.0 if abs(first) <= abs(last) else end

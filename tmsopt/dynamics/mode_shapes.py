@@ -1,4 +1,4 @@
-"""Shapes of modes: how lean and steer go together at each root, one shape for all the roots that meet in a chain."""
+"""Mode shapes: amplitude and phase of lean and steer at each root, one shape for each Jordan chain."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,30 +7,30 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.analysis import diagnosed
+from tmsopt.analysis import diagnose_roots
 from tmsopt.dynamics.system import ANGLES, coordinates_of, matrices_of
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Complex, Table, plain
 from tmsopt.roots import Root, Structure
 
-_DIGITS = 9  # of a shape: singular vectors have a few less than doubles have
-_NOTHING = 1e-12  # of the largest amplitude: one so small has no phase
+_DIGITS = 9  # of a shape; singular vectors have fewer digits than doubles
+_NOTHING = 1e-12  # amplitude, relative to the largest, below which there is no phase
 
 
 @dataclass(frozen=True)
 class ModeShape:
-    """One shape of a root, of a pair of the upper one: e^(st) times these amplitudes solves the equations of motion.
+    """One shape of a root, or of the upper root of a pair: e^(st) times the shape solves the equations of motion.
 
     Attributes:
-        re, im: the root, per unit of time of the motion; of a complex H s = −i ω.
-        multiplicity: how many roots meet there.
-        geometric: how many independent shapes they have left; 1 where all have merged in this one.
-        partial: lengths of their Jordan chains, longest first: a chain of k moves as t^(k−1) e^(st).
-        amplitudes: of each coordinate, the largest 1.
-        phases: in degrees, by which each is ahead of the first (of lean), from −180 to 180; nan of one at rest. Of a
-            complex H the argument of ψₖ/ψ₁, of motion as e^(−iωt).
-        eigenfrequency: of a complex H ω = i s, else None.
+        re, im: the root, per unit of time of the motion; for a complex H s = −i ω.
+        multiplicity: number of roots that meet there.
+        geometric: number of independent shapes; 1 if all have merged in this one.
+        partial: lengths of the Jordan chains, longest first; a chain of k contains motions t^(k−1) e^(st).
+        amplitudes: amplitude of each coordinate, the largest 1.
+        phases: phase lead over the first coordinate (lean) in degrees, from −180 to 180; nan for a coordinate at rest.
+            For a complex H the argument of ψₖ/ψ₁, with motion as e^(−iωt).
+        eigenfrequency: ω = i s for a complex H, else None.
     """
 
     re: float
@@ -44,7 +44,7 @@ class ModeShape:
 
     @property
     def steer_per_lean(self) -> float:
-        """Amplitude of steer for each of lean; nan without these, inf where it does not lean."""
+        """Ratio of steer to lean amplitude; nan without these, inf without lean."""
         lean, steer = (self.amplitudes.get(n, math.nan) for n in ANGLES)
         return math.inf if lean == 0 and steer else steer / lean
 
@@ -56,21 +56,21 @@ class ModeShape:
         return plain(self, "re im") | omega | plain(self, "multiplicity geometric partial") | shape | ratio
 
 
-def mode_shapes(
+def compute_mode_shapes(
     problem: Posed, parameters: Mapping[str, float], structure: Structure, rate: float
 ) -> tuple[ModeShape, ...]:
-    """The shapes at every root of a design, rightmost first: null vectors of its matrices at the root.
+    """Mode shapes at every root of a design, rightmost first: null vectors of its matrices at the root.
 
-    They are the right singular vectors of L(s) with the smallest singular values, at the roots of the ideal design:
-    where roots meet, those of the design as rounded are scattered around it. Of a complex H L(s) = s + i H.
+    They are the right singular vectors of L(s) with the smallest singular values, at the roots of the ideal design,
+    because the roots of the rounded design are scattered where roots meet. For a complex H L(s) = s + i H.
 
     Args:
-        rate: how many 1/s a rate of 1 is.
+        rate: the unit of rates in 1/s.
     """
-    model, of = problem.model, problem.parameter_set
-    pencil = matrices_of(model)(of.native(parameters))
+    model, parameter_set = problem.model, problem.parameter_set
+    pencil = matrices_of(model)(parameter_set.native(parameters))
     names = coordinates_of(model, pencil)
-    chains = diagnosed(model, of, parameters, structure)
+    chains = diagnose_roots(model, parameter_set, parameters, structure)
     if model.double is not None:  # −[[J, R], [−R, J]]
         n = len(names)
         pencil = [np.eye(n), pencil[1][:n, :n] - 1j * pencil[1][:n, n:]]
@@ -82,7 +82,7 @@ def mode_shapes(
         chain = min(chains, key=lambda d: abs(complex(d.re, d.im) - s), default=None)
         if root.multiplicity > 1 and chain is not None:
             s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
-        vectors = _null(pencil, s, geometric)
+        vectors = _null_vectors(pencil, s, geometric)
         omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag)])), None)
         for vector in vectors:
             columns = _amplitudes(vector[: len(names)])
@@ -92,8 +92,8 @@ def mode_shapes(
     return tuple(found)
 
 
-def _null(pencil: Sequence[Any], s: complex, count: int) -> Complex:
-    """The vectors that L(s) = Σ Pₖ s^(d−k) takes to 0, as rows; it is scaled first, so that units play no part."""
+def _null_vectors(pencil: Sequence[Any], s: complex, count: int) -> Complex:
+    """Null vectors of L(s) = Σ Pₖ s^(d−k) as rows; L is scaled first, so the result does not depend on units."""
     powers = [s ** (len(pencil) - 1 - k) for k in range(len(pencil))]
     L = sum(z * P for z, P in zip(powers, pencil, strict=True))
     size = sum(abs(z) * np.abs(P) for z, P in zip(powers, pencil, strict=True))

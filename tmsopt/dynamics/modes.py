@@ -1,4 +1,4 @@
-"""Roots followed over a parameter as modes with names, from one meeting of roots to the next."""
+"""Roots followed over a parameter as named modes, from one meeting of roots to the next."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array, Complex
 
-_LEAST, _SHORT = 3, 1e-4  # points of a stretch, and its part of the range; where many roots meet rounding makes such
-_APART = 0.5  # of the distance to a third root: two that are nearer to one another than this meet alone
+_LEAST, _SHORT = 3, 1e-4  # fewest points of a piece, and its least share of the range; rounding causes shorter ones
+_APART = 0.5  # distance of two roots, relative to that of a third one, up to which the two meet alone
 
 
 @dataclass(frozen=True)
 class Mode:
-    """A root, of a pair the upper one, between two places where roots meet: `values` and `roots` have shape (n,)."""
+    """A root, or the upper one of a pair, between two meetings of roots: `values` and `roots` have shape (n,)."""
 
     name: str
     values: Array
@@ -24,14 +24,14 @@ class Mode:
 
 @dataclass(frozen=True)
 class _Piece:
-    """Where the number of real roots stays: the real ones ascending, then the pairs."""
+    """A range with a constant number of real roots: the real roots ascending, then the pairs."""
 
     values: Array
     roots: Complex
     real: int
 
 
-def modes(
+def follow_modes(
     values: Array,
     found: Complex,
     design: float,
@@ -42,30 +42,30 @@ def modes(
 ) -> tuple[Mode, ...]:
     """Every root between meetings, with the name of its mode.
 
-    A root that has no part in a meeting keeps its name. Of a bicycle the names begin where one pair and two real
-    roots are, at the highest speed or else at the design: the pair is weave, the real root to the left castering, the
-    other capsize; of two pairs that come from no such place the one that is farther right is weave. Of other models
-    roots are numbered from the right at the design. A pair of two real roots is named after both. Where more than two
-    roots meet, as at EP3 and EP4, names begin anew.
+    A root keeps its name past meetings of other roots. For a bicycle, naming starts at one pair and two real roots, at
+    the highest speed or at the design: the pair is weave, the left real root castering, the right one capsize. Of two
+    pairs without such a start, the rightmost one is weave. For other models, roots are numbered from the right at the
+    design. A pair formed by two real roots is named after both. Where more than two roots meet, as at EP3 and EP4,
+    naming starts anew.
 
     Args:
-        values: of the parameter, ascending, shape (n,).
+        values: values of the parameter, ascending, shape (n,).
         found: roots, shape (n, degree).
         design: value of the design.
-        crowds: where more than two roots meet, besides what the roots show.
+        crowds: values where more than two roots meet.
     """
-    parts = _pieces(values, found, crowds)
+    parts = _split_pieces(values, found, crowds)
     if not parts:
         return ()
     usual = [k for k, part in enumerate(parts) if bicycle and part.roots.shape[1] == 3 and part.real == 2]
     here = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
     first = here if not usual or (not speed and here in usual) else usual[-1]
-    names = {first: _named(parts[first], design, bicycle)}
+    names = {first: _name_modes(parts[first], design, bicycle)}
     for order in (range(first, len(parts)), range(first, -1, -1)):
         for before, k in pairwise(order):
-            passed = _passed(parts[before], names[before], parts[k], forward=k > before)
+            passed = _pass_names(parts[before], names[before], parts[k], forward=k > before)
             mixed = bicycle and any("weave +" in name or "+ weave" in name for name in passed)
-            names[k] = passed if passed and not mixed else _named(parts[k], design, bicycle)
+            names[k] = passed if passed and not mixed else _name_modes(parts[k], design, bicycle)
     return tuple(
         Mode(name, part.values, column)
         for k, part in enumerate(parts)
@@ -73,7 +73,7 @@ def modes(
     )
 
 
-def _pieces(values: Array, found: Complex, crowds: Sequence[float]) -> list[_Piece]:
+def _split_pieces(values: Array, found: Complex, crowds: Sequence[float]) -> list[_Piece]:
     real = np.count_nonzero(found.imag == 0, axis=1)
     cuts = np.union1d(np.flatnonzero(np.diff(real)) + 1, np.searchsorted(values, crowds))
     parts = []
@@ -85,24 +85,24 @@ def _pieces(values: Array, found: Complex, crowds: Sequence[float]) -> list[_Pie
         pairs = np.sort_complex(own[own.imag > 0].reshape(len(run), -1))
         for k in range(1, len(run)) if pairs.shape[1] > 1 else ():
             ahead = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
-            pairs[k] = pairs[k][_nearest(ahead, pairs[k])]
+            pairs[k] = pairs[k][_match(ahead, pairs[k])]
         parts.append(_Piece(values[run], np.concatenate([reals, pairs], axis=1), count))
     return parts
 
 
-def _nearest(a: Complex, b: Complex) -> NDArray[np.intp]:
-    """For each of a its own one of b, the squares of the distances least together."""
+def _match(a: Complex, b: Complex) -> NDArray[np.intp]:
+    """Indices of b matched one to one to a, with the least sum of squared distances."""
     apart = np.abs(a[:, None] - b) ** 2
-    if len(a) <= 2:  # as of every bicycle
+    if len(a) <= 2:  # always so for a bicycle
         order = np.arange(len(a))
         return order[::-1] if apart[order, order[::-1]].sum() < apart.trace() else order
-    from scipy.optimize import linear_sum_assignment  # a fifth of a second, paid only where there are more
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import, and is rarely needed
 
     return np.asarray(linear_sum_assignment(apart)[1])
 
 
-def _named(part: _Piece, design: float, bicycle: bool) -> list[str]:
-    """Names where none are handed on: of a bicycle in words, else numbered from the right, nearest to the design."""
+def _name_modes(part: _Piece, design: float, bicycle: bool) -> list[str]:
+    """New names: words for a bicycle, otherwise numbers from the right at the value nearest to the design."""
     count, row = part.real, part.roots[np.abs(part.values - design).argmin()]
     pairs = len(row) - count
     if bicycle and (count, pairs) == (2, 1):
@@ -114,8 +114,8 @@ def _named(part: _Piece, design: float, bicycle: bool) -> list[str]:
     return [f"real {count - k}" for k in range(count)] + [f"pair {k}" for k in rank]
 
 
-def _passed(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[str]:
-    """Names handed on over a meeting of two roots; none where more have a part in it."""
+def _pass_names(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[str]:
+    """Names passed on across a meeting of two roots; empty if more roots meet."""
     if abs(old.real - new.real) != 2:
         return []
     many, few = (old, new) if old.real > new.real else (new, old)
@@ -126,7 +126,7 @@ def _passed(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[s
     apart = [np.abs(x - y).min(initial=np.inf) for x, y in ((r[others], r[i : i + 2].mean()), (p[rest], p[j].real))]
     if abs(r[i + 1] - r[i]) > _APART * apart[0] or 2 * p[j].imag > _APART * apart[1]:
         return []
-    rest[few.real :] = rest[few.real :][_nearest(r[others[few.real :]], p[rest[few.real :]])]  # real ones stay in order
+    rest[few.real :] = rest[few.real :][_match(r[others[few.real :]], p[rest[few.real :]])]  # real ones stay in order
     if many is old:
         both = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
         found = {j: both} | {b: names[a] for a, b in zip(others, rest, strict=True)}

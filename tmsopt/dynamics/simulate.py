@@ -1,4 +1,4 @@
-"""What a design does after a lean, a push or in noise: `simulate` and the `Simulation` that it gives."""
+"""Motion of a design after a lean or a push, or in noise: `simulate` and its `Simulation`."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from tmsopt.boundaries.weighted_design import parameter_faults
-from tmsopt.dynamics.asked import Disturbance, asked_for
-from tmsopt.dynamics.flow import sampled, shaken, stationary
-from tmsopt.dynamics.measures import FINEST, MOST, Measure, Watched, grid, measured
-from tmsopt.dynamics.mode_shapes import ModeShape, mode_shapes
+from tmsopt.dynamics.disturbance import Disturbance, parse_disturbance
+from tmsopt.dynamics.flow import sample_motion, simulate_noise, stationary_covariance
+from tmsopt.dynamics.measures import FINEST, MOST, Measure, SampledMotion, measure_output, sample_grid
+from tmsopt.dynamics.mode_shapes import ModeShape, compute_mode_shapes
 from tmsopt.dynamics.speeds import parameters_of
 from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
 from tmsopt.errors import InputError, input_error
@@ -24,35 +24,33 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Column, Table, Tabular, plain
 from tmsopt.roots import Structure
 
-_DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # times of a motion that is watched, in times 1/|abscissa| and 1/|s|
-_DOUBLINGS, _STILL = 8, 0.002  # of a stable one, until the second half is so much smaller than its peak
-_NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # of the largest root: growth that is none; decay that doubles cannot tell
-_SLOW = _DECAYS * FINEST / (2 * math.pi * MOST)  # of the fastest oscillation: decay that no grid can follow to its end
-_ALONE = 10.0  # times 1/‖A‖ where all roots are 0
-_AFTER = 1.2  # times the settling time
-_LARGEST = 600.0  # powers of e by which a motion may grow
+_DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # durations in units of 1/|abscissa| (twice) and 1/|s|
+_DOUBLINGS, _STILL = 8, 0.002  # doublings of the duration until the second half is this much smaller than the peak
+_NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # growth and decay, relative to the largest root, that are not significant
+_SLOW = _DECAYS * FINEST / (2 * math.pi * MOST)  # decay, relative to the fastest root, too slow for the grid
+_ALONE = 10.0  # duration in units of 1/‖A‖ if all roots are 0
+_AFTER = 1.2  # duration relative to the settling time
+_LARGEST = 600.0  # largest growth as an exponent of e
 
 
 @dataclass(frozen=True, repr=False)
 class Simulation(Tabular):
-    """What a design does over time.
+    """Motion of a design over time.
 
     Attributes:
-        parameters: the design: every parameter, as stored.
-        disturbance: what set it moving.
-        columns: ``t``; of a bicycle ``phi delta phidot deltadot``, then the torques of a controller if it has one
-            (``T_phi``, ``T_delta``), then the path: ``x`` along the road, yaw ``psi``, the contacts ``y_rear`` and
-            ``y_front`` to the right; of a stated system ``q1 … q1dot …`` or ``x1 …``, of a
-            complex H ``psi1_re psi1_im psi2_re …``.
-        units: of each column that has one: s, rad, N m, m; of dimensionless parameters √(w/g), rad, m_B g w, w.
-        measures: of each coordinate and torque; of the whole motion where the design is stable, else of the time
-            shown, as where it dies out so slowly that 20 000 oscillations do not show it; in noise of the times shown.
-        deviations: in noise, standard deviations of the long run; empty where there are none, as of a design that is
-            not stable.
-        modes: shapes of the modes, rightmost first.
-        structure: which roots meet on the rightmost line, e.g. ``EP4``.
-        stable: whether all roots lie left of the axis; not where those that lie on it but for rounding are multiple, or
-            those of a complex H, whose loss then is none.
+        parameters: every parameter of the design, as stored.
+        disturbance: the disturbance that set it moving.
+        columns: ``t``, then for a bicycle ``phi delta phidot deltadot``, the torques of a controller (``T_phi``,
+            ``T_delta``) if there is one, and the path: ``x`` along the road, yaw ``psi``, the contacts ``y_rear`` and
+            ``y_front`` to the right. For a stated system ``q1 … q1dot …`` or ``x1 …``, for a complex H
+            ``psi1_re psi1_im psi2_re …``.
+        units: unit of each column that has one: s, rad, N m, m; for dimensionless parameters √(w/g), rad, m_B g w, w.
+        measures: one for each coordinate and torque. They cover the whole motion of a stable design, otherwise, or if
+            the decay takes more than some 20 000 oscillations, the time shown; in noise the times shown.
+        deviations: stationary standard deviations in noise; empty without noise or for an unstable design.
+        modes: mode shapes, rightmost first.
+        structure: structure of the roots on the rightmost line, e.g. ``EP4``.
+        stable: whether all roots lie left of the axis; multiple roots, and roots of a complex H, by more than rounding.
         extra: the columns of torques and path.
 
     Example:
@@ -86,14 +84,14 @@ class Simulation(Tabular):
         return self.columns[name]
 
     def records(self) -> Iterable[dict[str, float]]:
-        """Every column at each time, one time a row."""
+        """Every column, one row per time."""
         return (dict(zip(self.columns, row, strict=True)) for row in zip(*self.columns.values(), strict=True))
 
     def write_csv(self, path: str | PathLike[str], *, whole: bool = False) -> None:
-        """The columns in one table headed by their names alone: s and rad.
+        """Write the columns as a table with their names as header, in s and rad.
 
         Args:
-            whole: with the torques of a controller and the path too.
+            whole: include the torques of a controller and the path.
 
         Raises:
             OSError: when the file cannot be written.
@@ -126,35 +124,34 @@ def simulate(
     at: Mapping[str, float] | None = None,
     progress: Listener | None = None,
 ) -> Simulation:
-    """What a design does after a lean, a push of its handlebar or in noise, exactly, also where its roots meet.
+    """Simulate a design after a lean, a push of its handlebar or in noise; exact even where its roots meet.
 
-    The motion is x(t) = e^(At) x(0) of the linear equations of the design as stored, at evenly spaced times; at a
-    multiple root with a Jordan block the same exponential has the terms t^k e^(st). Rounding of the parameters, which
-    scatters the roots of an exceptional point, moves e^(At) by no more than itself. Peaks and settling times are those
-    of the exact motion, not of the times shown.
+    The motion is x(t) = e^(At) x(0) for the linear equations of the stored design, at evenly spaced times. At a
+    multiple root with a Jordan block the exponential contains the terms t^k e^(st). Rounding scatters the roots of an
+    exceptional point, but changes e^(At) only by the size of the rounding. Peaks and settling times belong to the exact
+    motion, not to the times shown.
 
     Args:
-        design: a solution; or a problem or its file, solved first if it frees parameters.
-        lean, steer: angles at the start, to the right, in degrees as on the command line; or ``"0.1 rad"``. Where
-            nothing is asked for, a bicycle starts with a lean of 1 degree, a stated system with 1 in its first
-            coordinate.
-        push, lean_push: impulse of steer torque and of lean torque at t = 0, in N m s; of dimensionless parameters in
+        design: a solution, or a problem or its file, which is solved first if it has free parameters.
+        lean, steer: initial angles, positive to the right, in degrees, or ``"0.1 rad"``. Without any disturbance, a
+            bicycle starts with a lean of 1 degree, and a stated system with 1 in its first coordinate.
+        push, lean_push: impulse of steer torque and of lean torque at t = 0, in N m s; for dimensionless parameters in
             m_B g w √(w/g).
-        start: other states at the start, by the names of columns, in rad and s: ``{"phidot": 0.1}``, ``{"q1": 1}``,
+        start: other initial states, by names of columns, in rad and s: ``{"phidot": 0.1}``, ``{"q1": 1}``,
             ``{"psi1_re": 1}``.
-        noise: intensity σ of white noise on the steer torque, in N m √s: in a time T its impulse has the standard
+        noise: intensity σ of white noise on the steer torque, in N m √s; its impulse over a time T has the standard
             deviation σ √T.
-        seed: of the noise.
-        seconds: how long; by default until all has settled, of a design that is not stable until it has grown
-            e³-fold, or 200 radians of its fastest root. Of dimensionless parameters in √(w/g).
-        points: how many times, evenly spaced, 0 and the last one included.
-        at: parameters of the design that have other values here, such as another speed: ``{"v": 1.5}``. A design of
-            several scenarios is looked at for the nominal one.
+        seed: seed of the noise.
+        seconds: duration, for dimensionless parameters in √(w/g). By default until all has settled; for an unstable
+            design until it has grown e³-fold, or 200 radians of its fastest root.
+        points: number of evenly spaced times, including 0 and the last one.
+        at: parameters with other values here, such as the speed: ``{"v": 1.5}``. For several scenarios, the nominal
+            one is simulated.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
-        NotSolved: where there is no design to look at.
-        InputError: for a model without matrices, or what cannot be asked of it.
+        NotSolved: if no design is found.
+        InputError: for a model without matrices, or invalid arguments.
 
     Example:
         >>> swing = tmsopt.models.from_matrices(M=[[1]], D=[["c"]], K=[[1]])
@@ -172,30 +169,30 @@ def simulate(
         raise InputError([replace(f, key=("at", *f.key[-1:])) for f in faults])
     start_steps(progress, "following the motion")
     system = system_of(asked, own)
-    disturbance = asked_for(system, given)
+    disturbance = parse_disturbance(system, given)
     found: Structure = asked.values(own)["structure"]
     structure = user_structure(asked.model, found)
-    of = asked.parameter_set
-    rate = 1.0 if of.rate is None else float(of.rate(own))
+    parameter_set = asked.parameter_set
+    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(own))
     x = disturbance.state(system)
-    stable = _dies_out(asked, found)
-    followed, ending, on = _watched(system, x, structure, stable, rate, seconds, bool(noise))
+    stable = _is_stable(asked, found)
+    decays, ending, motion = _choose_duration(system, x, structure, stable, rate, seconds, bool(noise))
     times, step = np.linspace(0.0, ending, points), ending / (points - 1)
     watched, deviations = {n: system.rows[n] for n in (*system.coordinates, *system.torques)}, Table[float]()
     if noise:
         force = disturbance.noise * system.impulses["T_delta"]
-        states = shaken(system.A, x, force, step, points, seed)
-        measures = tuple(_greatest(name, times, states @ row) for name, row in watched.items())
-        deviations = _deviations(system, force) if stable else deviations
+        states = simulate_noise(system.A, x, force, step, points, seed)
+        measures = tuple(_find_peak(name, times, states @ row) for name, row in watched.items())
+        deviations = _long_run_deviations(system, force) if stable else deviations
     else:
-        states = sampled(system.A, x, step, points)
-        measures = tuple(measured(name, row, on, followed) for name, row in watched.items())
+        states = sample_motion(system.A, x, step, points)
+        measures = tuple(measure_output(name, row, motion, decays) for name, row in watched.items())
     base = tuple(n for n in system.names if n not in system.torques)
     rest = tuple(n for n in system.rows if n not in base)
     columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *rest)}
     if rest:
         columns["x"], rest = Column(system.speed * times), (*rest, "x")
-    modes = mode_shapes(asked, own, found, rate)
+    modes = compute_mode_shapes(asked, own, found, rate)
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
         asked.problem,
@@ -212,67 +209,65 @@ def simulate(
     )
 
 
-def _dies_out(problem: Posed, found: Structure) -> bool:
-    """Whether the design is stable, multiple roots and those of a complex H by more than rounding."""
+def _is_stable(problem: Posed, found: Structure) -> bool:
+    """Whether the design is stable; multiple roots, and roots of a complex H, by more than rounding."""
     rightmost = [r.multiplicity for r in found.roots if r.re == found.abscissa]
     exact = problem.model.carrier is None and max(rightmost, default=1) == 1
     largest = max((r.size for r in found.roots), default=0.0)
     return found.abscissa < (0.0 if exact else -_ROUNDING * largest)
 
 
-def _watched(
+def _choose_duration(
     system: System, x: Array, structure: Structure, stable: bool, rate: float, seconds: float | None, noisy: bool
-) -> tuple[bool, float, Watched]:
-    """Whether the motion dies out while it is measured, how long it is shown, and the motion that is measured.
+) -> tuple[bool, float, SampledMotion]:
+    """Whether the sampled motion decays to its end, the time to show, and the sampled motion.
 
     Raises:
-        InputError: where it would grow beyond all numbers.
+        InputError: if the motion would overflow.
     """
     if not structure.roots:
-        raise input_error(
-            "the roots of this design cannot be told: one of them is at infinity, or nearly so", "parameters"
-        )
+        raise input_error("the roots of this design are not known: one of them is at infinity, or nearly so", "parameters")
     z = rate * np.array([complex(r.re, r.im) for r in structure.roots])
     abscissa, fastest, largest = map(float, (z.real.max(), np.abs(z.imag).max(), np.abs(z).max()))
     if seconds is not None and seconds * abscissa > _LARGEST:
         accepted = f"accepted: up to {_LARGEST / abscissa:.4g}, in which it grows by e^{_LARGEST:.0f}"
-        raise input_error(f"found {seconds:.6g} of a design that is not stable; {accepted}", "seconds")
+        raise input_error(f"found {seconds:.6g} for an unstable design; {accepted}", "seconds")
     size = float(np.linalg.norm(system.A[: len(system.names), : len(system.names)], 2))
     ending = _RADIANS / largest if largest > _ROUNDING * size else _ALONE / (size or 1.0)
     if not stable or -abscissa < max(_SLOW * fastest, _ROUNDING * largest):
         if abscissa > _NO_GROWTH * largest:
             ending = min(ending, _GROWTHS / abscissa)
-        ending = _rounded_up(ending) if seconds is None else seconds
-        return False, ending, grid(system.A, x, ending, fastest, largest)
+        ending = _round_up(ending) if seconds is None else seconds
+        return False, ending, sample_grid(system.A, x, ending, fastest, largest)
     ending, rows = _DECAYS / -abscissa, [system.rows[name] for name in system.coordinates]
     for _ in range(_DOUBLINGS):
-        on = grid(system.A, x, ending, fastest, largest)
-        values = np.abs(on.states @ np.array(rows).T)
-        if (values[on.times > ending / 2].max(axis=0) <= _STILL * values.max(axis=0)).all():
+        motion = sample_grid(system.A, x, ending, fastest, largest)
+        values = np.abs(motion.states @ np.array(rows).T)
+        if (values[motion.times > ending / 2].max(axis=0) <= _STILL * values.max(axis=0)).all():
             break
         ending *= 2
     if seconds is None:
-        settled = [measured("", row, on, True).settling for row in rows]
+        settled = [measure_output("", row, motion, True).settling for row in rows]
         last = max((s for s in settled if s > 0), default=ending)
-        seconds = _rounded_up(ending if noisy else _AFTER * last)
-    return True, seconds, on
+        seconds = _round_up(ending if noisy else _AFTER * last)
+    return True, seconds, motion
 
 
-def _rounded_up(value: float) -> float:
-    """To two digits."""
+def _round_up(value: float) -> float:
+    """Round up to two digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return float(f"{math.ceil(value / unit) * unit:.6g}")
 
 
-def _greatest(name: str, times: Array, values: Array) -> Measure:
-    """The peak of a path in noise, at the times shown."""
+def _find_peak(name: str, times: Array, values: Array) -> Measure:
+    """The peak of a motion in noise, at the times shown."""
     k = int(np.abs(values).argmax())
     return Measure(name, float(values[k]), float(times[k]), math.nan, math.nan)
 
 
-def _deviations(system: System, force: Array) -> Table[float]:
-    """Standard deviations in the long run, of all but the path, which wanders off for ever."""
+def _long_run_deviations(system: System, force: Array) -> Table[float]:
+    """Stationary standard deviations of all columns but the path, which diffuses without limit."""
     n = len(system.names)
-    spread = stationary(system.A[:n, :n], force[:n])
+    spread = stationary_covariance(system.A[:n, :n], force[:n])
     rows = {name: system.rows[name][:n] for name in (*ANGLES, *RATES, *system.torques)}
     return Table({name: math.sqrt(max(float(row @ spread @ row), 0.0)) for name, row in rows.items()})

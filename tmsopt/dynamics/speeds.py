@@ -1,4 +1,4 @@
-"""The speeds at which a bicycle changes its kind of motion: weave, capsize, and roots that meet, all of them."""
+"""All critical speeds of a bicycle: weave, capsize, and speeds at which roots meet."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +12,7 @@ from tmsopt.algebra.balls import rational
 from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.boundaries.weighted_design import parameter_faults
-from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, crossings, user_crossings
+from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, find_crossings, user_crossings
 from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.problem.files import Given, pose
@@ -25,23 +25,23 @@ from tmsopt.search.solve import solve
 
 @dataclass(frozen=True, repr=False)
 class Speeds(Tabular):
-    """What happens to one design over all its speeds.
+    """Critical speeds of one design.
 
     Attributes:
-        parameter: the speed, or whatever was asked for, e.g. ``v``.
+        parameter: the speed, or another parameter, e.g. ``v``.
         parameters: every parameter of the design.
-        lower, upper: the range that was looked through, its ends left out; an upper end may be inf.
+        lower, upper: the open range of speeds; `upper` may be inf.
         found: every speed at which a root crosses the imaginary axis or roots meet, in ascending order.
         stable: bands of speeds with all Re s < 0.
         heavily_damped: bands with all s real and negative.
-        always: ``capsize``, ``weave``, ``EP2`` or ``infinity`` where that holds at every speed.
-        marginal: bands with no root right of the imaginary axis, those on it simple, where roots stay on it; a root 0
-            that is there at every speed is left aside.
+        always: the kinds ``capsize``, ``weave``, ``EP2`` or ``infinity`` that are present at every speed.
+        marginal: bands with no root right of the imaginary axis and simple roots on it, where roots stay on it; a root
+            0 that is present at every speed does not count.
         zeros: multiplicity of that root 0.
 
     Example:
-        >>> ridden = tmsopt.speeds("problems/whipple_benchmark.toml")
-        >>> [f"{a:.6f} {b:.6f}" for a, b in ridden.stable]  # Meijaard et al. (2007), m/s
+        >>> found = tmsopt.speeds("problems/whipple_benchmark.toml")
+        >>> [f"{a:.6f} {b:.6f}" for a, b in found.stable]  # Meijaard et al. (2007), m/s
         ['4.292383 6.024262']
 
     More: docs/explanation/weave_and_capsize.md
@@ -71,11 +71,11 @@ class Speeds(Tabular):
 
     @property
     def exceptional(self) -> tuple[Crossing, ...]:
-        """Where roots meet."""
+        """Speeds at which roots meet."""
         return tuple(c for c in self.found if "EP" in c.kind)
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """What happens at each speed, one a row."""
+        """The critical speeds, one per row."""
         return (
             {self.parameter: c.at, "kind": c.kind, **vars(c.root), "rightmost": c.rightmost}
             | {"stability_changes": c.changes}
@@ -104,20 +104,20 @@ def speeds(
     problem: Given | None = None,
     progress: Listener | None = None,
 ) -> Speeds:
-    """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
+    """Every weave and capsize speed of a design, and every speed at which roots meet, by exact root isolation.
 
-    The coefficients are polynomials in the speed, so these speeds are the roots of polynomials too, and none is missed.
+    The coefficients are polynomials in the speed. The critical speeds are roots of polynomials too, so none is missed.
 
     Args:
-        design: a solution, a problem or its file, or the parameters of a design of `problem`. A problem that frees
-            more than this parameter is solved first.
-        parameter: what varies, by default the speed; any parameter that the coefficients are polynomials in.
+        design: a solution, a problem or its file, or the parameters of a design of `problem`. A problem with further
+            free parameters is solved first.
+        parameter: the parameter that varies, by default the speed; the coefficients must be polynomials in it.
+        between: the range; by default that of the problem if the parameter is free, else its whole physical range.
         progress: called with a `tmsopt.Progress` now and then.
-        between: the range to look through; by default the parameter's box, or all of its physical range.
 
     Raises:
-        NotSolved: where there is no design to look at.
-        InputError: where the parameter does not enter as a polynomial.
+        NotSolved: if no design is found.
+        InputError: if the coefficients are not polynomials in the parameter.
 
     Example:
         >>> import math
@@ -130,76 +130,78 @@ def speeds(
     """
     whole = pose(problem if problem is not None and isinstance(design, Mapping) else design)
     asked = whole.nominal
-    of = asked.parameter_set
-    name = parameter if parameter is not None else speed_of(of)
+    parameter_set = asked.parameter_set
+    name = parameter if parameter is not None else speed_of(parameter_set)
     if name is None:
-        message = f"the model '{asked.model.name}' has no parameter that is a speed; say which one varies, "
-        message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(of.names)}"
+        message = f"the model '{asked.model.name}' has no speed; name the parameter that varies, "
+        message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(parameter_set.names)}"
         raise input_error(message, "parameter")
-    if name not in of.names:
-        raise input_error(f"unknown parameter '{name}'; {suggest(name, of.names)}", "parameter")
+    if name not in parameter_set.names:
+        raise input_error(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", "parameter")
     own = parameters_of(design, whole, name, progress)
     start_steps(progress, "isolating speeds")
-    allowed = of[name].range
+    allowed = parameter_set[name].range
     try:
         lower, upper = map(float, asked.free.get(name, (allowed.lower, allowed.upper)) if between is None else between)
         if not -math.inf < lower < upper:
             raise ValueError
     except (TypeError, ValueError):
-        message = f"found {short(between)}; accepted: a least value and a greater one, `--between LOW,HIGH`"
+        message = f"found {short(between)}; accepted: a smaller and a larger number, `--between LOW,HIGH`"
         raise input_error(message, "between") from None
-    met = user_crossings(asked.model, crossings(coefficients_over(asked, of, own, name), lower, upper))
-    return Speeds(asked.problem, name, Table(own), lower, upper, **vars(met))
+    found = user_crossings(
+        asked.model, find_crossings(coefficients_over(asked, parameter_set, own, name), lower, upper)
+    )
+    return Speeds(asked.problem, name, Table(own), lower, upper, **vars(found))
 
 
 def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
-    """The bands of its speed in which a design is stable, whatever the box of that is; None without a speed.
-
-    What happens at their ends, which takes most of the time of `speeds`, is not looked at.
+    """The bands of all physical speeds in which a design is stable; None without a speed. Faster than `speeds`.
 
     Raises:
-        InputError: where the speed does not enter as a polynomial, or the design has none of its own.
+        InputError: if the coefficients are not polynomials in the speed.
     """
     asked = design.problem.posed.nominal
-    of, name = asked.parameter_set, speed_of(asked.parameter_set)
-    if name is None or not math.isfinite(of[name].range.lower):
+    parameter_set, name = asked.parameter_set, speed_of(asked.parameter_set)
+    if name is None or not math.isfinite(parameter_set[name].range.lower):
         return None
-    a, ends = coefficients_over(asked, of, design.parameters, name), of[name].range
-    return crossings(a, ends.lower, ends.upper, bands_alone=True).stable
+    a, ends = coefficients_over(asked, parameter_set, design.parameters, name), parameter_set[name].range
+    return find_crossings(a, ends.lower, ends.upper, bands_alone=True).stable
 
 
-def speed_of(of: ParameterSet) -> str | None:
+def speed_of(parameter_set: ParameterSet) -> str | None:
     """The parameter of a set that is a speed: in m/s, or the Froude number."""
-    return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
+    return next((p.name for p in parameter_set.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def coefficients_over(problem: Posed, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+def coefficients_over(
+    problem: Posed, parameter_set: ParameterSet, own: Mapping[str, float], name: str
+) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:
-        InputError: where they are none.
+        InputError: if they are not polynomials.
     """
     nodes = {**problem.as_nodes(own), name: symbol(name)}
-    at = problem.model.algebraic(of.native({n: nodes[n] for n in of.names}))
+    at = problem.model.algebraic(parameter_set.native({n: nodes[n] for n in parameter_set.names}))
     try:
         with flint.ctx.workdps(DIGITS):
             over = fold(formula(at.values()), {name: flint.arb_poly([0, 1])}, BALLS)
-            exact_ones = {n: _with_fractions(x) for n, x in zip(at, over, strict=True)}
+            exact_ones = {n: _to_fractions(x) for n, x in zip(at, over, strict=True)}
             a = [list(flint.fmpq_poly([0]) + c) or [flint.fmpq(0)] for c in problem.model.polynomial(**exact_ones)]
-    except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # no polynomial on the way
+    except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # not a polynomial
         a = []
     if not any(x != 0 for c in a for x in c):
-        raise input_error(f"the coefficients are no polynomials in {name}, or all 0", "parameter")
+        raise input_error(f"the coefficients are not polynomials in {name}, or all are 0", "parameter")
     return a
 
 
-def _with_fractions(x: Any) -> Any:
-    """A polynomial, or a number, with fractions that are right to the digits carried."""
+def _to_fractions(x: Any) -> Any:
+    """A polynomial or number with fractions that are correct to `DIGITS`."""
     return flint.fmpq_poly([rational(c) for c in x]) if isinstance(x, flint.arb_poly) else rational(x)
 
 
 def parameters_of(design: Any, whole: Posed, name: str, progress: Listener | None) -> dict[str, float]:
-    """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
+    """The parameters of the design; a problem with free parameters other than `name` is solved first."""
     if isinstance(design, Solution):
         return dict(design.parameters)
     if isinstance(design, Mapping):

@@ -1,4 +1,4 @@
-"""A design as one linear system of first order x′ = A x, the path of its wheels among the states."""
+"""A design as a first-order linear system x′ = A x, with the path of its wheels among the states."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,10 +14,9 @@ from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Table
 
 ANGLES, RATES, TORQUES = ("phi", "delta"), ("phidot", "deltadot"), ("T_phi", "T_delta")
-"""Names of lean and steer, to the right, of their rates, and of a controller's torques on them."""
+"""Names of lean and steer (positive to the right), of their rates, and of a controller's torques."""
 
-
-_SINGULAR = 1e15  # condition of a mass matrix, columns of one size, from which on it cannot be inverted
+_SINGULAR = 1e15  # condition number of a mass matrix, with columns of equal size, above which it counts as singular
 
 
 @dataclass(frozen=True)
@@ -25,13 +24,13 @@ class System:
     """x′ = A x, in the units of time, torque and length of `units`.
 
     Attributes:
-        names: of the states; of a bicycle without the last two, which are yaw and the way of the rear contact aside.
-        coordinates: those that one looks at: lean and steer, or those of a stated system.
+        names: names of the states; for a bicycle without the last two, yaw and lateral position of the rear contact.
+        coordinates: lean and steer, or the coordinates of a stated system.
         A: shape (n, n).
-        rows: column of a table → row c of the output c x; torques of a controller, and the path, too.
-        impulses: ``T_phi``, ``T_delta`` → what an impulse of 1 of that torque adds to x; empty without torques.
-        speed: of a bicycle, at which it runs along; nan for other systems.
-        units: ``t``, and name of a column → its unit, empty without one.
+        rows: column of a table → row c of the output c x, including the torques of a controller and the path.
+        impulses: ``T_phi``, ``T_delta`` → change of x by a unit impulse of that torque; empty without torques.
+        speed: forward speed of a bicycle; nan for other systems.
+        units: ``t`` and names of columns → unit, empty for a dimensionless one.
     """
 
     names: tuple[str, ...]
@@ -54,21 +53,21 @@ def is_bicycle(model: Model) -> bool:
 
 
 def matrices_of(model: Model) -> Any:
-    """The matrices of a model by its native parameters, of a complex H those of (Re ψ, Im ψ).
+    """The matrices of a model as a function of its native parameters; for a complex H those of (Re ψ, Im ψ).
 
     Raises:
-        InputError: where it is known by its characteristic polynomial alone.
+        InputError: if only the characteristic polynomial is known.
     """
     pencil = model.double or model.pencil
     if pencil is None:
-        advice = "write its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
-        message = f"'{model.name}' is given by its coefficients alone, which tell roots and no motion; {advice}"
+        advice = "give its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
+        message = f"'{model.name}' has coefficients only, which determine roots but no motion; {advice}"
         raise input_error(message, "model")
     return lambda native: [np.array(P, dtype=float) for P in pencil(native)]
 
 
 def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
-    """Names of the coordinates of a mode: lean and steer, ``q1 …``, ``x1 …`` or, of a complex H, ``psi1 …``."""
+    """Names of the coordinates of a mode: lean and steer, ``q1 …``, ``x1 …``, or ``psi1 …`` for a complex H."""
     if is_bicycle(model):
         return ANGLES
     n, letter = len(pencil[0]), "q" if len(pencil) == 3 else "x"
@@ -78,17 +77,17 @@ def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
 
 
 def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
-    """The linear system of a design, in SI where the problem is written so, else in the model's own units.
+    """The linear system of a design, in SI if the problem is in SI, else in the model's own units.
 
-    M q″ + D q′ + K q = 0 becomes x′ = A x, x = (q, q′); two matrices I, −A are it already. Of a bicycle the yaw and
-    the rear contact of `contact_path` are further states, so that they are exact too. Of ψ′ = −i H ψ, H = R + i J as
-    written, they are Re ψ₁, Im ψ₁, Re ψ₂ …, of A = [[J, R], [−R, J]] in that order.
+    M q″ + D q′ + K q = 0 becomes x′ = A x with x = (q, q′); two matrices I, −A give A directly. A bicycle has yaw and
+    the rear contact of `contact_path` as further states, so they are exact too. For ψ′ = −i H ψ with H = R + i J, the
+    matrix [[J, R], [−R, J]] is reordered to the states Re ψ₁, Im ψ₁, Re ψ₂ ….
 
     Raises:
-        InputError: without matrices, or where the mass matrix cannot be inverted.
+        InputError: without matrices, or if the mass matrix is singular.
     """
-    model, of = problem.model, problem.parameter_set
-    native = of.native(parameters)
+    model, parameter_set = problem.model, problem.parameter_set
+    native = parameter_set.native(parameters)
     pencil = matrices_of(model)(native)
     n = len(pencil[0])
     scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
@@ -99,7 +98,7 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     if len(pencil) == 3:
         A = np.block([[np.zeros((n, n)), np.eye(n)], [A, -np.linalg.solve(pencil[0], pencil[1])]])
     if is_bicycle(model):
-        return _bicycle(A, pencil[0], problem, parameters)
+        return _bicycle_system(A, pencil[0], problem, parameters)
     q = coordinates_of(model, pencil)
     names = (*q, *(f"{name}dot" for name in q)) if len(pencil) == 3 else q
     if model.double is not None:
@@ -109,13 +108,10 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     return System(names, q, A, Table(dict(zip(names, np.eye(len(names)), strict=True))), Table(), math.nan, Table())
 
 
-def _bicycle(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
-    """The path as two more states, and the torques of a controller as rows, in the units of the parameters.
-
-    A rate of 1 is `rate` 1/s, a torque of 1 `torque` N m and a length of 1 `length` m.
-    """
-    of = problem.parameter_set
-    native = of.native(parameters)
+def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
+    """The system with the path as two more states and the torques of a controller as rows, in the user's units."""
+    parameter_set = problem.parameter_set
+    native = parameter_set.native(parameters)
     feedback = problem.model.feedback(native) if problem.model.feedback else None
     lagged, driven = feedback is not None and feedback.lag is not None, dict[str, int]()
     if feedback is not None:
@@ -134,10 +130,10 @@ def _bicycle(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, flo
         gains = np.hstack([np.array(feedback.gains, dtype=float), np.zeros((2, 2))])
         rows |= {name: -gains[k] for name, k in driven.items()}
     jumps = np.linalg.inv(mass)
-    rate = 1.0 if of.rate is None else float(of.rate(parameters))
-    torque = 1.0 if of.torque is None else float(of.torque(parameters))
+    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
+    torque = 1.0 if parameter_set.torque is None else float(parameter_set.torque(parameters))
     length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
-    kinds = (  # names, what 1 is, and its unit in SI and else
+    kinds = (  # names, scale, and units of dimensionless and SI parameters
         (("t",), 1.0, ("√(w/g)", "s")),
         ((*ANGLES, "psi"), 1.0, ("rad", "rad")),
         (RATES, rate, ("rad √(g/w)", "rad/s")),
@@ -156,5 +152,5 @@ def _bicycle(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, flo
         Table({name: one[name] * row / states for name, row in rows.items()}),
         Table(impulses),
         v * rate * length,
-        Table({name: either[of.rate is not None] for each, _, either in kinds for name in each}),
+        Table({name: either[parameter_set.rate is not None] for each, _, either in kinds for name in each}),
     )

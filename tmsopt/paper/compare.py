@@ -1,4 +1,4 @@
-"""A numeric optimum beside the closed-form laws, law by law, and beside the other formulation."""
+"""Comparison of a numeric optimum with the closed-form laws and with the other formulation of its problem."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ from tmsopt.versions import SCHEMA
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Tabular):
-    """What `compare` found.
+    """Comparison of a design with the laws of the paper.
 
     Attributes:
         design: the solution of the problem as stated.
         laws: one row per law.
-        other: the solution by the other formulation, if there is one.
-        reason: why there is no other formulation to compare with; empty if there is.
+        other: the solution by the other formulation; None without one.
+        reason: why there is no other solution to compare with, else empty.
 
     Example:
         >>> compared = tmsopt.compare("problems/ep4.toml")
@@ -49,7 +49,7 @@ class Comparison(Tabular):
         return {**free, "abscissa": self.other.abscissa - self.design.abscissa}
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The laws, one a row."""
+        """The laws, one per row."""
         return (row.to_json() for row in self.laws)
 
     def to_json(self) -> dict[str, Any]:
@@ -60,13 +60,13 @@ class Comparison(Tabular):
 
 @documents_options(CommonOptions)
 def compare(design: Given, **options: Unpack[CommonOptions]) -> Comparison:
-    """Set a design beside the laws of the paper, which are of skates alone, and solve it by the other formulation.
+    """Compare a design with the laws of the paper, which hold for skates only, and solve it by the other formulation.
 
-    The laws are of one design at one speed: scenarios and tolerances are left aside, and the problem is solved again.
+    The laws describe one design at one speed. A problem with scenarios or tolerances is solved again without them.
 
     Args:
-        design: a solution; or a problem or its file, solved first.
-        options: for the solves that this takes; see `solve`.
+        design: a solution, or a problem or its file, which is solved first.
+        options: options of `solve`.
 
     Example:
         >>> laws = {row.label: row for row in tmsopt.compare("problems/ep4.toml").laws}
@@ -97,15 +97,15 @@ def _other_formulation(design: Solution, options: Options) -> tuple[Solution | N
     else:
         square = len(problem.free) == PATTERNS[design.structure].codimension and not problem.constraints
         restated = problem.derive(locate=design.structure, start={})
-        if square:  # there may be several such designs: the one near this
-            restated = restated.derive(minimize=None, maximize=None, start=_near(design))
+        if square:  # several designs may exist; find the one near this
+            restated = restated.derive(minimize=None, maximize=None, start=_round_start(design))
     other = solve_any_status(restated, options)
     if other.status != "optimal":
-        return None, f"the {other.formulation} formulation ended {other.status}"
+        return None, f"the {other.formulation} formulation has the status {other.status}"
     return other, ""
 
 
-def _near(design: Solution) -> dict[str, float]:
-    """The free parameters to two digits, within their box."""
+def _round_start(design: Solution) -> dict[str, float]:
+    """The free parameters rounded to two digits, within their ranges."""
     box = design.problem.free
     return {n: min(max(float(f"{design.parameters[n]:.2g}"), low), high) for n, (low, high) in box.items()}

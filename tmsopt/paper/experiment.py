@@ -1,4 +1,4 @@
-"""The experimental bicycle beside the scaling law, and how flat the optimum is that the law describes."""
+"""The experimental bicycle compared with the scaling law, and the flatness of the law's optimum."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from tmsopt import laws
-from tmsopt.paper.reference import ReferenceBicycle, benchmark, experimental, optimised
+from tmsopt.paper.reference import ReferenceBicycle, benchmark, experimental, optimised_benchmark
 from tmsopt.records import Array
 from tmsopt.roots import is_stable
 
@@ -15,13 +15,13 @@ TILT = np.deg2rad(20.0)
 """Assumed steer axis tilt in rad: the source gives none for the experimental bicycle."""
 
 MASS_RATIOS = (0.1, 1.0, 3.0)
-"""Assumed mass ratios, likewise."""
+"""Assumed mass ratios, which the source does not give either."""
 
 SLACK = 0.01
-"""Of the least Fr_c: what is as good."""
+"""Relative excess over the least Fr_c that counts as equally good."""
 
 _POINTS = 601
-_JUST_ABOVE = 1 + 1e-6  # of Fr_c: where a bicycle that gains stability at Fr_c must have it
+_JUST_ABOVE = 1 + 1e-6  # speed relative to Fr_c at which stability is checked
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class CriticalSpeed:
     Attributes:
         chi_B: ascending, shape (n,).
         Fr_c: shape (n,), nan where no speed above it is stable.
-        chi_H, mu: of this curve; at χ_H = 1 the mass ratio has no influence and is nan.
-        best: (χ_B, Fr_c) at the minimum, nan where no χ_B is stable.
-        own: Fr_c at the χ_B that was built, likewise.
+        chi_H, mu: parameters of this curve; at χ_H = 1 the mass ratio has no influence and is nan.
+        best: (χ_B, Fr_c) at the minimum; nan if no χ_B is stable.
+        own: Fr_c at the χ_B of the built bicycle; nan if unstable.
         flat: range of χ_B where Fr_c exceeds the minimum by at most `SLACK`.
     """
 
@@ -48,7 +48,7 @@ class CriticalSpeed:
 
 @dataclass(frozen=True)
 class Experiment:
-    """The law's curve, shape (n,); bicycles beside it, the built one first; Fr_c over χ_B at `lambda_s` (rad)."""
+    """The law's curve, shape (n,); bicycles to compare, the built one first; Fr_c over χ_B at `lambda_s` (rad)."""
 
     ratio: Array
     law: Array
@@ -70,7 +70,7 @@ def experiment(lambda_s: float = TILT) -> Experiment:
     return Experiment(
         ratio=ratio,
         law=np.asarray(laws.chib1(-ratio, np.full_like(ratio, -1.0))),
-        bicycles=(built, benchmark(), optimised()),
+        bicycles=(built, benchmark(), optimised_benchmark()),
         lambda_s=lambda_s,
         least_tilt=float(np.arctan((p["chi_H"] - 1) / p["zeta_H"])),
         critical=tuple(_critical(chi_H, mu, lambda_s) for chi_H, mu in shapes),
@@ -98,7 +98,7 @@ def _critical(chi_H: float, mu: float, lambda_s: float) -> CriticalSpeed:
     best = float(minimize_scalar(square, bounds=ends, method="bounded", options={"xatol": 1e-10}).x)
     flat = np.nan, np.nan
     if np.isfinite(value(best)):
-        # where Fr_c, given by its square with one minimum between two poles, exceeds it by the slack, on either side
+        # Fr_c² has one minimum between two poles; find where Fr_c exceeds it by the slack on either side
         level = (1 + SLACK) ** 2 * square(best)
         low, high = (float(brentq(lambda x: square(x) - level, best, end)) for end in ends)
         flat = low, high

@@ -1,4 +1,4 @@
-"""The planes and the surface that the paper draws for χ_H = 1, as data: charts, exact boundaries, the EP set."""
+"""Data of the paper's planes and surface for χ_H = 1: charts, exact boundaries, the EP set."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
 from tmsopt.tracing.trace import trace
 
 FR, TILT, CHI_B = (0.01, 5.0), (0.01, 1.5), (1.001, 1.999)
-"""Boxes of the planes; between χ_B = 1 and ζ_B/ζ_H = 2 a bicycle with λ_s > 0 can be stable."""
+"""Ranges of the planes; a bicycle with λ_s > 0 can be stable between χ_B = 1 and ζ_B/ζ_H = 2."""
 
 OFF_LAW_CHI_B, OFF_LAW_TILT = -0.1, -0.18
 """Distances from the laws `chib1` and `tls` in Fig. fig2; the tilt in rad."""
@@ -27,12 +27,12 @@ SECTIONS = (0.0, -0.1, 0.5)
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane of two parameters, all else fixed, with what the laws say about it.
+    """A plane of two parameters, with all others fixed, and the curves of the laws in it.
 
     Attributes:
-        ep_set: traced 2EP2 and CEP2, None where the plane does not contain the EP set.
+        ep_set: traced 2EP2 and CEP2; None if the plane does not contain the EP set.
         laws: label of an equation → (horizontal, vertical) values of its curve, nan where it does not exist.
-        marked: name → point, in closed form.
+        marked: name → point in closed form.
     """
 
     chart: Chart
@@ -47,7 +47,7 @@ def ep4() -> Table[float]:
 
 
 def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
-    """(Fr, λ_s) at a distance from the law `chib1`; with the EP set where it lies there, unless without curves."""
+    """(Fr, λ_s) at a distance in χ_B from the law `chib1`; on the law with the EP set, unless without boundaries."""
     at, tilt = ep4(), np.linspace(*TILT, 1200)
     chi_B, on_law = at["chi_B"] + chi_B_offset, not chi_B_offset
     curves, marked = {"Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), tilt)}, {}
@@ -55,8 +55,8 @@ def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), 
         curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
         curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
         marked = {"EP4": (at["Fr"], at["lambda_s"])}
-    charted = chart(bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT}), points=points, boundaries=boundaries)
-    return Plane(charted, ep_set() if on_law and boundaries else None, curves, marked)
+    plane = chart(bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT}), points=points, boundaries=boundaries)
+    return Plane(plane, ep_set() if on_law and boundaries else None, curves, marked)
 
 
 def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:

@@ -1,4 +1,4 @@
-"""Geometry of a two-mass-skate bicycle seen from its right side, to scale."""
+"""Geometry of a two-mass-skate bicycle, seen from its right side and to scale."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ class Sketch:
     """Points (x, z) of the side view, in wheelbases: x forward, z down, the rear contact at the origin.
 
     Attributes:
-        parameters: the native parameters that it shows.
+        parameters: the native parameters.
         rear, front: contacts of the skates, shape (2,).
         B, H: the two masses.
-        axis: unit vector up along the steer axis, which passes through the front contact: there is no trail.
+        axis: unit vector up along the steer axis, which passes through the front contact (zero trail).
         foot: foot of the perpendicular from H on the steer axis.
         nu_H: signed distance of H from the axis, positive in front of it (below equation matrices).
     """
@@ -42,7 +42,7 @@ def sketch(parameters: Mapping[str, float]) -> Sketch:
     """
     p = Table(parameters)
     front, H = np.array([1.0, 0.0]), np.array([p["chi_H"], p["zeta_H"]])
-    axis = -np.array([np.sin(p["lambda_s"]), np.cos(p["lambda_s"])])  # a positive tilt leans it back
+    axis = -np.array([np.sin(p["lambda_s"]), np.cos(p["lambda_s"])])  # a positive tilt leans its top back
     forward = np.array([-axis[1], axis[0]])
     foot = front + np.dot(H - front, axis) * axis
     return Sketch(

@@ -1,7 +1,7 @@
 """The universal chart of quartics: every polynomial of degree 4 with a4/a0 > 0, scaled to three numbers.
 
-With s = |ω0| σ and ω0⁴ = a4/a0 it is σ⁴ + A1 σ³ + A2 σ² + A3 σ + 1, so that stability, heavy damping and
-exceptional points are fixed sets of (A1, A2, A3), the same for every model.
+With s = |ω0| σ and ω0⁴ = a4/a0 it is σ⁴ + A1 σ³ + A2 σ² + A3 σ + 1. Stability, heavy damping and exceptional points are
+fixed sets of (A1, A2, A3), the same for every model.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmsopt.models import tms
-from tmsopt.paper.locus import over_Fr
+from tmsopt.paper.locus import sweep_Fr
 from tmsopt.paper.reference import table_1
 from tmsopt.records import Array
 
@@ -21,10 +21,10 @@ class UniversalPath:
     """The path of a design of Table 1 in the universal chart while Fr is swept.
 
     Attributes:
-        name: of its exceptional point.
+        name: name of its exceptional point.
         tilt: λ_s in rad.
-        A: A1, A2, A3 in the columns, shape (n, 3); A1 = A3, as χ_B is that of the law.
-        stable: where stability begins, shape (3,).
+        A: A1, A2, A3 in the columns, shape (n, 3); A1 = A3, because χ_B obeys the law.
+        stable: the point where stability begins, shape (3,).
         exceptional: the exceptional point, shape (3,).
     """
 
@@ -39,15 +39,15 @@ def table_1_paths() -> list[UniversalPath]:
     """The three designs of Table 1 swept over 0 < Fr ≤ 5."""
     paths = []
     for bicycle in table_1():
-        data = over_Fr(bicycle)
+        data = sweep_Fr(bicycle)
         onset = next(c.at for c in data.events if c.changes)
         a = tms.coefficients({**bicycle.parameters, "Fr": np.array([onset, data.design, *data.values])}, tms.sets[0])
-        stable, exceptional, *A = normalised(np.stack(np.broadcast_arrays(*a), axis=-1))
+        stable, exceptional, *A = normalise_quartics(np.stack(np.broadcast_arrays(*a), axis=-1))
         paths.append(UniversalPath(bicycle.name, bicycle.parameters["lambda_s"], np.array(A), stable, exceptional))
     return paths
 
 
-def normalised(coefficients: Array) -> Array:
+def normalise_quartics(coefficients: Array) -> Array:
     """A1, A2, A3 of shape (n, 3) for quartics a0 … a4 of shape (n, 5) with a4/a0 > 0."""
     monic = coefficients / coefficients[:, :1]
     return np.asarray(monic[:, 1:4] / monic[:, 4:] ** (np.arange(1, 4) / 4))
@@ -62,7 +62,7 @@ def ep_set(A1: ArrayLike) -> Array:
 def heavy_section(A1: ArrayLike) -> tuple[Array, Array]:
     """Least and largest A2 of heavy damping in the plane A3 = A1; nan for A1 < 4, where there is none.
 
-    There the polynomial is σ² (y² + A1 y + A2 − 2), y = σ + 1/σ. All σ are real and negative exactly if both y
+    In this plane the polynomial is σ² (y² + A1 y + A2 − 2), y = σ + 1/σ. All σ are real and negative exactly if both y
     are real and at most −2: A2 ≤ 2 + A1²/4 and, as −A1/2 ≤ −2, A2 ≥ 2 A1 − 2.
     """
     a = np.where(np.greater_equal(A1, 4), A1, np.nan)

@@ -1,6 +1,6 @@
-"""Study: one problem solved for thousands of rows of what varies in it.
+"""Study: one problem solved for thousands of rows of varied values.
 
-In: a study file, or `Study`. Out: `Results`, kept row by row in a store that survives any kill. Open `study` first,
+In: a study file, or `Study`. Out: `Results`, with rows kept in a store that survives any kill. Open `study` first,
 then `run`; `store` keeps the rows.
 """
 

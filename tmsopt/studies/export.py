@@ -21,22 +21,22 @@ def export(
     metadata: Mapping[str, Any] | None = None,
     progress: Listener | None = None,
 ) -> None:
-    """Write rows to a file whose ending says how, one of `FORMATS`; doubles come back bit by bit.
+    """Write rows to a file in the format of its ending, one of `FORMATS`; doubles are exact.
 
-    A blank in CSV is nan or absent; Parquet has null for what is absent; netCDF nan, on the dimension ``row``, and
-    where the rows fill a grid also in the group ``grid``, over the values that vary.
+    Absent values are blank in CSV (as is nan), null in Parquet and nan in netCDF. netCDF has the dimension ``row``, and
+    for rows that fill a grid also the group ``grid`` over the varied values.
 
     Args:
+        metadata: plain data such as `Store.about`, written as JSON to Parquet (schema metadata, key ``tmsopt``) and
+            netCDF (attribute ``tmsopt``).
         progress: called with a `tmsopt.Progress` now and then.
-        metadata: plain data to go with the rows in Parquet (schema metadata, key ``tmsopt``) and netCDF (attribute
-            ``tmsopt``), as JSON; `Store.about` makes it.
 
     Raises:
         InputError: for another ending, a missing package, or a file that cannot be written.
     """
     path = Path(path)
     check_export(path)
-    write, _ = FORMATS[_ending(path)]
+    write, _ = FORMATS[_suffix(path)]
     try:
         with write_atomic(path) as temporary:
             write(rows, temporary, metadata or {}, start_steps(progress, f"writing {path.name}", "row"))
@@ -45,27 +45,27 @@ def export(
 
 
 def check_export(path: Path) -> None:
-    """That rows can be exported to a file, before any work is done; imports what is needed for it.
+    """Check that rows can be exported to a file, before any work is done; imports the packages for it.
 
     Raises:
-        InputError: for another ending, a missing package or folder, or what is there and is no file.
+        InputError: for another ending, a missing package or folder, or a path that is not a regular file.
     """
-    if _ending(path) not in FORMATS:
+    if _suffix(path) not in FORMATS:
         accepted = ", ".join(f".{e}" for e in FORMATS)
         raise input_error(f"found '{path}'; accepted: a file name ending in {accepted}", "export")
     if (path.exists() and not path.is_file()) or not path.parent.is_dir():
-        problem = "is no regular file" if path.exists() else "is in a folder that does not exist"
+        problem = "is not a regular file" if path.exists() else "is in a folder that does not exist"
         raise input_error(f"'{path}' {problem}; give the path of a file to write", "export")
-    for module in FORMATS[_ending(path)][1]:
+    for module in FORMATS[_suffix(path)][1]:
         import_optional(module, "export to a .csv file")
 
 
-def _ending(path: Path) -> str:
+def _suffix(path: Path) -> str:
     return path.suffix.lstrip(".").lower()
 
 
-def _blocks(rows: RowTable, steps: Steps | None) -> Iterator[dict[str, Any]]:
-    """Columns of some rows after others, at least of none, counted as they are done."""
+def _batches(rows: RowTable, steps: Steps | None) -> Iterator[dict[str, Any]]:
+    """Columns of successive rows, at least one batch even without rows; reports progress."""
     for first in range(0, max(len(rows), 1), BLOCK):
         yield {head: rows.column(head, slice(first, first + BLOCK)) for head in rows.headers}
         if steps:
@@ -77,12 +77,12 @@ def _csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps |
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(format_cell(format_header(head, units.get(_bare(head), ""))) for head in rows.headers)
-        for columns in _blocks(rows, steps):
+        for columns in _batches(rows, steps):
             writer.writerows(map(_cell, line) for line in zip(*(c.tolist() for c in columns.values()), strict=True))
 
 
 def _bare(header: str) -> str:
-    """The name whose unit a column has: of what varies, is reported or violated, that without its prefix and end."""
+    """The name whose unit a column has: a header without prefix and end."""
     for table in ("varied", "reports", "violations"):
         header = header.removeprefix(PREFIXES[table])
     return re.sub(r"\.(min|max|limit)$", "", header)
@@ -101,7 +101,7 @@ def _parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Ste
     types = {head: pa.string() if kind.hasobject else pa.from_numpy_dtype(kind) for head, kind in kinds.items()}
     schema = pa.schema(types, {"tmsopt": json.dumps(metadata)})
     with parquet.ParquetWriter(path, schema) as writer:
-        for columns in _blocks(rows, steps):
+        for columns in _batches(rows, steps):
             arrays = [pa.array(c.data, types[head], mask=c.mask, from_pandas=False) for head, c in columns.items()]
             writer.write_table(pa.table(arrays, schema=schema))
 
@@ -110,17 +110,17 @@ def _netcdf(rows: RowTable, path: Path, metadata: Mapping[str, Any], _: Steps | 
     over_rows = _dataset(rows, _table(rows).set_index(rows.numbers).rename_axis("row"))
     with netcdf_errors():
         over_rows.assign_attrs(tmsopt=json.dumps(metadata)).to_netcdf(path, engine="netcdf4")
-        if (over_grid := gridded(rows)) is not None:
+        if (over_grid := build_grid_dataset(rows)) is not None:
             over_grid.to_netcdf(path, mode="a", group="grid", engine="netcdf4")
 
 
-def gridded(rows: RowTable) -> Any:
-    """Rows that fill a grid as a dataset over the values that vary; None for others.
+def build_grid_dataset(rows: RowTable) -> Any:
+    """Rows that fill a grid as a dataset over the varied values; None for others.
 
-    What has one value in all rows is no axis.
+    A name with one value in all rows is not an axis.
 
     Raises:
-        InputError: where xarray is not installed.
+        InputError: if xarray is not installed.
     """
     import_optional("xarray")
     table = _table(rows)
@@ -132,7 +132,7 @@ def gridded(rows: RowTable) -> Any:
 
 
 def _names(rows: RowTable) -> dict[str, str]:
-    """Name of a variable → header: netCDF knows no slash; ``row`` is the dimension. All differ."""
+    """Unique name of a variable → header; netCDF allows no slash, and ``row`` is the dimension."""
     names: dict[str, str] = {}
     for head in rows.headers:
         name = head.replace("/", " over ").strip()
@@ -147,10 +147,10 @@ def _table(rows: RowTable) -> Any:
 
 
 def _dataset(rows: RowTable, table: Any) -> Any:
-    made = table.to_xarray()
+    dataset = table.to_xarray()
     for name, head in _names(rows).items():
-        made[name].attrs["long_name"] = head
-    return made
+        dataset[name].attrs["long_name"] = head
+    return dataset
 
 
 FORMATS: Mapping[str, tuple[Callable[[RowTable, Path, Mapping[str, Any], Steps | None], None], tuple[str, ...]]] = {
@@ -158,4 +158,4 @@ FORMATS: Mapping[str, tuple[Callable[[RowTable, Path, Mapping[str, Any], Steps |
     "parquet": (_parquet, ("pyarrow", "pyarrow.parquet")),
     "nc": (_netcdf, ("xarray", "netCDF4")),
 }
-"""Ending → how rows are written, and modules that the extra ``data`` brings; another one is added here."""
+"""Ending → function that writes rows, and its modules from the extra ``data``."""

@@ -1,4 +1,4 @@
-"""Study files: TOML to a Study, or to the Monte Carlo sampling that becomes one, with every fault at its line."""
+"""Study files: TOML to a Study or a Monte Carlo `Sampling`, with every fault at its line."""
 
 import csv
 import math
@@ -38,12 +38,12 @@ from tmsopt.studies.sampling import (
 from tmsopt.studies.study import METHODS, Study, common_faults, name_faults
 
 LARGEST = 1_000_000_000
-"""Bytes of a CSV file."""
+"""Most bytes of a CSV file."""
 
 MOST_COLUMNS, LONGEST_LINE = 1000, 1_000_000
-"""Columns of a CSV file, and characters of a line of it."""
+"""Most columns of a CSV file, and most characters of a line."""
 
-_SHOWN = 20  # faults of cells; a file in another format has one in each
+_SHOWN = 20  # faults of cells that are listed; a file in another format has one in each cell
 _RANGE = "{ min = 0.1, max = 1 }, with log = true for equal factors"
 _VARIED = {
     "grid": f"a list of values such as [0.1, 0.2], or {_RANGE.replace(' }', ', points = 10 }')}",
@@ -51,17 +51,17 @@ _VARIED = {
     "latin_hypercube": _RANGE,
     "sobol": _RANGE,
 }
-"""How what varies is written, by method."""
+"""Method → accepted form of a varied value."""
 
 
 def unit_of(problem: Posed, name: str) -> str:
-    """The unit in which what varies is a number; 1 where it has none."""
+    """The unit of a varied name, 1 for a dimensionless one."""
     stem, _, end = name.rpartition(".")
     return dimension_of(problem, stem).unit if end == "limit" else si_units(problem).get(stem or name, "1")
 
 
 def _entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
-    """Each name, its place and what is written there; ``trail.limit = …`` without quotes is a table in TOML."""
+    """Each name, its place and its value; ``trail.limit = …`` without quotes is a table in TOML."""
     for name, spec in table.items():
         if isinstance(spec, Mapping) and any(isinstance(inner, list | Mapping) for inner in spec.values()):
             yield from ((f"{name}.{end}", ("vary", name, end), inner) for end, inner in spec.items())
@@ -70,10 +70,10 @@ def _entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
 
 
 def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
-    """Name → list of numbers, `Span` of a sample, or span and points of an axis; adds what is wrong to `faults`."""
+    """Name → list of numbers, `Span` of a sample, or span and points of an axis; adds to `faults`."""
     method, read, wrong_with = written.study.method, {}, name_faults(problem)
     if not written.vary:
-        faults.append(Fault(f"nothing varies; write what does under [vary], such as mu = {_VARIED[method]}", ("vary",)))
+        faults.append(Fault(f"nothing varies; add a name under [vary], such as mu = {_VARIED[method]}", ("vary",)))
     for name, key, spec in _entries(written.vary):
         if wrong := wrong_with(name):
             faults.append(Fault(wrong, key))
@@ -88,7 +88,7 @@ def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> di
 
 
 def _range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
-    """A span; of a grid with the number of its points."""
+    """A span, and for a grid its number of points."""
     needed, hint = {"min": "…", "max": "…"}, "; a sample has rows, under [study]"
     if method == "grid":
         needed, hint = needed | {"points": "10"}, ""
@@ -114,7 +114,7 @@ def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
     if is_number(value):
         return float(value)
     message = f"found {short(value)}; accepted: a finite number"
-    if isinstance(value, str) and len(faults) <= LISTED:  # no unit is looked up where it is only counted
+    if isinstance(value, str) and len(faults) <= LISTED:  # further faults are only counted
         try:
             return parse_quantity(value, unit)
         except ValueError as error:
@@ -124,7 +124,7 @@ def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
 
 
 def _rows(read: Mapping[str, Any], options: "_Options") -> dict[str, Any]:
-    """What a study has of the rows that are written so: its columns, and what else there is to say."""
+    """Arguments of the Study for the values of its file: columns, notes and the shape of a grid."""
     rows = options.rows or 0
     match options.method:
         case "latin_hypercube":
@@ -140,13 +140,13 @@ def _rows(read: Mapping[str, Any], options: "_Options") -> dict[str, Any]:
 
 
 def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda name: "") -> dict[str, Column]:
-    """The columns of a CSV file by the names in its first line, which may vary in a study.
+    """The columns of a CSV file whose first line has their names.
 
     Cells are numbers in rad and SI units, separated by commas, or texts such as ``20 deg`` where units are known. A
-    byte order mark and empty lines do not matter.
+    byte order mark and empty lines are ignored.
 
     Args:
-        unit_of: name of a column → unit of its numbers, empty for one that has none.
+        unit_of: name of a column → unit of its numbers, empty for an unknown one.
 
     Raises:
         InputError: listing every fault with file, line and column.
@@ -187,7 +187,7 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
 
 
 def _header_faults(names: list[str]) -> Iterator[str]:
-    header, example = ",".join(names), "accepted: names of what varies, separated by commas, such as: mu,lambda_s.max"
+    header, example = ",".join(names), "accepted: varied names, separated by commas, such as: mu,lambda_s.max"
     if not header:
         yield f"the first line is empty; {example}"
     elif mark := next((word for mark, word in ((";", "semicolons"), ("\t", "tabs")) if mark in header), ""):
@@ -205,7 +205,7 @@ def _header_faults(names: list[str]) -> Iterator[str]:
 
 
 def _float(cell: str) -> float:
-    """A number as TOML and other languages write it, Python takes more; nan for another text."""
+    """A number as in TOML (Python also accepts underscores); nan for another text."""
     try:
         return math.nan if "_" in cell else float(cell)
     except ValueError:
@@ -216,7 +216,7 @@ def _cell(cell: str, unit: str) -> float:
     """A number, or a text with a unit.
 
     Raises:
-        ValueError: for anything else.
+        ValueError: for another text.
     """
     if math.isfinite(number := _float(cell)):
         return number
@@ -234,7 +234,7 @@ _GOES_WITH: Mapping[Key, tuple[tuple[str, ...], str]] = {
     ("vary",): (tuple(_VARIED), ""),
     ("tolerances",): (("monte_carlo",), ""),
 }
-"""Keys that only some methods have; and what to write where they need them."""
+"""Key → methods that it goes with, and an example if they require it."""
 
 _ACCEPTED = {
     "title": "a text in quotes",
@@ -256,34 +256,38 @@ _ACCEPTED = {
 class _Options(Section):
     """How the rows of a study are made and solved."""
 
-    method: StrictStr = Field(default="grid", description="How rows are made of what varies.")
-    rows: StrictInt | None = Field(default=None, description="How many, of latin_hypercube, sobol and monte_carlo.")
-    csv: StrictStr | None = Field(
-        default=None, description='A CSV file beside this one with a column for all that varies, of method = "csv".'
+    method: StrictStr = Field(default="grid", description="How the rows are made.")
+    rows: StrictInt | None = Field(
+        default=None, description="Number of rows, for latin_hypercube, sobol and monte_carlo."
     )
-    distribution: StrictStr | None = Field(default=None, description="Of errors within the tolerances, of monte_carlo.")
-    seed: StrictInt = Field(default=0, description="Other numbers draw other samples.")
-    starts: StrictInt = Field(default=STARTS, description="Of a row, at most.")
-    warm: StrictBool = Field(default=False, description="Whether neighbours start each other.")
+    csv: StrictStr | None = Field(
+        default=None, description='Name of a CSV file with a column for each varied name, for method = "csv".'
+    )
+    distribution: StrictStr | None = Field(
+        default=None, description="Distribution of errors within the tolerances, for monte_carlo."
+    )
+    seed: StrictInt = Field(default=0, description="Seed of the samples and of the starts.")
+    starts: StrictInt = Field(default=STARTS, description="Most starts of a row.")
+    warm: StrictBool = Field(default=False, description="Whether each row starts at the optimum of its neighbour.")
     report: list[StrictStr] = Field(
         default_factory=list, description='Expressions recorded for every row, such as ["nu_H", "2*Fr_c"].'
     )
 
 
 class _StudyFile(Section):
-    """A study: one problem solved for every row of what varies."""
+    """A study: one problem solved for every row of varied values."""
 
     title: StrictStr = Field(default="", description="One line for reports.")
     problem: StrictStr | dict[str, Any] = Field(
-        description="A problem file beside this one, or its tables as [problem.parameters] and so on."
+        description="Name of a problem file, relative to this one, or its tables as [problem.parameters] and so on."
     )
     study: _Options = Field(default_factory=_Options, description="How rows are made and solved.")
     vary: dict[str, Any] = Field(
         default_factory=dict,
-        description='What varies from row to row: mu, "lambda_s.max" of a free one, "arm.limit" of a constraint.',
+        description='Varied names: a fixed parameter, "lambda_s.max" of a free one, or "arm.limit" of a constraint.',
     )
     tolerances: dict[str, Number] = Field(
-        default_factory=dict, description="Errors that a Monte Carlo draws from, in place of those of the problem."
+        default_factory=dict, description="Tolerances of a Monte Carlo study, in place of those of the problem."
     )
 
 
@@ -292,27 +296,27 @@ SHAPE: type[Section] = _StudyFile
 
 
 def load_study(path: str | PathLike[str]) -> Study | Sampling:
-    """Read a study file; a Monte Carlo study is a `Sampling`, of which `planned` makes a Study.
+    """Read a study file; a Monte Carlo study is a `Sampling`, which `run_study` turns into a Study.
 
-    Such a file names a problem file, or has its tables as [problem.parameters] and so on; names of files in it are
-    relative to its own place. Units are written as in problem files::
+    The file names a problem file, or has its tables as [problem.parameters] and so on. Names of files are relative to
+    the study file. Units are written as in problem files::
 
         problem = "realistic.toml"
         [study]
         method = "grid"            # list, latin_hypercube, sobol, csv, monte_carlo
-        rows = 1024                # of latin_hypercube, sobol, monte_carlo
-        csv = "rows.csv"           # of csv
-        distribution = "uniform"   # or normal, of monte_carlo
+        rows = 1024                # for latin_hypercube, sobol, monte_carlo
+        csv = "rows.csv"           # for csv
+        distribution = "uniform"   # or normal, for monte_carlo
         seed = 0
-        starts = 64                # of a row, at most; of monte_carlo, of its nominal design
-        warm = false               # neighbours start each other
+        starts = 64                # most starts of a row; for monte_carlo, of its nominal design
+        warm = false               # whether each row starts at the optimum of its neighbour
         report = ["nu_H", "2*Fr_c"]
         [vary]
-        mu = { min = 0.05, max = 1, points = 20, log = true }   # of a grid; samples have no points, lists only values
+        mu = { min = 0.05, max = 1, points = 20, log = true }   # for a grid; samples have no points, lists only values
         zeta_H = [-0.2, -0.25]
         "lambda_s.max" = ["20 deg", "30 deg"]
         "offset.limit" = [0.02, 0.05]
-        [tolerances]               # of monte_carlo, in place of those of the problem
+        [tolerances]               # for monte_carlo, in place of those of the problem
         chi_B = "5 mm"
 
     Raises:
@@ -329,7 +333,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
     if "parameters" in page.data and not {"problem", "study", "vary"} & set(page.data):
         message = (
             f"is one problem, not a study; run tmsopt solve {page.file}, "
-            f'or write a study file with problem = "{Path(page.file).name}" and what varies under [vary]'
+            f'or write a study file with problem = "{Path(page.file).name}" and the varied names under [vary]'
         )
         raise InputError([Fault(message, file=page.file)])
     faults, written = validate_tables(page.data, _StudyFile, _shape_fault)
@@ -368,7 +372,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
 
 
 def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
-    """The problem that a study is of; adds what is wrong with it to `faults`."""
+    """The problem of a study; adds to `faults`."""
     stated = page.data.get("problem")
     if isinstance(stated, dict):
         found, problem = problem_from_tables(stated, str(page.data.get("title", "")).strip() or title)
@@ -378,30 +382,30 @@ def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
         try:
             return as_solvable(Path(page.file).parent / stated).problem
         except InputError as error:
-            faults += _named(stated, error, ("problem",))
+            faults += _faults_of_named_file(stated, error, ("problem",))
     return None
 
 
-def _named(name: str, error: InputError, key: Key) -> list[Fault]:
-    """Faults of a file that a study names; those of the whole file where it is named."""
+def _faults_of_named_file(name: str, error: InputError, key: Key) -> list[Fault]:
+    """Faults of a file that a study names; a fault without a line is placed where the study names the file."""
     more = "the name is relative to the study file"
     return [f if f.line else Fault(f"'{name}' {f.message}; {more}", key) for f in error.faults]
 
 
 def _read_rows(page: Page, name: str, problem: Posed, faults: list[Fault]) -> dict[str, Column]:
-    """The columns of a CSV file that a study names; adds what is wrong with them to `faults`."""
+    """The columns of a CSV file that a study names; adds to `faults`."""
     file, wrong_with = str(Path(page.file).parent / name), name_faults(problem)
     try:
         columns = read_csv(file, partial(unit_of, problem))
     except InputError as error:
-        faults += _named(name, error, ("study", "csv"))
+        faults += _faults_of_named_file(name, error, ("study", "csv"))
         return {}
     faults += [Fault(wrong, (column,)).at(file, 1) for column in columns if (wrong := wrong_with(column))]
     return columns
 
 
 def _method_faults(written: _StudyFile, reported: Set[Key]) -> Iterator[Fault]:
-    """Keys and sections that do not go with the method, or that it needs."""
+    """Faults of keys and sections that the method does not accept, or that it requires."""
     method = written.study.method
     if method not in METHODS:
         yield Fault(f"unknown method {short(method)}; {suggest(method, METHODS)}", ("study", "method"))
@@ -410,16 +414,16 @@ def _method_faults(written: _StudyFile, reported: Set[Key]) -> Iterator[Fault]:
         given = getattr(written.study if key[1:] else written, key[-1]) not in (None, {})
         if given and method not in methods:
             name = key[-1] if key[1:] else f"[{key[0]}]"
-            yield Fault(f'{name} does not go with method = "{method}"; it is for {" ".join(methods)}', key)
+            yield Fault(f'{name} does not go with method = "{method}"; accepted for {" ".join(methods)}', key)
         elif example and method in methods and not given and key not in reported:
             message = f'missing {key[-1]}, which method = "{method}" needs; write e.g. {example}'
             yield Fault(message, ("study", "method"))
     if method == "monte_carlo" and written.study.warm:
-        yield Fault("nothing is free in a Monte Carlo study, so nothing starts warm; leave it out", ("study", "warm"))
+        yield Fault("a Monte Carlo study has no free parameters to start warm; remove this key", ("study", "warm"))
 
 
 def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
-    """One pydantic complaint in the words of the study file."""
+    """The fault for an error of pydantic, in terms of the study file."""
     key = tuple(str(k) for k in where if k not in ("str", "dict[str,any]", "float", "int"))
     last, inner = key[:2][-1], key[0] == "study" and len(key) > 1
     if kind == "extra_forbidden" and key[0] in ("parameters", "objective", "constraints"):

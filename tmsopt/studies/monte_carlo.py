@@ -1,4 +1,4 @@
-"""Monte Carlo over tolerances: a design built many times, each time a little off."""
+"""Monte Carlo over tolerances: designs drawn around a nominal one."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,25 +24,25 @@ from tmsopt.studies.store import check_same, view_store
 from tmsopt.studies.study import Study, common_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
-"""Of an error: uniform within ± tolerance; or normal, its standard deviation a third of the tolerance, cut off at
-± tolerance, as if the 0.27 % beyond were sorted out."""
+"""Distributions of an error: uniform within ± tolerance, or normal with a standard deviation of a third of the
+tolerance, truncated at ± tolerance (0.27 % would lie beyond)."""
 
 _DEVIATIONS = 3  # standard deviations in a tolerance
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """A Monte Carlo study whose design has yet to be found; `run_study` finds it first.
+    """A Monte Carlo study whose nominal design is not solved yet; `run_study` solves it first.
 
     Attributes:
-        problem: its optimum is the design; its tolerances are drawn from, unless `tolerances` are given.
-        rows: designs drawn.
-        seed: of the draws; the nominal design is solved from the starts of seed 0.
-        distribution: uniform, or normal with a third of the tolerance as its standard deviation, cut off there.
-        starts: of the nominal design, at most.
+        problem: the problem whose optimum is the nominal design, with its tolerances unless `tolerances` are given.
+        rows: number of designs to draw.
+        seed: seed of the draws; the nominal design is solved with seed 0.
+        distribution: ``uniform``, or ``normal`` with a third of the tolerance as standard deviation, truncated.
+        starts: most starts of the nominal design.
 
     Raises:
-        InputError: listing everything that is wrong, as far as it shows before the design is known.
+        InputError: listing all faults that are known before the design is solved.
 
     Example:
         >>> sampling = tmsopt.load_study("problems/study_built.toml")
@@ -77,16 +77,17 @@ class Sampling:
         object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
 
 
-def planned(asked: Study | Sampling, progress: Listener | None = None) -> Study:
-    """The study with all its rows: of a Monte Carlo study, once its nominal design is solved.
+def plan_study(asked: Study | Sampling, progress: Listener | None = None) -> Study:
+    """The study with all its rows; for a Monte Carlo study, its nominal design is solved first.
 
     Raises:
-        NotSolved: when there is no design to draw around.
-        InputError: when the design cannot be drawn around.
+        NotSolved: if the nominal design is not found.
+        InputError: if the tolerances take the design out of its physical range.
     """
     if isinstance(asked, Study):
         return asked
-    return _around(asked, solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False), progress)
+    solution = solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False)
+    return _draw_around(asked, solution, progress)
 
 
 def monte_carlo(
@@ -100,20 +101,20 @@ def monte_carlo(
     report: Sequence[str] = (),
     progress: Listener | None = None,
 ) -> Study:
-    """The study of `rows` designs drawn around one, in which nothing is free.
+    """The study of `rows` designs drawn around one, with nothing free.
 
-    Each parameter with a tolerance is drawn on its own; the others stay as they are. Inequalities and scenarios stay,
-    so that a row is infeasible where one is violated. Equalities and a pattern to locate are left out: no drawn design
-    meets them. The first rows of a longer study are those of a shorter one.
+    Each parameter with a tolerance is drawn independently; the others stay. Inequalities and scenarios stay too, and a
+    row that violates one is infeasible. Equalities and a pattern to locate are left out, because no drawn design
+    satisfies them. A longer study begins with the rows of a shorter one.
 
     Args:
-        design: a solution; or a problem or its file, solved first.
-        tolerances: parameter → how far it may be off either way; those of the design's problem where None.
+        design: a solution, or a problem or its file, which is solved first.
+        tolerances: parameter → largest error in either direction; by default those of the design's problem.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         NotSolved: for a design that is not optimal.
-        InputError: listing everything else that is wrong.
+        InputError: listing all faults.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -125,21 +126,21 @@ def monte_carlo(
     """
     solution = solve_if_needed(design, progress)
     asked = Sampling(solution.problem, rows, seed, distribution, tolerances or {}, title, report=report)
-    return _around(asked, solution, progress)
+    return _draw_around(asked, solution, progress)
 
 
-def _around(asked: Sampling, solution: Solution, progress: Listener | None) -> Study:
+def _draw_around(asked: Sampling, solution: Solution, progress: Listener | None) -> Study:
     start_steps(progress, "drawing designs")
     if solution.status != "optimal":
         raise NotSolved(solution)
-    return _drawn(asked, solution.parameters)
+    return _draw_study(asked, solution.parameters)
 
 
-def _drawn(asked: Sampling, design: Mapping[str, float]) -> Study:
-    """The study around any design, in which nothing is asked that no product can meet.
+def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
+    """The study around a design, without equalities and pattern.
 
     Raises:
-        InputError: for tolerances that take the design out of its physical range.
+        InputError: if the tolerances take the design out of its physical range.
     """
     problem = asked.problem
     equal = [name for name, condition in problem.posed.conditions.items() if condition.equality]
@@ -163,17 +164,17 @@ def _drawn(asked: Sampling, design: Mapping[str, float]) -> Study:
         seed=asked.seed,
         report=asked.report,
         method="monte_carlo",
-        notes=[f"left out, for no drawn design meets it exactly: {', '.join(left_out)}"] if left_out else [],
+        notes=[f"left out, because no drawn design satisfies it exactly: {', '.join(left_out)}"] if left_out else [],
     )
 
 
 def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None:
-    """Refuse the store of another Monte Carlo study before its design is found, if no design would make it the same.
+    """Refuse the store of another Monte Carlo study before the nominal design is solved.
 
-    That is so where it is another one around the design of the store, too.
+    The study is compared with the store around the design of the store, so only other differences count.
 
     Raises:
-        InputError: with the differences; where the store is none, or damaged.
+        InputError: with the differences; also if the file is not a store, or damaged.
     """
     path = as_path(store, "an SQLite file")
     if not isinstance(study, Sampling) or not path.exists():
@@ -182,17 +183,17 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
         known = opened.about()["definition"]
     try:
         design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.posed.parameter_set.names}
-        drawn = _drawn(study, {**design, **study.problem.fixed})
-    except (InputError, KeyError, TypeError, ValueError):  # of another model, or a design that cannot be drawn around
+        drawn = _draw_study(study, {**design, **study.problem.fixed})
+    except (InputError, KeyError, TypeError, ValueError):  # of another model, or the tolerances do not fit the design
         return
     check_same(path, drawn)
 
 
 def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
-    """What is wrong with tolerances to draw from."""
+    """Faults of the tolerances."""
     if not isinstance(tolerances, Mapping) or not tolerances:
         found = f"found {short(tolerances)}" if tolerances else "no tolerances"
-        accepted = "parameters and how far each may be off, such as lambda_s = 0.01"
+        accepted = "parameters with their largest error, such as lambda_s = 0.01"
         return [Fault(f"{found}; accepted: {accepted}", ("tolerances",))]
     names = problem.parameter_set.names
     faults, advice = [], limit_advice(suggest)
@@ -201,7 +202,7 @@ def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
         if name not in names:
             faults.append(Fault(f"unknown parameter {short(name)}; {advice(str(name), names)}", key))
         elif name in problem.scenarios:
-            message = f"{name} has a scenario, which a drawn value would not change; leave out one of the two"
+            message = f"{name} has a scenario, so its tolerance has no effect; remove one of the two"
             faults.append(Fault(message, key))
         elif not is_number(value) or value <= 0:
             faults.append(Fault(f"found {short(value)}; accepted: a finite number greater than 0", key))
@@ -209,7 +210,7 @@ def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
 
 
 def _errors(parameters: int, rows: int, seed: int, distribution: str) -> NDArray[np.float64]:
-    """Errors in tolerances, from −1 to 1: (parameters, rows)."""
+    """Errors relative to the tolerances, from −1 to 1, shape (parameters, rows)."""
     shares = np.random.default_rng(seed).random((rows, parameters)).T
     if distribution == "uniform":
         return np.asarray(2 * shares - 1)

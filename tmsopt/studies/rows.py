@@ -1,4 +1,4 @@
-"""The rows of a study: one as plain data, many as columns of NumPy."""
+"""The rows of a study: one row as plain data, many as NumPy columns."""
 
 import json
 import math
@@ -20,34 +20,34 @@ from tmsopt.search.solve import UNSTABLE
 from tmsopt.studies.study import Study
 
 STATUSES = ("optimal", "infeasible", "not_converged", "failed", "quarantined")
-"""Of a row: those of a solution; ``failed`` where the row cannot be posed or solving it broke; ``quarantined`` where it
-ended its worker, twice."""
+"""Statuses of a row: those of a solution, ``failed`` for an invalid problem or an error of the solver, ``quarantined``
+for a row that ended its worker twice."""
 
 BLOCK = 10_000
-"""Rows that are read, written or made at once."""
+"""Rows that are read or written at once."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one row of a study came to; a failure is a row with a cause.
+    """The result of one row of a study; a failure is a row with a cause.
 
     Attributes:
-        number: of the row, from 0.
-        seed: of its starts.
-        varied: name → value that the study gave it (rad, SI units).
+        number: number of the row, from 0.
+        seed: seed of its starts.
+        varied: name → value in this row (rad, SI units).
         status: one of `STATUSES`.
-        cause: why the status is not ``optimal``; empty where it is.
-        objective: value of the objective expression; nan where there is none.
-        abscissa, abscissa_realised: as in `Solution`; rows of older stores have the first alone.
-        parameters: every parameter of the set the problem is written in.
-        reports: the expressions that the study asked for.
-        bound: a value that no design in the box can beat; −inf where none is known.
-        method: how the bound was found; ``none``.
+        cause: why the status is not ``optimal``, else empty.
+        objective: value of the objective; nan without one.
+        abscissa, abscissa_realised: as in `Solution`; rows of older stores have only the first.
+        parameters: every parameter of the problem's parameter set.
+        reports: values of the reported expressions.
+        bound: a value that no design within the limits can beat; −inf if unknown.
+        method: how the bound was found, or ``none``.
         laws: label of a law of the paper → relative residual, where the law applies.
-        violations: name → by how much it is violated, in its own units (rad, SI); inf where it has no value.
-        starts: tried.
+        violations: name → amount of violation in its own unit (rad, SI); inf where it has no value.
+        starts: number of starts tried.
         warm: whether it was started from a neighbour's optimum.
-        seconds, host: how long it took and where; the only ones that differ when a row is solved again.
+        seconds, host: time and machine; only these differ when a row is solved again.
 
     Example:
         >>> row = tmsopt.run_study(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.3]}), workers=1).rows[0]
@@ -82,7 +82,7 @@ class Row:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all roots lie left of the axis, ideal and as stored; None where there are none."""
+        """Whether all roots lie left of the axis, both ideal and as stored; None without roots."""
         return None if not math.isfinite(self.abscissa) else self.abscissa < 0 and not self.abscissa_realised >= 0
 
     @property
@@ -91,16 +91,16 @@ class Row:
         return json.dumps(self.to_json() | {"seconds": None, "host": None}, sort_keys=True)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``: None is nan, or no bound; other infinities are text, ``"-inf"``."""
-        made = {f.name: _to_json(f.type(getattr(self, f.name)), f.default) for f in _FIELDS}
-        return made | {"stable": self.stable}
+        """Plain data for ``json.dumps``: None for nan or an unknown bound, text such as ``"-inf"`` for infinities."""
+        data = {f.name: _to_json(f.type(getattr(self, f.name)), f.default) for f in _FIELDS}
+        return data | {"stable": self.stable}
 
     @staticmethod
     def from_json(data: Any) -> "Row":
-        """The row that `to_json` was made of.
+        """The row from the data of `to_json`.
 
         Raises:
-            ValueError: for data that no row becomes.
+            ValueError: for other data.
         """
         try:
             given = {f: _from_json(data[f.name]) for f in _FIELDS if data.get(f.name) is not None}
@@ -130,27 +130,27 @@ def _from_json(value: Any) -> Any:
 
 
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
-"""Of the header for the names in each table of a row. Parameters have none; one called as a field of the row, such as
-``seed``, is ``parameter.seed``. The header of a value so depends on nothing but its own name."""
+"""Table of a row → prefix of its headers. Parameters have none, except one with the name of a field, such as ``seed``,
+which is ``parameter.seed``. The header of a value thus depends only on its name."""
 
 SAVED: Mapping[str, Any] = {f.name: f.type for f in _FIELDS if f.name not in (*PREFIXES, "seed")}
-"""Fields with one value, but the seed, which follows from the study → type."""
+"""Field with one value → type; without the seed, which follows from the study."""
 
 _ORDER = [f.name for f in _FIELDS]
 _ORDER.insert(_ORDER.index("structure") + 1, "stable")
 
-Part = dict[str, NDArray[Any]]
-"""Columns of some rows by header: all of `SAVED`, and numbers of the tables, nan where a row has none; what follows
-from the study may be left out."""
+Batch = dict[str, NDArray[Any]]
+"""Columns of some rows by header: all of `SAVED`, and numbers of the tables, nan where absent; columns that follow from
+the study may be missing."""
 
 
 def header(table: str, key: str) -> str:
-    """Of the values of one name in one table of the rows."""
+    """Header of a name in a table of the rows."""
     return f"parameter.{key}" if table == "parameters" and key in _ORDER else f"{PREFIXES[table]}{key}"
 
 
 def headers(study: Study) -> dict[str, tuple[str, str]]:
-    """Header of every column that rows of a study have → field of the row, and name in it where that is a table."""
+    """Header of every column of a study's rows → field of the row, and the name in it if the field is a table."""
     problem = study.problem.posed
     names = {
         "varied": tuple(study.columns),
@@ -166,39 +166,39 @@ def headers(study: Study) -> dict[str, tuple[str, str]]:
 
 
 def column_of(values: Sequence[Any], kind: type) -> NDArray[Any]:
-    """Values of one type as an array; texts as objects."""
+    """Values of one type as an array, texts as objects."""
     return np.array(values, dtype=object if kind is str else kind)
 
 
-def blank(count: int) -> Part:
-    """So many rows that say nothing."""
-    return {name: column.repeat(count) for name, column in part_of([Row(0, 0, Table(), "")]).items()}
+def blank_batch(count: int) -> Batch:
+    """Rows with default values."""
+    return {name: column.repeat(count) for name, column in batch_rows([Row(0, 0, Table(), "")]).items()}
 
 
-def part_of(rows: Sequence[Row]) -> Part:
+def batch_rows(rows: Sequence[Row]) -> Batch:
     """Rows as columns."""
-    part = {name: column_of([getattr(row, name) for row in rows], kind) for name, kind in SAVED.items()}
+    batch = {name: column_of([getattr(row, name) for row in rows], kind) for name, kind in SAVED.items()}
     for k, row in enumerate(rows):
         for table in ("parameters", "reports", "laws", "violations"):
             for key, value in getattr(row, table).items():
-                part.setdefault(header(table, key), np.full(len(rows), np.nan))[k] = value
-    return part
+                batch.setdefault(header(table, key), np.full(len(rows), np.nan))[k] = value
+    return batch
 
 
-def _merged(parts: Sequence[Part]) -> Part:
-    """Parts as one, by ascending number; they are left empty, so that no number is held twice."""
-    counts = [len(part["number"]) for part in parts]
-    order = np.argsort(np.concatenate([part["number"] for part in parts]), kind="stable")
+def _merge(batches: Sequence[Batch]) -> Batch:
+    """All batches as one, by ascending number; empties the batches to save memory."""
+    counts = [len(batch["number"]) for batch in batches]
+    order = np.argsort(np.concatenate([batch["number"] for batch in batches]), kind="stable")
     return {
         head: np.concatenate(
-            [part.pop(head, np.broadcast_to(np.nan, n)) for part, n in zip(parts, counts, strict=True)]
+            [batch.pop(head, np.broadcast_to(np.nan, n)) for batch, n in zip(batches, counts, strict=True)]
         )[order]
-        for head in list(dict.fromkeys(head for part in parts for head in part))
+        for head in list(dict.fromkeys(head for batch in batches for head in batch))
     }
 
 
-def _judged_causes(problem: Posed, judged: Part) -> NDArray[Any]:
-    """Why rows are infeasible that were judged without a solver."""
+def _violation_causes(problem: Posed, judged: Batch) -> NDArray[Any]:
+    """Causes of infeasible rows that were evaluated without a solver."""
     texts, unstable = judged["cause"], np.zeros(len(judged["cause"]), dtype=bool)
     for name, condition in problem.conditions.items():
         unit, amounts = unit_of(problem, name), judged.get(header("violations", name), np.empty(0))
@@ -214,20 +214,20 @@ def _judged_causes(problem: Posed, judged: Part) -> NDArray[Any]:
 class RowTable(Sequence[Row]):
     """Rows of a study by ascending number.
 
-    What the study gives a row is not kept: its seed and what varies; of rows that were judged without a solver the
-    parameters too.
+    Values that follow from the study are computed on demand: seeds, varied values, and the parameters of rows evaluated
+    without a solver.
 
     Args:
-        parts: columns of some rows each, which are taken over.
+        batches: columns of the rows; they are emptied.
 
     Attributes:
-        headers: of all columns; see `headers`.
-        numbers: of the rows.
+        headers: headers of all columns; see `headers`.
+        numbers: numbers of the rows.
     """
 
-    def __init__(self, study: Study, parts: Sequence[Part]) -> None:
+    def __init__(self, study: Study, batches: Sequence[Batch]) -> None:
         self.study, self.headers = study, headers(study)
-        self._kept = _merged([blank(0), *parts])
+        self._kept = _merge([blank_batch(0), *batches])
         self.numbers: NDArray[np.int64] = self._kept["number"]
         status = self._kept["status"]
         self._unsolved = (status == "failed") | (status == "quarantined")
@@ -260,52 +260,52 @@ class RowTable(Sequence[Row]):
     def __repr__(self) -> str:
         return f"RowTable({len(self)})"
 
-    def _rows(self, at: slice) -> list[Row]:
-        columns = [self.column(head, at).tolist() for head in self.headers]
-        made = []
+    def _rows(self, place: slice) -> list[Row]:
+        columns = [self.column(head, place).tolist() for head in self.headers]
+        rows = []
         for values in zip(*columns, strict=True):
             row: dict[str, Any] = {name: {} for name in PREFIXES}
             for (name, key), value in zip(self.headers.values(), values, strict=True):
                 if name not in PREFIXES:
-                    row[name] = math.nan if value != value else value  # noqa: PLR0124  # one nan: equal rows are equal
+                    row[name] = math.nan if value != value else value  # noqa: PLR0124  # one nan object, so that equal rows compare equal
                 elif value is not None:
                     row[name][key] = value
-            made.append(Row(**{f.name: f.type(row[f.name]) for f in _FIELDS}))
-        return made
+            rows.append(Row(**{f.name: f.type(row[f.name]) for f in _FIELDS}))
+        return rows
 
     @cached_property
     def _causes(self) -> NDArray[Any]:
-        """Why rows are not optimal; of those that were judged without a solver it follows from their numbers."""
+        """Why rows are not optimal; computed from the numbers for rows evaluated without a solver."""
         texts = self._kept["cause"]
         judged = np.flatnonzero((self._kept["status"] == "infeasible") & (texts == ""))
-        texts[judged] = _judged_causes(self.study.problem.posed, {head: x[judged] for head, x in self._kept.items()})
+        texts[judged] = _violation_causes(self.study.problem.posed, {head: x[judged] for head, x in self._kept.items()})
         return texts
 
     def values(self, head: str) -> NDArray[Any]:
-        """One column; nan where a row has no value."""
+        """One column, nan where a row has no value."""
         column = self.column(head)
         return np.where(column.mask, np.nan, column.data) if column.mask.any() else column.data
 
-    def column(self, head: str, at: slice = slice(None)) -> Any:
-        """One column of the rows at some places, as a masked array: a row without a value is masked."""
-        (name, key), numbers, study = self.headers[head], self.numbers[at], self.study
-        values = self._kept[head][at] if head in self._kept else np.full(len(numbers), np.nan)
+    def column(self, head: str, place: slice = slice(None)) -> Any:
+        """One column, or a slice of it, as a masked array; a row without a value is masked."""
+        (name, key), numbers, study = self.headers[head], self.numbers[place], self.study
+        values = self._kept[head][place] if head in self._kept else np.full(len(numbers), np.nan)
         absent: Any = False
         match name:
             case "seed":
                 values = column_of([study.seed_of(number) for number in numbers.tolist()], int)
             case "cause":
-                values = self._causes[at]
+                values = self._causes[place]
             case "stable":
-                ideal, realised = self._kept["abscissa"][at], self._kept["abscissa_realised"][at]
+                ideal, realised = self._kept["abscissa"][place], self._kept["abscissa_realised"][place]
                 values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)
             case "varied" | "parameters":
                 varied = key in study.columns
                 given = np.asarray(study.columns[key])[numbers] if varied else study.problem.fixed.get(key, np.nan)
                 values = np.where(np.isnan(values), given, values)
-                absent = self._unsolved[at] & (name == "parameters")
+                absent = self._unsolved[place] & (name == "parameters")
             case "reports":
-                absent = self._unsolved[at]
+                absent = self._unsolved[place]
             case "laws" | "violations":
                 absent = np.isnan(values)
         return np.ma.array(values, mask=absent)

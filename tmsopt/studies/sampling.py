@@ -1,4 +1,4 @@
-"""Rows of a study by rule: every combination of values, or a sample of a box."""
+"""Rows of a study: every combination of values, or a sample of a box."""
 
 import inspect
 import math
@@ -12,17 +12,17 @@ from tmsopt.errors import Fault, InputError, count_faults, input_error, is_numbe
 from tmsopt.records import Array, Column
 
 MOST_ROWS = 10_000_000
-"""Rows of a study; one with more is another kind of question, such as a chart."""
+"""Most rows of a study."""
 
 MOST_NUMBERS = 40_000_000
-"""Numbers in all columns, which are held in memory."""
+"""Most numbers in all columns, which are held in memory."""
 
-_DIGITS = 15  # of a decimal number, all of which a double holds
+_DIGITS = 15  # decimal digits that every double holds
 
 
 @dataclass(frozen=True)
 class Span:
-    """From `low` to `high`, evenly or, with `log`, by equal factors, for which both ends have one sign.
+    """A range from `low` to `high`, linear or, with `log`, logarithmic; then both ends must have the same sign.
 
     Example:
         >>> [round(x, 9) for x in tmsopt.Span(1, 100, log=True).points(3)]
@@ -42,7 +42,7 @@ class Span:
         return np.clip(inside, min(low, high), max(low, high))
 
     def points(self, count: int) -> list[float]:
-        """So many numbers: both ends to the last bit, and between them to 15 digits, such as 0.3 for 0.1 + 0.2."""
+        """`count` numbers: exact ends, and numbers between them rounded to 15 digits, such as 0.3 for 0.1 + 0.2."""
         if self.log:
             inside = np.geomspace(self.low, self.high, count).tolist()[1:-1]
             rounded = [float(f"{value:.{_DIGITS}g}") for value in inside]
@@ -55,10 +55,10 @@ class Span:
 
 
 def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
-    """Every combination of the axes' values, the last axis fastest, as `itertools.product` has them.
+    """Every combination of the axes' values, the last axis fastest, as in `itertools.product`.
 
     Raises:
-        InputError: for more rows than a study may have, or an axis that is no list of numbers.
+        InputError: for too many rows, or an axis that is not a list of numbers.
     """
     lists = list[Array]()
     for name, values in axes.items():
@@ -73,13 +73,13 @@ def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
 
 
 def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
-    """A Latin hypercube sample: cut into `rows` equal parts, the range of each column has one value in each part.
+    """A Latin hypercube sample: each range is divided into `rows` equal parts, with one value in each part.
 
     Args:
         ranges: name → (least, greatest), or a `Span`.
 
     Raises:
-        InputError: listing everything that is wrong.
+        InputError: listing all faults.
 
     Example:
         >>> sample = tmsopt.latin_hypercube({"mu": (0, 1), "Fr": (1, 5)}, rows=4)
@@ -89,7 +89,7 @@ def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict
     More: docs/reference/study_file.md
     """
     spans = _spans(ranges, rows, seed)
-    return _placed(spans, _sampler("LatinHypercube", spans, seed).random(rows))
+    return _to_columns(spans, _sampler("LatinHypercube", spans, seed).random(rows))
 
 
 def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
@@ -99,7 +99,7 @@ def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Colu
         ranges: name → (least, greatest), or a `Span`.
 
     Raises:
-        InputError: listing everything that is wrong.
+        InputError: listing all faults.
 
     Example:
         >>> sample = tmsopt.sobol({"mu": tmsopt.Span(0.01, 1, log=True)}, rows=2)
@@ -109,11 +109,11 @@ def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Colu
     More: docs/reference/study_file.md
     """
     spans = _spans(ranges, rows, seed)
-    return _placed(spans, _sampler("Sobol", spans, seed).random_base2(math.ceil(math.log2(rows)))[:rows])
+    return _to_columns(spans, _sampler("Sobol", spans, seed).random_base2(math.ceil(math.log2(rows)))[:rows])
 
 
 def sobol_note(rows: int) -> str:
-    """What the reader should know of a number of rows that is no power of 2; empty where it is one."""
+    """A note for a number of rows that is not a power of 2; else empty."""
     if rows & (rows - 1) == 0:
         return ""
     near = 2 ** round(math.log2(rows))
@@ -121,15 +121,15 @@ def sobol_note(rows: int) -> str:
 
 
 def most_rows(columns: int) -> int:
-    """Of a study with so many columns."""
+    """Most rows of a study with this number of columns."""
     return min(MOST_ROWS, MOST_NUMBERS // max(1, columns))
 
 
 def check_size(sizes: Sequence[int]) -> None:
-    """Refuse a grid with more rows than a study may have, before they are made.
+    """Refuse a grid with too many rows before it is built.
 
     Raises:
-        InputError: saying how many there would be.
+        InputError: with the number of rows.
     """
     if math.prod(sizes) > (most := most_rows(len(sizes))):
         found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
@@ -137,7 +137,7 @@ def check_size(sizes: Sequence[int]) -> None:
 
 
 def span_faults(name: str, span: Span) -> Iterator[Fault]:
-    """What is wrong with a range."""
+    """Faults of a range."""
     key = ("ranges", name)
     if not (is_number(span.low) and is_number(span.high)):
         yield Fault(f"found {short(span.low)} to {short(span.high)}; accepted: finite numbers", key)
@@ -152,11 +152,11 @@ def span_faults(name: str, span: Span) -> Iterator[Fault]:
 
 
 def column_of_numbers(values: Any) -> Array | None:
-    """What a user gave as an array of doubles; None where it is no list of numbers."""
+    """The user's values as an array of doubles; None if they are not a list of numbers."""
     try:
         array = np.asarray(None if isinstance(values, str | bytes | Mapping) else values)
-        wanted = array.ndim == 1 and (array.dtype.kind in "fiu" or not array.size)
-        return array.astype(np.float64) if wanted else None
+        numeric = array.ndim == 1 and (array.dtype.kind in "fiu" or not array.size)
+        return array.astype(np.float64) if numeric else None
     except (TypeError, ValueError, OverflowError):
         return None
 
@@ -181,7 +181,7 @@ def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
 
 
 def _sampler(name: str, spans: Mapping[str, Span], seed: int) -> Any:
-    """One of SciPy, whose argument for random numbers 1.15 renamed."""
+    """A sampler of SciPy; version 1.15 renamed the argument for random numbers."""
     from scipy.stats import qmc
 
     kind = getattr(qmc, name)
@@ -189,5 +189,5 @@ def _sampler(name: str, spans: Mapping[str, Span], seed: int) -> Any:
     return kind(len(spans), **{stream: np.random.default_rng(seed)})
 
 
-def _placed(spans: Mapping[str, Span], shares: Array) -> dict[str, Column]:
+def _to_columns(spans: Mapping[str, Span], shares: Array) -> dict[str, Column]:
     return {name: Column(span.at(share)) for (name, span), share in zip(spans.items(), shares.T, strict=True)}

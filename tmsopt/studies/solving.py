@@ -1,6 +1,4 @@
-"""How the rows of a study are solved, each for itself or from neighbour to neighbour, and judged at once where nothing
-is free.
-"""
+"""Solve the rows of a study: one by one, warm from neighbour to neighbour, or all at once where nothing is free."""
 
 import math
 import platform
@@ -23,30 +21,30 @@ from tmsopt.problem.unit_system import amounts_text
 from tmsopt.records import Array, Table
 from tmsopt.search.solve import solve
 from tmsopt.search.state import same_objective
-from tmsopt.studies.neighbours import blocks
-from tmsopt.studies.rows import PREFIXES, Part, Row, blank, column_of, header
+from tmsopt.studies.neighbours import split_into_blocks
+from tmsopt.studies.rows import PREFIXES, Batch, Row, blank_batch, column_of, header
 from tmsopt.studies.study import Study
 
 _AFAR = 1
-"""Starts of a row beside the one near its neighbour: an optimum that neither end of a block knows is met on the way."""
+"""Starts of a warm row besides its neighbour's optimum, which find optima that neither end of a block has."""
 
 
 @dataclass(frozen=True)
 class SolvedRow:
-    """A row, and the solution that it says the most important of; None where there is none."""
+    """A row and its solution; None without one."""
 
     row: Row
     solution: Solution | None = None
 
 
 def solve_row(study: Study, number: int) -> SolvedRow:
-    """One row solved without the others, as in the study; with warm starts, with the other rows of its block.
+    """Solve one row as in the study; with warm starts, together with the other rows of its block.
 
     Raises:
-        InputError: for a row that the study has not.
+        InputError: for a row number outside the study.
     """
     study.varied(number)
-    unit = next((block for block in blocks(study) if number in block), ()) if study.warm else (number,)
+    unit = next((block for block in split_into_blocks(study) if number in block), ()) if study.warm else (number,)
     return next(answer for answer in Solver(study).answers(unit) if answer.row.number == number)
 
 
@@ -54,8 +52,7 @@ def solve_row(study: Study, number: int) -> SolvedRow:
 class Solver:
     """Solves rows of one study.
 
-    A unit is one row, or with warm starts a whole block of neighbours: rows of a part of a block are solved as if the
-    study were cold.
+    A unit is one row, or with warm starts a whole block of neighbours; a single row of a block is solved cold.
     """
 
     study: Study
@@ -71,44 +68,44 @@ class Solver:
                 return self._block(numbers)
             return [self._answer(number) for number in numbers]
 
-    def lost(self, number: int, cause: str) -> Row:
-        """A row that ended its worker."""
+    def quarantine(self, number: int, cause: str) -> Row:
+        """The row for one that ended its worker."""
         return self._row(number, status="quarantined", cause=cause)
 
     def _block(self, numbers: Sequence[int]) -> list[SolvedRow]:
-        """Both ends from many starts, the others from their neighbours and from afar; back again where that is better.
+        """Solve both ends from many starts, and the others from their neighbours and from `_AFAR` further starts.
 
-        An optimum that is carried along can be overtaken by another on the way. The far end and the start from afar
-        that every row has may find that one; it is then carried back as far as it is better.
+        Another optimum may become better along the block. If the last row or a further start finds it, it is carried
+        back as far as it is better.
         """
         found = [self._answer(numbers[0])]
         for number in numbers[1:]:
             found.append(self._answer(number, found[-1].row, _AFAR))
         end = self._answer(numbers[-1]) if found[-1].row.warm else found[-1]
-        news = [_new(answer) for answer in found]
-        if self._better(end.row, found[-1].row):
-            found[-1], news[-1] = end, True
+        differs = [_may_differ(answer) for answer in found]
+        if self._is_better(end.row, found[-1].row):
+            found[-1], differs[-1] = end, True
         for k in range(len(numbers) - 2, -1, -1):
-            if news[k + 1] and found[k + 1].row.status == "optimal":
+            if differs[k + 1] and found[k + 1].row.status == "optimal":
                 back = self._answer(numbers[k], found[k + 1].row)
-                if self._better(back.row, found[k].row):
-                    found[k], news[k] = back, True
+                if self._is_better(back.row, found[k].row):
+                    found[k], differs[k] = back, True
         return found
 
-    def _better(self, one: Row, other: Row) -> bool:
-        """Whether one solution of a row beats another by more than rounding."""
+    def _is_better(self, one: Row, other: Row) -> bool:
+        """Whether one solution of a row is better than another by more than rounding."""
         if one.status != "optimal" or other.status != "optimal":
             return one.status == "optimal" and other.status != "optimal"
         sign = self.study.problem.posed.sign
         return sign * one.objective < sign * other.objective and not same_objective(one.objective, other.objective)
 
     def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> SolvedRow:
-        """One row, near a neighbour's optimum and from so many starts afar if that leads to an optimum."""
+        """Solve one row, warm from a neighbour's optimum and `afar` further starts, or cold if that fails."""
         began, solution = time.perf_counter(), None
         try:
             problem = self.study.row_problem(number)
             options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False}
-            # What takes longer than the rest of a row without a design is left out, and Ctrl-C is for the whole study.
+            # Slow analyses of infeasible rows are left out, and Ctrl-C stops the whole study.
             options |= {"alone": False, "stability": 0.0, "interruptible": False}
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
@@ -129,7 +126,7 @@ class Solver:
 
 
 def _fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
-    """What a row says of its solution."""
+    """The fields of a row from its solution."""
     problem, bound = solution.problem.posed, solution.bound
     values = problem.values(solution.parameters)
     return {
@@ -154,31 +151,31 @@ def _fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
 
 @cache
 def _pools() -> ThreadpoolController:
-    """Thread pools of NumPy and SciPy: with more threads, sums are taken in another order and last digits differ."""
-    import scipy.linalg  # noqa: F401  # it brings its own
+    """Thread pools of NumPy and SciPy, to be limited because more threads change the last digits of sums."""
+    import scipy.linalg  # noqa: F401  # has a pool of its own
 
     return ThreadpoolController()
 
 
-def _new(answer: SolvedRow) -> bool:
+def _may_differ(answer: SolvedRow) -> bool:
     """Whether a row may have another optimum than the neighbour that it was started from."""
     starts = answer.solution.starts if answer.solution is not None else None
     return starts is not None and (not answer.row.warm or starts.at_best < starts.tried)
 
 
 def _cause(solution: Solution) -> str:
-    """Why a solution is not optimal, in words."""
+    """Why a solution is not optimal, or what the stored doubles miss."""
     if solution.status == "optimal":
-        lost = amounts_text(solution.problem.posed, solution.missed)
-        return f"as stored in doubles, misses {lost}" if lost else ""
+        amounts = amounts_text(solution.problem.posed, solution.missed)
+        return f"as stored in doubles, misses {amounts}" if amounts else ""
     violated = amounts_text(solution.problem.posed, solution.violations)
     conflict = solution.relaxation.conflict if solution.relaxation else ()
-    parts = [
+    causes = [
         f"violated: {violated}" if violated else "",
         f"in conflict: {', '.join(conflict)}" if conflict else "",
         *solution.notes,
     ]
-    return "; ".join(part for part in parts if part)
+    return "; ".join(filter(None, causes))
 
 
 def _laws(solution: Solution) -> Mapping[str, float]:
@@ -188,20 +185,20 @@ def _laws(solution: Solution) -> Mapping[str, float]:
     return {row.name: row.relative for row in law_rows(solution) if row.applies}
 
 
-_JUDGED = ("objective", "abscissa", "damping_ratio", "bound", "gap", "oscillates", "by_relation")
+_EVALUATED = ("objective", "abscissa", "damping_ratio", "bound", "gap", "oscillates", "by_relation")
 
 
-def applies(study: Study) -> bool:
-    """Whether rows of a study may be judged at once: only fixed parameters vary, and nothing is free."""
+def can_evaluate(study: Study) -> bool:
+    """Whether rows can be evaluated without a solver: only fixed parameters vary, and nothing is free."""
     names = study.problem.posed.parameter_set.names
     return not study.warm and can_evaluate_columns(study.problem.posed) and all(name in names for name in study.columns)
 
 
-def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
-    """Columns of those rows that are certain; the others are left to be solved one by one.
+def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
+    """Evaluate rows together; doubtful ones are omitted and must be solved one by one.
 
     Args:
-        numbers: of the rows, ascending.
+        numbers: numbers of the rows, ascending.
     """
     given = {name: np.asarray(column) for name, column in study.columns.items()}
     for first in range(0, len(numbers), BLOCK):
@@ -213,28 +210,29 @@ def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[Part]:
             return
         if found.certain.any():
             tables = {"reports": found.reports, "laws": found.laws, "violations": found.violations}
-            each = {name: getattr(found, name) for name in _JUDGED}
+            each = {name: getattr(found, name) for name in _EVALUATED}
             each |= {header(name, key): values for name, table in tables.items() for key, values in table.items()}
             columns = {name: values[found.certain] for name, values in each.items()}
-            yield judged_part(some[found.certain], columns, (time.perf_counter() - began) / len(some), platform.node())
+            seconds = (time.perf_counter() - began) / len(some)
+            yield evaluated_batch(some[found.certain], columns, seconds, platform.node())
 
 
-def judged_part(numbers: NDArray[np.int64], given: dict[str, Array], seconds: float, host: str) -> Part:
-    """Columns of rows that were judged at once.
+def evaluated_batch(numbers: NDArray[np.int64], given: dict[str, Array], seconds: float, host: str) -> Batch:
+    """All columns of rows that were evaluated together.
 
     Args:
-        given: header → numbers; and ``oscillates`` and ``by_relation``, from which structure and method follow.
+        given: header → numbers; also ``oscillates`` and ``by_relation``, which determine structure and method.
     """
-    wrong = np.zeros(len(numbers), dtype=bool)
+    infeasible = np.zeros(len(numbers), dtype=bool)
     for name, values in given.items():
-        wrong |= name.startswith(PREFIXES["violations"]) & ~np.isnan(values)
+        infeasible |= name.startswith(PREFIXES["violations"]) & ~np.isnan(values)
     method = np.where(np.isfinite(given["bound"]), 1 + given.pop("by_relation"), 0)
     texts = {
-        "status": (("optimal", "infeasible"), wrong),
+        "status": (("optimal", "infeasible"), infeasible),
         "structure": (("real", "pair"), given.pop("oscillates")),
         "method": (("none", "omega0", "relation"), method),
         "host": ((host,), 0 * method),
     }
-    made = blank(len(numbers)) | given | {"number": numbers, "abscissa_realised": given["abscissa"]}
-    made["seconds"] = np.full(len(numbers), seconds)
-    return made | {name: column_of(words, str)[which.astype(int)] for name, (words, which) in texts.items()}
+    batch = blank_batch(len(numbers)) | given | {"number": numbers, "abscissa_realised": given["abscissa"]}
+    batch["seconds"] = np.full(len(numbers), seconds)
+    return batch | {name: column_of(words, str)[which.astype(int)] for name, (words, which) in texts.items()}

@@ -1,8 +1,8 @@
-"""Where the rows of a study are kept: one SQLite file with one writer and any number of readers.
+"""The store of a study: one SQLite file with one writer and any number of readers.
 
-A row is a line of the table ``rows``: its fields, and the numbers of its tables as little-endian doubles, named in
-turn by the table ``numbers``. Rows that have been added survive ``kill -9`` of the writer. A store of an earlier
-version is copied to this form when it is written, and in memory when it is read.
+A row is a line of the table ``rows``: its fields, and the numbers of its tables as little-endian doubles in the order
+of the table ``numbers``. Added rows survive ``kill -9`` of the writer. A store of an earlier version is converted when
+it is opened for writing, and in memory when it is read.
 """
 
 import json
@@ -23,19 +23,19 @@ from numpy.typing import NDArray
 from tmsopt import files
 from tmsopt.errors import Fault, InputError, input_error
 from tmsopt.files import from_json, list_differences
-from tmsopt.studies.old_stores import about_of, columns_of, parts_of
-from tmsopt.studies.rows import BLOCK, SAVED, STATUSES, Part, column_of
+from tmsopt.studies.old_stores import read_about, read_batches, read_columns
+from tmsopt.studies.rows import BLOCK, SAVED, STATUSES, Batch, column_of
 from tmsopt.studies.study import Study, definition
 from tmsopt.versions import installed_versions, ipopt_version
 
 APPLICATION = 0x746D736F
-"""In the header of every store, where `file` and SQLite look for it: "tmso"."""
+"""Application id of SQLite in the header of every store: "tmso"."""
 
 SCHEMA = 3
-"""Of the stores that are written; 1 and 2 are those of `old_stores`."""
+"""Schema of new stores; `old_stores` reads 1 and 2."""
 
 LARGEST = 2**27
-"""Bytes of one value: more than a column of the study with the most rows takes."""
+"""Most bytes of one value: more than a column of the largest study."""
 
 _INTEGER = "INTEGER NOT NULL DEFAULT 0"
 _SQL = {int: _INTEGER, bool: _INTEGER, float: "REAL DEFAULT 0", str: "TEXT NOT NULL DEFAULT ''"}
@@ -53,13 +53,13 @@ CREATE TABLE rows ({", ".join(f"{name} {_SQL[kind]}" for name, kind in SAVED.ite
 _SESSION = ("started", "ended", "pid", "host", "versions", "rows")
 _ABSENT = b"\xff"  # eight of them are a nan
 _COMPANIONS = ("-journal", "-wal", "-shm")
-_PATIENCE = 60.0  # s to wait for somebody who writes just now
-_MOST = 20  # differences shown
-_PACKAGES = ("tmsopt", "casadi", "numpy", "scipy", "python-flint")  # that the numbers of a row depend on
+_PATIENCE = 60.0  # s to wait for a lock of another process
+_MOST = 20  # most differences listed
+_PACKAGES = ("tmsopt", "casadi", "numpy", "scipy", "python-flint")  # packages that affect the numbers of a row
 
 DAMAGED = "is damaged; --fresh moves it aside and starts a new store, or give another --store"
 _FULL = "reading or writing fails, or the disk is full; make room and run the same command again, the rows are safe"
-_PLACE = "cannot be opened or written here; give a file in a folder that can be written"
+_PLACE = "cannot be opened or written here; give a file in a writable folder"
 _BUSY = f"another program kept it locked for {_PATIENCE:g} s; end that and run the same command again"
 _MEANINGS = {
     sqlite3.SQLITE_FULL: _FULL,
@@ -67,24 +67,24 @@ _MEANINGS = {
     sqlite3.SQLITE_READONLY: _PLACE,
     sqlite3.SQLITE_PERM: _PLACE,
     sqlite3.SQLITE_CANTOPEN: _PLACE,
-    sqlite3.SQLITE_NOTADB: "is no store of tmsopt; give another file",
+    sqlite3.SQLITE_NOTADB: "is not a store of tmsopt; give another file",
     sqlite3.SQLITE_BUSY: _BUSY,
     sqlite3.SQLITE_LOCKED: _BUSY,
     sqlite3.SQLITE_PROTOCOL: "locks do not work on this file system; give a --store on another disk",
 }
 
 
-def refuse(path: Path, *lines: str) -> InputError:
-    """The error that says these lines about a store."""
+def store_error(path: Path, *lines: str) -> InputError:
+    """The error with these lines about a store."""
     return InputError([Fault(lines[0], file=str(path)), *(Fault(f"  {line}") for line in lines[1:])])
 
 
 @contextmanager
-def explained(path: Path) -> Iterator[None]:
-    """Turn what SQLite and readers of data complain of into words of a store.
+def translate_errors(path: Path) -> Iterator[None]:
+    """Translate errors of SQLite, data and files into an `InputError` about a store.
 
     Raises:
-        InputError: for any error of the file or the place where it is.
+        InputError: for any error of the file or its folder.
     """
     try:
         yield
@@ -92,25 +92,24 @@ def explained(path: Path) -> Iterator[None]:
         raise
     except sqlite3.DatabaseError as error:
         meaning = _MEANINGS.get(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF, DAMAGED)
-        raise refuse(path, f"{meaning} ({error!s:.200})") from error  # it may quote the file at length
+        raise store_error(path, f"{meaning} ({error!s:.200})") from error  # limited, because it may quote the file
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise refuse(path, f"{DAMAGED} ({error!s:.200})") from error
+        raise store_error(path, f"{DAMAGED} ({error!s:.200})") from error
     except OSError as error:
-        raise refuse(path, f"cannot be written: {error.strerror or error}") from error
+        raise store_error(path, f"cannot be written: {error.strerror or error}") from error
 
 
 class Store:
     """Rows of one study, open for writing (`open_store`) or reading (`view_store`); a context manager.
 
     Attributes:
-        path: of the file.
-        warnings: what the user should know, one line each: other versions of the libraries, and where ``fresh`` put the
-            store that was there before.
+        path: path of the file.
+        warnings: one line each: changed versions of libraries, and where ``fresh`` moved the previous store.
     """
 
-    def __init__(self, path: Path, connection: sqlite3.Connection, ending: ExitStack, session: int = 0) -> None:
+    def __init__(self, path: Path, connection: sqlite3.Connection, stack: ExitStack, session: int = 0) -> None:
         self.path, self.warnings = path, tuple[str, ...]()
-        self._connection, self._ending, self._session = connection, ending, session
+        self._connection, self._stack, self._session = connection, stack, session
 
     def __enter__(self) -> Self:
         return self
@@ -119,34 +118,34 @@ class Store:
         self.close()
 
     def close(self) -> None:
-        """Close the file, and give up the right to write it; a second time does nothing."""
-        self._ending.close()
+        """Close the file and release its lock; may be called twice."""
+        self._stack.close()
 
-    def add(self, part: Part) -> None:
-        """Keep rows; when it returns they are safe from ``kill -9``. A row that is there stays as it is.
+    def add(self, batch: Batch) -> None:
+        """Add rows durably: they survive ``kill -9`` after the call. An existing row stays unchanged.
 
         Raises:
             InputError: on a full disk.
         """
-        with self._change():
+        with self._transaction():
             heads = dict.fromkeys(_numbers(self._connection))
-            new = [h for h, x in part.items() if h not in SAVED and h not in heads and not np.isnan(x).all()]
+            new = [h for h, x in batch.items() if h not in SAVED and h not in heads and not np.isnan(x).all()]
             self._connection.executemany("INSERT INTO numbers VALUES (?)", [(head,) for head in new])
-            absent = np.full(len(part["number"]), np.nan)
-            table = np.column_stack([part.get(head, absent) for head in (*heads, *new)] or [absent])
+            absent = np.full(len(batch["number"]), np.nan)
+            table = np.column_stack([batch.get(head, absent) for head in (*heads, *new)] or [absent])
             table[np.isnan(table)] = np.frombuffer(8 * _ABSENT)[0]
             doubles, size = table.astype("<f8").tobytes(), 8 * table.shape[1]
             blobs = [doubles[k : k + size].rstrip(_ABSENT) for k in range(0, len(doubles), size)]
-            told = ["number", *(name for name in list(SAVED)[1:] if part[name].any())]  # the others are as by default
-            lines = zip(*(part[name].tolist() for name in told), blobs, strict=True)
-            query = f"INSERT OR IGNORE INTO rows ({', '.join(told)}, numbers) VALUES ({'?, ' * len(told)}?)"
+            fields = ["number", *(name for name in list(SAVED)[1:] if batch[name].any())]  # the others have defaults
+            lines = zip(*(batch[name].tolist() for name in fields), blobs, strict=True)
+            query = f"INSERT OR IGNORE INTO rows ({', '.join(fields)}, numbers) VALUES ({'?, ' * len(fields)}?)"
             added = self._connection.executemany(query, lines).rowcount
             self._connection.execute("UPDATE sessions SET rows = rows + ? WHERE id = ?", (max(added, 0), self._session))
 
     @contextmanager
-    def _change(self) -> Iterator[None]:
-        """A transaction: all or nothing of what is done within."""
-        with explained(self.path):
+    def _transaction(self) -> Iterator[None]:
+        """A transaction, rolled back on any error."""
+        with translate_errors(self.path):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -155,84 +154,84 @@ class Store:
                 if self._connection.in_transaction:
                     self._connection.execute("ROLLBACK")
 
-    def parts(self) -> list[Part]:
+    def read_batches(self) -> list[Batch]:
         """All rows as columns, for a `RowTable`.
 
         Raises:
             InputError: for a damaged store.
         """
-        parts, known = list[Part](), dict[Any, Any]()  # a text that many rows have is held once
+        batches, known = list[Batch](), dict[Any, Any]()  # equal texts share memory
         query = f"SELECT {', '.join(SAVED)}, numbers FROM rows ORDER BY number"
-        with explained(self.path), closing(self._connection.execute(query)) as found:
+        with translate_errors(self.path), closing(self._connection.execute(query)) as found:
             while lines := found.fetchmany(BLOCK):
                 *saved, blobs = zip(*lines, strict=True)
-                part = {
+                batch = {
                     name: column_of([known.setdefault(v, v) for v in values] if kind is str else values, kind)
                     for (name, kind), values in zip(SAVED.items(), saved, strict=True)
                 }
-                if not set(part["status"]) <= set(STATUSES):
-                    raise ValueError("a row has no known status")
+                if not set(batch["status"]) <= set(STATUSES):
+                    raise ValueError("a row has an unknown status")
                 heads = _numbers(self._connection)
                 doubles = b"".join(blob.ljust(8 * len(heads), _ABSENT) for blob in blobs)
                 table = np.frombuffer(doubles, "<f8").reshape(len(lines), len(heads)).T
-                part |= {head: values.copy() for head, values in zip(heads, table, strict=True)}
-                parts.append(part)
-        return parts
+                batch |= {head: values.copy() for head, values in zip(heads, table, strict=True)}
+                batches.append(batch)
+        return batches
 
-    def done(self) -> NDArray[np.int64]:
+    def numbers(self) -> NDArray[np.int64]:
         """The numbers of all rows, ascending."""
-        with explained(self.path):
+        with translate_errors(self.path):
             found = self._connection.execute("SELECT number FROM rows ORDER BY number").fetchall()
         return np.array([number for (number,) in found], dtype=np.int64)
 
     def about(self) -> dict[str, Any]:
-        """Schema, definition without its columns, seed, when, where and with which versions the store was made."""
-        with explained(self.path):
+        """Schema, definition without columns, seed, and when, where and with which versions the store was made."""
+        with translate_errors(self.path):
             found = _pairs(self._connection, "study")
             return {"schema": SCHEMA} | found | {n: from_json(found[n]) for n in ("definition", "seed", "versions")}
 
     def sessions(self) -> list[dict[str, Any]]:
-        """Every process that wrote, in order: started, ended (None where killed), pid, host, versions, rows added."""
-        with explained(self.path):
+        """Every writing process in order: started, ended (None if killed), pid, host, versions, rows added."""
+        with translate_errors(self.path):
             found = self._connection.execute(f"SELECT {', '.join(_SESSION)} FROM sessions ORDER BY id").fetchall()
-            made = [dict(zip(_SESSION, line, strict=True)) for line in found]
-            return [session | {"versions": dict(from_json(session["versions"]))} for session in made]
+            sessions = [dict(zip(_SESSION, line, strict=True)) for line in found]
+            return [session | {"versions": dict(from_json(session["versions"]))} for session in sessions]
 
     def forget(self, numbers: Iterable[int]) -> None:
         """Remove rows, so that they are solved again."""
-        with self._change():
+        with self._transaction():
             self._connection.executemany("DELETE FROM rows WHERE number = ?", [(int(number),) for number in numbers])
 
 
 def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
-    """Open the store of a study for writing; made if absent.
+    """Open the store of a study for writing, creating it if absent.
 
     Args:
-        fresh: move a store that is there aside, to ``name.1.sqlite`` or the next number, and start a new one.
+        fresh: move an existing store to ``name.1.sqlite`` or the next free number, and start a new one.
 
     Raises:
-        InputError: when the store holds another study (with the differences), another process writes it, the file is
-            no store, is damaged or of a newer tmsopt, or the place cannot be written.
+        InputError: if the store belongs to another study (with the differences), another process writes it, the file is
+            not a store, is damaged or of a newer tmsopt, or the folder is not writable.
     """
-    path, schema = _examined(path)
-    with explained(path), ExitStack() as undo:
+    path, schema = _inspect(path)
+    with translate_errors(path), ExitStack() as undo:
         lock, moved = FileLock(f"{path}.lock", timeout=0), list[str]()
         try:
             lock.acquire()
         except Timeout:
-            raise refuse(path, _holder(path) if os.path.lexists(lock.lock_file) else _PLACE) from None
+            raise store_error(path, _describe_writer(path) if os.path.lexists(lock.lock_file) else _PLACE) from None
         undo.callback(_release, lock)
         if fresh and schema:
-            with suppress(sqlite3.Error), closing(_connect(path, "rw")) as old:  # a damaged one is moved as it is
+            with suppress(sqlite3.Error), closing(_connect(path, "rw")) as old:  # a damaged store is moved unchanged
                 old.execute("PRAGMA journal_mode=DELETE")
         if (fresh and schema) or (not schema and any(Path(f"{path}{ending}").exists() for ending in _COMPANIONS)):
             moved, schema = [f"moved the old store to {files.move_aside(path, _COMPANIONS)}"], 0
         if not schema:
-            with _written(path) as new:
-                _create(new, *_described(study))
-        check_same(path, study)  # what is refused is not changed
+            with _replace_database(path) as new:
+                _create(new, *_describe_study(study))
+        check_same(path, study)  # before any change
         if 0 < schema < SCHEMA:
-            with closing(_connect(path, "rw")) as old, _written(path) as new:
+            with closing(_connect(path, "rw")) as old, _replace_database(path) as new:
                 old.execute("PRAGMA journal_mode=DELETE")
                 _copy(old, new)
         connection = undo.enter_context(closing(_connect(path, "rw")))
@@ -246,20 +245,20 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
         store = Store(path, connection, undo, session)
         earlier = [then["versions"] for then in store.sessions() if then["rows"] > 0]
         changed = [line for then in earlier for line in list_differences(then, today, ("in the store", "now"))]
-        store.warnings, store._ending = tuple(dict.fromkeys(changed + moved)), undo.pop_all()
+        store.warnings, store._stack = tuple(dict.fromkeys(changed + moved)), undo.pop_all()
         return store
 
 
 def view_store(path: Path | str) -> Store:
-    """Open a store for reading, also while another process writes it.
+    """Open a store for reading, even while another process writes it.
 
     Raises:
-        InputError: when there is no such file, or it is no store of tmsopt.
+        InputError: if there is no such file, or it is not a store of tmsopt.
     """
-    path, schema = _examined(path)
+    path, schema = _inspect(path)
     if not schema:
-        raise refuse(path, "no such file")
-    with explained(path), ExitStack() as undo:
+        raise store_error(path, "no such file")
+    with translate_errors(path), ExitStack() as undo:
         connection = undo.enter_context(closing(_connect(path, "ro")))
         _check_content(connection, path)
         if schema < SCHEMA:
@@ -269,29 +268,29 @@ def view_store(path: Path | str) -> Store:
 
 
 def check_same(path: Path | str, study: Study) -> None:
-    """Check that a store, if there is one, is of this study.
+    """Check that an existing store belongs to this study.
 
     Raises:
-        InputError: with the differences where it is not; where it is no store, or damaged.
+        InputError: with the differences if it does not; also if the file is not a store, or damaged.
     """
-    path, schema = _examined(path)
+    path, schema = _inspect(path)
     if not schema:
         return
-    with view_store(path) as store, explained(path):
-        there = _pairs(store._connection, "study"), _pairs(store._connection, "columns")
-        known, asked = (
+    with view_store(path) as store, translate_errors(path):
+        in_store = _pairs(store._connection, "study"), _pairs(store._connection, "columns")
+        old, new = (
             from_json(about["definition"]) | {"columns": {name: array("d", x) for name, x in columns.items()}}
-            for about, columns in (there, _described(study))
+            for about, columns in (in_store, _describe_study(study))
         )
-        found = list(list_differences(known, asked, ("in the store", "in the file")))
+        found = list(list_differences(old, new, ("in the store", "in the file")))
     if found:
         more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
-        advice = "to keep it and start a new store, add --fresh, which moves this one aside; or give another --store"
-        raise refuse(path, f"holds the rows of another study; {advice}. What differs:", *found[:_MOST], *more)
+        advice = "add --fresh to move it aside and start a new store, or give another --store"
+        raise store_error(path, f"holds the rows of another study; {advice}. Differences:", *found[:_MOST], *more)
 
 
-def _described(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
-    """What a new store says of itself and its study, and the columns of that as little-endian doubles."""
+def _describe_study(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
+    """The metadata of a new store, and the columns of the study as little-endian doubles."""
     plain = definition(study, lambda values: np.asarray(values, dtype="<f8").tobytes())
     kept = plain.pop("columns", {})
     about = {
@@ -303,13 +302,13 @@ def _described(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
         "versions": json.dumps(_versions()),
     }
     if len(about["definition"]) > files.LARGEST_JSON:
-        message = f"takes more than {files.LARGEST_JSON} characters to define; give the values in a CSV file"
+        message = f"its definition has more than {files.LARGEST_JSON} characters; give the values in a CSV file"
         raise input_error(message, "study")
     return about, kept
 
 
 def _create(connection: sqlite3.Connection, about: Mapping[str, str], kept: Mapping[str, bytes]) -> None:
-    """Make an empty store."""
+    """Create an empty store."""
     connection.executescript(_TABLES)
     for table, pairs in (("study", about), ("columns", kept)):
         connection.executemany(f"INSERT INTO {table} VALUES (?, ?)", pairs.items())
@@ -317,31 +316,31 @@ def _create(connection: sqlite3.Connection, about: Mapping[str, str], kept: Mapp
 
 def _copy(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
     """Copy a store of an earlier version to an empty database."""
-    _create(new, about_of(old), columns_of(old))
+    _create(new, read_about(old), read_columns(old))
     store = Store(Path("copy"), new, ExitStack())
-    with closing(parts_of(old)) as parts:
-        for part in parts:
-            store.add(part)
+    with closing(read_batches(old)) as batches:
+        for batch in batches:
+            store.add(batch)
     sessions = old.execute(f"SELECT {', '.join(_SESSION)} FROM sessions ORDER BY id").fetchall()
     new.executemany(f"INSERT INTO sessions ({', '.join(_SESSION)}) VALUES (?, ?, ?, ?, ?, ?)", sessions)
 
 
 @contextmanager
-def _written(path: Path) -> Iterator[sqlite3.Connection]:
-    """An empty database that takes the place of a path if all went well; the lock must be held."""
+def _replace_database(path: Path) -> Iterator[sqlite3.Connection]:
+    """An empty database that replaces the file at a path on success; the caller must hold the lock."""
     with files.write_atomic(path, locked=True) as place, closing(_connect(place, "rwc")) as connection:
         yield connection
 
 
 def _end(connection: sqlite3.Connection, session: int) -> None:
-    with suppress(sqlite3.Error):  # on a full disk there is a better error than this one
+    with suppress(sqlite3.Error):  # a full disk has already raised a better error
         connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (_now(), session))
-        connection.execute("PRAGMA journal_mode=DELETE")  # one plain file, unless somebody reads it
+        connection.execute("PRAGMA journal_mode=DELETE")  # a single file, unless another process reads it
 
 
 def _release(lock: FileLock) -> None:
     with suppress(OSError):
-        Path(lock.lock_file).unlink()  # while it is held; Windows keeps an open file
+        Path(lock.lock_file).unlink()  # before the release; Windows keeps an open file
     lock.release()
 
 
@@ -352,45 +351,45 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
     return connection
 
 
-def _examined(given: Path | str) -> tuple[Path, int]:
-    """The path of a store, and its schema; 0 where there is none.
+def _inspect(given: Path | str) -> tuple[Path, int]:
+    """The path of a store and its schema, 0 if there is none.
 
     Raises:
-        InputError: for a place where none can be, another file, and the store of a newer tmsopt.
+        InputError: for a missing folder, another kind of file, or the store of a newer tmsopt.
     """
-    path = Path(os.path.realpath(given))  # a link's lock is that of the store
+    path = Path(os.path.realpath(given))  # a link and its store share one lock
     if not path.parent.is_dir():
-        raise refuse(path, f"the folder {path.parent} does not exist; make it, or give another --store")
+        raise store_error(path, f"the folder {path.parent} does not exist; make it, or give another --store")
     if not os.path.lexists(path):
         return path, 0
     if not path.is_file():
-        raise refuse(path, "is no regular file; give the name of a store, such as study.sqlite")
-    with explained(path), closing(_connect(path, "ro")) as connection:
-        connection.execute("PRAGMA writable_schema=ON")  # or a file that was cut off is no store at all
+        raise store_error(path, "is not a regular file; give the name of a store, such as study.sqlite")
+    with translate_errors(path), closing(_connect(path, "ro")) as connection:
+        connection.execute("PRAGMA writable_schema=ON")  # so that a truncated file is still recognised
         ((application,),) = connection.execute("PRAGMA application_id")
         ((schema,),) = connection.execute("PRAGMA user_version")
     if application != APPLICATION or schema < 1:
-        raise refuse(path, _MEANINGS[sqlite3.SQLITE_NOTADB])
+        raise store_error(path, _MEANINGS[sqlite3.SQLITE_NOTADB])
     if schema > SCHEMA:
         message = f"is a store of a newer tmsopt: its schema is {schema}, this version reads up to {SCHEMA}"
-        raise refuse(path, f"{message}; update tmsopt or give another --store")
+        raise store_error(path, f"{message}; update tmsopt or give another --store")
     return path, schema
 
 
 def _check_content(connection: sqlite3.Connection, path: Path) -> None:
-    """Check that a store has tables alone, which run nothing, and that its pages are whole."""
+    """Check that a store has only plain tables, which execute nothing, and that its pages are intact."""
     query = "SELECT type, name FROM sqlite_schema WHERE type NOT IN ('table', 'index') OR sql LIKE '%VIRTUAL%' LIMIT 1"
     for kind, name in connection.execute(query):
-        raise refuse(path, f"{DAMAGED} (its {kind} '{name!s:.60}' is not that of a store)")
-    ((whole,),) = connection.execute("PRAGMA quick_check(1)")
-    if whole != "ok":
-        raise refuse(path, f"{DAMAGED} ({whole!s:.200})")
+        raise store_error(path, f"{DAMAGED} (a store has no {kind} '{name!s:.60}')")
+    ((result,),) = connection.execute("PRAGMA quick_check(1)")
+    if result != "ok":
+        raise store_error(path, f"{DAMAGED} ({result!s:.200})")
 
 
-def _holder(path: Path) -> str:
-    """Who writes a store just now, as the store tells it."""
-    who = "another process, which has only just begun,"
-    with suppress(InputError, IndexError), view_store(path) as store:  # it may be moved aside just now
+def _describe_writer(path: Path) -> str:
+    """The process that writes a store, and what to do."""
+    who = "another process, which has just started,"
+    with suppress(InputError, IndexError), view_store(path) as store:  # it may be moved aside at this moment
         last = store.sessions()[-1]
         if last["ended"] is None:
             who = f"process {last['pid']} on {last['host']}, since {last['started']},"
@@ -402,7 +401,7 @@ def _pairs(connection: sqlite3.Connection, table: str) -> dict[str, Any]:
 
 
 def _numbers(connection: sqlite3.Connection) -> list[str]:
-    """Headers of the numbers of a row, in their order."""
+    """Headers of the numbers of a row, in order."""
     return [header for (header,) in connection.execute("SELECT header FROM numbers ORDER BY rowid")]
 
 
@@ -412,6 +411,6 @@ def _now() -> str:
 
 
 def _versions() -> dict[str, str]:
-    """Of tmsopt, Python, the libraries that solve, and IPOPT where its file tells; nothing is imported for it."""
+    """Versions of tmsopt, Python, the numerical libraries, and IPOPT if its file shows it; imports nothing."""
     found = {"python": platform.python_version(), **installed_versions(_PACKAGES), "ipopt": ipopt_version()}
     return {name: version or "unknown" for name, version in found.items()}

@@ -1,4 +1,4 @@
-"""A study as data: a problem, and what varies from row to row."""
+"""A study as data: a problem, and values that vary from row to row."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -35,25 +35,25 @@ _SEEDS = 2**31
 
 @dataclass(frozen=True)
 class Study:
-    """A problem and what varies from row to row; see `load_study` for its file form.
+    """A problem and values that vary from row to row; see `load_study` for its file form.
 
     Attributes:
-        problem: what is asked of every row; what varies has some value here too.
-        columns: what varies → its value in every row (rad, SI units); all of the same length. Names are fixed
-            parameters, ``lambda_s.min`` and ``lambda_s.max`` of a free one, and ``trail.limit``, the number that the
-            constraint ``trail`` compares with.
+        problem: the problem of every row; varied names have a value here too.
+        columns: name → its value in every row (rad, SI units); all have the same length. A name is a fixed parameter,
+            ``lambda_s.min`` or ``lambda_s.max`` of a free one, or ``trail.limit``, the number in the constraint
+            ``trail``.
         title: one line for reports.
-        seed: the rows' own seeds follow from it.
-        starts: of a row, at most.
-        warm: whether neighbours start each other.
-        report: expressions recorded for every row beside parameters and abscissa.
-        grid_shape: of a full grid, axis → how many values it has, in the order of the columns, the last one fastest;
-            None for other studies.
-        method: how the columns were made (grid, list, latin_hypercube, sobol, csv, monte_carlo); rows are the same.
+        seed: seed from which the seeds of the rows follow.
+        starts: most starts of a row.
+        warm: whether each row starts at the optimum of its neighbour.
+        report: expressions recorded for every row, besides parameters and abscissa.
+        grid_shape: axis → number of values for a full grid, in the order of the columns, the last one fastest; None for
+            other studies.
+        method: how the columns were made (grid, list, latin_hypercube, sobol, csv, monte_carlo); has no effect on rows.
         notes: sentences for the reader.
 
     Raises:
-        InputError: listing everything that is wrong, each with the accepted values.
+        InputError: listing all faults with the accepted values.
 
     Example:
         >>> study = tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1, 0.2], "zeta_H": [-0.2, -0.3]})
@@ -89,7 +89,7 @@ class Study:
 
     @property
     def axes(self) -> dict[str, Array]:
-        """Of a full grid, axis → its values in their order."""
+        """Axis → its values in order, for a full grid."""
         found, stride = {}, len(self)
         for name, size in (self.grid_shape or {}).items():
             stride //= size
@@ -97,21 +97,21 @@ class Study:
         return found
 
     def varied(self, row: int) -> Table[float]:
-        """What the study gives a row, counted from 0.
+        """The varied values of a row, counted from 0.
 
         Raises:
-            InputError: for a row that the study has not.
+            InputError: for a row number outside the study.
         """
         if not 0 <= row < len(self):
-            message = f"found {row}; accepted: 0 to {len(self) - 1}, for the study has {len(self)} rows"
+            message = f"found {row}; accepted: 0 to {len(self) - 1}, because the study has {len(self)} rows"
             raise input_error(message, "row")
         return Table({name: float(column[row]) for name, column in self.columns.items()})
 
     def row_problem(self, row: int) -> Problem:
-        """The problem of a row; a start outside the row's own bounds is moved to the nearer one.
+        """The problem of a row; a start outside the bounds of the row is moved to the nearer bound.
 
         Raises:
-            InputError: for a row that cannot be posed, such as one with lambda_s.min above lambda_s.max.
+            InputError: for an invalid problem, such as one with lambda_s.min above lambda_s.max.
         """
         problem = self.problem
         fixed, free, constraints = dict(problem.fixed), dict(problem.free), dict(problem.constraints)
@@ -128,7 +128,7 @@ class Study:
         return replace(problem, fixed=fixed, free=free, constraints=constraints, start=start)
 
     def seed_of(self, row: int) -> int:
-        """The seed of a row's starts, by which the row can be solved alone."""
+        """The seed of a row's starts; it depends on the row only, so the row can be solved alone."""
         state = np.random.SeedSequence(self.seed, spawn_key=(row,)).generate_state(1)
         return int(state[0]) % _SEEDS
 
@@ -146,7 +146,7 @@ def over_grid(
     """The study of every combination of the axes' values, the last axis fastest.
 
     Raises:
-        InputError: listing everything that is wrong with it.
+        InputError: listing all faults.
 
     Example:
         >>> study = tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1, 0.2, 0.3], "zeta_H": [-0.2, -0.3]})
@@ -171,13 +171,13 @@ def over_grid(
 
 
 def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
-    """Everything that the rows of a study follow from, for ``json.dumps``; titles and notes are left out.
+    """Everything that determines the rows of a study, for ``json.dumps``, without title and notes.
 
-    Two studies with equal definitions have equal rows, solved by the same versions. A grid is given by its axes. The
-    order of names in ``order`` counts as well: starts are spread over the free parameters in turn.
+    Two studies with equal definitions, solved by the same versions, have equal rows. A grid is given by its axes. The
+    order of names in ``order`` matters too, because starts depend on the order of the free parameters.
 
     Args:
-        column: what is made of a column that is no axis of a grid; lists take four times the memory.
+        column: conversion of a column that is not an axis of a grid; lists take four times the memory.
     """
     if study.grid_shape is None:
         columns: dict[str, Any] = {"columns": {name: column(values) for name, values in study.columns.items()}}
@@ -201,31 +201,31 @@ def _problem(problem: Posed) -> dict[str, Any]:
         name: {"min": float(s.min), "max": float(s.max), "points": s.points} if isinstance(s, Band) else list(s)
         for name, s in problem.scenarios.items()
     }
-    asked = {sense: getattr(problem, sense) for sense in ("minimize", "maximize", "locate")}
+    goals = {sense: getattr(problem, sense) for sense in ("minimize", "maximize", "locate")}
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
         "parameters": problem.parameter_set.name,
-        "objective": {sense: text for sense, text in asked.items() if text is not None},
+        "objective": {sense: text for sense, text in goals.items() if text is not None},
         **tables,
         "order": {name: list(table) for name, table in tables.items() if len(table) > 1 and name != "fixed"},
     }
 
 
-# What is wrong with a study
+# Faults of a study
 
 
 MOST_REPORTED = 1000
-"""Expressions recorded for every row."""
+"""Most expressions recorded for every row."""
 
 METHODS = ("grid", "list", "latin_hypercube", "sobol", "csv", "monte_carlo")
-"""How the rows of a study are made."""
+"""Methods of making the rows of a study."""
 
 Stated = Any
-"""A Study as its author stated it: any field may be of any type."""
+"""A Study before validation: any field may be of any type."""
 
 
 def faults(study: Stated) -> Iterator[Fault]:
-    """What is wrong with a study, everything at once."""
+    """All faults of a study."""
     if not isinstance(study.problem, Problem):
         message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
         yield Fault(message, ("problem",))
@@ -234,13 +234,13 @@ def faults(study: Stated) -> Iterator[Fault]:
     if isinstance(study.columns, Mapping):
         yield from _column_faults(study)
     else:
-        accepted = "what varies with its value in every row, such as {'mu': [0.1, 0.2]}"
+        accepted = "varied names with a value for every row, such as {'mu': [0.1, 0.2]}"
         yield Fault(f"found {short(study.columns)}; accepted: {accepted}", ("columns",))
     yield from _option_faults(study)
 
 
 def variable_names(problem: Posed) -> tuple[str, ...]:
-    """What may vary from row to row of a study of a problem."""
+    """Names that may vary from row to row in a study of a problem."""
     fixed = tuple(n for n in problem.parameter_set.names if n in problem.fixed and n not in problem.scenarios)
     ends = tuple(f"{n}.{end}" for n in problem.parameter_set.names if n in problem.free for end in ("min", "max"))
     limits = tuple(f"{n}.limit" for n, text in problem.constraints.items() if limit_value(text) is not None)
@@ -248,19 +248,17 @@ def variable_names(problem: Posed) -> tuple[str, ...]:
 
 
 def name_faults(problem: Posed) -> Callable[[Any], str]:
-    """Says why a name cannot vary, one after the other; empty where it can."""
+    """A function that says why a name cannot vary; empty if it can."""
     accepted, advice = variable_names(problem), limit_advice(suggest)
 
-    def wrong(name: Any) -> str:
+    def find_fault(name: Any) -> str:
         if name in accepted:
             return ""
         stem, _, end = str(name).rpartition(".")
         if name in problem.free:
-            return f"{name} is free, so each row finds its own; fix it, or vary {name}.min or {name}.max"
+            return f"{name} is free, so each row finds its own value; fix it, or vary {name}.min or {name}.max"
         if name in problem.scenarios:
-            return (
-                f"{name} has a scenario, which every row must do in; leave the scenario out to vary it from row to row"
-            )
+            return f"{name} has a scenario, which is the same for every row; remove the scenario to vary {name}"
         if end in ("min", "max") and stem in problem.fixed:
             return f"{stem} is fixed, so it has no {end}; vary {stem} itself, or free it"
         if end == "limit" and stem in problem.constraints:
@@ -268,13 +266,13 @@ def name_faults(problem: Posed) -> Callable[[Any], str]:
             return f"neither side of '{text}' is a number; write the constraint with a number alone on one side"
         return f"unknown name {short(name)}; {advice(str(name), accepted)}"
 
-    return wrong
+    return find_fault
 
 
 def _column_faults(study: Stated) -> Iterator[Fault]:
     if not study.columns:
         accepted = " ".join(variable_names(study.problem.posed))
-        yield Fault(f"nothing varies; give at least one column, of: {accepted}", ("columns",))
+        yield Fault(f"nothing varies; give at least one column; accepted: {accepted}", ("columns",))
         return
     lengths: dict[str, int] = {}
     wrong_with = name_faults(study.problem.posed)
@@ -296,13 +294,13 @@ def _column_faults(study: Stated) -> Iterator[Fault]:
     elif not 1 <= rows <= MOST_ROWS:
         yield Fault(f"found {rows} rows; accepted: 1 to {MOST_ROWS}", ("columns",))
     elif study.grid_shape is not None and len(lengths) == len(study.columns) and not _fills_grid(study):
-        accepted = f"an entry for each column in turn: {', '.join(study.columns)}"
-        message = f"found {short(study.grid_shape)} for {rows} rows; accepted: {accepted}, of a grid with the last axis"
-        yield Fault(f"{message} fastest; see over_grid", ("grid_shape",))
+        accepted = f"a size for each column in order ({', '.join(study.columns)}), the last axis fastest"
+        message = f"found {short(study.grid_shape)} for {rows} rows; accepted: {accepted}; see over_grid"
+        yield Fault(message, ("grid_shape",))
 
 
 def _fills_grid(study: Stated) -> bool:
-    """Whether the columns are what the grid's shape says."""
+    """Whether the columns agree with the shape of the grid."""
     shape = study.grid_shape
     if not isinstance(shape, Mapping) or list(shape) != list(study.columns):
         return False
@@ -324,7 +322,7 @@ def _option_faults(study: Stated) -> Iterator[Fault]:
 
 
 def common_faults(problem: Posed, seed: Any, starts: Any, report: Any) -> Iterator[Fault]:
-    """What is wrong with the seed, the starts and the report of a study."""
+    """Faults of the seed, the starts and the report of a study."""
     yield from count_faults("seed", seed, 0)
     yield from count_faults("starts", starts, 1, MOST_STARTS)
     if wrong := list_faults("report", report, "['nu_H', '2*Fr_c']"):

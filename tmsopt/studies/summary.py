@@ -1,4 +1,4 @@
-"""What the rows of a study say together."""
+"""Summary of the rows of a study."""
 
 import math
 import re
@@ -18,19 +18,19 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True)
 class Share:
-    """How many of how many, with the 95 % interval of Wilson for the share of all that could be drawn."""
+    """A count out of a total, with Wilson's 95 % interval for the share in the population."""
 
     count: int
     of: int
 
     @property
     def share(self) -> float:
-        """From 0 to 1; nan of none."""
+        """From 0 to 1; nan for an empty total."""
         return self.count / self.of if self.of else math.nan
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Least and greatest share that the count speaks for."""
+        """Wilson's 95 % interval of the share."""
         from scipy.stats import binomtest
 
         if not self.of:
@@ -45,15 +45,14 @@ class Share:
 
 @dataclass(frozen=True)
 class Yield:
-    """Shares of the rows drawn; rows that failed count in none of them.
+    """Shares of the drawn rows; failed rows do not count.
 
     Attributes:
-        stable: all roots left of the axis, in the worst scenario.
-        feasible: every constraint met.
-        good: both.
-        failed: rows without an answer.
-        abscissa: quantile, such as ``0.95`` → the abscissa of the row there, in the worst scenario; inf where that
-            row has a root at infinity.
+        stable: rows with all roots left of the axis, in the worst scenario.
+        feasible: rows that satisfy every constraint.
+        good: rows with both.
+        failed: number of rows without a result.
+        abscissa: quantile, such as ``0.95`` → abscissa in the worst scenario; inf for a root at infinity.
     """
 
     stable: Share
@@ -73,22 +72,22 @@ _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 @dataclass(frozen=True)
 class Summary:
-    """A study in a few numbers.
+    """Summary of a study.
 
     Attributes:
-        rows: in the study.
-        counts: status → rows that have it.
-        best: the optimal row with the best objective; None where there is none.
-        causes: cause of rows that are not optimal → how many have it, numbers in it aside, the commonest first.
-        spread: ``objective``, ``abscissa`` → least, median and greatest over the optimal rows.
-        stable: rows whose design is stable.
-        structures: structure → optimal rows that have it, the commonest first.
-        proven: rows whose bound is closed.
-        warm: rows started from a neighbour's optimum.
-        laws: law → greatest relative residual over the rows in which it applies.
-        seconds: that the rows took, one after the other.
-        product: of a Monte Carlo study, the shares that are as they should be.
-        clocked: the spread, and the ``quantiles`` of `product`, in 1/s; of what is per √(g/w) where a second is known.
+        rows: number of rows in the study.
+        counts: status → number of rows.
+        best: the optimal row with the best objective; None without one.
+        causes: cause of rows that are not optimal → number of rows, ignoring numbers in it, the most frequent first.
+        spread: ``objective``, ``abscissa`` → minimum, median and maximum over the optimal rows.
+        stable: number of rows with a stable design.
+        structures: structure → number of optimal rows, the most frequent first.
+        proven: number of rows with a proved optimum.
+        warm: number of rows started from a neighbour's optimum.
+        laws: law → largest relative residual over the rows in which it applies.
+        seconds: total time of all rows.
+        product: the yield of a Monte Carlo study, else None.
+        clocked: the spread, and the ``quantiles`` of `product`, converted from √(g/w) to 1/s where that is possible.
     """
 
     rows: int
@@ -115,21 +114,21 @@ class Summary:
         }
 
 
-def summary(rows: RowTable) -> Summary:
-    """The rows of a study, read once."""
+def summarise(rows: RowTable) -> Summary:
+    """Summarise the rows of a study."""
     study, problem = rows.study, rows.study.problem
     status, structure = rows.values("status"), rows.values("structure")
     values = {name: rows.values(name) for name in ("objective", "abscissa")}
     counts, optimal = Counter(status.tolist()), status == "optimal"
-    clocked = _clocked(rows, values)
-    judged = problem.posed.sign * clocked.get("objective", values["objective"])
-    ranked = np.where(optimal & np.isfinite(judged), judged, np.inf)
+    clocked = _to_seconds(rows, values)
+    objective = problem.posed.sign * clocked.get("objective", values["objective"])
+    ranked = np.where(optimal & np.isfinite(objective), objective, np.inf)
     best = rows[int(np.argmin(ranked))] if np.isfinite(ranked).any() else None
     spreads = [{n: ends for n, x in some.items() if (ends := _ends(x[optimal]))} for some in (values, clocked)]
     in_seconds: dict[str, tuple[float, ...]] = dict(spreads[1])
     product = None
     if study.method == "monte_carlo":
-        product = yield_of(rows)
+        product = compute_yield(rows)
         if "abscissa" in clocked:
             in_seconds["quantiles"] = _quantiles(clocked["abscissa"][optimal | (status == "infeasible")])
     laws = {key: rows.column(head).compressed() for head, (name, key) in rows.headers.items() if name == "laws"}
@@ -150,8 +149,8 @@ def summary(rows: RowTable) -> Summary:
     )
 
 
-def _clocked(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
-    """Objective and abscissa of every row in 1/s, where they are per √(g/w) and a second is known: w may differ."""
+def _to_seconds(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
+    """Objective and abscissa of every row converted from √(g/w) to 1/s, where possible; w may vary between rows."""
     problem, found = rows.study.problem, {}
     parameters = {name: rows.values(header("parameters", name)) for name in problem.posed.parameter_set.names}
     for name, text in (("objective", problem.minimize or problem.maximize), ("abscissa", "abscissa")):
@@ -173,7 +172,7 @@ def _ends(values: Array) -> tuple[float, float, float] | None:
     return (float(known.min()), float(np.median(known)), float(known.max())) if known.size else None
 
 
-def yield_of(rows: RowTable) -> Yield:
+def compute_yield(rows: RowTable) -> Yield:
     """Shares of stable and feasible rows, and quantiles of their abscissa."""
     status, stable = rows.values("status"), rows.column("stable").filled(False)
     feasible = status == "optimal"

@@ -161,7 +161,7 @@ def _cases() -> list[Case]:
     )
 
     masses = {**_SKATES, "m_B": {"min": 14, "max": 20}, "m_H": {"min": 1.5, "max": 3}}
-    proved = _says("infeasible, proved", never="none that no design is feasible")
+    proved = _says("infeasible, proved", never="infeasibility is not proved")
     limits = {"total": "m_B + m_H <= 15"}
     found.append(_told("total of masses", _file(masses, fastest, limits), proved, "14 + 1.5 > 15"))
     limits = {"ahead": "x_B >= 0.6", "behind": "x_B <= 0.59"}
@@ -207,7 +207,7 @@ def _cases() -> list[Case]:
         fastest,
         {"arm": "nu_H >= 0.02"},
     )
-    judge = _says(r"--certify [2-9]\d* |proved", never=r"; --certify goes on|a longer --certify")
+    judge = _says(r"--certify [2-9]\d* |\(proved|is proved", never=r"; --certify closes|a longer --certify")
     found.append(_told("after --certify", file, judge, "whoever gave --certify 1 must give it more", "--certify", "1"))
     return found
 

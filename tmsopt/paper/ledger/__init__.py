@@ -1,7 +1,7 @@
 """A ledger of every number and every verifiable statement of the source paper, recomputed by independent routes.
 
-In: nothing but the paper's own claims, in `claims.toml`. Out: a `Ledger` with a verdict on each. Open `claims` first:
-it says how a claim is added.
+In: the paper's claims in `claims.toml`. Out: a `Ledger` with a verdict on each. Open `claims` first: it explains how to
+add a claim.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
-"""Exact rational functions, certified roots, and Newton's method in balls: what `claims.toml` computes with.
+"""The algebra of `claims.toml`: exact rational functions, certified roots, and Newton's method in balls.
 
-A polynomial in s is a list of coefficients in descending powers; they are fractions, rational functions, or balls that
-contain the true value. A comparison of balls is true only if it is certain.
+A polynomial in s is a list of coefficients in descending powers: fractions, rational functions, or balls that contain
+the true value. A comparison of balls is true only if it is certain.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,8 +23,8 @@ PRECISION = 80
 Ball: TypeAlias = Any  # flint.arb
 Coefficients: TypeAlias = Sequence[Any]
 
-_SOLVED = PRECISION - 15  # decimal digits to which Newton's method goes
-_RADIUS = 50  # of the box in which a solution is proved
+_SOLVED = PRECISION - 15  # decimal digits of Newton's method
+_RADIUS = 50  # decimal digits of the box in which a solution is proved
 
 
 def make_ring(names: str) -> dict[str, Quotient]:
@@ -53,26 +53,24 @@ def evaluate_at(x: Quotient, values: Mapping[str, Any]) -> Any:
 
 
 def substitute(x: Quotient, /, **values: Any) -> Any:
-    """A quotient with values for some of its variables; a fraction where no variable is left."""
+    """A quotient with values for some of its variables; a fraction if no variable is left."""
     found = evaluate_at(x, make_ring(" ".join(x.numerator.context().names())) | values)
     constant = isinstance(found, Quotient) and found.numerator.is_constant() and found.denominator.is_constant()
     return sum(found.numerator.coeffs()) / found.denominator.leading_coefficient() if constant else found
 
 
 def is_positive(x: Quotient) -> bool:
-    """Whether numerator and denominator have coefficients of one sign, so that x > 0 where all variables are."""
-    return any(
-        all(sign * c > 0 for c in [*x.numerator.coeffs(), *x.denominator.coeffs()]) and x != 0 for sign in (1, -1)
-    )
+    """Whether all coefficients of numerator and denominator have one sign, so x > 0 for positive variables."""
+    return any(all(sign * c > 0 for c in [*x.numerator.coeffs(), *x.denominator.coeffs()]) and x != 0 for sign in (1, -1))
 
 
 def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:
-    """Whether a quotient is 0 where a polynomial is: its numerator is a multiple, its denominator is not."""
+    """Whether a quotient vanishes with a polynomial: its numerator is a multiple of it, its denominator is not."""
     return bool(divmod(x.numerator, modulus.numerator)[1] == 0 and divmod(x.denominator, modulus.numerator)[1] != 0)
 
 
 def list_coefficients(x: Quotient, variable: Quotient) -> Coefficients:
-    """Coefficients of a numerator in one variable alone, descending."""
+    """Coefficients of a numerator in a single variable, descending."""
     terms = {powers[_index_of(x, variable)]: c for powers, c in x.numerator.to_dict().items()}
     return [terms.get(k, flint.fmpq(0)) for k in range(max(terms), -1, -1)]
 
@@ -92,7 +90,7 @@ def factorise(x: Quotient) -> list[Quotient]:
 
 
 def resultant(x: Quotient, y: Quotient, variable: Quotient) -> Quotient:
-    """Resultant of two numerators: it vanishes where both do for one value of the variable."""
+    """Resultant of two numerators: it vanishes where both vanish for the same value of the variable."""
     return Quotient(x.numerator.resultant(y.numerator, str(variable.numerator)))
 
 
@@ -100,14 +98,14 @@ def resultant(x: Quotient, y: Quotient, variable: Quotient) -> Quotient:
 
 
 def is_stable(p: Coefficients) -> bool:
-    """Whether every root lies in Re s < 0, certainly: Liénard–Chipart on fractions or balls."""
+    """Whether every root certainly lies in Re s < 0, by Liénard–Chipart on fractions or balls."""
     if not (p[0] > 0 or p[0] < 0):
         return False
     return all(bool(quantity > 0) for quantity in lienard_chipart([c if p[0] > 0 else -c for c in p]))
 
 
 def certified_roots(p: Coefficients) -> list[Any]:
-    """Isolating balls of the roots of a polynomial with fractions, each as often as it is one."""
+    """Isolating balls of the roots of a polynomial with fractions, repeated by multiplicity."""
     return [z for z, multiplicity in isolated_roots(p) for _ in range(multiplicity)]
 
 
@@ -118,7 +116,7 @@ def ball_roots(p: Coefficients) -> list[Any]:
 
 
 def count_real_roots(p: Coefficients) -> int:
-    """How many roots of a polynomial with fractions are real, with multiplicity."""
+    """Number of real roots of a polynomial with fractions, with multiplicity."""
     return sum(z.imag == 0 for z in certified_roots(p))
 
 
@@ -133,10 +131,10 @@ def is_heavily_damped(p: Coefficients) -> bool:
 def match_factors(
     p: Coefficients, parts: Sequence[Coefficients], guess: Mapping[str, float], known: Mapping[str, Any]
 ) -> dict[str, Ball]:
-    """The unknowns near a guess with which a polynomial is its leading coefficient times monic factors, proved.
+    """The proved unknowns near a guess for which a polynomial is its leading coefficient times monic factors.
 
     Raises:
-        ArithmeticError: where no unique solution is proved.
+        ArithmeticError: if no unique solution is proved.
     """
     names = list(guess)
     sides = [_evaluation(equation.numerator) for equation in _differences(p, parts)]
@@ -149,13 +147,13 @@ def match_factors(
 
 
 def tangent(p: Coefficients, parts: Sequence[Coefficients], names: str, point: Mapping[str, Any]) -> list[Ball]:
-    """The direction of the curve of one unknown more on which a polynomial has monic factors, at a point of it."""
+    """The direction, at a point, of the curve on which a polynomial has monic factors (one unknown more)."""
     rows = [equation.numerator for equation in _differences(p, parts)]
     return kernel([[_evaluation(row.derivative(name))(point) for name in names.split()] for row in rows])
 
 
 def kernel(matrix: Sequence[Sequence[Any]]) -> list[Any]:
-    """The vector, up to a factor, that a matrix with one more column than rows maps to 0."""
+    """A null vector of a matrix with one more column than rows."""
     leave = range(len(matrix) + 1)
     return [(-1) ** k * det([[e for j, e in enumerate(row) if j != k] for row in matrix]) for k in leave]
 
@@ -166,12 +164,12 @@ def det(matrix: Sequence[Sequence[Any]]) -> Any:
 
 
 def _differences(p: Coefficients, parts: Sequence[Coefficients]) -> list[Any]:
-    """What must vanish for a polynomial to be its leading coefficient times the product of monic factors."""
+    """Differences between a polynomial and its leading coefficient times the product of monic factors."""
     return [a - p[0] * m for a, m in zip(p[1:], product(*parts)[1:], strict=True)]
 
 
 def _evaluation(polynomial: Any) -> Callable[[Mapping[str, Any]], Any]:
-    """The value of a polynomial as a function, for those who need it often."""
+    """A function that evaluates a polynomial repeatedly."""
     names = polynomial.context().names()
     terms = [
         (coefficient, [(name, power) for name, power in zip(names, powers, strict=True) if power])
@@ -190,7 +188,7 @@ def _evaluation(polynomial: Any) -> Callable[[Mapping[str, Any]], Any]:
 
 
 def sqrt(x: Any) -> Any:
-    """The square root of a ball, complex or not, or of a fraction as a ball."""
+    """The square root of a real or complex ball, or of a fraction, as a ball."""
     return (x if isinstance(x, flint.acb) else flint.arb(x)).sqrt()
 
 

@@ -11,8 +11,8 @@ A claim about a printed decimal is one table in that file, and nothing else:
     printed = "2.236317517"
     value = "ep4.Fr"
 
-The head of the file tells the other rules and what a table may have. What the expressions of `language` cannot tell
-becomes a function of `algebra`, which is a word of `vocabulary`.
+The head of the file explains the other rules and the keys of a table. A computation that the expressions of `language`
+cannot express becomes a function of `algebra`, which is then a word of `vocabulary`.
 """
 
 from dataclasses import dataclass
@@ -38,13 +38,13 @@ def compute_entry(claim: Table) -> Entry:
     """Compute a claim.
 
     Raises:
-        ArithmeticError: where the outcome is not explained, or the explanation not proved: no entry stands on words.
+        ArithmeticError: if an outcome that is not exact has no explanation, or the explanation is not proved.
     """
     scope = open_scope(claim, {})
-    shown = {name: _Shown(value) for name, value in scope.items()}
+    shown = {name: _FormattedValue(value) for name, value in scope.items()}
     printed, remark, otherwise, condition, against = (claim.get(field, "").format_map(shown) for field in _TEXTS)
     value = compute(claim.get("value", claim.get("computed", "''")), scope)
-    computed = format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_Shown(value)}"
+    computed = format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_FormattedValue(value)}"
     proved = are_true(claim.get("holds", []), scope)
     match claim["rule"]:
         case "decimal":
@@ -56,21 +56,21 @@ def compute_entry(claim: Table) -> Entry:
             outcome = judge_statement(condition, bool(condition) and proved, against, refuted, remark)
     if (outcome.verdict != EXACT and not outcome.remark) or not are_true(claim.get("noted", []), scope):
         raise ArithmeticError(f"{claim['key']}: '{outcome.verdict}' without an explanation that is proved")
-    told = {field: claim[field] for field in ("key", "section", "place", "statement", "route")}
-    return Entry(**told, printed=printed, computed=computed, **outcome._asdict())
+    copied = {field: claim[field] for field in ("key", "section", "place", "statement", "route")}
+    return Entry(**copied, printed=printed, computed=computed, **outcome._asdict())
 
 
 @dataclass(frozen=True)
-class _Shown:
+class _FormattedValue:
     """A value of an expression within a text."""
 
     value: Any
 
     def __format__(self, form: str) -> str:
-        """As it is, to so many digits, or as Python formats a float."""
+        """The text of the value: as it is, to a number of digits, or as Python formats a float."""
         match self.value:
             case list(parts):
-                return ", ".join(format(_Shown(part), form) for part in parts)
+                return ", ".join(format(_FormattedValue(part), form) for part in parts)
             case Quotient(numerator=numerator):
                 return str(numerator)
             case number if form.isdigit():

@@ -1,4 +1,4 @@
-"""What a ledger is made of, and the rules that turn what was computed into a verdict."""
+"""Entries of the ledger, and the rules that give a verdict on a computed value."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -22,12 +22,12 @@ VERDICTS = (EXACT, DIGITS_HOLD, DIGITS_OFF, CONDITIONAL, FAILS)
 SHOWN = 40
 """Significant digits of a computed number."""
 
-_OFF_UNITS = 50  # of the last printed digit: only the last two digits differ
-_OFF_RELATIVE = 1e-6  # and the number is the same for every practical purpose
+_OFF_UNITS = 50  # of the last printed digit, so only the last two digits differ
+_OFF_RELATIVE = 1e-6  # largest relative difference
 
 
 class Judgement(NamedTuple):
-    """What computing a claim gave, and what a reader must know besides."""
+    """The verdict on a claim, and a remark for the reader."""
 
     verdict: str
     remark: str = ""
@@ -65,12 +65,12 @@ class Ledger(Tabular):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of entries per verdict, every verdict named."""
+        """Verdict → number of entries, for all verdicts."""
         counted = Counter(entry.verdict for entry in self.entries)
         return {verdict: counted[verdict] for verdict in VERDICTS}
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The entries, one a row."""
+        """The entries, one per row."""
         return map(plain, self.entries)
 
     def to_json(self) -> dict[str, Any]:
@@ -89,11 +89,11 @@ def format_digits(value: Any) -> str:
 def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
     """Judge a printed decimal against a ball, or a fraction, that contains the true value.
 
-    Exact if they are one number; the printed digits hold if the true value is within half a unit of the last;
-    the last digits are off if it is within 50 units and a millionth; otherwise the number does not hold.
+    The number is exact if both are equal. The printed digits hold within half a unit of the last digit. The last digits
+    are off within 50 units and a relative millionth. Otherwise the number does not hold.
 
     Raises:
-        ArithmeticError: if the ball is too wide to tell.
+        ArithmeticError: if the ball is too wide to decide.
     """
     claimed, ball = rational(printed), flint.arb(value)
     if isinstance(value, flint.fmpq) and value == claimed:
@@ -113,7 +113,7 @@ def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
 
 
 def judge_identity(holds: bool, remark: str = "", otherwise: str = "") -> Judgement:
-    """Exact where a proof runs through; otherwise it does not hold, for the reason given."""
+    """Exact if the proof succeeds; otherwise it does not hold, for the given reason."""
     return Judgement(EXACT, remark) if holds else Judgement(FAILS, otherwise or "The proof does not run through.")
 
 
@@ -121,13 +121,13 @@ def judge_statement(condition: str, under: bool, against: str, counterexample: b
     """Judge a general statement: proved under a condition and refuted outside it, or refuted.
 
     Args:
-        condition: what must be added.
-        under: whether the proof under the condition runs through.
+        condition: the condition that must be added.
+        under: whether the proof under the condition succeeds.
         against: the counterexample in words.
         counterexample: whether it refutes the statement as printed.
 
     Raises:
-        ArithmeticError: where it does not.
+        ArithmeticError: if it does not.
     """
     if not counterexample:
         raise ArithmeticError(f"neither proved nor refuted: {condition}")

@@ -1,9 +1,9 @@
-"""The expressions of `claims.toml`: a small part of Python's, parsed and walked here, never run.
+"""The expressions of `claims.toml`: a small subset of Python, parsed and evaluated here, never executed by Python.
 
 An expression has exact numbers (0.1 is 1/10), names, texts, ``+ - * / **``, comparisons, ``and or not``, lists, calls,
-indices, fields such as ``ep4.Fr``, and ``[… for … in … if …]``. A name is, in this order: a variable or definition of
-the claim, a definition under ``[define]``, a word of `VOCABULARY`. Problem files are read by another parser: the ledger
-shares nothing with what it checks.
+indices, fields such as ``ep4.Fr``, and ``[… for … in … if …]``. A name is looked up as a variable or definition of the
+claim, then as a definition under ``[define]``, then as a word of `VOCABULARY`. Problem files have another parser,
+because the ledger shares nothing with the code that it checks.
 """
 
 import ast
@@ -60,18 +60,18 @@ def compute(text: str, scope: Scope) -> Any:
     """Value of an expression.
 
     Raises:
-        SyntaxError: for what is no expression of this language.
+        SyntaxError: for text that is not an expression of this language.
     """
     return _walk(_parse(text).value, scope)
 
 
 def are_true(texts: Iterable[str], scope: Scope) -> bool:
-    """Whether all of these statements are true, certainly; what is no statement is not."""
+    """Whether all statements are certainly true; a value other than True counts as false."""
     return all(compute(text, scope) is True for text in texts)
 
 
 def open_scope(table: Table, scope: Scope) -> Scope:
-    """A scope with the variables and definitions of a table, those of its setting first."""
+    """A scope with the variables and definitions of a table, after those of its setting."""
     both = read_tables()["setting"].get(table.get("setting"), {}), table
     opened = {**scope, **make_ring(" ".join(part.get("variables", "") for part in both))}
     for part in both:
@@ -96,13 +96,13 @@ def _look_up(name: str, scope: Scope) -> Any:
 
 
 def _apply(name: str, *operands: Any) -> Any:
-    """What a definition stands for: a value, whether it holds, or a solved point."""
+    """The result of a definition: a value, whether it holds, or a solved point."""
     parameters, table = list_definitions()[name]
     scope = dict(zip(parameters, operands, strict=True))
     if isinstance(table, str):
         return compute(table, scope)
     if "guess" in table:
-        with flint.ctx.workdps(PRECISION):  # it is kept
+        with flint.ctx.workdps(PRECISION):  # independent of the caller, because the result is cached
             return _solve(name, *operands)
     opened = open_scope(table, scope)
     return compute(table["value"], opened) if "value" in table else are_true(table["holds"], opened)
@@ -110,7 +110,7 @@ def _apply(name: str, *operands: Any) -> Any:
 
 @cache
 def _solve(name: str, *operands: Any) -> dict[str, Any]:
-    """A point: what is known of it, and the unknowns with which its polynomial has the factors, proved."""
+    """A point: its known values, and the proved unknowns for which its polynomial has the factors."""
     parameters, table = list_definitions()[name]
     scope = dict(zip(parameters, operands, strict=True))
     known = {unknown: compute(text, scope) for unknown, text in table.get("known", {}).items()}
@@ -120,18 +120,18 @@ def _solve(name: str, *operands: Any) -> dict[str, Any]:
 
 
 def _bind(target: ast.expr, value: Any) -> dict[str, Any]:
-    """Names with their values, where one or several are assigned."""
+    """Names with their values, for one or several targets."""
     match target:
         case ast.Name(id=name):
             return {name: value}
         case ast.Tuple(elts=parts):
             pairs = zip(parts, value, strict=True)
             return {name: found for pair in pairs for name, found in _bind(*pair).items()}
-    raise SyntaxError(f"'{ast.unparse(target)}' is no name")
+    raise SyntaxError(f"'{ast.unparse(target)}' is not a name")
 
 
 def _walk_list(nodes: list[ast.expr], scope: Scope) -> list[Any]:
-    """Values of the parts of a list or a call, those of a starred one in its place."""
+    """Values of the elements of a list or a call, with starred elements unpacked."""
     found: list[Any] = []
     for node in nodes:
         found += _walk(node.value, scope) if isinstance(node, ast.Starred) else [_walk(node, scope)]
@@ -177,4 +177,4 @@ def _walk(node: ast.expr | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912
         case ast.Compare(left=left, ops=signs, comparators=others):
             sides = _walk_list([left, *others], scope)
             return all(_OPERATORS[type(sign)](*pair) for sign, *pair in zip(signs, sides, sides[1:], strict=False))
-    raise SyntaxError(f"'{ast.unparse(node)}' is no expression of the ledger")
+    raise SyntaxError(f"'{ast.unparse(node)}' is not an expression of the ledger")

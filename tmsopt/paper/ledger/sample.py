@@ -1,4 +1,4 @@
-"""Random rational bicycles, each with the five printed conditions and whether it is stable by its Routh conditions."""
+"""Random rational bicycles, each with the five printed conditions and its stability by Liénard–Chipart."""
 
 import random
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from tmsopt.models import copo
 from tmsopt.paper.ledger.algebra import is_stable
 
 _COUNT = 4000
-_LAWS: Any = laws  # which take exact numbers too
+_LAWS: Any = laws  # typed loosely, because the laws accept exact numbers too
 
 
 @cache
@@ -21,10 +21,10 @@ def draw_sample() -> list[dict[str, Any]]:
 
 
 def describe_design(*design: Any) -> dict[str, Any]:
-    """What is asked of a bicycle, in fractions, from Fr, μ, χ_B, χ_H, ζ_B, ζ_H and tan λ_s.
+    """Facts about a bicycle, in fractions, from Fr, μ, χ_B, χ_H, ζ_B, ζ_H and tan λ_s.
 
-    `skew` is a1/(Fr ζ_B); `square` is Fr_c² by flus, None where it is infinite; `lines` are the five conditions lscf,
-    `admitted` says whether all of them hold, and `stable` whether the bicycle is.
+    `skew` is a1/(Fr ζ_B); `square` is Fr_c² by flus, None if infinite; `lines` are the five conditions lscf, `admitted`
+    is whether all of them hold, and `stable` is whether the bicycle is stable.
     """
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(rational, design)
     skew = zeta_B * chi_H - zeta_H * chi_B

@@ -1,4 +1,4 @@
-"""Words of the expressions of `claims.toml`, besides the definitions there: all of `algebra`, and what stands here."""
+"""Words of the expressions of `claims.toml`, besides its definitions: all of `algebra`, and the words below."""
 
 from collections.abc import Mapping
 from inspect import getmembers, isfunction

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from tmsopt.dynamics.growth import growth
 from tmsopt.models import tms
-from tmsopt.paper.reference import benchmark, optimised
+from tmsopt.paper.reference import benchmark, optimised_benchmark
 from tmsopt.plots.labels import FROUDE
 from tmsopt.plots.style import CRITICAL, LINE, MARK, REAL, draw_bands, new_figure, note
 from tmsopt.problem.problem import Problem
@@ -16,7 +16,7 @@ def growth_figure() -> Figure:
     """Growth rates Re s with bands of stability and heavy damping, the critical Fr and that of the least abscissa."""
     others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
     fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False)
-    best = solve(Problem(tms, fixed=dict(optimised().parameters)))
+    best = solve(Problem(tms, fixed=dict(optimised_benchmark().parameters)))
     figure = new_figure(9.2, 4.2)
     panels = figure.subplots(1, 2, sharey=True)
     for ax, design, name in zip(panels, (fastest, best), ("(a) benchmark", "(b) optimised benchmark"), strict=True):

@@ -1,4 +1,4 @@
-"""What sets a design moving, as a user asks for it, and as a state of its system."""
+"""The disturbance that sets a design moving, as the user states it and as a state of its system."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from tmsopt.records import Array, Table, plain
 
 MOST_POINTS = 1_000_000
 
-_LEAN = math.pi / 180  # where nothing is asked for
+_LEAN = math.pi / 180  # default
 _ANGLED = dict(zip(("lean", "steer"), ANGLES, strict=True))
 _IMPULSES = {"push": "T_delta", "lean_push": "T_phi"}
 _AMOUNTS = (*_IMPULSES, "noise")
@@ -22,14 +22,14 @@ _AMOUNTS = (*_IMPULSES, "noise")
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What sets a design moving.
+    """A disturbance of a design.
 
     Attributes:
-        start: states at the start, before any push, in rad and s; those that are left out are 0.
+        start: states at the start, before any push, in rad and s; missing ones are 0.
         push, lean_push: impulses of steer torque and lean torque at t = 0.
         noise: intensity of the white noise on the steer torque.
-        seed: of the noise.
-        default: whether nothing was asked for.
+        seed: seed of the noise.
+        default: whether the user stated no disturbance.
     """
 
     start: Table[float] = field(default_factory=Table)
@@ -40,7 +40,7 @@ class Disturbance:
     default: bool = False
 
     def state(self, system: System) -> Array:
-        """The state at once after it; yaw and the way aside are 0."""
+        """The state immediately after it; yaw and lateral displacement are 0."""
         x = np.zeros(len(system.A))
         x[: len(system.names)] = [self.start.get(name, 0.0) for name in system.names]
         for name, torque in _IMPULSES.items():
@@ -53,16 +53,16 @@ class Disturbance:
         return plain(self, "start push lean_push default") | (plain(self, "noise seed") if self.noise else {})
 
 
-def asked_for(system: System, given: Mapping[str, Any]) -> Disturbance:
-    """The disturbance that a user asks for.
+def parse_disturbance(system: System, given: Mapping[str, Any]) -> Disturbance:
+    """The disturbance that the arguments of `simulate` state.
 
     Args:
-        given: the arguments of `simulate` by name.
+        given: the arguments by name.
 
     Raises:
-        InputError: with everything that cannot be asked so.
+        InputError: with all faults of the arguments.
     """
-    start, faults = _angles(system, given)
+    start, faults = _parse_angles(system, given)
     stated = {} if given["start"] is None else given["start"]
     wrong = table_faults("start", stated, f"{{'{system.names[-1]}': 0.1}}")
     faults += wrong
@@ -72,7 +72,7 @@ def asked_for(system: System, given: Mapping[str, Any]) -> Disturbance:
         elif not is_number(value):
             faults.append(Fault(f"found {short(value)}; accepted: a number", ("start", name)))
         elif name in start:
-            faults.append(Fault("is given twice, in degrees and in rad; leave one out", ("start", name)))
+            faults.append(Fault("is given twice, in degrees and in rad; give it once", ("start", name)))
         else:
             start[name] = float(value)
     seconds = given["seconds"]
@@ -88,20 +88,20 @@ def asked_for(system: System, given: Mapping[str, Any]) -> Disturbance:
     return Disturbance(Table(start), **amounts, seed=int(given["seed"]), default=nothing)
 
 
-def _angles(system: System, given: Mapping[str, Any]) -> tuple[dict[str, float], list[Fault]]:
-    """The angles at the start, and what is wrong with them and with the amounts of pushes and noise."""
+def _parse_angles(system: System, given: Mapping[str, Any]) -> tuple[dict[str, float], list[Fault]]:
+    """The angles at the start, and faults of these angles and of the amounts of pushes and noise."""
     faults, start = list[Fault](), dict[str, float]()
     for word, value in ((w, given[w]) for w in (*_ANGLED, *_AMOUNTS) if given[w] is not None):
         if not system.impulses:
             example = ", ".join(f"{n}=1" for n in system.names[-1:])
-            message = f"a stated system has no lean and no steer; say where it starts, start (--start) {example}"
+            message = f"a stated system has no lean and no steer; give its initial state, start (--start) {example}"
             faults.append(Fault(message, (word,)))
         elif word in _ANGLED and isinstance(value, str):
             try:
                 start[_ANGLED[word]] = parse_quantity(value, "rad")
             except ValueError as error:
-                said = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
-                faults.append(Fault(said, (word,)))
+                text = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
+                faults.append(Fault(text, (word,)))
         elif not is_number(value):
             faults.append(Fault(f"found {short(value)}; accepted: a number", (word,)))
         elif word in _ANGLED:
