@@ -58,7 +58,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
     single: bool = option("Write numbers in single precision.")
     fresh: bool = option("Move the folder of --output aside.")
     engine: str | None = option("", hidden=True)
-    workers: int = option("Processes.", 1, min=1, max=256)
+    workers: int = option("Processes.", 1, type=click.IntRange(1, 256))
     layer: str = option("Layer that --plot shows.", "kind")
     slice: Mapping[str, str] = option(
         "Parameter of three that --plot holds.", metavar="NAME=VALUE", example="lambda_s=0.4", multiple=False

@@ -1,7 +1,7 @@
 """Commands as frozen dataclasses: a field states an argument or an option once, the docstring is the help."""
 
 import sys
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from inspect import getdoc
 from pathlib import Path
@@ -9,14 +9,13 @@ from typing import Any, Literal, dataclass_transform, get_args, get_origin
 
 import click
 
-from tmsopt.cli.context import colour_options
+from tmsopt.cli.context import colour_option
 from tmsopt.cli.outputs import FIGURES, PAGES, check_output
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.errors import MOST_STARTS, Fault, InputError
 
 _COLUMN = 32  # columns of an option in a help
-_RANGES: Mapping[Any, Any] = {int: click.IntRange, float: click.FloatRange}
-_BOUNDS, _OWN = {"min", "max", "min_open"}, {"text", "names", "endings", "example", "parse"}  # click knows the bounds
+_OWN = {"text", "names", "endings", "example", "parse"}  # settings of tmsopt; click knows the others
 
 
 def argument(default: Any = MISSING, **settings: Any) -> Any:
@@ -30,8 +29,8 @@ def option(text: str, default: Any = None, *names: str, **settings: Any) -> Any:
     Args:
         text: its help.
         names: further names.
-        settings: `min`, `max` and `min_open` of a number; `endings` of a file to write; an `example` of NAME=VALUE; a
-            function that `parse`s the text; or settings of `click.Option`.
+        settings: `endings` of a file to write; an `example` of NAME=VALUE; a function that `parse`s the text; or
+            settings of `click.Option`, such as the `type` of a number in a range.
     """
     return field(default=default, metadata={"text": text, "names": names, **settings})
 
@@ -80,8 +79,8 @@ class WithCsv(Command):
 
 
 class WithSearch(Command):
-    starts: int | None = option("Most starts to try.  [default: 64]", min=1, max=MOST_STARTS)
-    seed: int = option("Seed of the starts.", 0, min=0)
+    starts: int | None = option("Most starts to try.  [default: 64]", type=click.IntRange(1, MOST_STARTS))
+    seed: int = option("Seed of the starts.", 0, type=click.IntRange(0))
 
     @property
     def search(self) -> dict[str, Any]:
@@ -108,7 +107,7 @@ def build_command(kind: type[Command], name: str) -> click.Command:
 
     options = {f.name for f in fields(kind) if "text" in f.metadata}  # type: ignore[arg-type]
     summary, _, rest = (getdoc(kind) or "").partition("\n\n")
-    parameters = [*map(_build_parameter, fields(kind)), *colour_options()]  # type: ignore[arg-type]
+    parameters = [*map(_build_parameter, fields(kind)), colour_option()]  # type: ignore[arg-type]
     return _ShortHelp(name, params=parameters, callback=call, help=summary, epilog=rest.replace("\n\nExit", "\nExit"))
 
 
@@ -142,50 +141,37 @@ def _name_option(fault: Fault, options: Container[str]) -> Fault:
 
 
 def _build_parameter(of: Field[Any]) -> click.Parameter:
-    settings = {key: value for key, value in of.metadata.items() if key not in _OWN | _BOUNDS}
+    about = of.metadata
+    settings = {key: value for key, value in about.items() if key not in _OWN}
     hint, default = of.type, None if of.default is MISSING else of.default
     if type(None) in get_args(hint):
         hint = get_args(hint)[0]
-    if "text" not in of.metadata:
+    if "text" not in about:
         return click.Argument([of.name], type=_type_of(hint), required=of.default is MISSING, **settings)
     flag, kind = _flag_of(of.name), hint
     if get_origin(hint) in (tuple, Mapping):
         kind, settings = get_args(hint)[0], {"multiple": True, **settings}
     elif hint is bool:
-        kind, settings["is_flag"] = None, True
+        settings["is_flag"], default = True, bool(default)
         flag += f"/--no-{of.name}" if default else ""
-    return _Option(
-        [of.name, flag, *of.metadata["names"]],
-        type=_type_of(kind, {key: value for key, value in of.metadata.items() if key in _BOUNDS}),
-        default=bool(default) if hint is bool else default,
-        help=of.metadata["text"],
-        callback=_make_reader(hint, of.metadata),
-        show_default=hint is not bool,
-        **settings,
-    )
-
-
-def _type_of(hint: Any, bounds: Mapping[str, Any] | None = None) -> Any:
-    if get_origin(hint) is Literal:
-        return click.Choice(get_args(hint))
-    if hint is Path:
-        return click.Path(path_type=Path)
-    return _RANGES[hint](**bounds) if bounds else str if hint is Any else hint
-
-
-def _make_reader(hint: Any, settings: Mapping[str, Any]) -> Callable[[click.Context, click.Parameter, Any], Any]:
-    """The callback of an option, which refuses a value before any work is done."""
 
     def read(_context: click.Context, option: click.Parameter, value: Any) -> Any:
-        name, parse = option.opts[0], settings.get("parse")
-        if "endings" in settings:
-            check_output(name, value, settings["endings"])
-        if "example" in settings:
+        """Refuse a value before any work is done."""
+        if "endings" in about:
+            check_output(option.opts[0], value, about["endings"])
+        if "example" in about:
             texts = [value] if isinstance(value, str) else value or ()
-            return _parse_pairs(name, texts, get_args(hint)[1], settings["example"])
-        return parse(value) if parse and value is not None else value
+            return _parse_pairs(option.opts[0], texts, get_args(hint)[1], about["example"])
+        return about["parse"](value) if "parse" in about and value is not None else value
 
-    return read
+    settings = {"type": _type_of(kind), "show_default": hint is not bool, **settings}
+    return _Option([of.name, flag, *about["names"]], default=default, help=about["text"], callback=read, **settings)
+
+
+def _type_of(hint: Any) -> Any:
+    if get_origin(hint) is Literal:
+        return click.Choice(get_args(hint))
+    return {Path: click.Path(path_type=Path), bool: None, Any: str}.get(hint, hint)
 
 
 def _parse_pairs(option: str, texts: Sequence[str], kind: Any, example: str) -> dict[str, Any]:
@@ -195,7 +181,8 @@ def _parse_pairs(option: str, texts: Sequence[str], kind: Any, example: str) -> 
     for name, text in ([part.strip() for part in text.partition("=")[::2]] for text in texts):
         try:
             if not (name and text) or name in pairs:
-                faults.append(Fault(f"found '{name}'; accepted: NAME=VALUE, such as {example}, once", (option,)))
+                accepted = f"accepted: NAME=VALUE, such as {example}, each name once"
+                faults.append(Fault(f"found '{name}'; {accepted}", (option,)))
             else:
                 pairs[name] = kind(text)
         except ValueError:

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from tmsopt import __version__
-from tmsopt.cli.context import WORDS, colour_options
+from tmsopt.cli.context import SPELLINGS, WORDS, colour_option
 from tmsopt.cli.ending import BAD_INPUT, STATUSES, report_end
 from tmsopt.errors import InputError
 
@@ -161,7 +161,9 @@ def _is_encodable(word: str) -> bool:
     return True
 
 
-@click.group("tmsopt", cls=_Group, commands=_Commands(), context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    "tmsopt", cls=_Group, commands=_Commands(), context_settings={"help_option_names": ["-h", "--help"], **SPELLINGS}
+)
 @click.option("--version", is_flag=True, expose_value=False, callback=_show_version, help="Show the version and exit.")
 @click.option(
     "--json",
@@ -187,4 +189,4 @@ def every() -> None:
     )  # it may find no folder for its cache: figures stay the same
 
 
-every.params += colour_options()
+every.params.append(colour_option())

@@ -9,17 +9,18 @@ COLOUR, WORDS = "tmsopt.colour", "tmsopt.words"
 """Keys of what --color says, and of the words of the command line."""
 
 
-def colour_options() -> list[click.Parameter]:
-    """--color, and its British spelling, which the help leaves out."""
+SPELLINGS = {"token_normalize_func": lambda word: "color" if word == "colour" else word}
+"""A setting of click's context, by which --colour is --color."""
+
+
+def colour_option() -> click.Option:
+    """--color of every command, and of all of them."""
 
     def keep(context: click.Context, _: click.Parameter, value: str | None) -> None:
         context.meta[COLOUR] = value or context.meta.get(COLOUR)
 
     kind, text = click.Choice(["auto", "always", "never"]), "Colour the text.  [default: auto]"
-    return [
-        click.Option([name], type=kind, callback=keep, expose_value=False, hidden=hidden, help=text)
-        for name, hidden in (("--color", False), ("--colour", True))
-    ]
+    return click.Option(["--color"], type=kind, callback=keep, expose_value=False, help=text)
 
 
 def is_coloured() -> bool:

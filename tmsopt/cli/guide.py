@@ -133,7 +133,7 @@ class ImportCommand(WithToml, OnFile):
     Exit status: 0 done, 2 bad input.
     """
 
-    speed: float | None = option("Speed in m/s.  [default: of FILE, or 5]", min=0)
+    speed: float | None = option("Speed in m/s.  [default: of FILE, or 5]", type=click.FloatRange(0))
 
     def run(self) -> None:
         from tmsopt.models import problem_text, read_bicycle

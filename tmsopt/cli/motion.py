@@ -62,9 +62,9 @@ class SimulateCommand(WithCsv, WithPage, WithPlot, OnFile):
     )
     at: Mapping[str, float] = option("Another value of a parameter, in SI.", metavar="NAME=VALUE", example="v=1.5")
     noise: float | None = option("Noise of steer torque, in N m sqrt(s).", metavar="INTENSITY")
-    seed: int = option("Seed of the noise.", 0, min=0)
+    seed: int = option("Seed of the noise.", 0, type=click.IntRange(0))
     seconds: float | None = option("How long.  [default: until it has settled]")
-    points: int = option("Times in the table.", 1001, min=2, max=1_000_000)
+    points: int = option("Times in the table.", 1001, type=click.IntRange(2, 1_000_000))
     path: bool = option("With --csv: torques and the wheels' path too.")
 
     def run(self) -> Reply:

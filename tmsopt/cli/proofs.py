@@ -23,7 +23,7 @@ class ProveCommand(WithSearch, WithPage, WithPlot, OnFile):
     Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
     """
 
-    digits: int = option("Digits of every number.", 30, min=1, max=1000)
+    digits: int = option("Digits of every number.", 30, type=click.IntRange(1, 1000))
     exact: Mapping[str, str] = option("Exact value of a parameter.", metavar="NAME=VALUE", example="zeta_B=-1/3")
 
     def run(self) -> Reply:

@@ -57,12 +57,12 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
         "Prove the optimum.  [default: 60]", parse=_parse_seconds, metavar="[SECONDS]", is_flag=False, flag_value="60"
     )
     all: bool = option("Find all designs that have the pattern.")
-    seconds: float | None = option("Time for --all.  [default: 60]", min=0, min_open=True)
-    points: int | None = option("Points of a front.  [default: 25, or 12]", min=2, max=MOST_POINTS)
-    workers: int | None = option("Processes for a front.  [default: up to 4]", min=1)
+    seconds: float | None = option("Time for --all.  [default: 60]", type=click.FloatRange(0, min_open=True))
+    points: int | None = option("Points of a front.  [default: 25, or 12]", type=click.IntRange(2, MOST_POINTS))
+    workers: int | None = option("Processes for a front.  [default: up to 4]", type=click.IntRange(1))
     wheelbase: str | None = option("Show SI for this wheelbase, e.g. 25cm.")
     rear_mass: str | None = option("Show SI for this rear mass m_B, e.g. 9kg.")
-    starts: int | None = option("Most starts.  [default: 64, of a front 2]", min=1, max=MOST_STARTS)
+    starts: int | None = option("Most starts.  [default: 64, of a front 2]", type=click.IntRange(1, MOST_STARTS))
 
     def run(self) -> Reply:
         from tmsopt.problem import as_solvable

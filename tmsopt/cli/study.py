@@ -40,8 +40,8 @@ class StudyCommand(WithPage, WithPlot, OnFile):
 
     store: Path | None = option("SQLite file of the rows.  [default: NAME.sqlite]")
     fresh: bool = option("Move an existing store aside and start anew.")
-    row: int | None = option("Solve this row alone; no store.", min=0)
-    workers: int | None = option("Processes.  [default: as many as cores]", min=1)
+    row: int | None = option("Solve this row alone; no store.", type=click.IntRange(0))
+    workers: int | None = option("Processes.  [default: as many as cores]", type=click.IntRange(1))
     scheduler: str | None = option("Dask cluster, instead of processes.", metavar="ADDRESS")
     export: tuple[Path, ...] = option("Write all rows (csv, parquet, nc), repeatable.")
 

@@ -25,8 +25,8 @@ class TraceCommand(WithSearch, WithCsv, WithPage, WithPlot, OnFile):
 
     pattern: str | None = option("Pattern.  [default: the one that FILE locates]")
     axes: str | None = option("Two parameters to draw over, e.g. Fr,chi_B.")
-    step: float = option("Longest step, in widths of the box.", 0.005, min=1e-6, max=0.1)
-    starts: int = option("Fruitless starts in a row, to stop.", 48, min=1, max=MOST_STARTS)
+    step: float = option("Longest step, in widths of the box.", 0.005, type=click.FloatRange(1e-6, 0.1))
+    starts: int = option("Fruitless starts in a row, to stop.", 48, type=click.IntRange(1, MOST_STARTS))
 
     def run(self) -> Reply:
         self.refuse_useless((not self.plot, "axes", "says what --plot draws; add --plot FILE"))
