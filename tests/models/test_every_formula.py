@@ -154,8 +154,8 @@ def _by_intervals(built, part, point):
 
 
 def _by_scip(built, part, point):
-    terms = {n: built.free(x - 1e-9, x + 1e-9) for n, x in point.items()}
-    ball = fold(part, terms, built.kind(), built.variable)[0].ball
+    terms = {n: built.add_variable(x - 1e-9, x + 1e-9) for n, x in point.items()}
+    ball = fold(part, terms, built.kind(), built.as_affine)[0].ball
     return flint.arb(ball) * flint.arb(1, 2**-52)  # SCIP's constants are doubles
 
 
@@ -182,12 +182,12 @@ def test_intervals_of_branch_and_prune_hold_the_ball(name, of, count):
     for k, output in enumerate(own.outputs):
         part = own.part([output])
         try:
-            part = pruning.prepared(part)
+            part = pruning.prepare_formula(part)
         except NotAccepted:
             assert k not in needed
             continue
         with np.errstate(all="ignore"):
-            found = pruning._forward(part, np.stack([points - 1e-12, points + 1e-12]))[part.outputs[0]]
+            found = pruning._evaluate_ranges(part, np.stack([points - 1e-12, points + 1e-12]))[part.outputs[0]]
         low, high = np.broadcast_to(found, (2, count))
         known = [j for j in range(count) if np.isfinite([low[j], high[j]]).all()]
         assert known or k not in needed

@@ -10,7 +10,7 @@ import numpy as np
 from tmsopt.algebra.balls import Number
 from tmsopt.errors import Fault, InputError, is_number, short
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.global_search.complete import SECONDS, Completeness, completeness
+from tmsopt.global_search.completeness import SECONDS, Completeness, prove_completeness
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
@@ -149,7 +149,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
     nlp = _posed(problem)
     state = SearchState(problem, problem, nlp, options_of(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
-    proof = completeness(problem, seconds, state.options.progress) if seconds > 0 else None
+    proof = prove_completeness(problem, seconds, state.options.progress) if seconds > 0 else None
     proved = [] if proof is None else [_clipped(problem, design) for design in proof.designs]
     known = proof is not None and (proof.complete or proof.stopped)
     found, errors, coverage = ([], [], None) if known else _search(problem, nlp, state)

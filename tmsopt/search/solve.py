@@ -209,10 +209,10 @@ def _with_stability(solution: Solution, options: Options, began: float, policy: 
     problem = solution.problem.posed
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
-    from tmsopt.global_search.stability import any_stable  # a tenth of all imports, which few problems need
+    from tmsopt.global_search.stability import find_stable_design  # a tenth of all imports, which few problems need
 
     begin(options.progress, "looking for a stable design", "s")
-    asked = any_stable(problem, options.stability, solution.parameters, options.progress)
+    asked = find_stable_design(problem, options.stability, solution.parameters, options.progress)
     if asked.design is not None:
         words = "branch and bound found the stable design from which this one was reached"
         solution = _follow(solution, asked.design, words, options, policy)
