@@ -38,7 +38,7 @@ def fill_curve(executor: Executor, solver: FrontSolver, front: Front, points: in
     search, interrupted = _Search(executor, solver, points, progress), False
     try:
         for _ in range(_ROUNDS):
-            search.fill()
+            search.add_points()
             if not search.sweep():
                 break
         while search.refine_kinks_and_gaps():
@@ -84,7 +84,7 @@ class _Stretch:
         return math.hypot(*self.size)
 
     @property
-    def changes(self) -> bool:
+    def has_kink(self) -> bool:
         known = "undecided" not in (self.left.structure, self.right.structure)
         return known and (self.left.structure, set(self.left.limits)) != (self.right.structure, set(self.right.limits))
 
@@ -109,10 +109,10 @@ class _Search:
         found = [*self.ends, *(p.point for p in self.probes if p.point is not None)]
         return efficient_points(found, [_SAME * r for r in self.range])
 
-    def stretches(self) -> list[_Stretch]:
-        return [self._stretch(left, right) for left, right in pairwise(self.efficient_chain())]
+    def find_stretches(self) -> list[_Stretch]:
+        return [self._find_stretch(left, right) for left, right in pairwise(self.efficient_chain())]
 
-    def _stretch(self, left: FrontPoint, right: FrontPoint) -> _Stretch:
+    def _find_stretch(self, left: FrontPoint, right: FrontPoint) -> _Stretch:
         a, b = left.objectives, right.objectives
         size = tuple(abs(x - y) / span for x, y, span in zip(a, b, self.range, strict=True))
         own = [p for p in self.probes if self._found_nothing(p, *((b, a) if p.axis else (a, b)))]
@@ -172,12 +172,12 @@ class _Search:
     def is_exhausted(self) -> bool:
         return len(self.probes) >= _MOST_PROBES * self.points + 100
 
-    def fill(self) -> None:
+    def add_points(self) -> None:
         """Add points where neighbours are farthest apart, until there are enough."""
         self.progress.begin("following the front", "point")
         self.steps_done, self.steps_total = len(self.efficient_chain()), self.points
         while not self.is_exhausted:
-            stretches = self.stretches()
+            stretches = self.find_stretches()
             open_ = sorted((s for s in stretches if not s.gap and s.length > _GAP), key=lambda s: -s.length)
             if (missing := self.points - 1 - len(stretches)) <= 0 or not open_:
                 return
@@ -229,9 +229,9 @@ class _Search:
         self.progress.begin("placing kinks and gaps", "sub-problem")
         self.steps_done = 0
         while not self.is_exhausted:
-            stretches = self.stretches()
+            stretches = self.find_stretches()
             unclear = [s for s in stretches if not s.gap and s.suspect and s.length > _GAP]
-            changing = [s for s in stretches if s.changes and s.halvings]
+            changing = [s for s in stretches if s.has_kink and s.halvings]
             if not (now := (unclear or changing)[:MAX_PARALLEL]):
                 break
             self.steps_total = self.steps_done + len(unclear) + sum(s.halvings for s in changing)
@@ -284,16 +284,20 @@ def _solve_request(solver: FrontSolver, request: _ProbeRequest) -> _Probe | None
 
 def _assemble_front(search: _Search, front: Front) -> Front:
     """The front as reported: all labelled points, and the others where they are not crowded."""
-    stretches = search.stretches()
+    stretches = search.find_stretches()
     chain = [stretches[0].left, *(s.right for s in stretches)]
-    labels = [[search.ends[0].label], *(list[str]() for _ in chain[1:-1]), [search.ends[1].label]]  # even if better
+    labels = [
+        [search.ends[0].label],
+        *(list[str]() for _ in chain[1:-1]),
+        [search.ends[1].label],
+    ]  # an end keeps its label
     kinks, gaps = list[Kink](), list[Gap]()
     for i, s in enumerate(stretches):
         if s.gap and s.length > _WIDE:
             gaps.append(Gap(_describe_gap(search.solver, s), i, s.failed))
             labels[i].append("gap begins")
             labels[i + 1].append("gap ends")
-        elif s.changes and not (s.left.label or s.right.label):
+        elif s.has_kink and not (s.left.label or s.right.label):
             labels[i] += (names := list_changes(s.left, s.right))
             kinks += [Kink(name, i, s.length) for name in names]
     spacing = sum(s.length for s in stretches if not s.gap) / max(search.points - 1, 1)

@@ -57,7 +57,7 @@ class FrontSolver:
         for k, best in self.single_optima.items():
             if not best.sides:
                 continue
-            if problem.minimize == self.texts[k] and problem.free == self.problem.free:  # what is near bounds it
+            if problem.minimize == self.texts[k] and problem.free == self.problem.free:  # points found bound it
                 known = [*(p.objectives for p in self.ends), *(objective_values(self, n) for n in near)]
                 reached = [values[k] for values in known if all(values[j] <= limit for j, limit in most.items())]
                 most = {**most, k: min(reached, default=math.inf)}
@@ -148,7 +148,7 @@ def objective_values(solver: FrontSolver, solution: Solution) -> tuple[float, ..
     problem = solver.problem
     if not (problem.scenarios or problem.tolerances or solution.problem.posed.asks_radius):
         values = problem.values(solution.parameters)
-        known = {**solution.quantities, "abscissa": solution.abscissa}  # certified, where an objective is one of these
+        known = {**solution.quantities, "abscissa": solution.abscissa}  # certified values
         found = ((expression, expression.text.strip()) for expression in problem.objectives)
         return tuple(known[text] if text in known else float(expression(values)) for expression, text in found)
     cases = (*problem.cases, *([solution.worst] if solution.worst else []))

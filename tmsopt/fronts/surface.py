@@ -44,7 +44,7 @@ def fill_surface(executor: Executor, solver: FrontSolver, front: Front, points: 
     ends = solver.ends
     low, high = ([f(column) for column in zip(*(p.objectives for p in ends), strict=True)] for f in (min, max))
     side, count, interrupted = min(points, MAX_SIDE), 0, False
-    solved: dict[tuple[int, int], Solution | None] = {(side, side): ends[0].solution}  # the loosest limits cut nothing
+    solved: dict[tuple[int, int], Solution | None] = {(side, side): ends[0].solution}  # the loosest limits are inactive
     failed: dict[int, str] = {}
     try:
         for diagonal in range(2 * side - 1, 1, -1):

@@ -382,27 +382,27 @@ def _contract(graph: Formula, x: Array, most: float) -> tuple[Array, Truth]:
 
     Evaluates the steps forward, then bounds each operand from the result and the other operand (Benhamou et al. 1999).
     """
-    found, narrow = _evaluate_ranges(graph, x), x.copy()
+    found, narrowed = _evaluate_ranges(graph, x), x.copy()
     possible = np.ones(x.shape[-1], dtype=bool)
 
-    def meet(k: int, own: Array) -> None:
+    def narrow_step(k: int, own: Array) -> None:
         found[k] = _intersect(found[k], own)
         np.logical_and(possible, found[k][0] <= found[k][1], out=possible)
 
     for o in graph.outputs:
-        meet(o, np.array([[0.0], [most]]))
+        narrow_step(o, np.array([[0.0], [most]]))
     for k, (op, operands, value) in reversed([*enumerate(graph.steps)]):
         if op == INPUT:
-            narrow[:, graph.names.index(value)] = found[k]
+            narrowed[:, graph.names.index(value)] = found[k]
         elif op != CONSTANT:
             each = _OPERATIONS[op].back(found[k], *(found[o] for o in operands))
             for o, part in zip(operands, each, strict=True):
-                meet(o, part)
-    return narrow, possible
+                narrow_step(o, part)
+    return narrowed, possible
 
 
 def outer_doubles(number: Any) -> tuple[float, float]:
-    """The doubles next below and above a number; the same double twice if the number is one."""
+    """Doubles below and above a number; the same double twice if the number is a double."""
     exact = flint.arb(number)
     if exact.is_finite() and exact.is_exact() and flint.arb(float(exact)) == exact:
         return float(exact), float(exact)

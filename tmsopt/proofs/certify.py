@@ -184,7 +184,7 @@ def _interval_bound(design: Solution) -> Bound:
         return Bound()
     build = Builder(problem, _cases(design))
     build.optimise()
-    lower, upper = build.over([build.objective])[0]  # of the negative, where it is maximised
+    lower, upper = build.over([build.objective])[0]  # of the negative objective if it is maximised
     sense = problem.sign
     gap = max(sense * design.value - lower, 0.0)
     return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()

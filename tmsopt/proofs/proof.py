@@ -308,7 +308,7 @@ def _assemble(
     }
     abscissa = found.factorisation.abscissa
     real = problem.model.carrier is None
-    hidden = () if real or pattern is None else pattern.unknowns  # of the double with its carrier
+    hidden = () if real or pattern is None else pattern.unknowns  # those of the real double
     hidden = (*hidden, *(f"{pattern.name}.{n}" for n in hidden)) if pattern else ()
     roots = user_roots(problem.model, found.factorisation.roots or ())
     geometric, defective = eigenvector_verdict(problem, design, found)
