@@ -351,7 +351,7 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
 
     path = tmp_path / "box.toml"
     path.write_text(UNSTABLE)
-    monkeypatch.setattr(import_module("tmsopt.global_search.stability"), "any_stable", asked)
+    monkeypatch.setattr(import_module("tmsopt.global_search.stability"), "find_stable_design", asked)
     monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setattr(sys, "stdout", io.StringIO())
     with pytest.raises(SystemExit) as stop:

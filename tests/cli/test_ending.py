@@ -234,14 +234,14 @@ def test_an_answer_in_hand_is_written_as_a_whole(run, monkeypatch):
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), TERM])
 def test_proofs_leave_what_is_proved(run, monkeypatch, number, status):
     """Of all designs; branch and prune is at its first box."""
-    module = import_module("tmsopt.global_search.complete")
+    module = import_module("tmsopt.global_search.completeness")
     monkeypatch.setattr(module, "prune", lambda *_: (press(number), time.sleep(LONG)))
     ended, out, _ = run("solve", "problems/ep4_matching.toml", "--all", "--json")
     assert (ended, json.loads(out)["completeness"]["complete"]) == (status, False)
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
-@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify doubt"])
+@pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify find_exclusion"])
 def test_a_proof_that_is_stopped_leaves_the_design(run, monkeypatch, where, tmp_path):
     """While SCIP is at work, and while a question to it is made."""
     module, _, name = where.partition(" ")
@@ -291,7 +291,7 @@ def test_what_a_global_solver_raises_is_heard(run, monkeypatch, tmp_path):
         assert str(failed.exception()) == "must be real number, not types.SimpleNamespace"
     finally:
         process.end()
-    monkeypatch.setattr(race.SolverPool, "race", lambda *_: race._decisions([failed]))
+    monkeypatch.setattr(race.SolverPool, "race", lambda *_: race._collect_decisions([failed]))
     status, out, _ = run("solve", box(tmp_path), "--certify")
     assert status == 0
     assert "note: SCIP failed: TypeError: must be real number" in " ".join(out.split())

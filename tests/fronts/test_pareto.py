@@ -208,7 +208,7 @@ def test_objectives_without_conflict_give_one_point():
     found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "3*chi_B - 1"]))
     assert len(found) == 1
     assert found.points[0].objectives == pytest.approx((0, -1), abs=1e-8)
-    assert "not in conflict" in found.notes[0]
+    assert "do not conflict" in found.notes[0]
 
 
 def test_a_front_over_a_pattern_is_the_ep_set():
@@ -251,8 +251,8 @@ def sides(forward, backward):
 )
 def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
     end = front_data.FrontPoint(end, None, ())
-    ask = subproblems.FrontSolver(problem(free=TILTED).posed, options.Options(), ends=(end,), easier={0: halves})
-    assert ask._hopeless(subproblems.subproblem(ask, k, limits), ()) == out
+    ask = subproblems.FrontSolver(problem(free=TILTED).posed, options.Options(), ends=(end,), single_optima={0: halves})
+    assert ask._worse_sides(subproblems.build_subproblem(ask, k, limits), ()) == out
 
 
 def test_a_half_that_is_left_out_is_not_searched():
@@ -297,7 +297,7 @@ def test_three_objectives_on_a_sphere():
 def test_a_rounded_tie_does_not_decide_the_order_of_a_front():
     values = [(1 + 1e-13, 1.0, 3.0), (1.0, 2.0, 2.0), (1 - 1e-13, 3.0, 1.0)]
     points = [front_data.FrontPoint(each, None, ()) for each in values]
-    assert [p.objectives for p in front_data.efficient(points, [1e-12] * 3)] == values
+    assert [p.objectives for p in front_data.efficient_points(points, [1e-12] * 3)] == values
 
 
 FLAT = {

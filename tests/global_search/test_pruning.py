@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tmsopt.algebra import NODES, fold
-from tmsopt.global_search import Puzzle, prune
+from tmsopt.global_search import BoxConditions, prune
 
 pruning = import_module("tmsopt.global_search.pruning")
 formula, make_node, symbol = (
@@ -41,15 +41,18 @@ def drawn(rng, depth):
 def pruned(equations, box, least=1e-7, turns=60, limits=nothing):
     """Arrays that hold what is left of a box."""
     names = equations.names
-    equations = pruning.prepared(equations)
-    puzzle = Puzzle(
-        equations, pruning.prepared(formula(limits or [], names)), tuple(hi - lo for lo, hi in box), formula([], names)
+    equations = pruning.prepare_formula(equations)
+    conditions = BoxConditions(
+        equations,
+        pruning.prepare_formula(formula(limits or [], names)),
+        tuple(hi - lo for lo, hi in box),
+        formula([], names),
     )
     waiting, kept = np.array(box).T[..., None], []
     for _ in range(turns):
-        found = prune(puzzle, waiting[..., -512:], least)
-        kept += [found.shown[1], found.small]
-        waiting = np.concatenate([waiting[..., :-512], found.left], axis=-1)
+        found = prune(conditions, waiting[..., -512:], least)
+        kept += [found.proved[1], found.small]
+        waiting = np.concatenate([waiting[..., :-512], found.remaining_factors], axis=-1)
     return np.concatenate([*kept, waiting], axis=-1)
 
 
@@ -95,10 +98,10 @@ def test_no_operation_loses_a_point_or_a_slope(name):
     else:
         asked, function = formula([make_node(name, x)], ("x", "y")), lambda a, _: FUNCTIONS[name](a)
     ends = np.sort(rng.choice([-2.0, -0.7, 0.0, 0.3, 0.9, 2.5], (2, 2, 400)), axis=0)
-    asked = pruning.prepared(asked)
+    asked = pruning.prepare_formula(asked)
     with np.errstate(all="ignore"):
-        low, high = pruning._forward(asked, ends)[asked.outputs[0]]
-        slopes = pruning._slopes(asked, ends)[:, 0]
+        low, high = pruning._evaluate_ranges(asked, ends)[asked.outputs[0]]
+        slopes = pruning._evaluate_slopes(asked, ends)[:, 0]
     for share in (0.0, 0.25, 1.0):
         points = np.minimum(ends[0] + share * (ends[1] - ends[0]), ends[1])
         for k, (a, b) in enumerate(points.T.tolist()):
@@ -117,7 +120,7 @@ def test_no_operation_loses_a_point_or_a_slope(name):
             box = tuple(zip(*ends[:, :, k].tolist(), strict=True))
             level = formula([fold_minus(asked, value), y - Fraction(b)], ("x", "y"))
             with np.errstate(all="ignore"):
-                own, kept = pruning._narrowed(pruning.prepared(level), ends[..., k : k + 1], 0.0)
+                own, kept = pruning._contract(pruning.prepare_formula(level), ends[..., k : k + 1], 0.0)
             assert kept[0], (box, a, b)
             assert np.all((own[0, :, 0] <= [a + 1e-9, b + 1e-9]) & (own[1, :, 0] >= [a - 1e-9, b - 1e-9]))
 

@@ -9,7 +9,7 @@ import pytest
 import tmsopt
 from tmsopt.models import from_coefficients
 
-none_stable = import_module("tmsopt.global_search.signs").none_stable
+none_stable = import_module("tmsopt.global_search.signs").has_no_stable_design
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 GRID = 33

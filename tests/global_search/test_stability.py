@@ -8,7 +8,7 @@ import casadi as ca
 import pytest
 
 from tmsopt import Problem
-from tmsopt.global_search import INFEASIBLE, SCIP, Decision, SolverPool, Stability, any_stable
+from tmsopt.global_search import INFEASIBLE, SCIP, Decision, SolverPool, Stability, find_stable_design
 from tmsopt.models import from_coefficients
 
 asking = import_module("tmsopt.global_search.stability")
@@ -41,9 +41,11 @@ def problem(coefficients, free, **asked):
 @pytest.mark.slow
 def test_boxes_without_a_stable_design(coefficients, free, asked):
     stated = problem(coefficients, free, **asked)
-    assert any_stable(stated.posed, SECONDS).any is False
+    assert find_stable_design(stated.posed, SECONDS).any is False
     assert (
-        any_stable(stated.posed, SECONDS, known=stated.posed.ordered({n: hi for n, (_, hi) in free.items()})).any
+        find_stable_design(
+            stated.posed, SECONDS, known=stated.posed.ordered({n: hi for n, (_, hi) in free.items()})
+        ).any
         is False
     )
 
@@ -52,7 +54,7 @@ def test_boxes_without_a_stable_design(coefficients, free, asked):
 @pytest.mark.parametrize("most", [3.0, 2.001])
 def test_a_stable_design_is_found(most):
     """Be it one in a thousand."""
-    found = any_stable(problem(DAMPED, {"x": (0, most)}).posed, SECONDS)
+    found = find_stable_design(problem(DAMPED, {"x": (0, most)}).posed, SECONDS)
     assert found.any is True
     assert found.design is not None
     assert 2 < found.design["x"] <= most
@@ -60,7 +62,7 @@ def test_a_stable_design_is_found(most):
 
 @scip
 def test_limits_hold_for_what_is_found():
-    found = any_stable(
+    found = find_stable_design(
         problem(DAMPED, {"x": (0, 9)}, constraints={"most": "x**2 <= 5", "rest": "abscissa >= 1"}).posed, SECONDS
     )
     assert found.any is True
@@ -80,7 +82,7 @@ def test_limits_hold_for_what_is_found():
 def test_of_designs_on_the_axis_nothing_is_said(coefficients, most):
     """What is refuted is that roots may lie left of the axis or on it, and here they may."""
     began = time.perf_counter()
-    assert any_stable(problem(coefficients, {"x": (0, most)}).posed, 60.0).any is None
+    assert find_stable_design(problem(coefficients, {"x": (0, most)}).posed, 60.0).any is None
     assert time.perf_counter() - began < 10  # and no time is spent on it
 
 
@@ -89,7 +91,7 @@ def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch):
     monkeypatch.setattr(
         SolverPool, "race", lambda self, tasks, tick=None: [Decision(INFEASIBLE, bound=1.0) for _ in tasks]
     )
-    assert any_stable(problem(DAMPED, {"x": (0, 3)}).posed, SECONDS, known={"x": 1.0}) == Stability()
+    assert find_stable_design(problem(DAMPED, {"x": (0, 3)}).posed, SECONDS, known={"x": 1.0}) == Stability()
 
 
 @scip
@@ -98,20 +100,20 @@ def test_an_interrupt_goes_on(when, monkeypatch):
     """While the question is asked, or while its answer is looked at: the tasks within limits do that."""
 
     def stop(self, tasks, tick=None):
-        if when == "asked" or tasks[0].within:
+        if when == "asked" or tasks[0].box:
             raise KeyboardInterrupt
         return [Decision(INFEASIBLE)]
 
-    monkeypatch.setattr(asking, "none_stable", lambda problem: False)
+    monkeypatch.setattr(asking, "has_no_stable_design", lambda problem: False)
     monkeypatch.setattr(SolverPool, "race", stop)
     with pytest.raises(KeyboardInterrupt):
-        any_stable(problem(DAMPED, {"x": (0, 1)}).posed, SECONDS, known={"x": 1.0})
+        find_stable_design(problem(DAMPED, {"x": (0, 1)}).posed, SECONDS, known={"x": 1.0})
 
 
 @scip
 def test_what_scip_cannot_take_is_left_undecided():
     assert (
-        any_stable(problem(DAMPED, {"x": (0, 3)}, constraints={"huge": "exp(60*x) >= 1e10"}).posed, SECONDS)
+        find_stable_design(problem(DAMPED, {"x": (0, 3)}, constraints={"huge": "exp(60*x) >= 1e10"}).posed, SECONDS)
         == Stability()
     )
 
@@ -119,5 +121,5 @@ def test_what_scip_cannot_take_is_left_undecided():
 def test_without_a_global_solver_nothing_is_asked(monkeypatch):
     monkeypatch.setattr(asking, "SOLVER", replace(SCIP, module="no_such_module"))
     monkeypatch.setattr(asking, "SolverPool", None)
-    monkeypatch.setattr(asking, "none_stable", lambda problem: False)
-    assert any_stable(problem(DAMPED, {"x": (0, 1)}), SECONDS) == Stability()
+    monkeypatch.setattr(asking, "has_no_stable_design", lambda problem: False)
+    assert find_stable_design(problem(DAMPED, {"x": (0, 1)}), SECONDS) == Stability()

@@ -186,12 +186,12 @@ def test_intervals_of_branch_and_prune_hold_the_ball(name, of, count):
     for k, output in enumerate(own.outputs):
         part = own.extract([output])
         try:
-            part = pruning.prepared(part)
+            part = pruning.prepare_formula(part)
         except UnsupportedOperation:
             assert k not in needed
             continue
         with np.errstate(all="ignore"):
-            found = pruning._forward(part, np.stack([points - 1e-12, points + 1e-12]))[part.outputs[0]]
+            found = pruning._evaluate_ranges(part, np.stack([points - 1e-12, points + 1e-12]))[part.outputs[0]]
         low, high = np.broadcast_to(found, (2, count))
         known = [j for j in range(count) if np.isfinite([low[j], high[j]]).all()]
         assert known or k not in needed

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from tmsopt.algebra import EVERYTHING, UnsupportedOperation, ball, bound_roots, from_casadi, interval, ranges
-from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
+from tmsopt.global_search import (
+    FOUND,
+    INFEASIBLE,
+    SCIP,
+    frequency_count,
+    interlacing_conditions,
+    make_task,
+    squared_frequencies,
+)
 from tmsopt.problem import parse_value
 from tmsopt.program import NLP
 from tmsopt.roots import product
@@ -65,7 +73,7 @@ def as_ball(x):
 def holds(c, squares):
     """Whether the conditions hold. A number of such small heights that is not 0 is far larger than a ball of 600 bits."""
     balls = [as_ball(x) for x in c]
-    equations, nonnegative = interlacing(balls, [(x, 1) for x in map(as_ball, squares)])
+    equations, nonnegative = interlacing_conditions(balls, [(x, 1) for x in map(as_ball, squares)])
     return all(flint.arb(e).contains(0) for e in equations) and not any(flint.arb(e) < 0 for e in nonnegative)
 
 
@@ -90,9 +98,9 @@ def test_squares_interlace_exactly_if_no_root_is_to_the_right(degree, rightmost)
 def test_all_roots_on_the_axis(pairs, zeros):
     """p(iω) has no second part then; the squares are any that its first part leaves room for: the pairs themselves."""
     c = product(*([Fraction(1), Fraction(0), Fraction(x)] for x in pairs), *[[Fraction(1), Fraction(0)]] * zeros)
-    squares = pairs[: unknowns(len(c) - 1)]
+    squares = pairs[: frequency_count(len(c) - 1)]
     assert holds(c, squares)
-    found = squares_of([float(x) for x in c])  # a triple root scatters by 6e-6, the cube root of a rounding
+    found = squared_frequencies([float(x) for x in c])  # a triple root scatters by 6e-6, the cube root of a rounding
     assert holds(c, [Fraction(x).limit_denominator(1000) for x in found])
 
 
@@ -100,7 +108,7 @@ def test_all_roots_on_the_axis(pairs, zeros):
 def test_even_polynomials_with_roots_to_the_right(c):
     """Whatever the squares: s⁴ + s² + 1, (s² − 1)(s² − 4) and (s² + 4)(s² − 1) have a root to the right."""
     fractions = [Fraction(x) for x in c]
-    count = unknowns(len(c) - 1)
+    count = frequency_count(len(c) - 1)
     grid = [Fraction(k, 7) for k in range(60)]
     tried = [(x, *([x / 3] * (count - 1))) for x in grid]
     assert not any(holds(fractions, squares) for squares in tried)
@@ -122,9 +130,9 @@ def test_squares_are_found_for_known_coefficients(degree):
     rng = np.random.default_rng(degree)
     for _ in range(30):
         c = [float(x) for x in product(*drawn_factors(rng, degree, 0))]
-        squares = squares_of(c)
-        assert len(squares) == unknowns(degree)
-        equations, nonnegative = interlacing(c, [(x, 1.0) for x in squares])
+        squares = squared_frequencies(c)
+        assert len(squares) == frequency_count(degree)
+        equations, nonnegative = interlacing_conditions(c, [(x, 1.0) for x in squares])
         size = max(c) * (1 + max(squares, default=0.0)) ** (degree // 2)
         assert max([*map(abs, equations), *(-e for e in nonnegative)]) <= 1e-7 * size
 
@@ -261,7 +269,7 @@ def test_every_operation_is_what_it_is(text):
     at, _ = ONE_OF_EACH[text]
     value = float(parse_value(text, ("x",))({"x": at}))
     for sign in (1.0, -1.0):
-        decision = SCIP.decide(task(least(text, (at, at), sign), 5.0, least=True))
+        decision = SCIP.decide(make_task(least(text, (at, at), sign), 5.0, minimise=True))
         assert decision.verdict == FOUND
         assert decision.bound == pytest.approx(sign * value, abs=3e-6 * (1 + abs(value)))
         assert decision.bound <= sign * value
@@ -276,7 +284,7 @@ def test_no_value_is_below_the_bound(text):
     values = parse_value(text, ("x",))({"x": np.linspace(*ends, 30001)})
     for sign in (1.0, -1.0):
         lowest = float((sign * values).min())
-        decision = SCIP.decide(task(least(text, ends, sign), 5.0, least=True))
+        decision = SCIP.decide(make_task(least(text, ends, sign), 5.0, minimise=True))
         assert decision.verdict == FOUND
         assert lowest - 1e-5 * (1 + abs(lowest)) <= decision.bound <= lowest
 
@@ -307,7 +315,7 @@ def constrained(texts, ends, most=0.0):
     ],
 )
 def test_possible_and_impossible(texts, possible):
-    decision = SCIP.decide(task(constrained(texts, [(-2, 2), (0.5, 2)]), 5.0))
+    decision = SCIP.decide(make_task(constrained(texts, [(-2, 2), (0.5, 2)]), 5.0))
     assert decision.verdict == (FOUND if possible else INFEASIBLE)
     if possible:
         x, y = decision.point if decision.point is not None else (math.nan, math.nan)
@@ -326,7 +334,8 @@ def test_hardly_any_room_is_room(text, width):
     value = float(parse_value(text, ("x", "y"))(centre))
     ends = [(v - width, v + width) for v in centre.values()]
     assert (
-        SCIP.decide(task(constrained([f"{text} - ({value!r})", f"{value!r} - ({text})"], ends), 5.0)).verdict == FOUND
+        SCIP.decide(make_task(constrained([f"{text} - ({value!r})", f"{value!r} - ({text})"], ends), 5.0)).verdict
+        == FOUND
     )
 
 
@@ -356,7 +365,7 @@ def test_what_is_possible_is_never_called_impossible(seed):
     for value in (known.min(), known.max(), known[0]) if len(known) else ():
         slack = 1e-8 * (1 + abs(value))
         rows = [f"{text} - ({float(value + slack)!r})", f"({float(value - slack)!r}) - ({text})"]
-        assert SCIP.decide(task(constrained(rows, [(-1.0, 1.5), (0.25, 2.0)]), 0.5)).verdict != INFEASIBLE, (
+        assert SCIP.decide(make_task(constrained(rows, [(-1.0, 1.5), (0.25, 2.0)]), 0.5)).verdict != INFEASIBLE, (
             text,
             value,
         )
@@ -368,7 +377,7 @@ def test_a_row_without_variables():
         x = ca.SX.sym("x", 2)
         f = ca.Function("f", [x], [ca.SX(0), ca.vertcat(ca.SX(value))])
         nlp = nlp_of(("x", "y"), f, (0.0, 0.0), (1.0, 1.0), ("row",), (-math.inf,), (0.0,))
-        assert SCIP.decide(task(nlp, 5.0)).verdict == verdict
+        assert SCIP.decide(make_task(nlp, 5.0)).verdict == verdict
 
 
 @scip
@@ -376,4 +385,4 @@ def test_an_operation_that_scip_lacks_is_named():
     x = ca.SX.sym("x")
     f = ca.Function("f", [x], [ca.floor(x), ca.SX(0, 1)])
     with pytest.raises(UnsupportedOperation, match="floor"):
-        SCIP.decide(task(nlp_of(("x",), f, (0.0,), (1.0,), (), (), ()), 1.0))
+        SCIP.decide(make_task(nlp_of(("x",), f, (0.0,), (1.0,), (), (), ()), 1.0))

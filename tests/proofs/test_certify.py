@@ -240,7 +240,7 @@ def test_json(slow_plane, bounded_plane):
 
 def unclaimed(design, names):
     """Whether nothing is claimed, and the reason told."""
-    said = [note for note in design.notes if note.startswith("no bound: the question excludes the design")]
+    said = [note for note in design.notes if note.startswith("no bound: ") and "excludes" in note]
     assert len(said) == 1
     assert names in said[0]
     return not design.bound.proven and not design.bound.tolerance
@@ -254,26 +254,26 @@ def test_a_bound_on_the_roots_that_is_too_small(slowest, monkeypatch):
 
 def test_a_wrong_equation(slowest, monkeypatch):
     """c3 + x c1 = 0 for c3 − x c1 = 0: no x for positive coefficients."""
-    right = interlaces.interlacing
+    right = interlaces.interlacing_conditions
 
     def wrong(coefficients, squares):
         ((x, y),) = squares
         return [coefficients[3] * y + x * coefficients[1]], right(coefficients, squares)[1]
 
-    monkeypatch.setattr(interlaces, "interlacing", wrong)
+    monkeypatch.setattr(interlaces, "interlacing_conditions", wrong)
     assert unclaimed(certify(slowest, seconds=SECONDS), "abscissa")
 
 
 @pytest.mark.parametrize("which", [0, 1, 2, 3])
 def test_a_wrong_sign(slowest, monkeypatch, which):
     """Of one coefficient of p(t − 0.2)."""
-    right = interlaces.interlacing
+    right = interlaces.interlacing_conditions
 
     def wrong(coefficients, squares):
         equations, nonnegative = right(coefficients, squares)
         return equations, [-e if k == which else e for k, e in enumerate(nonnegative)]
 
-    monkeypatch.setattr(interlaces, "interlacing", wrong)
+    monkeypatch.setattr(interlaces, "interlacing_conditions", wrong)
     assert unclaimed(certify(slowest, seconds=SECONDS), "abscissa")
 
 
@@ -499,8 +499,8 @@ def test_progress_is_told(slow_plane):
 
 def test_a_crew_is_closed_whatever_happens(children):
     def fail():
-        with SolverPool(SCIP) as crew:
-            crew.ahead(2)
+        with SolverPool(SCIP) as pool:
+            pool.start_processes(2)
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
@@ -524,9 +524,7 @@ def test_that_branch_and_bound_cannot_take_a_radius_is_said():
         load("problems/tolerant.toml"), maximize=None, minimize="Fr", constraints={"near": "radius >= 0.05"}
     )
     design = certify(asked, seconds=5)
-    assert [note for note in design.notes if "radius" in note] == [
-        "branch and bound cannot take radius, which has a search of its own"
-    ]
+    assert any("branch and bound" in note and "radius" in note for note in design.notes)
     assert not design.bound.proven
 
 

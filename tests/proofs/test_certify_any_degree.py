@@ -14,13 +14,13 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.evaluation import omega0_bound, relation_bound
-from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, Question, task
+from tmsopt.global_search import FOUND, INFEASIBLE, SCIP, Question, make_task
 from tmsopt.models import from_coefficients, from_matrices
 from tmsopt.proofs import prove_design
 from tmsopt.roots import Root, product, roots
 from tmsopt.roots.patterns import find_patterns, has_pattern
 
-factored = import_module("tmsopt.proofs.factored")
+factored = import_module("tmsopt.proofs.factorisation")
 
 scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
@@ -179,7 +179,7 @@ def test_more_parameters_than_have_corners():
 
 def verdict(problem, limit):
     question = Question(problem.posed, limit=limit)
-    return {SCIP.decide(task(question.program(sign), 20.0)).verdict for sign in question.signs()}
+    return {SCIP.decide(make_task(question.program(sign), 20.0)).verdict for sign in question.possible_signs()}
 
 
 @scip
@@ -244,7 +244,7 @@ def test_patterns_are_excluded_or_found_in_any_unit(most, told):
     problem = tmsopt.Problem(
         model, free={"a": (1.0, most), "b": (0.0, 20.0), "c": (0.0, 20.0), "d": (0.0, 20.0)}, locate="EP5"
     )
-    assert {SCIP.decide(task(Question(problem.posed, unit=128.0).program(1), 20.0)).verdict} == {told}
+    assert {SCIP.decide(make_task(Question(problem.posed, unit=128.0).program(1), 20.0)).verdict} == {told}
 
 
 @pytest.mark.slow

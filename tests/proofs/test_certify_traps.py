@@ -7,7 +7,16 @@ import pytest
 
 from tmsopt import Problem, certify, solve
 from tmsopt.algebra import INTERVALS, UnsupportedOperation, ball, interval
-from tmsopt.global_search import INFEASIBLE, SCIP, Decision, Question, SolverPool, interlace, squares_of, task
+from tmsopt.global_search import (
+    INFEASIBLE,
+    SCIP,
+    Decision,
+    Question,
+    SolverPool,
+    add_interlacing,
+    make_task,
+    squared_frequencies,
+)
 from tmsopt.models import tms
 
 pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
@@ -24,7 +33,7 @@ def question(free, *constraints, base=None, **asked):
 
 
 def verdicts(asked):
-    return {SCIP.decide(task(asked.program(sign), 5.0)).verdict for sign in asked.signs()}
+    return {SCIP.decide(make_task(asked.program(sign), 5.0)).verdict for sign in asked.possible_signs()}
 
 
 @pytest.mark.parametrize(("lower", "upper"), [(-1.5, 0.2), (-0.2, 1.5), (-1.0, 1.0), (0.0, 2.0), (-3.0, -1.0)])
@@ -96,8 +105,8 @@ def test_squared_frequencies_of_equal_roots_are_within_their_range(degree):
         def row(self, *_): ...
 
     coefficients = [float(math.comb(degree, k)) for k in range(degree + 1)]
-    interlace(Rows(), 0, coefficients, 1.0, False)
-    assert all(most >= max(squares_of(coefficients)) * (1 - 1e-12) for most in upper)
+    add_interlacing(Rows(), 0, coefficients, 1.0, False)
+    assert all(most >= max(squared_frequencies(coefficients)) * (1 - 1e-12) for most in upper)
 
 
 def test_a_search_that_finds_nothing_anywhere_is_not_believed(monkeypatch):

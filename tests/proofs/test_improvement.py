@@ -85,7 +85,7 @@ def test_what_is_better_only_beyond_a_limit_is_no_alarm(off, monkeypatch):
 
     def race(self, tasks, tick=None):
         beyond = Decision(FOUND, point=np.array([1 - off]))
-        return [Decision(UNDECIDED) if task.within else beyond for task in tasks]
+        return [Decision(UNDECIDED) if task.box else beyond for task in tasks]
 
     monkeypatch.setattr(SolverPool, "race", race)
     found = tmsopt.solve(problem(minimize="1 + 1000*(x - 1)", constraints={"least": "x >= 1"}))

@@ -21,10 +21,10 @@ from tmsopt.cli import every as main
 from tmsopt.documents import list_numbers
 from tmsopt.models import decimal
 from tmsopt.problem import Case
-from tmsopt.proofs import Factored, Proof, prove_design
+from tmsopt.proofs import Factorisation, Proof, prove_design
 from tmsopt.roots import exact_roots, product
 
-factored = import_module("tmsopt.proofs.factored")
+factored = import_module("tmsopt.proofs.factorisation")
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -533,10 +533,10 @@ def test_stability_and_heavy_damping_of_random_polynomials():
         stable = all(z.re < 0 for z in truth)
         heavy = stable and all(z.im == 0 for z in truth)
         with flint.ctx.workdps(60):
-            exact = factored.factored([flint.fmpq(c.numerator, c.denominator) for c in a])
+            exact = factored.factor_polynomial([flint.fmpq(c.numerator, c.denominator) for c in a])
             assert (exact.stable, exact.heavily_damped) == (stable, heavy)
             if all(z.multiplicity == 1 for z in truth):
-                balls = Factored((([flint.arb(flint.fmpq(c.numerator, c.denominator)) for c in a], 1),))
+                balls = Factorisation((([flint.arb(flint.fmpq(c.numerator, c.denominator)) for c in a], 1),))
                 assert balls.stable in ((stable,) if all(z.re != 0 for z in truth) else (False, None))
                 assert balls.heavily_damped in (heavy, None)
         seen.add((stable, heavy, any(z.multiplicity > 1 for z in truth)))
@@ -545,10 +545,10 @@ def test_stability_and_heavy_damping_of_random_polynomials():
 
 def test_signs_that_cannot_be_told_are_not():
     wide = flint.arb(0, 1e-10)
-    assert Factored((([flint.arb(1), flint.arb(2), wide], 1),)).stable is None
-    assert Factored((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).heavily_damped is None
-    assert Factored((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).stable is True
-    top = Factored((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).abscissa
+    assert Factorisation((([flint.arb(1), flint.arb(2), wide], 1),)).stable is None
+    assert Factorisation((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).heavily_damped is None
+    assert Factorisation((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).stable is True
+    top = Factorisation((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).abscissa
     assert top.contains(-1)
     assert top.rad() < 2e-5
 

@@ -201,7 +201,7 @@ locate = "CEP2"
     assert data["coverage"] is None
     text = CliRunner().invoke(main, ["solve", str(file), "--all", "--seconds", "0.001"]).output
     assert "locate CEP2: 2 solutions in the box" in text
-    assert "proof that these are all: none, time was over" in text
+    assert "proof that these are all: none, time limit reached" in text
     assert "undecided: c1 -2 … 2, c2 -2 … 2" in text
     assert "95 % confidence; no proof" in text
     data = json.loads(CliRunner().invoke(main, ["solve", str(file), "--all", "--json", "--seconds", "0.001"]).stdout)

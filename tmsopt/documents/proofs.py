@@ -29,7 +29,7 @@ from tmsopt.problem import unit_at
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.verdict.stability import CROSSING
-from tmsopt.proofs.facts import NOTHING, Verdict
+from tmsopt.proofs.facts import NOT_CHECKED, Verdict
 from tmsopt.proofs.proof import Proof
 from tmsopt.search.all_designs import Coverage, Every
 
@@ -143,7 +143,7 @@ def _describe_method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
 
 def _write_facts(proof: Proof) -> Iterator[Sentence]:
     of = " (of the design as stored)" if proof.stored and proof.reason else ""
-    asked = "EP" in proof.pattern and proof.defective != NOTHING
+    asked = "EP" in proof.pattern and proof.defective != NOT_CHECKED
     if asked or proof.geometric_multiplicity is not None:
         yield _write_verdict(f"defective{of}", proof.defective)
     yield _write_verdict(f"stable{of}", proof.stable)

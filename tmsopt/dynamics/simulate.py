@@ -226,7 +226,9 @@ def _choose_duration(
         InputError: if the motion would overflow.
     """
     if not structure.roots:
-        raise input_error("the roots of this design are not known: one of them is at infinity, or nearly so", "parameters")
+        raise input_error(
+            "the roots of this design are not known: one of them is at infinity, or nearly so", "parameters"
+        )
     z = rate * np.array([complex(r.re, r.im) for r in structure.roots])
     abscissa, fastest, largest = map(float, (z.real.max(), np.abs(z.imag).max(), np.abs(z).max()))
     if seconds is not None and seconds * abscissa > _LARGEST:

@@ -1,6 +1,6 @@
 """Pareto: fronts of two or three objectives.
 
-In: a problem with `pareto`. Out: a `Front` of designs none of which beats another. Open `pareto` first.
+In: a problem with `pareto`. Out: a `Front` of designs, none of which dominates another. Open `pareto` first.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""The front of two objectives: limits set one after the other where it is known least."""
+"""The front of two objectives, from limits set where neighbouring points are farthest apart."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from itertools import accumulate, islice, pairwise
 
 from tmsopt.executor import Executor
-from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
-from tmsopt.fronts.subproblems import FrontSolver, least, point
-from tmsopt.fronts.team import AT_ONCE, each
+from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient_points
+from tmsopt.fronts.parallel import MAX_PARALLEL, map_items
+from tmsopt.fronts.subproblems import FrontSolver, front_point, minimise_limited
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps
 from tmsopt.search.solve import add_cover
@@ -16,58 +16,58 @@ from tmsopt.search.solve import add_cover
 Objectives = tuple[float, ...]
 
 _SAME = 1e-9  # of the range: rounding of polished optima
-_UNUSED = 1e-6  # of the range: an eps whose limit the best design does not use
-_GAP = 1e-3  # of the range: how closely the far end of a gap is known
-_WIDE = 5e-3  # of the ranges: less is no gap but what is left of one, or rounding on a flat stretch
-_FAILED = 0.05  # the same where sub-problems are not solved, for each is tried from many starts
-_KINK = 2e-4  # of the ranges: how closely a kink is known
-_END = 1e-3  # a change this close to an end is the end's own: beside EP4 the structure is within rounding
-_ROUNDS = 3  # of sweeps that carry a better branch along the front
-_NEAR = 0.02  # of the box: designs this close to one another are taken to lie on the same branch
-_MOST = 8  # sub-problems per point asked for, at most
+_UNUSED = 1e-6  # of the range: an eps this far above the optimum is an inactive limit
+_GAP = 1e-3  # of the range: tolerance of the far end of a gap
+_WIDE = 5e-3  # of the ranges: narrower gaps are remains of others, or rounding on a flat stretch
+_FAILED = 0.05  # of the range: tolerance of a gap where sub-problems fail, since each takes many starts
+_KINK = 2e-4  # of the ranges: tolerance of a kink
+_END = 1e-3  # of the ranges: a kink closer to an end is ignored; next to EP4 the structure is within rounding
+_ROUNDS = 3  # sweeps that carry a better branch along the front
+_NEAR = 0.02  # of the box: designs this close count as one branch
+_MOST_PROBES = 8  # sub-problems per point
 _ROOM = 1.5  # of the mean spacing: a longer stretch has room for a point
 _CLOSE = 0.3  # of the mean spacing: unlabelled points closer than this to another are left out
 
 
-def curve(team: Executor, ask: FrontSolver, front: Front, points: int, progress: Steps) -> Front:
-    """The front between the two ends that `ask` has, with kinks and gaps; nothing else is known of it yet.
+def fill_curve(executor: Executor, solver: FrontSolver, front: Front, points: int, progress: Steps) -> Front:
+    """Fill in the front between its two ends, with kinks and gaps.
 
-    Each new limit is set where neighbours are farthest apart, on the objective that changes more there; sweeps both
-    ways then carry a better branch along the front.
+    Each new limit lies where neighbours are farthest apart, on the objective that changes more there. Sweeps in both
+    directions then carry a better branch along the front.
     """
-    search, interrupted = _Search(team, ask, points, progress), False
+    search, interrupted = _Search(executor, solver, points, progress), False
     try:
         for _ in range(_ROUNDS):
-            search.fill()
+            search.add_points()
             if not search.sweep():
                 break
-        while search.settle():
+        while search.refine_kinks_and_gaps():
             search.sweep()
     except KeyboardInterrupt:
         interrupted = True
-    return replace(_thinned(search, front), interrupted=interrupted)
+    return replace(_assemble_front(search, front), interrupted=interrupted)
 
 
 @dataclass(frozen=True)
 class _Probe:
-    """A solved sub-problem: objective `axis` ≤ eps, the other minimised; None where no optimum was found."""
+    """A solved sub-problem: objective `axis` ≤ eps, the other minimised; `point` is None without an optimum."""
 
     axis: int
     eps: float
-    found: FrontPoint | None
+    point: FrontPoint | None
 
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Two neighbours on the front, the left one better in objective 0.
+    """Two neighbours on the front; the left one is better in objective 0.
 
     Attributes:
-        size: difference of each objective, in ranges.
+        size: difference of each objective, relative to its range.
         axis: the objective to limit between them.
-        unknown: values of that limit about which no probe says anything.
-        suspect: whether a probe between the two led to no point between them.
+        unknown: range of that limit not yet probed.
+        suspect: whether a probe between the two found no point between them.
         failed: whether such a probe failed.
-        gap: whether no more probes are worth it.
+        gap: whether the stretch needs no more probes.
     """
 
     left: FrontPoint
@@ -84,42 +84,42 @@ class _Stretch:
         return math.hypot(*self.size)
 
     @property
-    def changes(self) -> bool:
+    def has_kink(self) -> bool:
         known = "undecided" not in (self.left.structure, self.right.structure)
         return known and (self.left.structure, set(self.left.limits)) != (self.right.structure, set(self.right.limits))
 
     @property
     def halvings(self) -> int:
-        """After how many the change between the two is known closely enough, or is that of an end."""
+        """Halvings left until the kink between the two is placed to its tolerance."""
         at_end = bool(self.left.label or self.right.label)
         return 0 if self.gap else max(0, math.ceil(math.log2(self.length / (_END if at_end else _KINK))))
 
 
 class _Search:
-    """The probes made so far; the front is always read from them afresh."""
+    """The probes made so far; the front is derived from them each time."""
 
-    def __init__(self, team: Executor, ask: FrontSolver, points: int, progress: Steps) -> None:
-        self.team, self.ask, self.points, self.progress = team, ask, points, progress
-        self.ends, self.range = ask.ends, ask.ranges
+    def __init__(self, executor: Executor, solver: FrontSolver, points: int, progress: Steps) -> None:
+        self.executor, self.solver, self.points, self.progress = executor, solver, points, progress
+        self.ends, self.range = solver.ends, solver.ranges
         self.probes: list[_Probe] = []
-        self.done, self.most = 0, points  # of what is counted
+        self.steps_done, self.steps_total = 0, points
 
-    def chain(self) -> list[FrontPoint]:
-        """Efficient points by the first objective."""
-        found = [*self.ends, *(p.found for p in self.probes if p.found is not None)]
-        return efficient(found, [_SAME * r for r in self.range])
+    def efficient_chain(self) -> list[FrontPoint]:
+        """The efficient points found, sorted by the first objective."""
+        found = [*self.ends, *(p.point for p in self.probes if p.point is not None)]
+        return efficient_points(found, [_SAME * r for r in self.range])
 
-    def stretches(self) -> list[_Stretch]:
-        return [self._stretch(left, right) for left, right in pairwise(self.chain())]
+    def find_stretches(self) -> list[_Stretch]:
+        return [self._find_stretch(left, right) for left, right in pairwise(self.efficient_chain())]
 
-    def _stretch(self, left: FrontPoint, right: FrontPoint) -> _Stretch:
+    def _find_stretch(self, left: FrontPoint, right: FrontPoint) -> _Stretch:
         a, b = left.objectives, right.objectives
         size = tuple(abs(x - y) / span for x, y, span in zip(a, b, self.range, strict=True))
-        own = [p for p in self.probes if self._led_nowhere(p, *((b, a) if p.axis else (a, b)))]
+        own = [p for p in self.probes if self._found_nothing(p, *((b, a) if p.axis else (a, b)))]
         axis = own[0].axis if own else int(size[1] > size[0])
         low, high = sorted((a[axis], b[axis]))
-        failures = [p.eps for p in own if p.axis == axis and p.found is None]
-        empty = [p.eps for p in own if p.axis == axis and p.found is not None]
+        failures = [p.eps for p in own if p.axis == axis and p.point is None]
+        empty = [p.eps for p in own if p.axis == axis and p.point is not None]
         above = max(failures + empty, default=low), high
         first = min(failures, default=low)
         below = max([low, *(e for e in empty if e < first)]), first
@@ -128,185 +128,193 @@ class _Search:
         gap = bool(own) and unknown[1] - unknown[0] <= enough * self.range[axis]
         return _Stretch(left, right, size, axis, unknown, bool(own), bool(failures), gap)
 
-    def _led_nowhere(self, probe: _Probe, low: Objectives, high: Objectives) -> bool:
-        """Whether a probe between two neighbours failed, or found nothing better than the one that is lower in it."""
+    def _found_nothing(self, probe: _Probe, low: Objectives, high: Objectives) -> bool:
+        """Whether a probe between two neighbours failed, or improved neither objective of the lower one."""
         k = probe.axis
         margin = _UNUSED * self.range[k]
         if not low[k] + margin < probe.eps < high[k]:
             return False
-        if probe.found is None:
+        if probe.point is None:
             return True
-        found = probe.found.objectives
-        if found[1 - k] > low[1 - k] + _UNUSED * self.range[1 - k]:  # no better one was known when it was asked
+        found = probe.point.objectives
+        if found[1 - k] > low[1 - k] + _UNUSED * self.range[1 - k]:  # a better neighbour was found later
             return False
         return found[k] <= low[k] + margin or found[1 - k] >= low[1 - k] - _SAME * self.range[1 - k]
 
-    def between(self, s: _Stretch, place: int, share: float = 0.5, few: bool = False) -> "_Asked":
-        """A probe between two neighbours, at a share of the way from the one that is lower in the probed objective."""
+    def plan_probe(self, s: _Stretch, place: int, share: float = 0.5, few_starts: bool = False) -> "_ProbeRequest":
+        """A probe between two neighbours, at a share of the way from the lower one in the limited objective."""
         low, high = s.unknown
         eps = low + (high - low) * (0.5 if s.suspect else share)
         near, k, known = (s.left.solution, s.right.solution), 1 - s.axis, s.right if s.axis else s.left
-        quick = ((near[:1] if self._near(*near) else near, True),) if few else ()
+        quick = ((near[:1] if self._are_close(*near) else near, True),) if few_starts else ()
         enough = known.objectives[k] + _UNUSED * self.range[k]
-        return _Asked(s.axis, eps, (*quick, (near, False)), enough, known, len(self.probes) + place)
+        return _ProbeRequest(s.axis, eps, (*quick, (near, False)), enough, known, len(self.probes) + place)
 
-    def probe(self, asked: Sequence["_Asked"]) -> list[_Probe | None]:
-        """What comes of probes, solved side by side; those that have ended are kept when the user ends the others."""
+    def probe(self, requests: Sequence["_ProbeRequest"]) -> list[_Probe | None]:
+        """Solve probes in parallel; Ctrl-C keeps the finished ones."""
         found: dict[int, _Probe | None] = {}
         try:
-            for k, probe in each(self.team, _probed, self.ask, asked):
+            for k, probe in map_items(self.executor, _solve_request, self.solver, requests):
                 found[k] = probe
-                self.done += 1
-                self.progress(min(self.done, self.most), self.most)
+                self.steps_done += 1
+                self.progress(min(self.steps_done, self.steps_total), self.steps_total)
         finally:
-            ended = [found.get(k) for k in range(len(asked))]
+            ended = [found.get(k) for k in range(len(requests))]
             self.probes += [probe for probe in ended if probe is not None]
         return ended
 
-    def _near(self, a: Solution, b: Solution) -> bool:
-        """Whether two designs are close, so that starting from either comes to the same."""
-        free = self.ask.problem.free.items()
+    def _are_close(self, a: Solution, b: Solution) -> bool:
+        """Whether two designs count as one branch."""
+        free = self.solver.problem.free.items()
         return all(abs(a.parameters[n] - b.parameters[n]) <= _NEAR * (high - low) for n, (low, high) in free)
 
     @property
-    def exhausted(self) -> bool:
-        return len(self.probes) >= _MOST * self.points + 100
+    def is_exhausted(self) -> bool:
+        return len(self.probes) >= _MOST_PROBES * self.points + 100
 
-    def fill(self) -> None:
-        """Points where neighbours are farthest apart, until there are enough."""
+    def add_points(self) -> None:
+        """Add points where neighbours are farthest apart, until there are enough."""
         self.progress.begin("following the front", "point")
-        self.done, self.most = len(self.chain()), self.points
-        while not self.exhausted:
-            stretches = self.stretches()
+        self.steps_done, self.steps_total = len(self.efficient_chain()), self.points
+        while not self.is_exhausted:
+            stretches = self.find_stretches()
             open_ = sorted((s for s in stretches if not s.gap and s.length > _GAP), key=lambda s: -s.length)
             if (missing := self.points - 1 - len(stretches)) <= 0 or not open_:
                 return
             spacing = sum(s.length for s in stretches if not s.gap) / (self.points - 1)
             parts = [max(2, round(s.length / spacing)) for s in open_]
-            wide = [k for k, s in enumerate(open_) if not k or s.length > _ROOM * spacing][: min(AT_ONCE, missing)]
-            self.probe([self.between(open_[k], k, (parts[k] // 2) / parts[k]) for k in wide])
+            wide = [k for k, s in enumerate(open_) if not k or s.length > _ROOM * spacing][: min(MAX_PARALLEL, missing)]
+            self.probe([self.plan_probe(open_[k], k, (parts[k] // 2) / parts[k]) for k in wide])
 
     def sweep(self) -> bool:
-        """Solve each point anew from the design before it, both ways; whether any became better."""
-        before = len(self.chain())
+        """Solve each point again from the design before it, in both directions; True if any improved."""
+        before = len(self.efficient_chain())
         self.progress.begin("looking for better branches", "sub-problem")
-        self.done, self.most = 0, 2 * before
+        self.steps_done, self.steps_total = 0, 2 * before
         better = False
         for backwards in (False, True):
-            chain = self.chain()[::-1] if backwards else self.chain()
+            chain = self.efficient_chain()[::-1] if backwards else self.efficient_chain()
             previous, rest = chain[0], chain[1:-1]
-            while rest:  # a few at once, as if none became better; where one does, those after it are asked again
-                ahead = [*islice(self._next(previous, rest), AT_ONCE)]
-                new = self.probe([asked for _, asked in ahead])
+            while rest:  # a few in parallel, assuming none improves; if one does, those after it are solved again
+                next_requests = [*islice(self._next_requests(previous, rest), MAX_PARALLEL)]
+                new = self.probe([request for _, request in next_requests])
                 found = next((k for k, probe in enumerate(new) if probe is not None), None)
                 if found is None:
-                    last = ahead[-1][0] if len(ahead) == AT_ONCE else len(rest) - 1
+                    last = next_requests[-1][0] if len(next_requests) == MAX_PARALLEL else len(rest) - 1
                     previous, rest = rest[last], rest[last + 1 :]
                 else:
                     late = sum(probe is not None for probe in new[found + 1 :])
                     del self.probes[len(self.probes) - late :]
-                    better, rest = True, rest[ahead[found][0] + 1 :]
-                    previous = self.probes[-1].found or previous
-        return better or len(self.chain()) < before
+                    better, rest = True, rest[next_requests[found][0] + 1 :]
+                    previous = self.probes[-1].point or previous
+        return better or len(self.efficient_chain()) < before
 
-    def _next(self, previous: FrontPoint, rest: Sequence[FrontPoint]) -> Iterator[tuple[int, "_Asked"]]:
-        """The next points that are to be solved anew, by their places, each from the one before it."""
+    def _next_requests(self, previous: FrontPoint, rest: Sequence[FrontPoint]) -> Iterator[tuple[int, "_ProbeRequest"]]:
+        """Yield the next points to solve again, with their places, each from the design before it."""
         for place, old in enumerate(rest):
-            probe = next((p for p in self.probes if p.found is old), None)
-            if probe is not None and not self._near(previous.solution, old.solution):
+            probe = next((p for p in self.probes if p.point is old), None)
+            if probe is not None and not self._are_close(previous.solution, old.solution):
                 k = 1 - probe.axis
                 enough = old.objectives[k] - _UNUSED * self.range[k]
                 way = ((previous.solution,), True)
-                yield place, _Asked(probe.axis, probe.eps, (way,), enough, None, len(self.probes))
+                yield place, _ProbeRequest(probe.axis, probe.eps, (way,), enough, None, len(self.probes))
             previous = old
 
-    def settle(self) -> bool:
-        """Ends of gaps and places of kinks, to their tolerance; ended early, with True, where another branch is met.
+    def refine_kinks_and_gaps(self) -> bool:
+        """Place the ends of gaps and the kinks to their tolerance; stops early, with True, at another branch.
 
-        A kink is halved from the neighbours' designs alone and, as both may be on a poorer branch, at last as others.
+        Probes of a kink start from the neighbours' designs alone. Both may lie on a poorer branch, so the last probe
+        uses new starts too.
         """
         self.progress.begin("placing kinks and gaps", "sub-problem")
-        self.done = 0
-        while not self.exhausted:
-            stretches = self.stretches()
+        self.steps_done = 0
+        while not self.is_exhausted:
+            stretches = self.find_stretches()
             unclear = [s for s in stretches if not s.gap and s.suspect and s.length > _GAP]
-            changing = [s for s in stretches if s.changes and s.halvings]
-            if not (now := (unclear or changing)[:AT_ONCE]):
+            changing = [s for s in stretches if s.has_kink and s.halvings]
+            if not (now := (unclear or changing)[:MAX_PARALLEL]):
                 break
-            self.most = self.done + len(unclear) + sum(s.halvings for s in changing)
-            few = [not unclear and s.halvings > 1 for s in now]
-            found = self.probe([self.between(s, k, few=few[k]) for k, s in enumerate(now)])
-            if not unclear and any(not f and self._apart(p, s) for s, f, p in zip(now, few, found, strict=True)):
+            self.steps_total = self.steps_done + len(unclear) + sum(s.halvings for s in changing)
+            few_starts = [not unclear and s.halvings > 1 for s in now]
+            found = self.probe([self.plan_probe(s, k, few_starts=few_starts[k]) for k, s in enumerate(now)])
+            if not unclear and any(
+                not f and self._is_other_branch(p, s) for s, f, p in zip(now, few_starts, found, strict=True)
+            ):
                 return True
         return False
 
-    def _apart(self, probe: _Probe | None, s: _Stretch) -> bool:
+    def _is_other_branch(self, probe: _Probe | None, s: _Stretch) -> bool:
         """Whether a probe found a design close to neither neighbour."""
-        found = probe.found if probe else None
-        return found is not None and not any(self._near(found.solution, end.solution) for end in (s.left, s.right))
+        found = probe.point if probe else None
+        return found is not None and not any(self._are_close(found.solution, end.solution) for end in (s.left, s.right))
 
 
 @dataclass(frozen=True)
-class _Asked:
-    """A probe to be made.
+class _ProbeRequest:
+    """A probe to make.
 
     Attributes:
         axis, eps: the limit.
-        ways: designs to start from and whether from them alone, one way after the other until the result will do.
-        enough: what the other objective has to come to at least.
-        known: what stands for a design that does not come to that; None where it is then as if nothing was asked.
-        count: of probes before it, for starts of its own.
+        attempts: (designs to start from, whether from these alone), tried in turn until a result is good enough.
+        enough: the value of the other objective that is good enough.
+        fallback: the point to use if no result is good enough; None drops the probe.
+        count: number of probes before it, which selects its random starts.
     """
 
     axis: int
     eps: float
-    ways: tuple[tuple[tuple[Solution, ...], bool], ...]
+    attempts: tuple[tuple[tuple[Solution, ...], bool], ...]
     enough: float
-    known: FrontPoint | None
+    fallback: FrontPoint | None
     count: int
 
 
-def _probed(ask: FrontSolver, asked: _Asked) -> _Probe | None:
-    """What comes of a probe."""
-    found, ask = None, ask.later(asked.count)
-    for near, few in asked.ways:
-        solution = least(ask, 1 - asked.axis, {asked.axis: asked.eps}, near, few)
-        found = None if solution is None else point(ask, solution)
-        if found is not None and found.objectives[1 - asked.axis] <= asked.enough:
-            return _Probe(asked.axis, asked.eps, found)
-    if asked.known is None:
+def _solve_request(solver: FrontSolver, request: _ProbeRequest) -> _Probe | None:
+    """Solve a probe; None drops it."""
+    found, solver = None, solver.reseed(request.count)
+    for near, few_starts in request.attempts:
+        solution = minimise_limited(solver, 1 - request.axis, {request.axis: request.eps}, near, few_starts)
+        found = None if solution is None else front_point(solver, solution)
+        if found is not None and found.objectives[1 - request.axis] <= request.enough:
+            return _Probe(request.axis, request.eps, found)
+    if request.fallback is None:
         return None
-    return _Probe(asked.axis, asked.eps, found and asked.known)  # of a poor local optimum, the neighbour is better
+    return _Probe(request.axis, request.eps, found and request.fallback)  # better than a poor local optimum
 
 
-def _thinned(search: _Search, front: Front) -> Front:
-    """The front as reported: labelled points, and the others where they are not crowded."""
-    stretches = search.stretches()
+def _assemble_front(search: _Search, front: Front) -> Front:
+    """The front as reported: all labelled points, and the others where they are not crowded."""
+    stretches = search.find_stretches()
     chain = [stretches[0].left, *(s.right for s in stretches)]
-    words = [[search.ends[0].label], *(list[str]() for _ in chain[1:-1]), [search.ends[1].label]]  # even if better
+    labels = [
+        [search.ends[0].label],
+        *(list[str]() for _ in chain[1:-1]),
+        [search.ends[1].label],
+    ]  # an end keeps its label
     kinks, gaps = list[Kink](), list[Gap]()
     for i, s in enumerate(stretches):
         if s.gap and s.length > _WIDE:
-            gaps.append(Gap(_missing(search.ask, s), i, s.failed))
-            words[i].append("gap begins")
-            words[i + 1].append("gap ends")
-        elif s.changes and not (s.left.label or s.right.label):
-            words[i] += (names := change_names(s.left, s.right))
+            gaps.append(Gap(_describe_gap(search.solver, s), i, s.failed))
+            labels[i].append("gap begins")
+            labels[i + 1].append("gap ends")
+        elif s.has_kink and not (s.left.label or s.right.label):
+            labels[i] += (names := list_changes(s.left, s.right))
             kinks += [Kink(name, i, s.length) for name in names]
     spacing = sum(s.length for s in stretches if not s.gap) / max(search.points - 1, 1)
-    at = [*accumulate((s.length for s in stretches), initial=0.0)]
+    positions = [*accumulate((s.length for s in stretches), initial=0.0)]
     kept, last = list[int](), -math.inf
-    for i, x in enumerate(at):
-        ahead = next((at[k] for k in range(i + 1, len(at)) if words[k]), math.inf)
-        if words[i] or min(x - last, ahead - x) >= _CLOSE * spacing:
+    for i, x in enumerate(positions):
+        next_label = next((positions[k] for k in range(i + 1, len(positions)) if labels[k]), math.inf)
+        if labels[i] or min(x - last, next_label - x) >= _CLOSE * spacing:
             kept.append(i)
             last = x
     place = {i: k for k, i in enumerate(kept)}
-    proved = dict(each(search.team, _covered, search.ask, [chain[i].solution for i in kept]))
-    notes = () if not search.exhausted else ("the search was ended: too many sub-problems; ask for more points",)
+    proved = dict(map_items(search.executor, _add_cover, search.solver, [chain[i].solution for i in kept]))
+    limit = "the search stopped at its limit of sub-problems; ask for more points"
+    notes = (limit,) if search.is_exhausted else ()
     return replace(
         front,
-        points=tuple(replace(chain[i], solution=proved[k], label="; ".join(words[i])) for k, i in enumerate(kept)),
+        points=tuple(replace(chain[i], solution=proved[k], label="; ".join(labels[i])) for k, i in enumerate(kept)),
         kinks=tuple(replace(kink, index=place[kink.index]) for kink in kinks),
         gaps=tuple(replace(gap, index=place[gap.index]) for gap in gaps),
         solved=len(search.probes) + 2,
@@ -314,18 +322,18 @@ def _thinned(search: _Search, front: Front) -> Front:
     )
 
 
-def _covered(_: FrontSolver, solution: Solution) -> Solution:
+def _add_cover(_: FrontSolver, solution: Solution) -> Solution:
     return add_cover(solution)
 
 
-def _missing(ask: FrontSolver, s: _Stretch) -> str:
+def _describe_gap(solver: FrontSolver, s: _Stretch) -> str:
     low, high = sorted((s.left.objectives[s.axis], s.right.objectives[s.axis]))
-    where = f"{ask.texts[s.axis]} from {low:.6g} to {high:.6g}"
+    where = f"{solver.texts[s.axis]} from {low:.6g} to {high:.6g}"
     return f"not solved for {where}; try more starts" if s.failed else f"no efficient design was found with {where}"
 
 
-def change_names(before: FrontPoint, after: FrontPoint) -> list[str]:
-    """What changes from one point to the next, in words."""
+def list_changes(before: FrontPoint, after: FrontPoint) -> list[str]:
+    """Names of the changes from one point to the next."""
     names = [f"{before.structure} -> {after.structure}"] if before.structure != after.structure else []
     names += [f"{n} begins to bind" for n in after.limits if n not in before.limits]
     return names + [f"{n} ceases to bind" for n in before.limits if n not in after.limits]

@@ -1,4 +1,4 @@
-"""A Pareto front as data: efficient designs, where the way they are limited changes, and what is missing."""
+"""A Pareto front as data: efficient designs, kinks where the active limits change, and gaps."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ from tmsopt.records import Tabular, plain
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """An efficient design: nothing found improves one objective without loss in another.
+    """An efficient design: no design found improves one objective without loss in another.
 
     Attributes:
-        objectives: their values, in the order of the problem.
+        objectives: values of the objectives, in the order of the problem.
         solution: the rechecked design; its problem minimises one objective with limits on the others.
-        limits: names of the user's constraints and bounds that bind.
-        label: what the point is besides, e.g. ``least Fr``, ``EP3 -> pair+real``; empty for most.
+        limits: names of the active constraints and bounds of the user.
+        label: what is special about the point, e.g. ``least Fr``, ``EP3 -> pair+real``; empty for most.
     """
 
     objectives: tuple[float, ...]
@@ -41,7 +41,7 @@ class FrontPoint:
         return self.solution.stable
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        """Plain data for ``json.dumps``; missing numbers are None."""
         solution = plain(self.solution, "parameters abscissa abscissa_realised stable structure")
         lost = {"missed_as_stored": plain(self.solution.missed)} if self.solution.missed else {}
         return plain(self, "objectives") | solution | lost | plain(self, "limits label")
@@ -53,7 +53,7 @@ class Kink:
 
     Attributes:
         name: e.g. ``EP3 -> pair+real``, ``lambda_s.min begins to bind``.
-        index: of the point, the last before the change.
+        index: index of the last point before the change.
         width: of the interval that holds the change, in ranges of the objectives.
     """
 
@@ -67,9 +67,9 @@ class Gap:
     """A stretch without points of the front.
 
     Attributes:
-        reason: that no efficient design lies there, or that a sub-problem was not solved.
-        index: of the point before it; of two objectives the next point ends it.
-        failed: whether it is the search that failed.
+        reason: no efficient design lies there, or a sub-problem was not solved.
+        index: index of the point before the gap; with two objectives the next point ends it.
+        failed: whether a sub-problem was not solved.
     """
 
     reason: str
@@ -79,16 +79,16 @@ class Gap:
 
 @dataclass(frozen=True, repr=False)
 class Front(Tabular):
-    """What `pareto` found.
+    """A Pareto front, the result of `pareto`.
 
     Attributes:
         objectives: the expressions, each minimised.
-        points: by the first objective, best first; none dominates another.
-        kinks, gaps: of two objectives; gaps of three are sub-problems that failed.
+        points: sorted by the first objective, best first; none dominates another.
+        kinks, gaps: for two objectives; with three, gaps are sub-problems that failed.
         ideal, nadir: least and greatest value of each objective over the points.
-        solved: sub-problems solved.
+        solved: number of sub-problems solved.
         notes: sentences for the reader.
-        interrupted: whether the user ended the search; the front is then what is known of it.
+        interrupted: whether the user stopped the search; the front then holds the points found.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # the abscissa is -c/2 up to c = 2
@@ -124,7 +124,7 @@ class Front(Tabular):
         return tuple(map(max, zip(*(p.objectives for p in self.points), strict=True)))
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """One record per point: objectives, parameters, roots, limits, label."""
+        """Yield one record per point: objectives, parameters, roots, limits, label."""
         for point in self.points:
             values = dict(zip(self.objectives, point.objectives, strict=True))
             yield {
@@ -139,10 +139,10 @@ class Front(Tabular):
             }
 
     def write_csv(self, path: str | PathLike[str]) -> None:
-        """The points in one table.
+        """Write the points as one table.
 
         Raises:
-            OSError: when the file cannot be written.
+            OSError: if the file cannot be written.
         """
         words = {None: "", True: "true", False: "false"}
         write_csv(
@@ -152,7 +152,7 @@ class Front(Tabular):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """The JSON of `tmsopt solve` for a front; numbers that do not exist are None."""
+        """The JSON of `tmsopt solve` for a front; missing numbers are None."""
         return {
             **self.problem.posed.heading,
             "status": "optimal",
@@ -164,8 +164,8 @@ class Front(Tabular):
         }
 
 
-def efficient(points: Sequence[FrontPoint], slack: Sequence[float]) -> list[FrontPoint]:
-    """Points that no other dominates, by their objectives; of those that are the same the first.
+def efficient_points(points: Sequence[FrontPoint], slack: Sequence[float]) -> list[FrontPoint]:
+    """The points that no other point dominates, sorted by their objectives; equal points are kept once.
 
     Args:
         slack: per objective, the difference that rounding explains.
@@ -173,9 +173,9 @@ def efficient(points: Sequence[FrontPoint], slack: Sequence[float]) -> list[Fron
     values, allowed = np.array([p.objectives for p in points]), np.asarray(slack)
     kept: list[int] = []
     for k, own in enumerate(values):
-        off = values - own
-        beaten = (off <= allowed).all(axis=1) & (off < -allowed).any(axis=1)
-        if not beaten.any() and not (np.abs(off[kept]) <= allowed).all(axis=1).any():
+        excess = values - own
+        dominated = (excess <= allowed).all(axis=1) & (excess < -allowed).any(axis=1)
+        if not dominated.any() and not (np.abs(excess[kept]) <= allowed).all(axis=1).any():
             kept.append(k)
     chosen = (points[k] for k in kept)
     return sorted(chosen, key=lambda p: [float(f"{x:.9g}") for x in p.objectives])  # rounding decides no tie

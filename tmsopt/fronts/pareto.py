@@ -7,11 +7,11 @@ from typing import Unpack
 
 from tmsopt.errors import MOST_POINTS, InputError, count_faults, input_error
 from tmsopt.executor import Executor, cores, here, processes
-from tmsopt.fronts.curve import curve
+from tmsopt.fronts.curve import fill_curve
 from tmsopt.fronts.front import Front, FrontPoint
-from tmsopt.fronts.subproblems import FrontSolver, alone, best_first, point
-from tmsopt.fronts.surface import surface
-from tmsopt.fronts.team import AT_ONCE, can_send, each
+from tmsopt.fronts.parallel import MAX_PARALLEL, can_pickle, map_items
+from tmsopt.fronts.subproblems import FrontSolver, front_point, minimise_alone, solve_end
+from tmsopt.fronts.surface import fill_surface
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
@@ -20,34 +20,36 @@ from tmsopt.progress import Steps
 
 POINTS = 25
 STARTS = 2
-"""New starts per sub-problem, beside the neighbours' designs."""
+"""New starts per sub-problem, in addition to the neighbours' designs."""
 
 _DEFAULTS = Options(starts=STARTS)
-_ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of optima that count as the same
+_NO_CONFLICT = 1e-7  # relative difference of the ends up to which objectives do not conflict, as for equal optima
 
 
 @documents_options(CommonOptions, _DEFAULTS)
-def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, **options: Unpack[CommonOptions]) -> Front:
-    """The front of two or three objectives, each minimised, with its ends, kinks and gaps.
+def pareto(
+    problem: Given, points: int = POINTS, *, workers: int | None = None, **options: Unpack[CommonOptions]
+) -> Front:
+    """Compute the Pareto front of two or three objectives, each minimised, with its ends, kinks and gaps.
 
-    Two objectives: minimise one subject to the other ≤ eps, the next eps where neighbours are farthest apart and on
-    the objective that changes more, then sweeps both ways that keep the better design. Three: a grid of eps over the
-    payoff table, points × points but at most 12 × 12. Gaps narrower than the spacing of the points may be missed.
-    Ctrl-C leaves what is known of the front, once one of its ends is.
+    With two objectives, each sub-problem minimises one subject to the other ≤ eps. The next eps lies where neighbours
+    are farthest apart, on the objective that changes more; sweeps in both directions then keep the better design. With
+    three, eps runs over a grid on the payoff table, points × points but at most 12 × 12. Gaps narrower than the
+    spacing of the points may be missed. Ctrl-C keeps the points found, once one end is known.
 
     Args:
-        problem: with ``pareto``; ``locate`` and constraints narrow the designs.
-        points: asked for along the front; kinks and ends of gaps come on top. Of three objectives, limits on each of
-            the last two, at most 12: the front has about the square of that in points, and fewer where limits follow
-            from one another or none can meet them.
-        workers: processes, by default one per core, of which up to four are of use; the front is
-            the same for any number.
-        options: ``starts`` per sub-problem beside the designs of the neighbours, 2 by default, ``seed`` and
-            ``linear_solver`` and ``progress`` as of `solve`.
+        problem: a problem with ``pareto``; ``locate`` and constraints narrow the designs.
+        points: number of points along the front; kinks and ends of gaps are added. With three objectives, number of
+            limits on each of the last two, at most 12: the front has about the square of that in points, fewer if
+            limits follow from one another or cannot be met.
+        workers: number of processes, by default one per core; at most four are used. The front is the same for any
+            number.
+        options: ``starts`` (new starts per sub-problem, 2 by default), ``seed``, ``linear_solver`` and ``progress``,
+            as for `solve`.
 
     Raises:
-        NotSolved: when an objective has no optimum, carrying the best point found.
-        InputError: for a problem without ``pareto``, or fewer than 2 points or more than 10000, or no process.
+        NotSolved: if an objective has no optimum; carries the best point found.
+        InputError: for a problem without ``pareto``, for fewer than 2 or more than 10000 points, or for no process.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # the abscissa is -c/2 up to c = 2
@@ -60,56 +62,57 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     """
     problem = pose(problem)
     if not problem.pareto:
-        message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
+        message = 'no front is asked for; add e.g. pareto = ["abscissa", "Fr"], or call tmsopt.solve'
         raise input_error(message, "objective")
     how = make_options(options, defaults=_DEFAULTS, fewest=0)
     faults = count_faults("points", points, 2, MOST_POINTS)
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)
     began = time.perf_counter()
-    ask = FrontSolver(problem, replace(how, progress=None))
-    several = min(workers or cores(), AT_ONCE) if can_send(ask) else 1
-    with processes(several) if several > 1 else here() as team:
-        front = _front(team, ask, points, how.progress or Steps(lambda _: None))
+    solver = FrontSolver(problem, replace(how, progress=None))
+    workers_used = min(workers or cores(), MAX_PARALLEL) if can_pickle(solver) else 1
+    with processes(workers_used) if workers_used > 1 else here() as executor:
+        front = _front(executor, solver, points, how.progress or Steps(lambda _: None))
     if front.interrupted:
-        words = f"the user stopped the search after {front.solved} sub-problems; this is what is known of the front"
-        front = replace(front, notes=(*front.notes, words))
+        note = f"the user stopped the search after {front.solved} sub-problems; the front holds the points found so far"
+        front = replace(front, notes=(*front.notes, note))
     return replace(front, seconds=time.perf_counter() - began)
 
 
-def _front(team: Executor, ask: FrontSolver, points: int, progress: Steps) -> Front:
-    n, easier, ends = len(ask.texts), dict[int, Solution](), dict[int, FrontPoint]()
+def _front(executor: Executor, solver: FrontSolver, points: int, progress: Steps) -> Front:
+    """Compute the ends of the front, then the points between them."""
+    n, single_optima, ends = len(solver.texts), dict[int, Solution](), dict[int, FrontPoint]()
     progress.begin("looking for the ends of the front", "sub-problem")
     progress(0, 2 * n)
-    front = Front(ask.problem.problem, ask.texts, (), (), (), n, 0.0)
+    front = Front(solver.problem.problem, solver.texts, (), (), (), n, 0.0)
     try:
-        for k, found in each(team, alone, ask, range(n)):
-            easier[k] = found
-            progress(len(easier), 2 * n)
-            for solution in (easier[j] for j in takewhile(easier.__contains__, range(n))):
+        for k, found in map_items(executor, minimise_alone, solver, range(n)):
+            single_optima[k] = found
+            progress(len(single_optima), 2 * n)
+            for solution in (single_optima[j] for j in takewhile(single_optima.__contains__, range(n))):
                 if solution.status != "optimal":
                     raise NotSolved(solution)
-        ask = replace(ask, easier=easier)
-        for k, best in each(team, best_first, ask, range(n)):
-            ends[k] = replace(point(ask, best), label=_label(ask.texts[k].strip()))
+        solver = replace(solver, single_optima=single_optima)
+        for k, best in map_items(executor, solve_end, solver, range(n)):
+            ends[k] = replace(front_point(solver, best), label=_label(solver.texts[k].strip()))
             progress(n + len(ends), 2 * n)
     except KeyboardInterrupt:
         if not ends:
             raise
         return replace(front, points=tuple(ends.values()), solved=n + len(ends), interrupted=True)
-    at = tuple(ends[k] for k in range(n))
-    ranges = [max(p.objectives[k] for p in at) - min(p.objectives[k] for p in at) for k in range(n)]
-    conflict = [r > _ALIKE * (1 + max(abs(p.objectives[k]) for p in at)) for k, r in enumerate(ranges)]
-    ask = replace(ask, ranges=tuple(ranges), ends=at)
+    reached = tuple(ends[k] for k in range(n))
+    ranges = [max(p.objectives[k] for p in reached) - min(p.objectives[k] for p in reached) for k in range(n)]
+    conflict = [r > _NO_CONFLICT * (1 + max(abs(p.objectives[k]) for p in reached)) for k, r in enumerate(ranges)]
+    solver = replace(solver, ranges=tuple(ranges), ends=reached)
     if not (all(conflict) if n == 2 else any(conflict)):
-        best_in_all = min(at, key=lambda p: sum(p.objectives))
-        note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
+        best_in_all = min(reached, key=lambda p: sum(p.objectives))
+        note = "the objectives do not conflict: one design is best in all of them, and the front is that point"
         return replace(front, points=(replace(best_in_all, label="best in all"),), notes=(note,))
-    return (curve if n == 2 else surface)(team, ask, front, points, progress)
+    return (fill_curve if n == 2 else fill_surface)(executor, solver, front, points, progress)
 
 
 def _label(text: str) -> str:
-    """Of the end of the front where an objective is best."""
+    """The label of the end at which an objective is best."""
     opposite = text.removeprefix("-").strip()
     greatest = text != opposite and opposite.isidentifier()
     return f"greatest {opposite}" if greatest else f"least {text}"

@@ -1,4 +1,4 @@
-"""Sub-problems of a Pareto front: one objective minimised, the others held below a value (eps-constraints)."""
+"""Sub-problems of a Pareto front: minimise one objective with limits on the others (eps-constraints)."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,139 +13,142 @@ from tmsopt.program.options import STARTS, Options
 from tmsopt.search.solve import solve_any_status
 
 RETRY = 16
-"""Starts for a sub-problem that the neighbours' designs and a few starts did not solve."""
-_SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
-_AT_END = 1e-6  # of a parameter's range: IPOPT stays inside it, and where limits are degenerate polishing keeps that
-_BEYOND = 1e-6  # relative: a part of the box whose best is worse by less than this is searched all the same
-_WORTH = 1e-4  # gain at an end that its slack does not explain: at a smooth optimum it buys sqrt(1e-9) = 3e-5
+"""Starts of a sub-problem that the neighbours' designs and a few starts did not solve."""
+
+_SLACK = 1e-9  # relative, on a best value held while the next is minimised; the recheck of a constraint forgives it
+_AT_BOUND = 1e-6  # of a range: IPOPT stays this far inside, and polishing may keep that at degenerate limits
+_WORSE = 1e-6  # relative: a side of the box is skipped only if its optimum is worse by more
+_MIN_GAIN = 1e-4  # a gain beyond that of the slack, which is sqrt(1e-9) = 3e-5 at a smooth optimum
 
 
 @dataclass(frozen=True)
 class FrontSolver:
-    """What all sub-problems of one front share.
+    """The data that all sub-problems of one front share.
 
     Attributes:
         problem: with `pareto`.
-        options: how to solve each, with so many new starts, against branches that the neighbours do not lead to.
-        ranges: of the objectives over the front, once its ends are known.
-        ends: the same.
-        easier: the least of each objective alone, as far as known: no sub-problem has a better one.
+        options: options of each solve; its new starts find branches that the neighbours do not lead to.
+        ranges: ranges of the objectives over the front, once its ends are known.
+        ends: the ends of the front, once known.
+        single_optima: the optimum of each objective alone, as far as known; no sub-problem has a better one.
     """
 
     problem: Posed
     options: Options
     ranges: tuple[float, ...] = ()
     ends: tuple[FrontPoint, ...] = ()
-    easier: Mapping[int, Solution] = field(default_factory=dict)
+    single_optima: Mapping[int, Solution] = field(default_factory=dict)
 
     def solve(
         self, problem: Posed, starts: int, near: Sequence[Solution] = (), without_sample: bool = False
     ) -> Solution:
-        """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
+        """Solve a sub-problem from nearby designs and new starts; returns the rechecked solution of any status."""
         free = problem.free.items()
-        beside = [{n: min(max(design.parameters[n], lo), hi) for n, (lo, hi) in free} for design in near]
-        options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
-        return solve_any_status(problem, options, beside, without_sample, self._hopeless(problem, near))
+        nearby_starts = [{n: min(max(design.parameters[n], lo), hi) for n, (lo, hi) in free} for design in near]
+        options = replace(self.options, starts=starts + len(nearby_starts) + bool(problem.start))
+        return solve_any_status(problem, options, nearby_starts, without_sample, self._worse_sides(problem, near))
 
-    def _hopeless(self, problem: Posed, near: Sequence[Solution]) -> frozenset[str]:
-        """Parts of the box whose best in an objective, without any limit, is worse than what is asked or had of it."""
-        names = eps_names(self)
+    def _worse_sides(self, problem: Posed, near: Sequence[Solution]) -> frozenset[str]:
+        """Sides of the box whose optimum in an objective is worse than its limit, or than a point found."""
+        names = limit_names(self)
         limits = {k: problem.constraints[n] for k, n in enumerate(names) if n in problem.constraints}
         most = {k: float(text.rpartition("<=")[2]) for k, text in limits.items()}
-        hopeless = set[str]()
-        for k, best in self.easier.items():
+        worse_sides = set[str]()
+        for k, best in self.single_optima.items():
             if not best.sides:
                 continue
-            if problem.minimize == self.texts[k] and problem.free == self.problem.free:  # what is near bounds it
-                known = [*(p.objectives for p in self.ends), *(objectives(self, n) for n in near)]
-                met = [values[k] for values in known if all(values[j] <= limit for j, limit in most.items())]
-                most = {**most, k: min(met, default=math.inf)}
-            worse = most.get(k, math.inf)
-            hopeless |= {n for n, value in best.sides.items() if value > worse + _BEYOND * (1 + abs(worse))}
-        return frozenset(hopeless if hopeless < {n for best in self.easier.values() for n in best.sides} else ())
+            if problem.minimize == self.texts[k] and problem.free == self.problem.free:  # points found bound it
+                known = [*(p.objectives for p in self.ends), *(objective_values(self, n) for n in near)]
+                reached = [values[k] for values in known if all(values[j] <= limit for j, limit in most.items())]
+                most = {**most, k: min(reached, default=math.inf)}
+            limit = most.get(k, math.inf)
+            worse_sides |= {n for n, value in best.sides.items() if value > limit + _WORSE * (1 + abs(limit))}
+        every_side = {n for best in self.single_optima.values() for n in best.sides}
+        return frozenset(worse_sides if worse_sides < every_side else ())
 
-    def later(self, count: int) -> "FrontSolver":
-        """The same with other starts."""
+    def reseed(self, count: int) -> "FrontSolver":
+        """The same solver with other random starts."""
         return replace(self, options=replace(self.options, seed=self.options.seed + count))
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """The objectives."""
+        """Texts of the objectives."""
         return tuple(self.problem.pareto)
 
 
-def alone(ask: FrontSolver, k: int) -> Solution:
-    """Objective `k` minimised alone, whatever the others are; of any status."""
-    return ask.solve(subproblem(ask, k, {}), STARTS)
+def minimise_alone(solver: FrontSolver, k: int) -> Solution:
+    """Minimise objective `k` without limits on the others; returns a solution of any status."""
+    return solver.solve(build_subproblem(solver, k, {}), STARTS)
 
 
-def best_first(ask: FrontSolver, first: int) -> Solution:
-    """An end of the front: the least of the first objective, held there while the others are minimised in turn."""
-    count = len(ask.texts)
-    found, held = ask.easier[first], dict[int, float]()
+def solve_end(solver: FrontSolver, first: int) -> Solution:
+    """An end of the front: minimise one objective, then each other one in turn with the earlier values held."""
+    count = len(solver.texts)
+    found, held = solver.single_optima[first], dict[int, float]()
     for done, k in pairwise((first + j) % count for j in range(count)):
-        values = objectives(ask, found)
+        values = objective_values(solver, found)
         held[done] = values[done] + _SLACK * (1 + abs(values[done]))
-        better = least(ask, k, held, [found], pin=first)
+        better = minimise_limited(solver, k, held, [found], pin=first)
         if better is None:
             continue
-        exact = len(held) == 1 and len(better.problem.free) < len(ask.problem.free)  # pinned, so without slack
-        gain = values[k] - objectives(ask, better)[k]
-        if gain >= 0 if exact else gain > _WORTH * (1 + abs(values[k])):
+        exact = len(held) == 1 and len(better.problem.free) < len(solver.problem.free)  # fixed, so without slack
+        gain = values[k] - objective_values(solver, better)[k]
+        if gain >= 0 if exact else gain > _MIN_GAIN * (1 + abs(values[k])):
             found = better
     return found
 
 
-def least(
-    ask: FrontSolver,
+def minimise_limited(
+    solver: FrontSolver,
     k: int,
     limits: Mapping[int, float],
     near: Sequence[Solution],
     few: bool = False,
     pin: int | None = None,
 ) -> Solution | None:
-    """Objective `k` minimised with others limited, from designs near by and, unless `few`, from new starts.
+    """Minimise objective `k` with limits on others, from nearby designs and, unless `few`, from new starts.
 
     Args:
-        pin: an objective that has its best value: where that is the end of a parameter's range, the parameter is fixed.
+        pin: an objective at its best value; if that is a bound of a parameter, the parameter is fixed there.
 
-    Returns: the best that is optimal, or None.
+    Returns:
+        The best optimal solution, or None.
     """
-    asked = subproblem(ask, k, limits)
+    problem = build_subproblem(solver, k, limits)
     if pin is not None:
-        asked = _pinned(ask, asked, pin, near[0])
-    ended = [ask.solve(asked, (0 if few else ask.options.starts) if near else RETRY, near, without_sample=few)]
+        problem = _fix_at_bound(solver, problem, pin, near[0])
+    ended = [solver.solve(problem, (0 if few else solver.options.starts) if near else RETRY, near, without_sample=few)]
     if not few and all(s.status != "optimal" for s in ended):
-        ended.append(ask.later(1).solve(asked, RETRY))
+        ended.append(solver.reseed(1).solve(problem, RETRY))
     found = min((s for s in ended if s.status == "optimal"), key=lambda s: s.value, default=None)
-    return found if found is None or not ask.ranges else _tightened(ask, k, limits, found)
+    return found if found is None or not solver.ranges else _improve_loose(solver, k, limits, found)
 
 
-def subproblem(ask: FrontSolver, k: int, limits: Mapping[int, float]) -> Posed:
-    """The problem that minimises objective `k`, with a limit on the value of others."""
-    names = eps_names(ask)
-    eps = {names[j]: f"({ask.texts[j]}) <= {float(value)!r}" for j, value in limits.items()}
-    constraints = {**ask.problem.constraints, **eps}
-    return ask.problem.derive(pareto=(), minimize=ask.texts[k], constraints=constraints)
+def build_subproblem(solver: FrontSolver, k: int, limits: Mapping[int, float]) -> Posed:
+    """The problem that minimises objective `k` with limits on others."""
+    names = limit_names(solver)
+    eps = {names[j]: f"({solver.texts[j]}) <= {float(value)!r}" for j, value in limits.items()}
+    constraints = {**solver.problem.constraints, **eps}
+    return solver.problem.derive(pareto=(), minimize=solver.texts[k], constraints=constraints)
 
 
-def eps_names(ask: FrontSolver) -> tuple[str, ...]:
-    """A constraint name per objective that is none of the user's."""
+def limit_names(solver: FrontSolver) -> tuple[str, ...]:
+    """A constraint name per objective that the user does not use."""
     names = []
-    for text in ask.texts:
+    for text in solver.texts:
         name = f"{text} <= eps"
-        while name in ask.problem.constraints:
+        while name in solver.problem.constraints:
             name += "'"
         names.append(name)
     return tuple(names)
 
 
-def objectives(ask: FrontSolver, solution: Solution) -> tuple[float, ...]:
-    """Values of all objectives, from the parameters alone; the worst over the cases that the design was made for."""
-    problem = ask.problem
+def objective_values(solver: FrontSolver, solution: Solution) -> tuple[float, ...]:
+    """Values of all objectives from the parameters alone; the worst over the cases of the solution."""
+    problem = solver.problem
     if not (problem.scenarios or problem.tolerances or solution.problem.posed.asks_radius):
         values = problem.values(solution.parameters)
-        known = {**solution.quantities, "abscissa": solution.abscissa}  # certified, where an objective is one of these
+        known = {**solution.quantities, "abscissa": solution.abscissa}  # certified values
         found = ((expression, expression.text.strip()) for expression in problem.objectives)
         return tuple(known[text] if text in known else float(expression(values)) for expression, text in found)
     cases = (*problem.cases, *([solution.worst] if solution.worst else []))
@@ -153,42 +156,44 @@ def objectives(ask: FrontSolver, solution: Solution) -> tuple[float, ...]:
     known = {n: x for n, x in solution.parameters.items() if n not in moved}  # the same in every case
     if solution.problem.minimize and not math.isnan(solution.value):
         known[solution.problem.minimize] = solution.value
-    alone = (problem.derive(pareto=(), minimize=text) for text in ask.texts if text not in known)
-    known |= {one.minimize or "": recheck(one, solution.parameters, cases).objective for one in alone}
-    return tuple(known[text] for text in ask.texts)
+    singles = (problem.derive(pareto=(), minimize=text) for text in solver.texts if text not in known)
+    known |= {one.minimize or "": recheck(one, solution.parameters, cases).objective for one in singles}
+    return tuple(known[text] for text in solver.texts)
 
 
-def point(ask: FrontSolver, solution: Solution) -> FrontPoint:
-    """A design as a point of the front."""
-    active = [n for n in solution.active if n in ask.problem.constraints]
-    for name, (low, high) in ask.problem.free.items():
+def front_point(solver: FrontSolver, solution: Solution) -> FrontPoint:
+    """A point of the front from a solution."""
+    active = [n for n in solution.active if n in solver.problem.constraints]
+    for name, (low, high) in solver.problem.free.items():
         near = (("min", low), ("max", high))
-        active += [f"{name}.{end}" for end, at in near if abs(solution.parameters[name] - at) <= _AT_END * (high - low)]
-    return FrontPoint(objectives(ask, solution), solution, tuple(active))
+        active += [
+            f"{name}.{end}" for end, at in near if abs(solution.parameters[name] - at) <= _AT_BOUND * (high - low)
+        ]
+    return FrontPoint(objective_values(solver, solution), solution, tuple(active))
 
 
-def _tightened(ask: FrontSolver, k: int, limits: Mapping[int, float], found: Solution) -> Solution:
-    """A design as good in objective `k` and better in the others, if a limit that does not bind leaves one."""
-    names = eps_names(ask)
-    loose = [j for j in limits if names[j] not in found.active and ask.ranges[j] > 0]
+def _improve_loose(solver: FrontSolver, k: int, limits: Mapping[int, float], found: Solution) -> Solution:
+    """A design as good in objective `k` and better in those whose limits are inactive, or the same design."""
+    names = limit_names(solver)
+    loose = [j for j in limits if names[j] not in found.active and solver.ranges[j] > 0]
     if not loose:
         return found
-    values = objectives(ask, found)
+    values = objective_values(solver, found)
     held = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
-    rest = " + ".join(f"({ask.texts[j]}) / {ask.ranges[j]!r}" for j in loose)
-    asked = _pinned(ask, subproblem(ask, k, held).derive(minimize=rest), k, found)
-    better = ask.solve(asked, ask.options.starts, [found])
-    gain = sum((values[j] - b) / ask.ranges[j] for j, b in enumerate(objectives(ask, better)) if j in loose)
-    return better if better.status == "optimal" and gain > _WORTH else found
+    rest = " + ".join(f"({solver.texts[j]}) / {solver.ranges[j]!r}" for j in loose)
+    problem = _fix_at_bound(solver, build_subproblem(solver, k, held).derive(minimize=rest), k, found)
+    better = solver.solve(problem, solver.options.starts, [found])
+    gain = sum((values[j] - b) / solver.ranges[j] for j, b in enumerate(objective_values(solver, better)) if j in loose)
+    return better if better.status == "optimal" and gain > _MIN_GAIN else found
 
 
-def _pinned(ask: FrontSolver, asked: Posed, k: int, best: Solution) -> Posed:
-    """The problem without slack where objective `k` is a parameter, or minus one, that ended at its bound."""
-    name = ask.texts[k].strip().removeprefix("-").strip()
-    if name not in asked.free or best.parameters[name] not in asked.free[name]:
-        return asked
-    fixed = {**asked.fixed, name: best.parameters[name]}
-    free = {n: ends for n, ends in asked.free.items() if n != name}
-    constraints = {n: text for n, text in asked.constraints.items() if n != eps_names(ask)[k]}
-    start = {n: v for n, v in asked.start.items() if n in free}
-    return asked.derive(fixed=fixed, free=free, constraints=constraints, start=start)
+def _fix_at_bound(solver: FrontSolver, problem: Posed, k: int, best: Solution) -> Posed:
+    """Fix the parameter at its bound instead of limiting objective `k`, if that objective is ± this parameter."""
+    name = solver.texts[k].strip().removeprefix("-").strip()
+    if name not in problem.free or best.parameters[name] not in problem.free[name]:
+        return problem
+    fixed = {**problem.fixed, name: best.parameters[name]}
+    free = {n: ends for n, ends in problem.free.items() if n != name}
+    constraints = {n: text for n, text in problem.constraints.items() if n != limit_names(solver)[k]}
+    start = {n: v for n, v in problem.start.items() if n in free}
+    return problem.derive(fixed=fixed, free=free, constraints=constraints, start=start)

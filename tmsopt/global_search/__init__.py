@@ -1,7 +1,7 @@
-"""Questions about whole boxes, is any design as good as a limit (SCIP), are these all (intervals).
+"""Searches of a whole box: does any design reach a limit (SCIP), are these all designs with a pattern (intervals).
 
-In: a `Question`, or a problem that leaves no freedom. Out: an `Answer`, no or a design; every design with its proof, as
-`Completeness`. Open `question` first, then `complete`; `race` runs SCIP in a process of its own.
+In: a `Question`, or a problem with as many conditions as free parameters. Out: an `Answer`, or a `Completeness` with
+every design. Open `question` first, then `completeness`; `race` runs SCIP in separate processes.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Questions put to branch and bound, within a time, and whether they admit the design that they are about."""
+"""Answers a question by branch and bound within a time limit, and checks that the question admits a known design."""
 
 import math
 import time
@@ -12,69 +12,68 @@ from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.algebra.intervals import ranges
 from tmsopt.global_search.question import Question
 from tmsopt.global_search.race import SolverPool
-from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
+from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, make_task
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import design_of, variables_of
 from tmsopt.program.starts import initial_point
 from tmsopt.progress import Counts
 
-_HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
-
-_AROUND = 1e-4  # of a range, which counts as
-_COARSE = 1e-2  # at least: SCIP cannot look closer
-_TIGHTENING = 1.0  # seconds to keep a0 away from 0
-_FIRST = 2.0  # seconds for the first turn, twice as many for each that follows
-_WAYS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
-"""Turns: units, as multiples of the usual one, and whether compact."""
+_ROW_TOLERANCE = 1e-6  # relative to a row's range; SCIP keeps 1e-9, multiple roots have half the digits
+_NEARBY = 1e-4  # of a variable's range: half the width of the box around a known design
+_MIN_RANGE = 1e-2  # relative: shorter ranges count as this long, since SCIP cannot resolve less
+_SHORT_SECONDS = 1.0  # for a bound on a0, and for the box around a known design
+_FIRST_SECONDS = 2.0  # for the first turn; each turn doubles it
+_TURNS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
+"""Formulations that race in each turn: (factor on the unit of the roots, compact)."""
 
 
 class Clock:
     """Time and nodes that a proof has used.
 
     Attributes:
-        note: what is known meanwhile, for who listens.
+        note: the state of the proof, shown as progress.
     """
 
-    def __init__(self, seconds: float, crew: SolverPool, progress: Counts | None = None) -> None:
-        self.seconds, self.crew, self.progress = seconds, crew, progress
+    def __init__(self, seconds: float, pool: SolverPool, progress: Counts | None = None) -> None:
+        self.seconds, self.pool, self.progress = seconds, pool, progress
         self.began = time.perf_counter()
         self.nodes, self.note = 0, ""
         self.interrupted = False
 
     @property
-    def used(self) -> float:
-        """Seconds since the beginning."""
+    def seconds_used(self) -> float:
+        """Seconds since the start."""
         return time.perf_counter() - self.began
 
     @property
-    def left(self) -> float:
-        """Seconds to the end; none after an interruption."""
-        return 0.0 if self.interrupted else max(self.seconds - self.used, 0.0)
+    def seconds_left(self) -> float:
+        """Seconds left; 0 after an interruption."""
+        return 0.0 if self.interrupted else max(self.seconds - self.seconds_used, 0.0)
 
     def race(self, tasks: Sequence[Task]) -> list[Decision]:
-        """Decisions on tasks, all at once until one is shown to have no feasible point; none if the user interrupts."""
+        """Decide tasks in parallel; the first infeasible one stops the others, Ctrl-C leaves all undecided."""
         try:
-            decisions = self.crew.race(tasks, self.tick)
+            decisions = self.pool.race(tasks, self.report_progress)
         except KeyboardInterrupt:
             self.interrupted = True
             return [Decision(UNDECIDED)]
         self.nodes += sum(decision.nodes for decision in decisions)
         return decisions
 
-    def tick(self) -> None:
-        """Tell the reader how far it is."""
+    def report_progress(self) -> None:
+        """Report the seconds used, the seconds granted and the note."""
         if self.progress:
-            self.progress(min(self.used, self.seconds), self.seconds, self.note)
+            self.progress(min(self.seconds_used, self.seconds), self.seconds, self.note)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What branch and bound says to a question.
+    """The answer of branch and bound to a question.
 
     Attributes:
-        verdict: ``infeasible``: no design; ``found``; ``undecided``.
-        better: the optimum that was reached from the design that was found.
-        other: that design, where it is feasible and better, and no optimum was reached from it.
+        verdict: ``infeasible`` (no such design), ``found`` or ``undecided``.
+        better: the optimum reached from the design found.
+        other: the design found, if it is feasible and better but no optimum was reached from it.
     """
 
     verdict: str
@@ -82,48 +81,49 @@ class Answer:
     other: Mapping[str, float] | None = None
 
 
-Confirm = Callable[[Mapping[str, float]], Answer]
+PointCheck = Callable[[Mapping[str, float]], Answer]
+"""Judges a point that the solver found."""
 
 
-def answer(question: Question, clock: Clock, share: float, confirm: Confirm) -> Answer:
-    """Ask for each sign of a0 in turn, within a share of the time that is left.
+def answer_question(question: Question, clock: Clock, share: float, confirm: PointCheck) -> Answer:
+    """Answer a question for each sign of a0 in turn, within a share of the time left.
 
-    The time that branch and bound needs varies wildly with how a question is put. So it is put in two ways at once, for
-    a short time, and then anew in others for longer.
+    The time of branch and bound varies strongly with the formulation. Each turn races two formulations, and each turn
+    lasts longer than the one before.
 
     Args:
-        confirm: what to make of a design that was found; ``undecided`` if it is none, but for the solver's tolerance.
+        confirm: judges a point found; ``undecided`` if the point exists only within the solver's tolerance.
 
     Raises:
-        UnsupportedOperation: for an operation that the solver cannot take.
+        NotAccepted: for an operation that the solver does not support.
     """
-    end = clock.used + share * clock.left
-    for sign in question.signs():
-        told = _asked(question, sign, clock, end, confirm)
-        if told.verdict != INFEASIBLE:
-            return told
+    end = clock.seconds_used + share * clock.seconds_left
+    for sign in question.possible_signs():
+        reply = _answer_for_sign(question, sign, clock, end, confirm)
+        if reply.verdict != INFEASIBLE:
+            return reply
     return Answer(INFEASIBLE)
 
 
-def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Confirm) -> Answer:
-    """One sign of a0."""
+def _answer_for_sign(question: Question, sign: int, clock: Clock, end: float, confirm: PointCheck) -> Answer:
+    """Answer a question for one sign of a0."""
     least = 0.0
-    if (leading := question.leading(sign)) is not None:
-        least = clock.race([task(leading, min(_TIGHTENING, end - clock.used), least=True)])[0].bound
-        if least == math.inf:  # not even the constraints can be met
+    if (leading := question.leading_program(sign)) is not None:
+        least = clock.race([make_task(leading, min(_SHORT_SECONDS, end - clock.seconds_used), minimise=True)])[0].bound
+        if least == math.inf:  # the constraints alone are infeasible
             return Answer(INFEASIBLE)
     for turn in count():
-        left = min(end - clock.used, clock.left)
+        left = min(end - clock.seconds_used, clock.seconds_left)
         if left <= 0:
             return Answer(UNDECIDED)
-        seconds = min(left, _FIRST * 2.0 ** min(turn, 30))  # one that gives up at once comes to thousands of turns
-        ways = [replace(question, unit=question.unit * u, compact=c) for u, c in _WAYS[turn % len(_WAYS)]]
+        seconds = min(left, _FIRST_SECONDS * 2.0 ** min(turn, 30))  # a solver that gives up at once takes many turns
+        variants = [replace(question, unit=question.unit * u, compact=c) for u, c in _TURNS[turn % len(_TURNS)]]
         try:
-            decisions = clock.race([task(way.program(sign, max(least, 0.0)), seconds) for way in ways])
+            decisions = clock.race([make_task(v.program(sign, max(least, 0.0)), seconds) for v in variants])
         except UnsupportedOperation:
             if turn == 0:
                 raise
-            continue  # numbers are too large or too small in these units alone
+            continue  # only these units make some number too large or too small
         if any(decision.verdict == INFEASIBLE for decision in decisions):
             return Answer(INFEASIBLE)
         for decision in decisions:
@@ -134,13 +134,13 @@ def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Con
     raise AssertionError  # unreachable: time ends
 
 
-def doubt(question: Question, design: Mapping[str, float]) -> str:
-    """Why the answer to a question would say nothing of a design that should be one; empty if it is admitted.
+def find_exclusion(question: Question, design: Mapping[str, float]) -> str:
+    """Why a question excludes a design that it must admit; empty if it admits the design.
 
-    A wrong limit, range or equation would exclude the design itself: what is proved of the others would be worthless.
+    A question with a wrong limit, range or equation excludes the known design, and then its answer proves nothing.
     """
-    nearest: list[tuple[float, str]] = []
-    for sign in question.signs():
+    excesses: list[tuple[float, str]] = []
+    for sign in question.possible_signs():
         nlp = question.program(sign)
         x = initial_point(nlp, question.problem, design)
         rows = nlp.evaluate(x)[1]
@@ -151,26 +151,26 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
         span = np.maximum(1.0, np.abs(x))
         outside = np.maximum(np.array(nlp.lower) - x, x - np.array(nlp.upper)) / span
         named = [*zip(off.tolist(), nlp.rows, strict=True), *zip(outside.tolist(), nlp.variables, strict=True)]
-        nearest.append(max(((np.inf if np.isnan(e) else e), name) for e, name in named))
-    if not nearest:
-        return "the question admits no design, so not even the one that was found"
-    excess, name = min(nearest)
-    return "" if excess <= _HOLDS else f"the question excludes the design that was found: {name} by {excess:.2g}"
+        excesses.append(max(((np.inf if np.isnan(e) else e), name) for e, name in named))
+    if not excesses:
+        return "the question excludes every design, the known one too"
+    excess, name = min(excesses)
+    return "" if excess <= _ROW_TOLERANCE else f"the question excludes the known design: {name} by {excess:.2g}"
 
 
-def contradicted(question: Question, design: Mapping[str, float], clock: Clock) -> bool:
-    """Whether the solver finds nothing feasible even close around a design that is: then no answer of it is worth much.
+def is_excluded_by_solver(question: Question, design: Mapping[str, float], clock: Clock) -> bool:
+    """Whether the solver calls a small box around a feasible design infeasible; then its answers prove nothing.
 
-    `doubt` looks at the equations; this looks at what became of them in the solver, its ranges and tolerances included.
+    `find_exclusion` checks the equations; this checks the solver's own model of them, with its ranges and tolerances.
     """
-    at = variables_of(question.problem, design)
+    point = variables_of(question.problem, design)
     verdicts = []
-    for sign in question.signs():
+    for sign in question.possible_signs():
         nlp = question.program(sign)
         near = tuple(
             (max(lo, x - d), min(hi, x + d))
-            for x, lo, hi in zip(at, nlp.lower, nlp.upper, strict=False)
-            for d in [_AROUND * max(hi - lo, _COARSE * (1 + abs(x)))]
+            for x, lo, hi in zip(point, nlp.lower, nlp.upper, strict=False)
+            for d in [_NEARBY * max(hi - lo, _MIN_RANGE * (1 + abs(x)))]
         )
-        verdicts += [d.verdict for d in clock.race([task(nlp, min(_TIGHTENING, clock.left), within=near)])]
+        verdicts += [d.verdict for d in clock.race([make_task(nlp, min(_SHORT_SECONDS, clock.seconds_left), box=near)])]
     return all(verdict == INFEASIBLE for verdict in verdicts)

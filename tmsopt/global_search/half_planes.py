@@ -1,4 +1,4 @@
-"""Root quantities for branch and bound: half-planes by interlacing parts, sectors by bounded factors."""
+"""Root quantities for branch and bound: half-planes by interlacing, sectors by bounded factors."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.algebra.formula import constant, formula
 from tmsopt.algebra.intervals import Interval, bound_roots
-from tmsopt.global_search.interlacing import interlace, squares_of
+from tmsopt.global_search.interlacing import add_interlacing, squared_frequencies
 from tmsopt.models import Model, Values
 from tmsopt.program.formulate import Builder
 from tmsopt.program.lifts import LiftedQuantity, pair_roots
@@ -20,98 +20,98 @@ from tmsopt.program.nlp import AddedVariable
 from tmsopt.roots import Pattern, product, shift
 from tmsopt.roots.patterns.pattern import Roots
 
-_PLAIN = 4  # degree up to which the powers of the unit are near enough to 1
+_UNSCALED_DEGREE = 4  # up to here the powers of the unit stay near 1
 
 
 @dataclass(frozen=True)
 class Frame:
-    """How coefficients are looked at.
+    """Normalisation of the coefficients.
 
     Attributes:
-        signs: case → sign of the leading one; cases without are left aside.
-        unit: usual size of the roots, a power of two.
-        touching: whether a line must have a root on it, lest more be claimed than is so.
-        compact: whether squared frequencies are taken as X/(1 − X).
-        least: what the leading coefficient of the model is not below in the first case, in absolute value.
+        signs: case → sign of its leading coefficient; cases without a sign are left out.
+        unit: typical size of the roots, a power of two.
+        needs_contact: whether a root must lie on the line; a problem that rewards a larger abscissa needs this.
+        compact: whether squared frequencies are written as X/(1 − X).
+        least_lead: lower bound on the size of the model's leading coefficient in the first case.
     """
 
     model: Model
     signs: Mapping[int, int]
     unit: float
-    touching: bool = False
+    needs_contact: bool = False
     compact: bool = False
-    least: float = 0.0
+    least_lead: float = 0.0
 
     def coefficients(self, values: Sequence[Values], case: int) -> list[Any]:
-        """Coefficients for roots in the unit, with a leading one that is positive, in the compact form of the model."""
-        a = compact(self.model, values[case])
+        """Compact coefficients of a case for roots in the unit; the leading one is positive."""
+        a = compact_coefficients(self.model, values[case])
         return [self.signs[case] * c * self.lead / self.unit**k for k, c in enumerate(a)]
 
     @property
     def lead(self) -> float:
-        """What all coefficients are multiplied by, so that none is far smaller than the others are large."""
-        return float(self.unit ** (self.model.degree // 2)) if self.model.degree > _PLAIN else 1.0
+        """Common factor of all coefficients; it balances small against large ones."""
+        return float(self.unit ** (self.model.degree // 2)) if self.model.degree > _UNSCALED_DEGREE else 1.0
 
-    def about(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
-        """The same of p(t + line)."""
+    def shifted_coefficients(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
+        """The coefficients of p(t + line)."""
         return shift(self.coefficients(values, case), line / self.unit)
 
-    def largest(self, ranges: Sequence[Interval], first: bool) -> float:
-        """Bound on the roots for coefficients in ranges, of the first case or of another."""
+    def bound_roots(self, ranges: Sequence[Interval], first: bool) -> float:
+        """Bound on the roots for coefficients in ranges; `first` marks the first case."""
         (lower, upper), *others = ranges
-        least = self.least * self.lead if first else -math.inf
+        least = self.least_lead * self.lead if first else -math.inf
         return bound_roots([(max(lower, least), max(upper, least)), *others])
 
 
-def compact(model: Model, values: Values) -> list[Any]:
-    """Coefficients but for a positive factor, in as few products as the model knows."""
-    with suppress(ZeroDivisionError):  # by a parameter that is fixed at 0
+def compact_coefficients(model: Model, values: Values) -> list[Any]:
+    """Coefficients up to a positive factor, in the model's shortest form."""
+    with suppress(ZeroDivisionError):  # a parameter is fixed at 0
         if model.compact is not None:
             return model.compact(**model.algebraic({name: values[name] for name in model.sets[0].names}))
     return list(values.coefficients)
 
 
-def half_planes(frame: Frame, build: Builder, line: float | None = None) -> LiftedQuantity:
-    """Every root of every case at or left of a line: a known one, or a variable."""
+def add_half_planes(frame: Frame, build: Builder, line: float | None = None) -> LiftedQuantity:
+    """Require all roots of all cases at or left of a line; None makes the line a variable."""
     first, covered, values = len(build.x), build.covered_cases, build.values
-    looked = [case for case in covered if case in frame.signs]
+    cases = [case for case in covered if case in frame.signs]
     at: Any = line
-    if line is None:  # it is no larger than the largest root, unless that is one of a case not looked at
+    if line is None:  # at most the largest root, unless a case that is left out has that root
         most = frame.unit * max(
-            frame.largest(build.enclose(frame.coefficients(values, case)), case == looked[0]) for case in looked
+            frame.bound_roots(build.enclose(frame.coefficients(values, case)), case == cases[0]) for case in cases
         )
-        at = build.variable("abscissa", -most, most if len(values) == 1 or not frame.touching else math.inf)
-    for case in looked:
-        c = frame.about(values, case, at)
-        edges = interlace(build, case, c, frame.largest(build.enclose(c), case == covered[0]), frame.compact)
-        if line is None and frame.touching and len(covered) == 1:
+        at = build.variable("abscissa", -most, most if len(values) == 1 or not frame.needs_contact else math.inf)
+    for case in cases:
+        c = frame.shifted_coefficients(values, case, at)
+        edges = add_interlacing(build, case, c, frame.bound_roots(build.enclose(c), case == covered[0]), frame.compact)
+        if line is None and frame.needs_contact and len(covered) == 1:
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
-    guess = partial(_half_plane_guess, frame, looked, line)
+    guess = partial(_guess_half_planes, frame, cases, line)
     return LiftedQuantity(constant(at), AddedVariable("abscissa", len(build.x) - first, guess), (), ())
 
 
-def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> LiftedQuantity:
-    """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
+def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> LiftedQuantity:
+    """Require a damping ratio of all roots of all cases: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
 
-    A root s > 0 has ζ = −1, and with another s < 0 no such factor. Where ζ may be −1, the factors are s² + pᵢ s + qᵢ,
-    with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked. An odd degree
-    has one factor s + d more, d ≥ 0 asked only of other ζ: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
+    A root s > 0 has ζ = −1 and, together with a root s < 0, no such factor. If ζ may be −1, the factors are
+    s² + pᵢ s + qᵢ, and qᵢ = wᵢ² is required for other ζ only: (1 + ζ)(wᵢ² − qᵢ) = 0. A fixed ζ = −1 requires nothing.
+    An odd degree adds a factor s + d, with d ≥ 0 for other ζ only: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
     """
     first, covered, values = len(build.x), build.covered_cases, build.values
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
-    looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
+    cases = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
 
-    def at_least(greater: Any, least: Any) -> None:
+    def require_at_least(greater: Any, least: Any) -> None:
         build.row("damping_ratio", greater - least, 0.0, np.inf)
 
-    def unless_real(a: Any, b: Any) -> None:
+    def require_equal_unless_real(a: Any, b: Any) -> None:
         """a ≥ b, and a = b for ζ > −1."""
         build.row("damping_ratio", (1 + zeta) * (a - b), 0.0, 0.0)
-        at_least(a, b)
+        require_at_least(a, b)
 
-    for case in looked:
+    for case in cases:
         a = frame.coefficients(values, case)
-        largest = frame.largest(build.enclose(a), case == covered[0])
+        largest = frame.bound_roots(build.enclose(a), case == covered[0])
         pairs, monic = [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
@@ -119,26 +119,26 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> LiftedQ
             q = build.variable(f"q{k}.{case}", -largest * largest, largest * largest) if ratio is None else w * w
             pairs.append(p)
             monic.append([1, p, q])
-            at_least(p, 2 * zeta * w)
+            require_at_least(p, 2 * zeta * w)
             if ratio is None:
-                unless_real(w * w, q)
+                require_equal_unless_real(w * w, q)
         if len(a) % 2 == 0:
             d = build.variable(f"d.{case}", 0.0 if ratio is not None else -largest, largest)
             monic.append([1, d])
             if ratio is None:
-                unless_real(build.variable(f"e.{case}", 0.0, largest), d)
-        for one, other in pairwise(pairs):  # their order means nothing
-            at_least(other, one)
+                require_equal_unless_real(build.variable(f"e.{case}", 0.0, largest), d)
+        for one, other in pairwise(pairs):  # fixes the order of the factors
+            require_at_least(other, one)
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
-    at_least(1, zeta)  # real roots would satisfy any larger one, too
-    guess = partial(_sector_guess, frame, looked, ratio, build.unit)
+    require_at_least(1, zeta)  # real roots would satisfy any larger ratio too
+    guess = partial(_guess_sectors, frame, cases, ratio, build.unit)
     return LiftedQuantity(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
-    """Ranges for the unknown factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
+    """Bound the factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
     count = len(pattern.unknowns)
-    largest = bound_roots(build.enclose(compact(frame.model, build.values[0]))) / build.unit
+    largest = bound_roots(build.enclose(compact_coefficients(frame.model, build.values[0]))) / build.unit
     symbols = build.x[-count:]
     for factor in pattern.factors(symbols):
         for k, c in enumerate(factor[1:], start=1):
@@ -149,19 +149,23 @@ def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
                     build.bounds[j - count] = (max(lower, -most), min(upper, most))
 
 
-def _half_plane_guess(
+def _guess_half_planes(
     frame: Frame, covered: Sequence[int], line: float | None, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """The least line, if it is not known, and squared frequencies."""
+    """The least line, unless it is fixed, and squared frequencies."""
     at = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
-    squares = [x for case in covered for x in squares_of([float(c) for c in frame.about(values, case, at)])]
+    squares = [
+        x
+        for case in covered
+        for x in squared_frequencies([float(c) for c in frame.shifted_coefficients(values, case, at)])
+    ]
     return [[*([at] if line is None else []), *(x / (1 + x) if frame.compact else x for x in squares)]]
 
 
-def _sector_guess(
+def _guess_sectors(
     frame: Frame, covered: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """Damping ratio, if it is not known, and factors; the roots are given in the unit of the NLP."""
+    """The damping ratio, unless it is fixed, and the factors; roots come in the unit of the NLP."""
     factors = []
     for case in covered:
         split = pair_roots(z[case] * unit / frame.unit)

@@ -1,11 +1,10 @@
-"""Stability without factors and without determinants: the theorem of Hermite and Biehler.
+"""Stability by the Hermite–Biehler theorem, without factors and determinants.
 
 Let F(X) = c0 X^m − c2 X^(m−1) + … and S(X) = c1 X^l − c3 X^(l−1) + … be the two parts of p(iω), in X = ω². All roots of
 p, c0 > 0, lie in Re t ≤ 0 exactly if all c_k ≥ 0 and the roots of the two parts are real and interlace: there are
-x1 ≥ x2 ≥ … ≥ 0 with S(X) = c1 (X − x1)(X − x2)… and (−1)^j F(xj) ≥ 0. From degree 5 a little more satisfies that, where
-S has a multiple zero at which F vanishes: a bound is no less valid for it. For a quartic that is one unknown instead of
-the four of two factors, and where it and the line are known, what is asked of the coefficients is linear:
-c3 = x c1 and c2 x ≥ c0 x² + c4.
+x1 ≥ x2 ≥ … ≥ 0 with S(X) = c1 (X − x1)(X − x2)… and (−1)^j F(xj) ≥ 0. From degree 5 on, polynomials whose S has a
+multiple zero at which F vanishes satisfy this too; bounds stay valid. A quartic needs one unknown x, where two factors
+need four. For fixed x and a fixed line its conditions are linear: c3 = x c1 and c2 x ≥ c0 x² + c4.
 """
 
 import math
@@ -19,29 +18,29 @@ from tmsopt.program.lifts import ProgramBuilder
 from tmsopt.roots import product
 
 Square = tuple[Any, Any]
-"""x/y of x and y ≥ 0: infinite where y = 0."""
+"""(x, y), both ≥ 0, stand for x/y; infinite for y = 0."""
 
 
-def unknowns(degree: int) -> int:
-    """How many frequencies the second part of a polynomial has."""
+def frequency_count(degree: int) -> int:
+    """Number of zeros of the second part of a polynomial."""
     return (degree - 1) // 2
 
 
-def interlacing(coefficients: Sequence[Any], squares: Sequence[Square]) -> tuple[list[Any], list[Any]]:
-    """Expressions that vanish, and that are not negative, if all roots have Re t ≤ 0; up to degree 4 only then.
+def interlacing_conditions(coefficients: Sequence[Any], squares: Sequence[Square]) -> tuple[list[Any], list[Any]]:
+    """Expressions that are 0, and expressions that are ≥ 0, if all roots have Re t ≤ 0; up to degree 4 only then.
 
     Args:
-        coefficients: descending, with a leading one that is positive.
+        coefficients: descending; the leading one is positive.
         squares: x1 ≥ x2 ≥ … ≥ 0, squared frequencies at which the second part vanishes.
     """
     first, second = coefficients[0::2], coefficients[1::2]
     expanded = product(*([y, x] for x, y in squares))
     equations = [c * expanded[0] - second[0] * e for c, e in zip(second[1:], expanded[1:], strict=True)]
-    signs = [(-1) ** (j + 1) * _alternating(first, *square) for j, square in enumerate(squares)]
+    signs = [(-1) ** (j + 1) * _alternating_sum(first, *square) for j, square in enumerate(squares)]
     return equations, [*coefficients, *signs, *(x * v - u * y for (x, y), (u, v) in pairwise(squares))]
 
 
-def _alternating(part: Sequence[Any], x: Any, y: Any) -> Any:
+def _alternating_sum(part: Sequence[Any], x: Any, y: Any) -> Any:
     """c0 x^m − c2 x^(m−1) y + …"""
     total, scale = part[0], 1
     for k, c in enumerate(part[1:], start=1):
@@ -50,23 +49,25 @@ def _alternating(part: Sequence[Any], x: Any, y: Any) -> Any:
     return total
 
 
-def interlace(
+def add_interlacing(
     build: ProgramBuilder, case: int, coefficients: Sequence[Any], largest: float, compact: bool
 ) -> list[Any]:
-    """Variables and rows that hold all roots in Re t ≤ 0, none larger than `largest`; what vanishes with a root on it.
-
-    Of the returned expressions, none negative, one can be 0 exactly if some root has Re t = 0.
+    """Add variables and rows that keep all roots in Re t ≤ 0.
 
     Args:
-        compact: take X/(1 − X) for the squares, so that no bound on the roots is needed.
+        largest: bound on the size of the roots.
+        compact: write the squares as X/(1 − X), which needs no bound on the roots.
+
+    Returns:
+        Expressions ≥ 0, one of which can be 0 exactly if some root has Re t = 0.
     """
     degree = len(coefficients) - 1
-    count = unknowns(degree)
+    count = frequency_count(degree)
     # The phase of p(iω) is least where all roots are at −R: degree · atan(ω/R), at the last frequency (degree − 2) π/2.
     reach = max(1.0, math.tan(math.pi / 2 - math.pi / degree)) if degree > 4 else 1.0
     most = 1.0 if compact else (largest * reach) ** 2
     unknown = [build.variable(f"x{k}.{case}", 0.0, most) for k in range(1, count + 1)]
-    equations, nonnegative = interlacing(coefficients, [(x, 1 - x if compact else 1) for x in unknown])
+    equations, nonnegative = interlacing_conditions(coefficients, [(x, 1 - x if compact else 1) for x in unknown])
     for expression in equations:
         build.row("abscissa", expression, 0.0, 0.0)
     for expression in nonnegative:
@@ -75,19 +76,19 @@ def interlace(
     return [coefficients[-1], *(signs or coefficients[1:2])]
 
 
-def squares_of(coefficients: Sequence[float]) -> list[float]:
-    """Squared frequencies for known coefficients that interlace best."""
+def squared_frequencies(coefficients: Sequence[float]) -> list[float]:
+    """The squared frequencies that violate interlacing least, for coefficients as numbers."""
 
     def violation(squares: Sequence[float]) -> float:
-        equations, nonnegative = interlacing(coefficients, [(x, 1.0) for x in squares])
+        equations, nonnegative = interlacing_conditions(coefficients, [(x, 1.0) for x in squares])
         return float(max(*map(abs, equations), *(-e for e in nonnegative), 0.0))
 
-    return min(_candidates(coefficients), key=violation)
+    return min(_candidate_squares(coefficients), key=violation)
 
 
-def _candidates(coefficients: Sequence[float]) -> Iterator[list[float]]:
-    """Zeros of the second part; values between those of the first, where the second vanishes; and 0."""
-    count = unknowns(len(coefficients) - 1)
+def _candidate_squares(coefficients: Sequence[float]) -> Iterator[list[float]]:
+    """Zeros of the second part; if that vanishes, values between the zeros of the first; and 0."""
+    count = frequency_count(len(coefficients) - 1)
     for part in (coefficients[1::2], coefficients[0::2]):
         alternating = np.array([c if k % 2 == 0 else -c for k, c in enumerate(part)])
         found = np.roots(alternating) if np.any(alternating) else np.zeros(0)

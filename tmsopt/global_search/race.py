@@ -1,7 +1,7 @@
-"""A global solver on several questions side by side, the first that is done stopping the others.
+"""Runs a global solver on several tasks in parallel; the first infeasible one stops the others.
 
-SCIP can crash, and two of it in the threads of one process do. In a process of its own it takes nothing with it, can be
-stopped at any moment, and what it prints is not seen.
+SCIP can crash, and does if two threads of one process run it. In a separate process a crash costs nothing else, the
+solver can be stopped at any moment, and its output is not shown.
 """
 
 import time
@@ -9,15 +9,15 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 
 from tmsopt.algebra.formula import UnsupportedOperation
-from tmsopt.global_search.tasks import INFEASIBLE, UNDECIDED, Decision, Failed, GlobalSolver, Task
+from tmsopt.global_search.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSolver, SolverFailed, Task
 from tmsopt.killable import Killable, ProcessEnded
 
-_TICK = 0.02  # seconds between looks
-_GRACE = 5.0  # seconds that a solver may take longer than it was given, as SCIP does in the midst of a relaxation
+_TICK = 0.02  # seconds between polls
+_GRACE = 5.0  # seconds a solver may overrun its limit, as SCIP does while it solves a relaxation
 
 
 class SolverPool:
-    """Processes that are kept from one question to the next; to be closed."""
+    """Processes that are reused from one question to the next; use it as a context manager."""
 
     def __init__(self, solver: GlobalSolver) -> None:
         self._solver = solver
@@ -30,20 +30,23 @@ class SolverPool:
         while self._idle:
             self._idle.pop().end()
 
-    def ahead(self, count: int) -> None:
-        """Start processes that will be needed."""
+    def start_processes(self, count: int) -> None:
+        """Start processes until `count` are idle."""
         while len(self._idle) < count:
             self._idle.append(Killable(self._solver.prepare))
 
     def race(self, tasks: Sequence[Task], tick: Callable[[], None] = lambda: None) -> list[Decision]:
-        """Decisions on tasks, run all at once, until one is shown to have no feasible point.
+        """Decide tasks in parallel until one is infeasible.
+
+        Args:
+            tick: called at every poll.
 
         Raises:
-            UnsupportedOperation: for operations or numbers that the solver cannot take, if no task can.
-            Failed: if the solver raised, and decided nothing.
-            KeyboardInterrupt: when the user stops it; no process is left behind.
+            NotAccepted: if the solver supports none of the tasks.
+            SolverFailed: if the solver raised an error and decided nothing.
+            KeyboardInterrupt: if the user stops it; no process is left behind.
         """
-        self.ahead(len(tasks))
+        self.start_processes(len(tasks))
         began = time.monotonic()
         running: list[tuple[Killable, Future[Decision]]] = []
         try:
@@ -56,7 +59,7 @@ class SolverPool:
                 finished, _ = wait(waiting, _TICK, FIRST_COMPLETED)
                 decided = (answer for answer in answers if answer.done() and not answer.exception())
                 if not finished and any(answer.result().verdict == INFEASIBLE for answer in decided):
-                    break  # not before: one that is all but done is worth more than a new process
+                    break  # after one more poll, since ending a process that is nearly done costs a new one
                 late = time.monotonic() - began - _GRACE
                 for task, (process, answer) in zip(tasks, running, strict=True):
                     if task.seconds < late and not answer.done():
@@ -67,11 +70,11 @@ class SolverPool:
                     self._idle.append(process)
                 else:
                     process.end()
-        return _decisions(answers)
+        return _collect_decisions(answers)
 
 
-def _decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
-    """Decisions in the order of the tasks; undecided where a process was ended or crashed."""
+def _collect_decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
+    """Decisions in the order of the tasks; undecided if the process was ended or crashed."""
     decisions, refused, failed = list[Decision](), list[UnsupportedOperation](), list[BaseException]()
     for answer in answers:
         match answer.exception() if answer.done() else ProcessEnded():
@@ -84,7 +87,7 @@ def _decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
             case error:
                 failed.append(error)
     if failed and all(decision.verdict == UNDECIDED for decision in decisions):
-        raise Failed(f"{type(failed[0]).__name__}: {' '.join(str(failed[0]).split())}") from failed[0]
+        raise SolverFailed(f"{type(failed[0]).__name__}: {' '.join(str(failed[0]).split())}") from failed[0]
     if refused and not decisions:
         raise refused[0]
     return decisions

@@ -1,4 +1,4 @@
-"""The one caller of SCIP: tasks in, decisions by spatial branch and bound out."""
+"""Decides tasks by spatial branch and bound with SCIP; no other module calls SCIP."""
 
 import math
 import time
@@ -8,8 +8,8 @@ import numpy as np
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
 from tmsopt.global_search.translation import FEASIBILITY, Translation
 
-_LEAST = 0.01  # seconds
-_MARGIN = 1e-6  # relative, for what tolerances do to a bound
+_MIN_SECONDS = 0.01
+_MARGIN = 1e-6  # relative: how far the tolerances may move a bound
 
 
 def prepare() -> None:
@@ -17,29 +17,29 @@ def prepare() -> None:
     import pyscipopt  # noqa: F401
 
 
-def decide(asked: Task) -> Decision:
-    """Branch and bound.
+def decide(task: Task) -> Decision:
+    """Decide a task.
 
     Raises:
-        UnsupportedOperation: for an operation that cannot be written for SCIP.
+        NotAccepted: for an operation that SCIP does not support.
     """
     began = time.perf_counter()
-    translated = Translation(asked.nlp)
-    if translated.impossible:
+    translation = Translation(task.nlp)
+    if translation.impossible:
         return Decision(INFEASIBLE, bound=math.inf)
-    model = translated.model
-    for x, (lower, upper) in zip(translated.x, asked.within, strict=False):
+    model = translation.model
+    for x, (lower, upper) in zip(translation.x, task.box, strict=False):
         model.chgVarLb(x.symbol, lower / x.scale)
         model.chgVarUb(x.symbol, upper / x.scale)
-    if asked.least:
-        model.setObjective(translated.objective)
+    if task.minimise:
+        model.setObjective(translation.objective)
     else:
         model.setParam("limits/solutions", 1)
-    model.setParam("limits/time", max(asked.seconds - (time.perf_counter() - began), _LEAST))
+    model.setParam("limits/time", max(task.seconds - (time.perf_counter() - began), _MIN_SECONDS))
     model.setParam("numerics/feastol", FEASIBILITY)
-    model.optimizeNogil()  # other threads of the process may see that there is nobody left to answer to
+    model.optimizeNogil()  # lets other threads notice that the parent process has ended
     status, found = model.getStatus(), model.getNSols() > 0
-    point = np.array([model.getVal(x.symbol) * x.scale for x in translated.x]) if found else None
+    point = np.array([model.getVal(x.symbol) * x.scale for x in translation.x]) if found else None
     bound = float(model.getDualbound())
     return Decision(
         verdict=INFEASIBLE if status == "infeasible" else FOUND if found else UNDECIDED,

@@ -1,4 +1,4 @@
-"""No stable design, by signs: a polynomial has all roots left of the axis only where its coefficients have one sign."""
+"""Proves by signs that no design is stable: all roots lie left of the axis only if all coefficients share one sign."""
 
 from collections import deque
 
@@ -9,28 +9,28 @@ from tmsopt.algebra.intervals import ranges
 from tmsopt.problem.problem import Posed
 from tmsopt.roots import hurwitz_minors
 
-_BOXES = 300  # looked at, beyond which it is left to others
+_MAX_BOXES = 300  # then branch and bound takes over
 
 
-def none_stable(problem: Posed) -> bool:
-    """Whether it is certain, by interval arithmetic alone, that no design of the box is stable, limits or not.
+def has_no_stable_design(problem: Posed) -> bool:
+    """Whether interval arithmetic proves that no design of the box is stable, whatever the constraints.
 
-    In each part of the box two coefficients have different signs, or one and a Hurwitz determinant of degree 3 or 4. Of
-    a problem with several cases nothing is said.
+    In each part of the box two coefficients differ in sign, or a coefficient and the Hurwitz determinant of degree 3
+    or 4. False for a problem with several cases or nothing free.
     """
     if problem.cases or not problem.free:
         return False
     a = problem.model.coefficients(problem.ordered({n: symbol(n) for n in problem.free}), problem.parameter_set)
     n = len(a) - 1
-    # Δ2 a0 of degree 3 and Δ3 of degree 4 have the coefficients' sign where all roots are left of the axis.
+    # If all roots lie left of the axis, Δ2 a0 (degree 3) or Δ3 (degree 4) has the sign of the coefficients.
     minors = [hurwitz_minors(a)[n - 2] * (a[0] if n == 3 else 1)] if n in (3, 4) else []
     tests = formula([*a, *minors], problem.free)
-    left = deque([[(lo, hi) for lo, hi in problem.free.values()]])
+    open_boxes = deque([[(lo, hi) for lo, hi in problem.free.values()]])
     widths = np.array([hi - lo for lo, hi in problem.free.values()])
-    for _ in range(_BOXES):
-        if not left:
+    for _ in range(_MAX_BOXES):
+        if not open_boxes:
             return True
-        box = left.popleft()
+        box = open_boxes.popleft()
         try:
             ends = np.array(ranges(tests, box))
         except UnsupportedOperation:
@@ -40,5 +40,5 @@ def none_stable(problem: Posed) -> bool:
         k = int(np.argmax(np.array([hi - lo for lo, hi in box]) / widths))
         lo, hi = box[k]
         middle = lo + (hi - lo) / 2
-        left += [[*box[:k], part, *box[k + 1 :]] for part in ((lo, middle), (middle, hi))]
-    return not left
+        open_boxes += [[*box[:k], part, *box[k + 1 :]] for part in ((lo, middle), (middle, hi))]
+    return not open_boxes

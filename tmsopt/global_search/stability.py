@@ -1,4 +1,4 @@
-"""Whether any design in a box is stable: asked of branch and bound in a few seconds, for a search that found none."""
+"""Decides in a few seconds by branch and bound whether any design of a box is stable, after a search found none."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -6,22 +6,22 @@ from functools import partial
 
 from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.global_search.answer import Answer, Clock, answer, contradicted, doubt
-from tmsopt.global_search.question import Question, unit_of
+from tmsopt.global_search.answer import Answer, Clock, answer_question, find_exclusion, is_excluded_by_solver
+from tmsopt.global_search.question import Question, typical_size
 from tmsopt.global_search.race import SolverPool
 from tmsopt.global_search.scip import SCIP
-from tmsopt.global_search.signs import none_stable
-from tmsopt.global_search.tasks import FOUND, INFEASIBLE, Failed
+from tmsopt.global_search.signs import has_no_stable_design
+from tmsopt.global_search.tasks import FOUND, INFEASIBLE, SolverFailed
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import default_start
 from tmsopt.progress import Counts
 
 SOLVER = SCIP
-"""Who is asked, here and for certificates."""
+"""The global solver in use, here and in `certify`."""
 
-_MARGIN = 1e-3  # of the roots' usual size: a design found left of it is stable for certain
+_MARGIN = 1e-3  # of the typical size of the roots: the second question asks for this much decay
 _SHARE = 0.7  # of the time, for the proof
-_ANY = partial(Answer, FOUND, None)  # whatever design the solver found ends the question
+_ACCEPT_ANY = partial(Answer, FOUND, None)
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class Stability:
     """Whether any design is stable.
 
     Attributes:
-        any: True where `design` is, by a recheck; False where it is proved that none is; None where it is not known.
-        design: free parameters of a stable design, to be improved: it may be off in a limit by the solver's tolerance.
-        proof: of what kind, in words.
-        failed: why the solver said nothing, where that is an error of its own.
+        any: True if `design` is stable by a recheck, False if it is proved that no design is, None if unknown.
+        design: free parameters of a stable design; it may violate a limit by the solver's tolerance.
+        proof: the kind of proof, in words.
+        failed: the error of the solver, if it failed.
     """
 
     any: bool | None = None
@@ -41,67 +41,67 @@ class Stability:
     failed: str = ""
 
 
-def any_stable(
+def find_stable_design(
     problem: Posed,
     seconds: float,
     known: Mapping[str, float] | None = None,
     progress: Counts | None = None,
 ) -> Stability:
-    """Whether any design in the box has all its roots left of the axis, in every case that the problem lists.
+    """Decide whether any design of the box has all roots left of the axis in every case listed.
 
-    Its constraints and its pattern hold, but for constraints on the roots themselves. Refuted is more than is claimed:
-    that all roots may lie left of the axis or on it. Where designs on the axis are the best there are, nothing is said.
-    The proof is one in floating-point arithmetic, to the solver's tolerance.
+    The constraints and the pattern hold, except constraints on the roots themselves. The proof excludes roots on the
+    axis too, so the answer is None if the best designs lie on it. It is a floating-point proof, to the solver's
+    tolerance.
 
     Args:
-        seconds: at most, but for those that a process takes to start; without a global solver none pass.
-        known: parameters of the best design known. A question that excludes what it should admit proves nothing.
-        progress: called with the seconds that passed and those there are.
+        seconds: time limit, without the start of processes; unused without a global solver.
+        known: parameters of the best known design; a question that excludes it proves nothing.
+        progress: called with the seconds used and the seconds granted.
 
     Raises:
-        KeyboardInterrupt: when the user stops it.
+        KeyboardInterrupt: if the user stops it.
     """
-    if none_stable(problem):
+    if has_no_stable_design(problem):
         return Stability(False, proof="by signs of coefficients, in interval arithmetic")
     if not SOLVER.available or not problem.free:
         return Stability()
-    kept = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
-    asked = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=kept)
-    best = _checked(asked, {n: known[n] for n in problem.free} if known else default_start(problem))
-    unit = unit_of(best.structure.roots)
-    at_axis = Question(asked, asked.cases, 0.0, unit)
-    with SolverPool(SOLVER) as crew:
-        clock = Clock(seconds, crew, progress)
+    constraints = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
+    relaxed = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=constraints)
+    best = _recheck_point(relaxed, {n: known[n] for n in problem.free} if known else default_start(problem))
+    unit = typical_size(best.structure.roots)
+    at_axis = Question(relaxed, relaxed.cases, 0.0, unit)
+    with SolverPool(SOLVER) as pool:
+        clock = Clock(seconds, pool, progress)
         try:
-            told = answer(at_axis, clock, _SHARE, _ANY)
-            proved = told.verdict == INFEASIBLE
+            reply = answer_question(at_axis, clock, _SHARE, _ACCEPT_ANY)
+            proved = reply.verdict == INFEASIBLE
             if proved and known is not None and not best.violations:
-                proved = _admits(at_axis, best, known, clock)
-            if told.verdict == FOUND and _judged(asked, told.other).design is None:  # it is on the axis
-                told = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _ANY)
+                proved = _is_admitted(at_axis, best, known, clock)
+            if reply.verdict == FOUND and _judge_point(relaxed, reply.other).design is None:  # on the axis
+                reply = answer_question(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _ACCEPT_ANY)
         except UnsupportedOperation:
             return Stability()
-        except Failed as error:
+        except SolverFailed as error:
             return Stability(failed=f"{SOLVER.name} failed: {error}")
     if clock.interrupted:
         raise KeyboardInterrupt
     by = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
-    return Stability(False, proof=by) if proved else _judged(asked, told.other)
+    return Stability(False, proof=by) if proved else _judge_point(relaxed, reply.other)
 
 
-def _checked(problem: Posed, design: Mapping[str, float]) -> Evaluation:
+def _recheck_point(problem: Posed, design: Mapping[str, float]) -> Evaluation:
     return recheck(problem, problem.ordered(design))
 
 
-def _judged(problem: Posed, design: Mapping[str, float] | None) -> Stability:
-    """What a design says that the solver found."""
-    if design is None or not max((checked := _checked(problem, design)).structure.abscissa, checked.realised) < 0:
+def _judge_point(problem: Posed, design: Mapping[str, float] | None) -> Stability:
+    """The verdict on a point that the solver found."""
+    if design is None or not max((checked := _recheck_point(problem, design)).structure.abscissa, checked.realised) < 0:
         return Stability()
     return Stability(None if checked.violations else True, design)
 
 
-def _admits(question: Question, best: Evaluation, known: Mapping[str, float], clock: Clock) -> bool:
-    """Whether the question for a line just right of a known design admits that design, as put and as solved."""
+def _is_admitted(question: Question, best: Evaluation, known: Mapping[str, float], clock: Clock) -> bool:
+    """Whether the question and the solver admit a known design, for a line just right of its roots."""
     design = {n: known[n] for n in question.problem.free}
     wider = replace(question, limit=best.structure.abscissa + _MARGIN * question.unit)
-    return not doubt(wider, design) and not contradicted(wider, design, clock)
+    return not find_exclusion(wider, design) and not is_excluded_by_solver(wider, design, clock)

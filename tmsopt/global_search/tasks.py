@@ -1,6 +1,6 @@
-"""What a global solver is: the tasks that it is given, what it decides, and what it is called.
+"""Interface of a global solver: its tasks, its decisions, its name.
 
-`scip` is one; another stands beside it, and `certify` says who is asked.
+`scip` implements it; `stability.SOLVER` selects the solver in use.
 """
 
 import importlib.util
@@ -16,18 +16,19 @@ from tmsopt.program.nlp import NLP
 INFEASIBLE, FOUND, UNDECIDED = "infeasible", "found", "undecided"
 
 
-class Failed(RuntimeError):
-    """What a global solver raised, in one line: an error of the solver or of its installation, and no decision."""
+class SolverFailed(RuntimeError):
+    """An error raised by a global solver or its installation, in one line; no decision."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What branch and bound came to.
+    """The outcome of branch and bound.
 
     Attributes:
-        verdict: ``infeasible``, ``found``, or ``undecided`` when time ran out.
-        point: of the NLP, where one was found.
-        bound: no feasible point has a lesser objective, if that was asked.
+        verdict: ``infeasible``, ``found``, or ``undecided`` if time ran out.
+        point: a feasible point of the NLP, if one was found.
+        bound: lower bound on the objective, if the task minimises.
+        nodes: of the search tree.
     """
 
     verdict: str
@@ -38,31 +39,31 @@ class Decision:
 
 @dataclass(frozen=True)
 class Task:
-    """What a global solver is asked.
+    """A task for a global solver.
 
     Attributes:
-        nlp: its functions, and the ranges of variables and rows; nothing else of it is to be read.
-        least: whether for the least objective; else for any feasible point.
-        within: limits for the first variables, narrower than their ranges.
+        nlp: only its functions and the ranges of its variables and rows are set.
+        minimise: find the least objective; otherwise any feasible point.
+        box: narrower ranges for the first variables.
     """
 
     nlp: NLP
     seconds: float
-    least: bool = False
-    within: tuple[tuple[float, float], ...] = ()
+    minimise: bool = False
+    box: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
 class GlobalSolver:
-    """A solver that decides tasks by branch and bound, in a process of its own.
+    """A solver that decides tasks by branch and bound in a separate process.
 
     Attributes:
-        name: in reports, and in small letters the method of its bounds.
-        module: to be imported.
-        missing: what to say where that is not there.
-        tolerance: by which it may be off in a row; 0 for exact arithmetic.
-        prepare: called once in its process, before the first task.
-        decide: raises UnsupportedOperation for an operation that it cannot take.
+        name: used in reports; in lower case the `method` of its bounds.
+        module: the Python module that it needs.
+        missing: the message if that module is not installed.
+        tolerance: feasibility tolerance of a row; 0 for exact arithmetic.
+        prepare: called once in the process, before the first task.
+        decide: decides a task; raises NotAccepted for an unsupported operation.
     """
 
     name: str
@@ -74,11 +75,11 @@ class GlobalSolver:
 
     @property
     def available(self) -> bool:
-        """Whether it is installed."""
+        """Whether its module is installed."""
         return importlib.util.find_spec(self.module) is not None
 
 
-def task(nlp: NLP, seconds: float, *, least: bool = False, within: tuple[tuple[float, float], ...] = ()) -> Task:
-    """An NLP as a task: whether it has any feasible point, or a bound on its objective."""
-    bare = replace(nlp, lifts=(), contacts={}, products=(), cases=())  # the rest cannot always be pickled
-    return Task(bare, seconds, least, within)
+def make_task(nlp: NLP, seconds: float, *, minimise: bool = False, box: tuple[tuple[float, float], ...] = ()) -> Task:
+    """A task from the parts of an NLP that a solver reads, which can always be pickled."""
+    bare = replace(nlp, lifts=(), contacts={}, products=(), cases=())
+    return Task(bare, seconds, minimise, box)

@@ -1,7 +1,7 @@
-"""Proofs: an exceptional point exists (interval Newton in balls), no better design does (branch and bound).
+"""Proofs that an exceptional point exists (interval Newton in balls) and that no better design does (branch and bound).
 
-In: a solution. Out: a `Proof`, every number with its radius, or the solution with a proved bound. Open `proof` first,
-then `certify`.
+In: a solution. Out: a `Proof`, whose numbers have radii, or the solution with a proved bound. Open `proof` first, then
+`certify`.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""What follows for a design whose roots are known in balls: stability, heavy damping, its place in the problem."""
+"""Facts about a design with roots in balls: eigenvectors, stability, heavy damping, box and limits."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +11,8 @@ from tmsopt.models import Values
 from tmsopt.models.exact import ExactDesign
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
-from tmsopt.proofs.existence import EXACT, Existing
-from tmsopt.proofs.factored import Factored
+from tmsopt.proofs.existence import EXACT, ProvedDesign
+from tmsopt.proofs.factorisation import Factorisation
 from tmsopt.roots import exact_nullity, has_one_eigenvector
 from tmsopt.roots.patterns.root_enclosures import factor_roots
 
@@ -22,62 +22,60 @@ class Verdict:
     """Whether something certainly holds.
 
     Attributes:
-        holds: None where the balls cannot tell, or nothing was asked.
-        words: what holds, or why not.
+        holds: None if undecided or not checked.
+        words: the fact, or the reason.
     """
 
     holds: bool | None = None
-    words: str = "not looked at"
+    words: str = "not checked"
 
 
-NOTHING = Verdict()
-"""Where no answer was looked for."""
-
+NOT_CHECKED = Verdict()
 
 BINDS = 1e-9
-"""Room between the sides of an inequality up to which it binds: what a solver leaves."""
+"""Difference between the sides of a comparison up to which it binds: the remainder that a solver leaves."""
 
 
-def eigenvectors(problem: Posed, design: ExactDesign, found: Existing) -> tuple[int | None, Verdict]:
-    """The most independent eigenvectors of a multiple root, and whether all multiple roots lack some.
+def eigenvector_verdict(problem: Posed, design: ExactDesign, found: ProvedDesign) -> tuple[int | None, Verdict]:
+    """The largest geometric multiplicity of a multiple root, and whether all multiple roots are defective.
 
-    In fractions where the design is exact; else by minors in balls, which show that there are no more than one.
+    Computed in fractions for an exact design; otherwise by minors in balls, which can only prove one eigenvector.
     """
-    repeated = [factor for factor, count in found.factored.factors if count > 1]
+    repeated = [factor for factor, count in found.factorisation.factors if count > 1]
     pencil, of = problem.model.pencil, problem.parameter_set
     if pencil is None:
-        return None, Verdict(None, "a system given by coefficients does not say")
+        return None, Verdict(None, "a model given by its coefficients has no eigenvectors")
     if not repeated:
-        return None, NOTHING
+        return None, NOT_CHECKED
     matrices = design.matrices(problem.model, of) if found.method == EXACT else None
     if matrices:
         parts = flint.fmpq_poly(list(found.coefficients)[::-1]).factor()[1]
-        found_each = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
-        most = max(nullity for nullity, _ in found_each)
-        missing = all(nullity < count for nullity, count in found_each)
-        return most, Verdict(missing, f"{most} eigenvector{'s' * (most > 1)}, in fractions")
+        nullities = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
+        most = max(nullity for nullity, _ in nullities)
+        defective = all(nullity < count for nullity, count in nullities)
+        return most, Verdict(defective, f"{most} eigenvector{'s' * (most > 1)}, in fractions")
     at = pencil(of.native(found.parameters))
     roots = [flint.acb(z.re, z.im) for f in repeated for z in factor_roots(f) or ()]
     one = bool(roots) and all(has_one_eigenvector(at, s) for s in roots)
-    words = "one eigenvector: a minor of the matrices is not 0, in balls" if one else "no minor tells it from 0"
+    words = "one eigenvector: a minor of the matrices is not 0, in balls" if one else "every minor may be 0"
     return (1 if one else None), Verdict(True if one else None, words)
 
 
-def stability(factored: Factored, of_H: bool = False) -> Verdict:
-    """Whether all roots are left of the imaginary axis, by the signs of Liénard and Chipart in balls.
+def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdict:
+    """Whether all roots lie left of the imaginary axis, by Liénard–Chipart signs in balls.
 
     Args:
-        of_H: whether to say it of eigenfrequencies ω = i s.
+        of_H: word the verdict for eigenfrequencies ω = i s.
     """
     one, right, left, below = "a root", "right of the imaginary axis", "left of the imaginary axis", "left of the axis"
     if of_H:
         one, right, left, below = "an eigenfrequency", "above the real axis", "below the real axis", "below the axis"
-    if factored.stable:
+    if factorisation.stable:
         every = "all eigenfrequencies" if of_H else "all roots"
         return Verdict(True, f"{every} are {left} (Routh–Hurwitz signs in balls)")
-    if factored.stable is None:
-        return Verdict(None, "a Routh–Hurwitz sign cannot be told from 0; ask for more digits")
-    roots = factored.roots or ()
+    if factorisation.stable is None:
+        return Verdict(None, "a Routh–Hurwitz expression may be 0; ask for more digits")
+    roots = factorisation.roots or ()
     axis = [z for z in roots if z.re == 0]
     if not axis or any(z.re > 0 for z in roots):
         return Verdict(False, f"{one} is {right if any(z.re > 0 for z in roots) else f'not {left}'}")
@@ -86,19 +84,19 @@ def stability(factored: Factored, of_H: bool = False) -> Verdict:
     return Verdict(False, at + f", the others {below}: on the boundary of stability" * simple)
 
 
-def heavy_damping(factored: Factored) -> Verdict:
+def heavy_damping_verdict(factorisation: Factorisation) -> Verdict:
     """Whether all roots are real and negative, and whether strictly."""
-    if factored.heavily_damped is None:
-        return Verdict(None, "real and complex roots cannot be told apart; ask for more digits")
-    if not factored.heavily_damped:
-        return Verdict(False, "a root is complex" if factored.stable else "a root is not negative")
-    if any(multiplicity > 1 for _, multiplicity in factored.factors) or factored.roots is None:
+    if factorisation.heavily_damped is None:
+        return Verdict(None, "some roots may be real or complex; ask for more digits")
+    if not factorisation.heavily_damped:
+        return Verdict(False, "a root is complex" if factorisation.stable else "a root is not negative")
+    if any(multiplicity > 1 for _, multiplicity in factorisation.factors) or factorisation.roots is None:
         return Verdict(True, "all roots are real and negative, some of them equal: on the edge of heavy damping")
     return Verdict(True, "all roots are real, negative and different: strictly inside heavy damping")
 
 
-def inside(problem: Posed, design: ExactDesign, found: Existing) -> Verdict:
-    """Whether every free parameter is certainly within its limits."""
+def box_verdict(problem: Posed, design: ExactDesign, found: ProvedDesign) -> Verdict:
+    """Whether every free parameter certainly lies within its limits."""
     if not problem.free:
         return Verdict(True, "nothing is free")
     undecided = []
@@ -107,22 +105,22 @@ def inside(problem: Posed, design: ExactDesign, found: Existing) -> Verdict:
         if name not in (*found.moved, *design.tangents) and (known := design.values[name].fraction) is not None:
             value = rational(known)
         if {name, f"tan({name})"} & set(design.stated) and float(value) in (least, greatest):
-            continue  # the exact form of a limit
+            continue  # the user states the limit exactly
         lo, hi = (problem.exactly({name: end})[name] for end in (least, greatest))
         if value < lo or value > hi:
             return Verdict(False, f"{name} is outside its limits")
         if not (value >= lo and value <= hi):
             undecided.append(name)
     if undecided:
-        return Verdict(None, f"{', '.join(undecided)} cannot be told from a limit")
+        return Verdict(None, f"{', '.join(undecided)} may lie on either side of a limit")
     return Verdict(True, "every free parameter is within its limits")
 
 
-def limits(problem: Posed, found: Existing) -> dict[str, str]:
-    """Each comparison at the nominal design; none where it must hold in several cases."""
+def limit_verdicts(problem: Posed, found: ProvedDesign) -> dict[str, str]:
+    """The verdict on each comparison at the nominal design; none if it must hold in several cases."""
     if problem.scenarios or problem.tolerances:
         return {}
-    roots = found.factored
+    roots = found.factorisation
     known = {
         "abscissa": roots.abscissa,
         "damping_ratio": roots.damping_ratio,
@@ -135,20 +133,20 @@ def limits(problem: Posed, found: Existing) -> dict[str, str]:
     for name, condition in problem.conditions.items():
         difference = flint.arb(condition.of(values, BALLS))
         if condition.equality:
-            verdicts[name] = _equal(difference, equations=found.method == "Krawczyk")
+            verdicts[name] = _equality_verdict(difference, equations=found.method == "Krawczyk")
         else:
-            verdicts[name] = _met(difference if condition.sign < 0 else -difference)
+            verdicts[name] = _inequality_verdict(difference if condition.sign < 0 else -difference)
     return verdicts
 
 
-def _equal(difference: Any, equations: bool) -> str:
+def _equality_verdict(difference: Any, equations: bool) -> str:
     if difference == 0 or (equations and difference.contains(0)):
         return "met"
     off = "cannot be told" if not difference.is_finite() else f"met but for {abs(float(difference.mid())):.1e}"
     return off if abs(difference) <= BINDS or not difference.is_finite() else "violated"
 
 
-def _met(room: Any) -> str:
+def _inequality_verdict(room: Any) -> str:
     if abs(room) <= BINDS:
         return "binds"
     return "met" if room > 0 else "violated" if room < 0 else "cannot be told"

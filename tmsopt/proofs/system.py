@@ -1,4 +1,4 @@
-"""The square system whose solution has a root pattern: a_k = a0 c_k, and the problem's equalities."""
+"""The square system of a root pattern: a_k = a0 c_k, and the problem's equalities."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,37 +7,37 @@ from typing import Any
 import numpy as np
 
 from tmsopt.algebra.krawczyk import ProofFailed, jacobian as jacobian_of
-from tmsopt.global_search.conditions import others, values_at
+from tmsopt.global_search.pattern_equations import extra_equations, values_at
 from tmsopt.models import Quantity
 from tmsopt.models.expression import Expression
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, lifted_quantities
 from tmsopt.program.nlp import proof_units, scale_of, unit_near
-from tmsopt.proofs.factored import abscissa_formula
+from tmsopt.proofs.factorisation import abscissa_formula
 from tmsopt.records import Array
 from tmsopt.roots import Pattern
 
 ROUNDINGS = 64
-"""Roundings of every number of an equation that a stored design may be off by."""
+"""Roundings of each number by which a stored design may miss an equation."""
 
-_DEPENDENT = 1e-9  # relative size of what a parameter adds to the others, below which it adds nothing
-_NOTHING = 1e-30  # of a range: what a solver leaves of a 0
-_NEAR_ZERO = 1e-3  # of a range: what moves a parameter that is smaller than that is measured by this
+_MIN_PIVOT = 1e-9  # relative: a parameter that adds less to the others counts as dependent
+_ZERO = 1e-30  # of a range: the remainder that a solver leaves for 0
+_MIN_SCALE = 1e-3  # of a range: least scale of a parameter
 _EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class Equations:
-    """Left sides of the pattern's and the problem's equations.
+    """Left sides of the equations of a pattern and a problem.
 
-    A number goes by its parameter's name, angles by their tangent; by the name of a quantity that has an equation
-    of its own; or by that of an unknown of the pattern, see `of_pattern`.
+    Numbers have the names of parameters (angles stand for their tangents), of lifted quantities, and of unknowns of
+    the pattern, see `pattern_unknowns`.
 
     Attributes:
         equalities: the == constraints.
         lifted: quantities in them that are unknowns with an equation.
-        unit: of the roots.
-        units: of numbers that are not of the size of 1, powers of 2.
+        unit: unit of the roots, a power of 2.
+        units: units of numbers that are not about 1, powers of 2.
     """
 
     problem: Posed
@@ -49,12 +49,12 @@ class Equations:
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """What is unknown besides parameters."""
-        return (*(q.name for q in self.lifted), *self.of_pattern)
+        """Names of the unknowns that are not parameters."""
+        return (*(q.name for q in self.lifted), *self.pattern_unknowns)
 
     @property
-    def of_pattern(self) -> tuple[str, ...]:
-        """Unknowns of the pattern, by names that no parameter or quantity has."""
+    def pattern_unknowns(self) -> tuple[str, ...]:
+        """Names of the unknowns of the pattern, different from those of parameters and quantities."""
         of = self.problem.parameter_set
         taken = {*of.names, *self.problem.model.quantity_names(of)}
         return tuple(f"{self.pattern.name}.{u}" if u in taken else u for u in self.pattern.unknowns)
@@ -67,64 +67,62 @@ class Equations:
     def __call__(self, at: Mapping[str, Any]) -> list[Any]:
         """The left sides."""
         values = values_at(self.problem, self.lifted, at, {})
-        u = [at[n] for n in self.of_pattern]
+        u = [at[n] for n in self.pattern_unknowns]
         a = values.coefficients
         left = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
         if self.equalities:
             values = values.with_known({"abscissa": abscissa_formula(self.pattern, u)})
-        return left + others(values, self.lifted, self.equalities, at)
+        return left + extra_equations(values, self.lifted, self.equalities, at)
 
 
-def equations(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:
+def build_equations(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:
     """The equations of a pattern in a problem.
 
     Raises:
-        ProofFailed: for an equality that cannot be evaluated in balls.
+        ProofFailed: for an equality of a quantity that balls do not support.
     """
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
-    beyond = [n for n in (RADIUS, "damping_ratio", ANGULAR_FREQUENCY) if any(n in c.names for c in equalities)]
-    if beyond:
-        raise ProofFailed(
-            f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest"
-        )
+    unsupported = [n for n in (RADIUS, "damping_ratio", ANGULAR_FREQUENCY) if any(n in c.names for c in equalities)]
+    if unsupported:
+        raise ProofFailed(f"a proof does not support == constraints on {unsupported[0]}; drop it to prove the rest")
     lifted = lifted_quantities(problem.model, problem.parameter_set, parameters, equalities)
     own = Equations(problem, pattern, equalities, lifted, unit_near(scale_of(problem).unit))
     units = proof_units(problem)
     units |= {q.name: unit_near(abs(float(problem.values(parameters)[q.name]))) for q in own.lifted}
-    units |= {n: own.unit**power for n, power in zip(own.of_pattern, pattern.powers, strict=True)}
+    units |= {n: own.unit**power for n, power in zip(own.pattern_unknowns, pattern.powers, strict=True)}
     return replace(own, units=units)
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """Parameters to move, and how well they are determined.
+class MovedParameters:
+    """The parameters to solve for, and how well the equations determine them.
 
     Attributes:
-        explained: moved parameter, or unknown of the equations → how far ROUNDINGS of every number may move it.
+        explained: parameter or unknown → how far ROUNDINGS of each number may move it.
     """
 
     moved: tuple[str, ...]
     explained: Mapping[str, float]
 
 
-def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Chosen:
-    """The best conditioned of the free parameters: QR with column pivoting, once the unknowns are projected out.
+def choose_moved(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> MovedParameters:
+    """Choose the best conditioned free parameters by QR with column pivoting, after projecting out the unknowns.
 
     Raises:
-        ProofFailed: with too few parameters, or none that the equations depend on.
+        ProofFailed: if there are too few parameters, or the equations do not determine them.
     """
     count, of = system.conditions, system.problem.parameter_set
     if len(among) < count:
         raise ProofFailed(
-            f"{_many(count, 'condition')} and {_many(len(among), 'free parameter')}: the pattern could not be proved "
-            "for these numbers; they may be rounded, or irrational, and then an equation that vanishes cannot be told "
-            f"from a small number; free {count - len(among)} more, or give fractions that have the pattern"
+            f"{_count(count, 'condition')} and {_count(len(among), 'free parameter')}: the pattern could not be proved "
+            "for these numbers, which may be rounded, or irrational; "
+            f"free {count - len(among)} more, or give fractions that have the pattern"
         )
     names = [*of.names, *system.unknowns]
     jacobian = np.array([[float(e) for e in row] for row in jacobian_of(system, at, names).tolist()])
     values = np.array([abs(float(at[n])) for n in names])
     rounding = np.abs(jacobian) @ values + 1e-300
-    widths = {n: _NEAR_ZERO * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
+    widths = {n: _MIN_SCALE * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     units = [system.units.get(n, 1.0) for n in names]
     scale = np.maximum(np.where(values > 0, values, units), [widths.get(n, 0.0) for n in names])
     outside = [names.index(n) for n in system.unknowns]
@@ -132,11 +130,13 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     size = np.abs(jacobian)[:, [*free, *outside]] @ scale[[*free, *outside]] + 1e-300
     scaled = jacobian / size[:, None] * scale
     if not np.all(np.isfinite(scaled)):
-        raise ProofFailed("the equations have no finite derivatives at the design; move it off the edge of its range")
+        raise ProofFailed(
+            "the equations have no finite derivatives at the design; move it away from the end of its range"
+        )
     basis = np.linalg.qr(scaled[:, outside], mode="complete")[0][:, len(outside) :] if outside else np.eye(len(scaled))
     reduced = basis.T @ scaled[:, free]
-    order, pivots = _pivoted(reduced, count)
-    if count and not pivots[-1] > _DEPENDENT * max(pivots[0], 1e-3):
+    order, pivots = _pivot_columns(reduced, count)
+    if count and not pivots[-1] > _MIN_PIVOT * max(pivots[0], 1e-3):
         idle = [n for n, k in zip(among, free, strict=True) if not np.any(jacobian[:, k])]
         why = f"; they do not depend on {', '.join(idle)}" if idle else ""
         raise ProofFailed(
@@ -145,13 +145,13 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     moved = tuple(sorted((among[k] for k in order), key=of.names.index))
     square = [names.index(n) for n in (*moved, *system.unknowns)]
     effect = np.abs(np.linalg.pinv(scaled[:, square])) @ (rounding / size) * scale[square] * (ROUNDINGS * _EPS)
-    floors = {n: _NOTHING * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
+    floors = {n: _ZERO * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     solved = zip((*moved, *system.unknowns), effect, strict=True)
-    return Chosen(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved})
+    return MovedParameters(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved})
 
 
-def _pivoted(columns: Array, count: int) -> tuple[list[int], list[float]]:
-    """Columns that add most to those before them, and how much: QR with pivoting, and nothing of SciPy to load."""
+def _pivot_columns(columns: Array, count: int) -> tuple[list[int], list[float]]:
+    """Order and sizes of the pivots of QR with column pivoting; avoids loading SciPy."""
     left, order, adds = columns, list[int](), list[float]()
     for _ in range(count):
         lengths = np.linalg.norm(left, axis=0)
@@ -163,5 +163,5 @@ def _pivoted(columns: Array, count: int) -> tuple[list[int], list[float]]:
     return order, adds
 
 
-def _many(count: int, noun: str) -> str:
+def _count(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.errors import Fault, InputError, is_number, short
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.global_search.complete import SECONDS, Completeness, completeness
+from tmsopt.global_search.completeness import SECONDS, Completeness, prove_completeness
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
@@ -148,7 +148,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Com
     nlp = _build_equations(problem)
     state = SearchState(problem, problem, nlp, make_options(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
-    proof = completeness(problem, seconds, state.options.progress) if seconds > 0 else None
+    proof = prove_completeness(problem, seconds, state.options.progress) if seconds > 0 else None
     proved_designs = proof.designs if proof else ()
     proved = [np.array([*clip_to_box(problem, {n: float(x) for n, x in d.items()}).values()]) for d in proved_designs]
     finished = proof is not None and (proof.complete or proof.stopped)

@@ -23,7 +23,9 @@ def solve_from(state: SearchState, start: Start) -> LocalEnd:
     exact = bool(nlp.cases) and nlp.exact
     best = run_once(state, start, "near" if start.near else "exact" if exact else "far")
     for again in range(tuning.restarts):
-        converged = best.feasible and best.run.status == "Solve_Succeeded" and not best.nlp.has_split_double_root(best.run.x)
+        converged = (
+            best.feasible and best.run.status == "Solve_Succeeded" and not best.nlp.has_split_double_root(best.run.x)
+        )
         exhausted = not best.feasible and again >= count_restarts(state)
         if converged or exhausted or not np.all(np.isfinite(best.run.x)):
             break

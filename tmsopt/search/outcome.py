@@ -77,7 +77,9 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
         return None
     notes = _find_doubts(problem, trial, checked)
     optimal = has_converged(trial) and not notes
-    if not (optimal or notes or checked.violations) and minimizes_abscissa(problem):  # no gradient shows it on a plateau
+    if not (optimal or notes or checked.violations) and minimizes_abscissa(
+        problem
+    ):  # no gradient shows it on a plateau
         optimal = instant_bound(problem, checked.objective).proven
     status = "optimal" if optimal and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
@@ -88,7 +90,9 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
         notes += (f"{surplus} are inconsistent{_suggest_balance(problem, -counted.count)}",)
     branches: tuple[OtherBranch, ...] = ()
     if counted.kind == "square":
-        equations = nlp if not nlp.kinks else formulate_matching(problem) if problem.pattern else formulate_abscissa(problem)
+        equations = (
+            nlp if not nlp.kinks else formulate_matching(problem) if problem.pattern else formulate_abscissa(problem)
+        )
         branches = _find_other_branches(problem, equations, parameters)
     active = _find_active_limits(problem, nlp, trial.point)
     checked_cases = tuple(nlp.cases if cases is None else cases)

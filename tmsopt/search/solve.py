@@ -216,10 +216,10 @@ def _add_stability(solution: Solution, options: Options, began: float, policy: P
     problem = solution.problem.posed
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
-    from tmsopt.global_search.stability import any_stable  # slow to import, rarely needed
+    from tmsopt.global_search.stability import find_stable_design  # slow to import, rarely needed
 
     begin(options.progress, "looking for a stable design", "s")
-    answer = any_stable(problem, options.stability, solution.parameters, options.progress)
+    answer = find_stable_design(problem, options.stability, solution.parameters, options.progress)
     if answer.design is not None:
         words = "this design was reached from a stable design that branch and bound found"
         solution = _solve_near(solution, answer.design, words, options, policy)

@@ -59,7 +59,9 @@ def continue_from(
             except ValueError:  # not a regular point of a curve
                 continue
     near = "near the design" if designs else "in the box"
-    raise input_error(f"no point of {problem_with_pattern.locate} found {near}; give another point to begin at", "through")
+    raise input_error(
+        f"no point of {problem_with_pattern.locate} found {near}; give another point to begin at", "through"
+    )
 
 
 class Continuation(Iterator[BranchPoint]):

@@ -61,7 +61,9 @@ def substitute(x: Quotient, /, **values: Any) -> Any:
 
 def is_positive(x: Quotient) -> bool:
     """Whether all coefficients of numerator and denominator have one sign, so x > 0 for positive variables."""
-    return any(all(sign * c > 0 for c in [*x.numerator.coeffs(), *x.denominator.coeffs()]) and x != 0 for sign in (1, -1))
+    return any(
+        all(sign * c > 0 for c in [*x.numerator.coeffs(), *x.denominator.coeffs()]) and x != 0 for sign in (1, -1)
+    )
 
 
 def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:

@@ -42,7 +42,9 @@ def read_numbers(
             unit = of[name].multiple_of or unit  # 5 mm is 0.005 of a wheelbase of 1 m
         try:
             found, written, exact = (
-                parse_exact_quantity(value, unit) if isinstance(value, str) else (value, "", Exact.from_fraction(Fraction(value)))
+                parse_exact_quantity(value, unit)
+                if isinstance(value, str)
+                else (value, "", Exact.from_fraction(Fraction(value)))
             )
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)

@@ -1,8 +1,8 @@
-"""A pattern as equations in the parameters and few unknowns, all of these bounded: designs at infinity are none.
+"""The equations of a pattern in the parameters and a few bounded unknowns, so that no solution lies at infinity.
 
-Only the roots that the pattern ties are unknown; the others drop out where p is divided by their factors. Roots s of
-at most a unit of size are unknown as themselves, larger ones as 1/s in the reversed polynomial: every unknown has a
-range, whatever the leading coefficient does, and no equation has a quotient.
+Only the roots that the pattern ties are unknowns; division of p by their factors eliminates the others. Roots s with
+|s| ≤ 1 unit are unknowns themselves, larger ones enter as 1/s in the reversed polynomial. So each unknown has a range,
+whatever the leading coefficient, and no equation has a quotient.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,20 +27,20 @@ from tmsopt.roots.polynomial import characteristic_polynomial
 
 Ends = tuple[float, float]
 
-_ROUNDED = 1e-9  # relative: more than the roundings of a few sums
-_AWAY = Fraction(3, 4)  # factors of one kind are told apart by b + 3c/4, which is rarely the same of two
+_ROUNDING = 1e-9  # relative: more than the roundings of a few sums
+_ORDER_WEIGHT = Fraction(3, 4)  # b + 3c/4 orders the factors of one kind; two factors rarely share it
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A factor of a pattern, to a power.
+    """A power of a factor of a pattern.
 
     Attributes:
-        kind: ``root``, ``pair``, ``meeting`` (two real roots), ``axis`` or ``zero``; of a complex H ``point``, or
-            ``line`` for one on the imaginary axis.
+        kind: ``root``, ``pair``, ``meeting`` (two real roots), ``axis`` or ``zero``; for a complex H ``point``, or
+            ``line`` for a root on the imaginary axis.
         order: the power.
-        outer: whether the unknowns are those of 1/s.
-        first: number of its first unknown.
+        outer: whether the factor is one in 1/s.
+        first: index of its first unknown.
     """
 
     kind: str
@@ -50,7 +50,7 @@ class Piece:
 
     @property
     def ranges(self) -> tuple[Ends, ...]:
-        """Of each unknown, where no root is larger than 1."""
+        """Range of each unknown, since no root is larger than 1."""
         return {
             "root": ((-1.0, 1.0),),
             "pair": ((-2.0, 2.0), (0.0, 1.0)),
@@ -61,13 +61,13 @@ class Piece:
             "line": ((-1.0, 1.0),),
         }[self.kind]
 
-    def own(self, unknowns: Sequence[Any]) -> Sequence[Any]:
-        """Its unknowns among all."""
+    def own_unknowns(self, unknowns: Sequence[Any]) -> Sequence[Any]:
+        """Its unknowns among all unknowns."""
         return unknowns[self.first : self.first + len(self.ranges)]
 
-    def factor(self, unknowns: Sequence[Any]) -> list[Any]:
-        """Monic, in s or in 1/s."""
-        u = self.own(unknowns)
+    def monic(self, unknowns: Sequence[Any]) -> list[Any]:
+        """Coefficients of the monic factor, in s or 1/s, descending."""
+        u = self.own_unknowns(unknowns)
         match self.kind:
             case "root":
                 return [1, -u[0]]
@@ -79,14 +79,14 @@ class Piece:
                 return [1, -Pair(*u) if len(u) == 2 else Pair(0, -u[0])]
         return [1, *u]
 
-    def place(self, unknowns: Sequence[Any]) -> Any:
-        """What ascends among factors that may change places."""
-        u = self.own(unknowns)
-        return u[0] if len(u) == 1 else u[0] + _AWAY * u[1]
+    def order_key(self, unknowns: Sequence[Any]) -> Any:
+        """The key that ascends among interchangeable factors."""
+        u = self.own_unknowns(unknowns)
+        return u[0] if len(u) == 1 else u[0] + _ORDER_WEIGHT * u[1]
 
     def nonnegative(self, unknowns: Sequence[Any]) -> list[Any]:
-        """What must be ≥ 0 beside the ranges."""
-        u = self.own(unknowns)
+        """Further expressions that must be ≥ 0."""
+        u = self.own_unknowns(unknowns)
         if self.kind == "pair":
             return [4 * u[1] - u[0] * u[0]]
         if self.kind == "meeting":
@@ -94,22 +94,23 @@ class Piece:
         return []
 
 
-def sheets(name: str, of_h: bool) -> Iterator[tuple[Piece, ...]]:
-    """The ways in which the roots of a pattern may be small or large.
+def enumerate_pieces(name: str, complex_h: bool) -> Iterator[tuple[Piece, ...]]:
+    """All choices of small and large roots of a pattern.
 
     Args:
-        of_h: whether the unknowns are eigenvalues of a complex H, the pattern named as that of its double: all small.
+        complex_h: whether the unknowns are eigenvalues of a complex H, which are all small; `name` is then the
+            pattern of its real double.
     """
-    for choice in product(*(list(_ways(part, of_h)) for part in parse_components(name))):
+    for choice in product(*(list(_part_pieces(part, complex_h)) for part in parse_components(name))):
         pieces: list[Piece] = []
         for kind, order, outer in (piece for way in choice for piece in way):
             pieces.append(Piece(kind, order, outer, sum(len(p.ranges) for p in pieces)))
         yield tuple(pieces)
 
 
-def _ways(part: Component, of_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
-    """Kind, power and place of the factors of a part."""
-    if of_h:
+def _part_pieces(part: Component, complex_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
+    """Choices of (kind, power, outer) for the factors of a part."""
+    if complex_h:
         yield [("point", part.order, False) if part.kind == "CEP" else ("line", part.roots // 2, False)] * part.count
     elif part.kind == "capsize":
         yield [("zero", 1, False)]
@@ -127,36 +128,36 @@ def _ways(part: Component, of_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
 
 @dataclass(frozen=True)
 class RotatingFrame:
-    """Where eigenfrequencies of a complex H are unknown: as (ω − centre)/unit, which none has larger than 1."""
+    """Maps eigenfrequencies of a complex H to (ω − centre)/unit, at most 1 in size."""
 
     centre: Fraction
     unit: Fraction
 
 
-def rotating_frame(problem: Posed) -> RotatingFrame | None:
-    """The frame of a complex H, by Gershgorin's discs over the box; None where these have no bound, or without H.
+def find_rotating_frame(problem: Posed) -> RotatingFrame | None:
+    """The frame of a complex H by Gershgorin discs over the box; None if they are unbounded, or for a real model.
 
     Raises:
-        UnsupportedOperation: for an operation that has no interval arithmetic.
+        NotAccepted: for an operation without interval arithmetic.
     """
     if problem.model.double is None:
         return None
     names = tuple(problem.free)
     rows = _complex_matrix(problem, {**problem.as_nodes(problem.fixed), **{n: symbol(n) for n in names}})
-    asked = formula((part for row in rows for x in row for part in (x.re, x.im)), names)
-    found = np.array(ranges(asked, [round_outwards(*ends) for ends in problem.free.values()]))
+    entries = formula((part for row in rows for x in row for part in (x.re, x.im)), names)
+    found = np.array(ranges(entries, [round_outwards(*ends) for ends in problem.free.values()]))
     if not np.isfinite(found).all():
         return None
     n = len(rows)
     own = found.reshape(n, n, 2, 2)
     centre = float(-own[range(n), range(n), 1].mean())
     own[range(n), range(n), 1] += centre
-    reach = np.hypot(*np.moveaxis(np.abs(own).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDED * abs(centre)
-    return RotatingFrame(Fraction(centre), Fraction(reach * (1 + _ROUNDED) or 1.0))
+    reach = np.hypot(*np.moveaxis(np.abs(own).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDING * abs(centre)
+    return RotatingFrame(Fraction(centre), Fraction(reach * (1 + _ROUNDING) or 1.0))
 
 
 def _complex_matrix(problem: Posed, own: Mapping[str, Any]) -> list[list[Pair]]:
-    """−i H of a model of a complex H."""
+    """The matrix −i H of a model with a complex H."""
     assert problem.model.double is not None
     _, rows = problem.model.double(problem.parameter_set.native(own))  # [[−J, −R], [R, −J]] of H = R + i J
     n = len(rows) // 2
@@ -164,43 +165,51 @@ def _complex_matrix(problem: Posed, own: Mapping[str, Any]) -> list[list[Pair]]:
 
 
 def _complex_coefficients(problem: Posed, own: Mapping[str, Any], frame: RotatingFrame) -> list[Any]:
-    """The polynomial of −i H in a frame."""
+    """Coefficients of the characteristic polynomial of −i H in a frame."""
     rows = _complex_matrix(problem, own)
     moved = [[x + Pair(0, frame.centre) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(rows)]
     return [c / frame.unit**k if k else c for k, c in enumerate(characteristic_polynomial(moved))]
 
 
-def values_at(problem: Posed, lifted: Sequence[Quantity], at: Mapping[str, Any], held: Mapping[str, Any]) -> Values:
-    """Everything that follows from numbers by name, angles by their tangents; `held` are parameters themselves."""
+def values_at(
+    problem: Posed, lifted: Sequence[Quantity], at: Mapping[str, Any], constants: Mapping[str, Any]
+) -> Values:
+    """Values of a model.
+
+    Args:
+        lifted: quantities that are unknowns.
+        at: parameters (angles as tangents) and lifted quantities by name.
+        constants: parameters as they are, which take precedence over `at`.
+    """
     of, known = problem.parameter_set, {q.name for q in lifted}
-    own = {n: held[n] if n in held else atan(at[n]) if of[n].tangent else at[n] for n in of.names}
+    own = {n: constants[n] if n in constants else atan(at[n]) if of[n].tangent else at[n] for n in of.names}
     return Values(problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
 
 
-def others(
+def extra_equations(
     values: Values, lifted: Sequence[Quantity], equalities: Sequence[Expression], at: Mapping[str, Any]
 ) -> list[Any]:
-    """Left sides of the equations beside those of a pattern: of quantities that are unknowns, and == constraints."""
+    """Left sides of the equations that do not belong to the pattern: lifted quantities and == constraints."""
     left = [values.fold(q.left_side, {q.name: at[q.name]})[0] for q in lifted if q.equation]
     return left + [e(values) for e in equalities]
 
 
 @dataclass(frozen=True)
-class Sheet:
-    """The equations of a pattern where some of its roots are small and the others large.
+class PatternSystem:
+    """The equations of a pattern for one choice of small and large roots.
 
-    A parameter goes by its name, an angle by its tangent; a quantity with an equation of its own by its name; the
-    unknowns of the pattern by ``:0``, ``:1`` and so on.
+    Parameters and lifted quantities keep their names, an angle stands for its tangent; the unknowns of the pattern are
+    ``:0``, ``:1`` and so on.
 
     Attributes:
-        names: all that is unknown.
-        lifted: quantities among them.
+        names: all unknowns.
+        lifted: the quantities among them.
         equations: left sides, as many as unknowns.
-        shared: what must be 0 beside them where roots of size 1 count as small and as large.
-        nonnegative: what must be ≥ 0 for the unknowns to be those of the pattern.
-        ascending: what is ≥ 0 for one of the ways to call the factors of a design by number.
+        shared: further left sides, needed because roots of size 1 count as small and as large.
+        nonnegative: must be ≥ 0, so that the unknowns fit the pattern.
+        ascending: must be ≥ 0, which fixes the order of interchangeable factors.
         leading: the leading coefficient.
-        limits: of each constraint that is no equality, left minus right.
+        limits: left minus right side of each inequality.
     """
 
     problem: Posed
@@ -215,13 +224,13 @@ class Sheet:
     limits: Mapping[str, Formula]
 
 
-def sheet(
+def build_system(
     problem: Posed, pieces: tuple[Piece, ...], scale: Scale | RotatingFrame, lifted: tuple[Quantity, ...]
-) -> Sheet:
-    """The sheet of some factors.
+) -> PatternSystem:
+    """The system of some factors.
 
     Args:
-        scale: of the roots and the coefficients; a frame for the polynomial of a complex H itself.
+        scale: scale of roots and coefficients, or the frame of a complex H.
         lifted: quantities in == constraints that are unknowns with an equation.
     """
     unknowns = tuple(f":{k}" for k in range(sum(len(p.ranges) for p in pieces)))
@@ -239,72 +248,72 @@ def sheet(
     equalities = [c for c in problem.conditions.values() if c.equality]
     own = [x for piece in pieces for x in piece.nonnegative(u)]
     alike = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
-    told = {n: c for n, c in problem.conditions.items() if not c.equality and all(name in values for name in c.names)}
-    left = conditions(a, pieces, u)
+    limits = {n: c for n, c in problem.conditions.items() if not c.equality and all(name in values for name in c.names)}
+    left = divisibility_conditions(a, pieces, u)
     real = [part for x in left for part in ((x.re, x.im) if isinstance(x, Pair) else (x,))]
-    return Sheet(
+    return PatternSystem(
         problem,
         pieces,
         names,
         lifted,
-        equations=formula([*real, *others(values, lifted, equalities, at)], names),
-        shared=formula(shared(a, pieces, u), names),
+        equations=formula([*real, *extra_equations(values, lifted, equalities, at)], names),
+        shared=formula(shared_conditions(a, pieces, u), names),
         nonnegative=formula(own, names),
-        ascending=formula((q.place(u) - p.place(u) for p, q in alike), names),
+        ascending=formula((q.order_key(u) - p.order_key(u) for p, q in alike), names),
         leading=formula([values.coefficients[0]], names),
-        limits={n: formula([c(values)], names) for n, c in told.items()},
+        limits={n: formula([c(values)], names) for n, c in limits.items()},
     )
 
 
 def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | RotatingFrame, u: Sequence[Any]) -> Any:
-    """Largest real part where the pattern makes up all roots; None elsewhere."""
+    """The largest real part, if the pattern ties all roots; otherwise None."""
     if problem.pattern is None or problem.pattern.abscissa is None:
         return None
     (piece,) = pieces
-    unit, own = Fraction(scale.unit), piece.own(u)
+    unit, own = Fraction(scale.unit), piece.own_unknowns(u)
     if piece.kind in ("root", "point"):
         return quotient(unit, own[0]) if piece.outer else unit * own[0]
     return quotient(-unit * own[0], 2 * own[1]) if piece.outer else -unit * own[0] / 2
 
 
-def conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
-    """Expressions that are all 0 where the factors divide a polynomial, each as often as its power says.
+def divisibility_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
+    """Expressions that vanish exactly if the powers of the factors divide a polynomial.
 
-    Where they make up all of it, its coefficients less those of the product, in fewer terms; else the remainders, of
-    small and of large roots apart. See `shared`.
+    If the factors make up the whole polynomial, coefficients minus those of the product, which have fewer terms;
+    otherwise the remainders, for small and for large roots separately. See `shared_conditions`.
     """
     left: list[Any] = []
     for outer in (False, True):
         rest = a[::-1] if outer else a
-        factors = [p.factor(unknowns) for p in pieces if p.outer == outer for _ in range(p.order)]
+        factors = [p.monic(unknowns) for p in pieces if p.outer == outer for _ in range(p.order)]
         whole = multiplied(*factors)
         if len(whole) == len(a):
             return left + [c - rest[0] * f for c, f in zip(rest[1:], whole[1:], strict=True)]
         for factor in factors:
-            rest, remainder = divided(rest, factor)
+            rest, remainder = divide(rest, factor)
             left += remainder
     return left
 
 
-def shared(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
-    """What `conditions` leaves out: that a small and a large root are two, though both are of size 1.
+def shared_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
+    """The condition that `divisibility_conditions` omits: a small and a large root of size 1 are two roots.
 
-    Remainders of what the factors of small roots leave, divided by those of large ones; none where all are of a kind.
+    The remainders of the quotient by the small factors, divided by the large ones; none if all factors are of one kind.
     """
-    inner, outer = ([p.factor(unknowns) for p in pieces if p.outer == o for _ in range(p.order)] for o in (False, True))
+    inner, outer = ([p.monic(unknowns) for p in pieces if p.outer == o for _ in range(p.order)] for o in (False, True))
     left: list[Any] = []
     if inner and outer:
         for factor in inner:
-            a, _ = divided(a, factor)
+            a, _ = divide(a, factor)
         a = a[::-1]
         for factor in outer:
-            a, remainder = divided(a, factor)
+            a, remainder = divide(a, factor)
             left += remainder
     return left
 
 
-def divided(a: Sequence[Any], monic: Sequence[Any]) -> tuple[list[Any], list[Any]]:
-    """Quotient and remainder of polynomials, descending."""
+def divide(a: Sequence[Any], monic: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+    """Quotient and remainder by a monic polynomial, coefficients descending."""
     rest = list(a)
     count = len(a) - len(monic) + 1
     for k in range(count):

@@ -17,7 +17,7 @@ curve = import_module("tmsopt.fronts.curve")
 options = import_module("tmsopt.program.options")
 pareto = import_module("tmsopt.fronts.pareto")
 subproblems = import_module("tmsopt.fronts.subproblems")
-team = import_module("tmsopt.fronts.team")
+parallel = import_module("tmsopt.fronts.parallel")
 
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 FREE = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.035, 1.4)}
@@ -25,22 +25,22 @@ PROBLEM = tmsopt.Problem(tms, FIXED, FREE, pareto=["abscissa", "Fr"], constraint
 ASK = subproblems.FrontSolver(PROBLEM, options.Options())
 
 
-def each(function, items, workers):
-    return dict(team.each(workers, function, ASK, items))
+def map_items(function, items, workers):
+    return dict(parallel.map_items(workers, function, ASK, items))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [here, lambda: processes(3)])
 def test_every_item_has_its_answer(workers):
     with workers() as side_by_side:
-        found = each(shares.squared, range(9), side_by_side)
+        found = map_items(shares.squared, range(9), side_by_side)
     assert {k: square for k, (square, _) in found.items()} == {k: k**2 for k in range(9)}
 
 
 @pytest.mark.slow
 def test_processes_share_the_work():
     with processes(2) as side_by_side:
-        workers = [pid for _, pid in each(shares.slowly_squared, range(8), side_by_side).values()]
+        workers = [pid for _, pid in map_items(shares.slowly_squared, range(8), side_by_side).values()]
     assert len(set(workers)) == 2
     assert os.getpid() not in workers
 
@@ -48,21 +48,21 @@ def test_processes_share_the_work():
 @pytest.mark.slow
 def test_an_item_that_ends_its_processes_is_an_error():
     with processes(2) as side_by_side, pytest.raises(EngineError, match="exit code 3"):
-        each(shares.dying_at_two, range(9), side_by_side)
+        map_items(shares.dying_at_two, range(9), side_by_side)
 
 
 def test_what_cannot_be_sent_is_solved_here():
-    assert team.can_send(ASK)
-    assert not team.can_send(replace(ASK, easier={0: threading.Lock()}))
+    assert parallel.can_pickle(ASK)
+    assert not parallel.can_pickle(replace(ASK, single_optima={0: threading.Lock()}))
 
 
 def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():
     with here() as side_by_side:
         found = []
         with pytest.raises(KeyboardInterrupt):
-            found.extend(team.each(side_by_side, shares.interrupted_at_two, ASK, range(4)))
+            found.extend(parallel.map_items(side_by_side, shares.interrupted_at_two, ASK, range(4)))
         assert found == [(0, 0), (1, 1)]
-        assert each(shares.squared, [3], side_by_side) == {0: (9, os.getpid())}
+        assert map_items(shares.squared, [3], side_by_side) == {0: (9, os.getpid())}
 
 
 @pytest.mark.slow
@@ -74,8 +74,8 @@ def test_the_front_is_the_same_for_any_number_of_processes():
 
 
 def test_an_interrupt_leaves_the_ends_that_are_known(monkeypatch):
-    first = pareto.best_first
-    monkeypatch.setattr(pareto, "best_first", lambda ask, k: first(ask, k) if k == 0 else _stop())
+    first = pareto.solve_end
+    monkeypatch.setattr(pareto, "solve_end", lambda ask, k: first(ask, k) if k == 0 else _stop())
     front = tmsopt.pareto(PROBLEM, 5, workers=1)
     assert front.interrupted
     assert [p.label for p in front.points] == ["least abscissa"]
@@ -83,9 +83,9 @@ def test_an_interrupt_leaves_the_ends_that_are_known(monkeypatch):
 
 
 def test_an_interrupt_leaves_the_points_that_are_known(monkeypatch):
-    probed, asked = curve._probed, []
+    probed, asked = curve._solve_request, []
     monkeypatch.setattr(
-        curve, "_probed", lambda ask, of: probed(ask, of) if asked.append(of) or len(asked) < 3 else _stop()
+        curve, "_solve_request", lambda ask, of: probed(ask, of) if asked.append(of) or len(asked) < 3 else _stop()
     )
     front = tmsopt.pareto(PROBLEM, 9, workers=1)
     assert front.interrupted
@@ -95,7 +95,7 @@ def test_an_interrupt_leaves_the_points_that_are_known(monkeypatch):
 
 
 def test_an_interrupt_before_any_end_is_known_is_raised(monkeypatch):
-    monkeypatch.setattr(pareto, "alone", lambda ask, k: _stop())
+    monkeypatch.setattr(pareto, "minimise_alone", lambda ask, k: _stop())
     with pytest.raises(KeyboardInterrupt):
         tmsopt.pareto(PROBLEM, 5, workers=1)
 

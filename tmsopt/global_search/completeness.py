@@ -1,0 +1,329 @@
+"""Finds all designs of a box with a pattern: drops boxes without one, proves that each other box holds exactly one."""
+
+import math
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import flint
+import numpy as np
+
+from tmsopt.algebra.balls import Number, number
+from tmsopt.algebra.formula import UnsupportedOperation, fold, formula, symbol
+from tmsopt.algebra.identity import multiply_out
+from tmsopt.algebra.intervals import interval
+from tmsopt.algebra.kinds import BALLS, NODES
+from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
+from tmsopt.global_search.pattern_equations import (
+    Ends,
+    PatternSystem,
+    build_system,
+    enumerate_pieces,
+    find_rotating_frame,
+)
+from tmsopt.global_search.pruning import Box, BoxConditions, outer_doubles, prepare_formula, prune
+from tmsopt.problem.problem import Posed
+from tmsopt.problem.quantities import lifted_quantities
+from tmsopt.program.nlp import Scale, proof_units, scale_of
+from tmsopt.progress import Counts
+from tmsopt.records import Array, Table, plain
+
+SECONDS = 60.0
+"""Default time limit of a proof."""
+
+_SINGULAR = "the equations are (nearly) singular there: the design is one of a continuum, or two designs meet"
+_TIME_OUT = "time limit reached"
+_STOPPED = "interrupted"
+_UNIT_FACTOR = 1.375  # on the usual unit: roots are often at 1, where small and large roots would meet
+_WORK_DIGITS, _ZERO_DIGITS, _RESULT_DIGITS = 60, 40, 25  # decimal digits: of arithmetic, of a zero, of a design
+_BATCH = 1024  # boxes per turn, so that a turn takes about 0.1 s
+_MIN_WIDTH, _MAX_MIN_WIDTH = 1e-7, 1e-2  # of the first box: smaller boxes are not split; grows from first to second
+_SMALL_BOXES = 400  # so many small boxes hold no isolated designs; then the least width grows tenfold
+_MAX_PLACES = 12  # undecided places listed one by one
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """An undecided part of the box.
+
+    Attributes:
+        ranges: range of each free parameter, angles in radians.
+        reason: why it is undecided.
+    """
+
+    ranges: Table[tuple[float, float]]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """Whether all designs of a box with a pattern are known.
+
+    Attributes:
+        complete: whether it is proved that the box holds `designs` and no other.
+        reason: why it is not proved.
+        designs: free parameters of each proved design, angles in radians.
+        limits: per design, the limit on which it lies within the digits carried; it may lie just beyond. Mostly empty.
+        boxes: number of boxes that branch and prune handled.
+        seconds: time used.
+        undecided: the undecided parts of the box.
+        stopped: whether Ctrl-C ended the proof.
+    """
+
+    complete: bool
+    reason: str = ""
+    designs: tuple[Table[Number], ...] = ()
+    limits: tuple[str, ...] = ()
+    boxes: int = 0
+    seconds: float = 0.0
+    undecided: tuple[Undecided, ...] = ()
+    stopped: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return plain(self) | {"seconds": round(self.seconds, 4)}
+
+
+def prove_completeness(problem: Posed, seconds: float = SECONDS, progress: Counts | None = None) -> Completeness:
+    """Find all designs of a box with the pattern of a problem, and prove that there are no others.
+
+    Boxes in the parameters and the unknowns of the pattern are contracted and split until interval arithmetic shows
+    that they hold no design, or Krawczyk's test shows that a box around them holds exactly one. Floats stand for the
+    shortest decimals that print them. Ctrl-C ends the proof and keeps what is proved.
+
+    Args:
+        problem: with a pattern, and as many conditions as free parameters.
+        progress: called with the seconds used and the seconds granted.
+    """
+    began = time.perf_counter()
+    with flint.ctx.workdps(_WORK_DIGITS):
+        try:
+            searches = [(system, *_build_conditions(system)) for system in _enumerate_systems(problem)]
+        except (UnsupportedOperation, TypeError, ZeroDivisionError) as error:
+            return Completeness(False, f"branch and prune does not support {error}")
+        run = _ZeroSearch(began + seconds, seconds, progress)
+        for system, conditions, box in searches:
+            run.search(system, conditions, box)
+        return run.summarise(problem, time.perf_counter() - began)
+
+
+@dataclass(frozen=True)
+class _Zero:
+    """A proved solution of a system.
+
+    Attributes:
+        near: the box in which it is unique.
+    """
+
+    system: PatternSystem
+    enclosure: Enclosure
+    near: Box
+
+
+@dataclass
+class _ZeroSearch:
+    """The state of a search over all systems of a pattern."""
+
+    end: float
+    seconds: float
+    progress: Counts | None
+    boxes: int = 0
+    stopped: str = ""
+    zeros: list[_Zero] = field(default_factory=list)
+    undecided: list[tuple[Box, str]] = field(default_factory=list)
+
+    def search(self, system: PatternSystem, conditions: BoxConditions, first: Box) -> None:
+        """Find all zeros of a system in its box."""
+        zeros: list[_Zero] = []
+        whole = np.array(first).T[..., None]
+        boxes, small = whole, whole[..., :0]
+        most, least = _SMALL_BOXES, _MIN_WIDTH
+        try:
+            while boxes.shape[-1] and least <= _MAX_MIN_WIDTH and not self.must_stop():
+                self.boxes += boxes[..., -_BATCH:].shape[-1]
+                pruned = prune(conditions, boxes[..., -_BATCH:], least)
+                boxes = np.concatenate([boxes[..., :-_BATCH], pruned.remaining_factors], axis=-1)
+                failed = [
+                    not _add_zero(zeros, system, *map(_as_box, pair)) for pair in np.moveaxis(pruned.proved, -1, 0)
+                ]
+                small = np.concatenate([small, pruned.small, pruned.proved[0][..., failed]], axis=-1)
+                if small.shape[-1] >= most:
+                    most, least = most + _SMALL_BOXES, 10 * least
+        except KeyboardInterrupt:
+            self.stopped, boxes = _STOPPED, whole  # the current batch may be lost
+        self.zeros += zeros
+        self.undecided += [(_as_box(box), _SINGULAR) for box in np.moveaxis(small, -1, 0)]
+        self.undecided += [(_as_box(box), self.stopped or _SINGULAR) for box in np.moveaxis(boxes, -1, 0)]
+
+    def must_stop(self) -> bool:
+        """Whether the search was stopped or its time is over; reports progress."""
+        left = self.end - time.perf_counter()
+        if self.progress:
+            self.progress(min(self.seconds - left, self.seconds), self.seconds, f"{self.boxes:,} boxes")
+        self.stopped = self.stopped or (_TIME_OUT if left <= 0 else "")
+        return bool(self.stopped)
+
+    def summarise(self, problem: Posed, seconds: float) -> Completeness:
+        """The result so far."""
+        designs: list[tuple[Mapping[str, Any], str]] = []
+        for zero in self.zeros:
+            at = {n: zero.enclosure.balls[n] for n in problem.free}
+            limit = _active_limits(zero)
+            if limit is not None and not any(all(at[n].overlaps(b[n]) for n in at) for b, _ in designs):
+                designs.append((at, limit))
+        designs.sort(key=lambda pair: [float(x) for x in pair[0].values()])
+        of = problem.parameter_set
+        numbers = [
+            {n: number(x.atan() if of[n].tangent else x, _RESULT_DIGITS) for n, x in at.items()} for at, _ in designs
+        ]
+        places = _merge_undecided(problem, self.undecided)
+        undecided = tuple(Undecided(_parameter_ranges(problem, box), reason) for box, reason in places)
+        reasons = dict.fromkeys(u.reason for u in undecided)
+        return Completeness(
+            complete=not (self.undecided or self.stopped),
+            reason="; ".join(reasons) or self.stopped,
+            designs=tuple(map(Table, numbers)),
+            limits=tuple(limit for _, limit in designs),
+            boxes=self.boxes,
+            seconds=seconds,
+            undecided=undecided,
+            stopped=self.stopped == _STOPPED,
+        )
+
+
+def _add_zero(zeros: list[_Zero], system: PatternSystem, wide: Box, image: Box) -> bool:
+    """Prove the only zero of a box in balls and add it to `zeros` if it is new; False if the proof fails."""
+    if any(_is_inside(image, other.near) for other in zeros):
+        return True
+    zero = _prove_zero(system, image)
+    at = [(zero.enclosure.balls[n],) * 2 for n in system.names] if zero else []
+    if zero is None or not _is_inside(at, wide):
+        return False
+    if not any(_is_inside(at, other.near) for other in zeros):
+        zeros.append(zero)
+    return True
+
+
+def _enumerate_systems(problem: Posed) -> Iterator[PatternSystem]:
+    """One system for each choice of small and large roots."""
+    assert problem.pattern is not None
+    equalities = tuple(c for c in problem.conditions.values() if c.equality)
+    middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
+    lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
+    frame, scale = find_rotating_frame(problem), scale_of(problem)
+    for pieces in enumerate_pieces(problem.pattern.form, complex_h=frame is not None):
+        yield build_system(problem, pieces, frame or Scale(_UNIT_FACTOR * scale.unit, scale.lead), lifted)
+
+
+def _build_conditions(system: PatternSystem) -> tuple[BoxConditions, Box]:
+    """Equations and limits of a system as plain data, and the box of its unknowns.
+
+    Raises:
+        NotAccepted: for equations that branch and prune does not support.
+    """
+    box = tuple((outer_doubles(lo)[0], outer_doubles(hi)[1]) for lo, hi in _unknown_ranges(system))
+    names = {n: symbol(n) for n in system.names}
+    limits = [*fold(system.nonnegative, names, NODES), *fold(system.ascending, names, NODES)]
+    for name, limit in system.limits.items():
+        with suppress(UnsupportedOperation):  # then the limit is only checked for each design found
+            limits.append(-system.problem.conditions[name].sign * fold(prepare_formula(limit), names, NODES)[0])
+    formulas = (system.equations, formula(limits, system.names), system.shared)
+    equations, limited, extra = (prepare_formula(multiply_out(f)) for f in formulas)
+    widths = tuple(hi - lo if math.isfinite(hi - lo) else 1.0 for lo, hi in box)
+    return BoxConditions(equations, limited, widths, extra), box
+
+
+def _unknown_ranges(system: PatternSystem) -> list[tuple[Any, Any]]:
+    """Least and greatest value of each unknown, as balls."""
+    problem = system.problem
+    ranges: list[tuple[Any, Any]] = []
+    for name, ends in problem.free.items():
+        lo, hi = (flint.arb(problem.exactly({name: end})[name]) for end in ends)
+        ranges.append((lo.tan(), hi.tan()) if problem.parameter_set[name].tangent else (lo, hi))
+    others = [(q.range.lower, q.range.upper) for q in system.lifted] + [r for p in system.pieces for r in p.ranges]
+    return ranges + [(flint.arb(low), flint.arb(high)) for low, high in others]
+
+
+def _prove_zero(system: PatternSystem, box: Box) -> _Zero | None:
+    """Prove a zero near the middle of a box by Krawczyk's test; None if the test fails."""
+    start = {n: flint.arb(lo + (hi - lo) / 2) for n, (lo, hi) in zip(system.names, box, strict=True)}
+    units = proof_units(system.problem)
+    try:
+        function = partial(fold, system.equations, kind=BALLS)
+        middle = refine_solution(function, start, system.names, _ZERO_DIGITS, units)
+        found = enclose_solution(function, middle, system.names, _ZERO_DIGITS, units)
+    except (ProofFailed, ZeroDivisionError, ValueError):
+        return None
+    around = {n: found.uniqueness * units.get(n, 1.0) for n in system.names}
+    near = [(middle[n] - r, middle[n] + r) for n, r in around.items()]
+    return _Zero(system, found, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
+
+
+def _as_box(own: Array) -> Box:
+    """A box from its array of lower and upper ends."""
+    return tuple(zip(*own.tolist(), strict=True))
+
+
+def _is_inside(box: Sequence[tuple[Any, Any]], other: Box) -> bool:
+    """Whether a box certainly lies inside another; a ball may stand for both ends."""
+    return all(lo > low and hi < high for (lo, hi), (low, high) in zip(box, other, strict=True))
+
+
+def _active_limits(zero: _Zero) -> str | None:
+    """The limits on which a design lies within the digits carried, or empty; None if it violates a limit."""
+    system, at = zero.system, zero.enclosure.balls
+    room: list[tuple[str, Any]] = []
+    for name, (lo, hi) in zip(system.names, _unknown_ranges(system), strict=True):
+        label = "" if name.startswith(":") else name
+        room += [(label and f"the least {label}", at[name] - lo), (label and f"the greatest {label}", hi - at[name])]
+    room += [("the edge of the pattern", x) for x in fold(system.nonnegative, at, BALLS)]
+    room += [("", x) for x in fold(system.ascending, at, BALLS)]
+    for name, condition in system.problem.conditions.items():
+        if not condition.equality:
+            excess = condition.sign * flint.arb(
+                fold(system.limits[name], at, BALLS)[0] if name in system.limits else "nan"
+            )
+            if not excess.is_finite():  # undefined somewhere in the ball: check the middle
+                middle = system.problem.ordered({n: float(at[n].mid()) for n in system.problem.free})
+                if not condition.violation(system.problem.values(middle)) <= 0:
+                    return None
+            room.append((f"constraint {name}", -excess))
+    if any(x < 0 for _, x in room):
+        return None
+    active = [label for label, x in room if label and not x > 0]
+    return ", ".join(active + ["a0 = 0"] * flint.arb(fold(system.leading, at, BALLS)[0]).contains(0))
+
+
+def _merge_undecided(problem: Posed, undecided: Iterable[tuple[Box, str]]) -> list[tuple[Box, str]]:
+    """Hulls, in the free parameters, of boxes that touch; one hull if there are many."""
+    places: list[tuple[Box, str]] = []
+    for box, reason in undecided:
+        own, rest = box[: len(problem.free)], []
+        for other, why in places:
+            if why == reason and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(own, other, strict=True)):
+                own = _hull([own, other])
+            else:
+                rest.append((other, why))
+        places = [*rest, (own, reason)]
+    if len(places) > _MAX_PLACES:
+        return [(_hull([own for own, _ in places]), "; ".join(dict.fromkeys(why for _, why in places)))]
+    return places
+
+
+def _hull(boxes: Sequence[Box]) -> Box:
+    """The smallest box that holds all boxes."""
+    return tuple((min(ends)[0], max(hi for _, hi in ends)) for ends in zip(*boxes, strict=True))
+
+
+def _parameter_ranges(problem: Posed, box: Box) -> Table[Ends]:
+    """The ranges of the free parameters in a box, angles in radians instead of tangents."""
+    of = problem.parameter_set
+    return Table(
+        {
+            n: (math.atan(lo), math.atan(hi)) if of[n].tangent else (lo, hi)
+            for n, (lo, hi) in zip(problem.free, box, strict=True)
+        }
+    )
