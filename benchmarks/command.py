@@ -71,6 +71,7 @@ SECTIONS = (
     Section("s", "narrow", f"{_DESIGNS}.narrow_optima", "narrow basins and plateaus: is optimal the best", long=True),
     Section("t", "targets", f"{_DESIGNS}.hard_references", "the best values of the hard problems, kept", long=True),
     Section("u", "statements", "benchmarks.reports.statements", "statements that a closed form can refute", long=True),
+    Section("u", "facts", "benchmarks.reports.facts", "facts of reports, beside an earlier checkout", long=True),
     Section("v", "fresh", "benchmarks.reports.fresh", "fresh random problems, judged independently", long=True),
     Section("w", "equivalence", "benchmarks.reports.equivalence", "answers beside those of a fixed commit", long=True),
 )

@@ -279,7 +279,7 @@ def test_grids_are_datasets():
     assert chart["abscissa"].values.tolist() == charted().abscissa.tolist()
     assert studied().to_xarray()["abscissa"].values.tolist() == [row.abscissa for row in studied().rows]
     one = tmsopt.Study(design().problem, {"mu": [0.1, 0.1]})
-    with pytest.raises(tmsopt.InputError, match="fill no grid; use to_frame"):
+    with pytest.raises(tmsopt.InputError, match="use to_frame"):
         replace(studied(), study=one, rows=studied().rows[:1] * 2).to_xarray()
 
 

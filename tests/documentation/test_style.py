@@ -19,12 +19,15 @@ BARE = re.compile(
 """Prepositions, and participles alone."""
 USUAL = {"need", "feed", "seed", "string", "spring", "bring", "sing", "ring", "embed", "speed", "heading", "rounding"}
 """Nouns and verbs that look like participles."""
-PUBLIC = {"posed"}
-"""Attributes that earlier versions promised."""
+PUBLIC = set(
+    "posed located typed ordered of allowed computed within named controlled found applied at varied varying satisfied "
+    "closed predicted without left meaning split reseed".split()
+)
+"""Attributes that versions promise, and words that are nouns or verbs too."""
 
 HABIT = re.compile(
     r"(?:^|(?<=[.!?:;] )|(?<=\n\n))(?:Of (?:a|an|the|two|each|every|all|those|which|what|whom|it|them)|That of|What is|"
-    r"What was|Whether|Likewise)\b"
+    r"What was|Likewise)\b"
 )
 """A sentence whose subject does not come first."""
 

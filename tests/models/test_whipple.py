@@ -265,7 +265,7 @@ def test_crossings_left_of_another_root_change_no_stability():
 
 def test_what_speeds_refuses():
     fixed = tmsopt.Problem(whipple, fixed=BENCHMARK)
-    with pytest.raises(tmsopt.InputError, match="no polynomials in lambda_s"):
+    with pytest.raises(tmsopt.InputError, match="not polynomials in lambda_s"):
         tmsopt.speeds(fixed, "lambda_s", between=(0.1, 0.5))
     with pytest.raises(tmsopt.InputError, match="unknown parameter"):
         tmsopt.speeds(fixed, "speed")

@@ -111,7 +111,7 @@ def test_nothing_grows_without_end():
     """Each box of a pattern without an objective makes another program."""
     problem = replace(EP4, minimize=None, locate="EP3")
     for k in range(80):
-        assert formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)}).posed).compiled
+        assert formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)}).posed).program
     assert nlp._PROGRAMS.get.cache_info().currsize == nlp._PROGRAMS.get.cache_info().maxsize == 64
 
 
@@ -119,7 +119,7 @@ def test_a_number_is_a_parameter_unless_it_is_nothing():
     """What differs in numbers alone is the same formula; a 0 leaves terms out."""
     ours, others = (formulate(with_fixed(EP4, chi_H=1.02, mu=mu).posed) for mu in (0.1, 0.7))
     assert ours.formula == others.formula
-    assert ours.compiled is others.compiled
+    assert ours.program is others.program
     assert ours.constants != others.constants
     lighter = formulate(with_fixed(EP4, chi_H=1.02, mu=0.0).posed)
     assert len(lighter.formula.steps) < len(ours.formula.steps)

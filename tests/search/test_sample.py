@@ -11,7 +11,7 @@ import tmsopt
 from tmsopt.models import from_coefficients
 
 sampling = import_module("tmsopt.search.sample")
-Cube, draw_box, sample_box = sampling.Cube, sampling.draw_box, sampling.sample_box
+Cube, draw_box, sample_box = sampling.UnitBox, sampling.draw_box, sampling.sample_box
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 SQUARE = {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}

@@ -15,7 +15,7 @@ import pytest
 from helpers.rows import assert_same
 
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
-from tmsopt.documents import row_sentence
+from tmsopt.documents import describe_row
 from tmsopt.errors import InputError
 from tmsopt.evaluation import LAWS, evaluate_columns, law_rows
 from tmsopt.plots import draw_histogram
@@ -196,7 +196,7 @@ def test_what_is_judged_is_called_feasible_and_not_optimal(study):
     assert row.solution is not None
     told = [
         results.report(),
-        row_sentence(study, row.row),
+        describe_row(study, row.row),
         row.solution.report(),
         repr(results),
         repr(row.solution),

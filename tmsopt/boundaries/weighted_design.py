@@ -84,7 +84,7 @@ class WeightedDesign:
     @cached_property
     def stable(self) -> bool:
         """Whether all roots are left of the imaginary axis."""
-        return bool(is_stable(self._scaled))
+        return bool(is_stable(self._scaled_weights))
 
     @cached_property
     def edges(self) -> tuple[str, ...]:
@@ -94,24 +94,24 @@ class WeightedDesign:
     @cached_property
     def heavily_damped(self) -> bool:
         """Whether all roots are real and negative, multiple ones included."""
-        degree = len(self._scaled) - 1
-        return self.is_on_damping_edge or bool(self._scaled[0] != 0 and real_roots(self._scaled)[0] == degree)
+        degree = len(self._scaled_weights) - 1
+        return self.is_on_damping_edge or bool(self._scaled_weights[0] != 0 and real_roots(self._scaled_weights)[0] == degree)
 
     @cached_property
     def is_on_damping_edge(self) -> bool:
         """Whether all roots are real and negative and two are equal, decided by coefficients."""
-        if self._scaled[0] == 0 or not self.stable:
+        if self._scaled_weights[0] == 0 or not self.stable:
             return False
-        found = multiple_real_roots(self._scaled, STRUCTURE_TOLERANCE)
+        found = multiple_real_roots(self._scaled_weights, STRUCTURE_TOLERANCE)
         return found is not None and all(r.re < 0 for r in found)
 
     @cached_property
     def sizes(self) -> Array:
         """Size of the terms of each coefficient, by which equations between coefficients are judged."""
-        return measure_terms(self._scaled) if self._scaled.any() else np.ones(len(self._scaled))
+        return measure_terms(self._scaled_weights) if self._scaled_weights.any() else np.ones(len(self._scaled_weights))
 
     @cached_property
-    def _scaled(self) -> Array:
+    def _scaled_weights(self) -> Array:
         return self._raw / self.scale
 
     @cached_property

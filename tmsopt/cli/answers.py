@@ -79,7 +79,7 @@ def make_document(result: Any, level: Any = "brief", **options: Any) -> Any:
 
     if isinstance(result, str | Document):
         return result
-    with result.analysis.reporting(progress_listener()) if hasattr(result, "analysis") else nullcontext():
+    with result.analysis.report_progress(progress_listener()) if hasattr(result, "analysis") else nullcontext():
         return document_of(result, level, **options)
 
 

@@ -14,7 +14,7 @@ import tmsopt
 from tmsopt.cli.answers import Reply
 from tmsopt.cli.command import OnFile, WithPage, WithPlot, option
 from tmsopt.cli.ending import INTERRUPTED
-from tmsopt.cli.outputs import check_output, saving
+from tmsopt.cli.outputs import check_output, report_writing
 from tmsopt.cli.problems import parse_number, split_names, take_nominal
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.deprecated import no_longer_needed
@@ -102,7 +102,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
                 progress=progress_listener(),
             )
         if self.output is not None and self._folder is None:
-            with saving("--output", self.output):
+            with report_writing("--output", self.output):
                 chart.save(self.output, (*dict.fromkeys(layers), *self.quantity))
         if self._folder is not None:
             click.echo(f"wrote {self._folder}", err=True)

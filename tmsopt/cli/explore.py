@@ -8,7 +8,7 @@ import click
 import tmsopt
 from tmsopt.cli.command import OnFile, WithSearch, option
 from tmsopt.cli.ending import hold_signals
-from tmsopt.cli.outputs import PAGES, check_output, saving
+from tmsopt.cli.outputs import PAGES, check_output, report_writing
 
 
 class ExploreCommand(WithSearch, OnFile):
@@ -28,7 +28,7 @@ class ExploreCommand(WithSearch, OnFile):
         path = self.output or Path(f"{self.file.stem}.html")
         check_output("--output", path, PAGES)
         page = tmsopt.explore(self.file, **self.search)
-        with hold_signals(), saving("--output", path):
+        with hold_signals(), report_writing("--output", path):
             page.save(path)
         solution = page.solution
         if solution is not None and solution.status != "optimal":

@@ -35,7 +35,7 @@ def check_output(option: str, path: Path | None, endings: Sequence[str], folders
 
 
 @contextmanager
-def saving(option: str, path: Path) -> Iterator[None]:
+def report_writing(option: str, path: Path) -> Iterator[None]:
     """Name the file that was written, or say why it was not and exit with status 2."""
     show_step(f"writing what {option} asks for")
     try:
@@ -51,7 +51,7 @@ def saving(option: str, path: Path) -> Iterator[None]:
 def write_file(option: str, path: Path | None, write: Callable[[Path], object]) -> None:
     """Write a file if the user named one."""
     if path is not None:
-        with saving(option, path):
+        with report_writing(option, path):
             write(path)
 
 
@@ -85,7 +85,7 @@ def write_new(option: str, path: Path, text: str) -> None:
         if not file.exists():
             places.setdefault(file if file.parent == path.parent else file.parent, []).append((file, content))
     for place, files in places.items():
-        with saving(option, place):
+        with report_writing(option, place):
             for file, content in files:
                 file.parent.mkdir(exist_ok=True)
                 write_text(file, content, new=True)

@@ -10,7 +10,7 @@ import click
 import tmsopt
 from tmsopt.cli.answers import Reply, answer
 from tmsopt.cli.command import Command, WithPlot, argument, option
-from tmsopt.cli.outputs import FIGURES, check_output, saving, write_file
+from tmsopt.cli.outputs import FIGURES, check_output, report_writing, write_file
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.errors import input_error
 from tmsopt.files import write_atomic, write_text
@@ -81,7 +81,7 @@ def _draw_items(items: "Sequence[Item]", files: Sequence[Path]) -> None:
     steps = start_steps(progress_listener(), "drawing", "figure")
     with closing(pictures(list(items), [path.suffix[1:].lower() for path in files])) as drawn:
         for done, (k, picture) in enumerate(drawn, start=1):
-            with saving("--output", files[k]), write_atomic(files[k]) as temporary:
+            with report_writing("--output", files[k]), write_atomic(files[k]) as temporary:
                 temporary.write_bytes(picture)
             if steps:
                 steps(done, len(items), items[k].name)

@@ -131,8 +131,8 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
         data = solution.to_json()
         if not self.full:
             return {name: value for name, value in data.items() if name in _KEYS.split()}
-        with solution.analysis.reporting(progress_listener()) as analysis:
-            found = {"meaning": analysis.resolved, "robustness": analysis.boundaries}
+        with solution.analysis.report_progress(progress_listener()) as analysis:
+            found = {"meaning": analysis.full_explanation, "robustness": analysis.boundaries}
             data |= {name: value.to_json() for name, value in found.items() if value}
             diagnoses = [diagnosis.to_json() for diagnosis in analysis.diagnoses]
         return data | ({"diagnosis": diagnoses} if diagnoses else {})

@@ -15,7 +15,7 @@ import tmsopt
 from tmsopt.cli.answers import Reply, answer, answer_rows, write_files
 from tmsopt.cli.command import OnFile, WithPage, WithPlot, option
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, hold_signals
-from tmsopt.cli.outputs import check_output, saving
+from tmsopt.cli.outputs import check_output, report_writing
 from tmsopt.cli.terminal import progress_listener, show_step
 from tmsopt.errors import input_error
 from tmsopt.files import read_text
@@ -69,7 +69,7 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         with hold_signals():
             self._answer(results, path, is_stopped)
         for target in self.export if len(results.rows) else ():
-            with saving("--export", target):
+            with report_writing("--export", target):
                 results.export(target, progress_listener())
         write_files(self, Reply(results), *self._list_files())
         if is_stopped:

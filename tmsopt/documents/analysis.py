@@ -31,7 +31,7 @@ class Analysis:
     _progress: Listener | None = None
 
     @contextmanager
-    def reporting(self, progress: Listener | None) -> Iterator["Analysis"]:
+    def report_progress(self, progress: Listener | None) -> Iterator["Analysis"]:
         """Tell a listener of the parts that are computed meanwhile."""
         self._progress = progress
         try:
@@ -52,7 +52,7 @@ class Analysis:
         return None if self.solution.interrupted else explain(self.solution, resolve=False, progress=self._progress)
 
     @cached_property
-    def resolved(self) -> Explanation | None:
+    def full_explanation(self) -> Explanation | None:
         """The same with each active limit moved and the problem solved again."""
         return None if self.solution.interrupted else explain(self.solution, progress=self._progress)
 

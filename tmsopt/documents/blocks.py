@@ -141,7 +141,7 @@ class Badge:
 
 @dataclass(frozen=True)
 class Document:
-    """What is to be said of a result.
+    """A result in words, tables and pictures.
 
     Attributes:
         kind: the class of the result.

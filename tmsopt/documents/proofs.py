@@ -49,7 +49,7 @@ def summarise_proof(proof: Proof) -> Iterator[Badge]:
 
 
 def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Iterator[Chapter]:
-    """What is proved, the numbers with their radii, the facts that follow, and the numbers that were taken exactly.
+    """The claim, the numbers with their radii, the facts that follow, and the numbers that were taken exactly.
 
     Args:
         design: what was proved: a page has its pictures and parameters too.
@@ -85,7 +85,7 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
 
 
 def list_numbers(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
-    """What was solved for, and the roots: name, decimal, radius, unit."""
+    """The numbers solved for, and the roots: name, decimal, radius, unit."""
     rows = []
     units = _find_units(problem, proof)
     per = units.get("abscissa", "")

@@ -41,7 +41,7 @@ HOME = {name: module for module, names in _HOMES.items() for name in names.split
 """Class of a result → the module that shows it."""
 
 ENDINGS = ("html", "htm")
-"""Of the name of a page."""
+"""Endings of the file name of a page."""
 
 _PACKAGES = ("tmsopt", "CasADi", "NumPy")
 

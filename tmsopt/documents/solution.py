@@ -262,7 +262,7 @@ def _describe_case(solution: Solution, case: Case) -> str:
 
 
 def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Blocks:
-    found = analysis.resolved if full else analysis.explanation
+    found = analysis.full_explanation if full else analysis.explanation
     if page and (rows := list_limits(solution)):
         yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
     if found is not None and found.levers:

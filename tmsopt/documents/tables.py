@@ -19,7 +19,7 @@ _DIGITS = 6
 
 
 def write_question(problem: Posed) -> Chapter:
-    """What was asked: parameters, values and ranges with their meaning, objective and limits."""
+    """The question: parameters, values and ranges with their meaning, objective and limits."""
     described = describe(problem)
     given = [w for of in described.sets for w in of.parameters]
     head = ("parameter", "value or range", "", "possible", "meaning")

@@ -43,8 +43,8 @@ def follow_modes(
     """Every root between meetings, with the name of its mode.
 
     A root keeps its name past meetings of other roots. For a bicycle, naming starts at one pair and two real roots, at
-    the highest speed or at the design: the pair is weave, the left real root castering, the right one capsize. Of two
-    pairs without such a start, the rightmost one is weave. For other models, roots are numbered from the right at the
+    the highest speed or at the design: the pair is weave, the left real root castering, the right one capsize. If two
+    pairs have no such start, the rightmost one is weave. For other models, roots are numbered from the right at the
     design. A pair formed by two real roots is named after both. Where more than two roots meet, as at EP3 and EP4,
     naming starts anew.
 

@@ -63,8 +63,8 @@ class Explorer:
 def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
     """The page of a problem, which is solved if it asks something; of a solution, without solving it again.
 
-    The page shows one design at a time: of bands and tolerances the nominal one. Of a front the first objective is
-    minimised. A design that violates something, or did not converge, is shown as what it is.
+    The page shows one design at a time: of bands and tolerances the nominal one. For a front it minimises the
+    first objective. A design that violates something, or did not converge, is shown as what it is.
 
     Args:
         problem: or the path of its file, or a solution.

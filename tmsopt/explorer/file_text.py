@@ -11,7 +11,7 @@ from tmsopt.problem import Posed
 _SHARED = re.compile(r"\[(\d+)\]")
 
 
-def around(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
+def surrounding_lines(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
     """What stands before and after the lines of [parameters].
 
     Args:
@@ -21,7 +21,7 @@ def around(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
     if problem.model.statement is None:
         before.append(_line("model", problem.model.name))
     else:
-        before += ["", *_model(model or _stated(problem))]
+        before += ["", *_model(model or model_table(problem))]
     after = []
     for name in ("constraints", "weights"):
         if entries := getattr(problem, name):
@@ -39,7 +39,7 @@ def _model(table: Mapping[str, Any]) -> Iterator[str]:
         yield from ("", f"[model.{toml_key(name)}]", *starmap(_line, values.items()))
 
 
-def _stated(problem: Posed) -> dict[str, Any]:
+def model_table(problem: Posed) -> dict[str, Any]:
     """The table of a model that was made in Python, with every shared part written out."""
     said = dict(problem.model.statement or {})
     shared, said["name"] = said.pop("shared"), problem.model.name
@@ -48,14 +48,14 @@ def _stated(problem: Posed) -> dict[str, Any]:
     def whole(text: str) -> str:
         return _SHARED.sub(lambda found: whole(shared[int(found[1]) - 1]), text)
 
-    def spelled(value: Any) -> Any:
+    def write_value(value: Any) -> Any:
         if isinstance(value, str):
             return whole(value)
         if isinstance(value, Mapping):
-            return {n: spelled(v) for n, v in value.items()}
-        return [spelled(v) for v in value]
+            return {n: write_value(v) for n, v in value.items()}
+        return [write_value(v) for v in value]
 
-    found = {n: v if n == "name" else spelled(v) for n, v in said.items() if v}
+    found = {n: v if n == "name" else write_value(v) for n, v in said.items() if v}
     return found | {n: rows[0] for n, rows in found.items() if n == "coefficients"}
 
 

@@ -78,13 +78,13 @@ def function(name: str, arguments: Sequence[str], asked: Formula, inputs: Mappin
     """
     results: list[str] = []
 
-    def named(text: str) -> str:
+    def name_term(text: str) -> str:
         results.append(f"t{len(results)}={_bare(text)}")
         return f"t{len(results) - 1}"
 
-    operations = {op: partial(_spelled, template, named) for op, template in _OPERATIONS.items()}
-    kind = Kind(operations | {"pow": partial(_power, named)}, lambda x: _number(as_double(x)))
-    texts = map(_bare, fold(asked, inputs, kind, named))
+    operations = {op: partial(_write_operation, template, name_term) for op, template in _OPERATIONS.items()}
+    kind = Kind(operations | {"pow": partial(_power, name_term)}, lambda x: _number(as_double(x)))
+    texts = map(_bare, fold(asked, inputs, kind, name_term))
     ends = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {next(texts)};"]
     if results:
         ends = [f"const {','.join(results)};", *ends]
@@ -154,15 +154,15 @@ def _ride(problem: Posed, p: Mapping[str, Any]) -> list[Any]:
     return [-b * scale, a * scale, yaw, yaw_of_rate, speed * length, ahead * length, aside * length]
 
 
-def _spelled(template: str, named: Callable[[str], str], *given: str) -> str:
+def _write_operation(template: str, name_term: Callable[[str], str], *given: str) -> str:
     """The text of an operation; operands that it takes twice, and what is long, are named."""
     often = [template.count(f"{{{k}}}") > 1 and _is_result(text) for k, text in enumerate(given)]
-    text = template.format(*(named(text) if twice else text for text, twice in zip(given, often, strict=True)))
-    return named(text) if len(text) > _LONGEST else text
+    text = template.format(*(name_term(text) if twice else text for text, twice in zip(given, often, strict=True)))
+    return name_term(text) if len(text) > _LONGEST else text
 
 
-def _power(named: Callable[[str], str], base: str, exponent: str) -> str:
-    return _spelled(_POWERS.get(exponent, "Math.pow({0},{1})"), named, base, exponent)
+def _power(name_term: Callable[[str], str], base: str, exponent: str) -> str:
+    return _write_operation(_POWERS.get(exponent, "Math.pow({0},{1})"), name_term, base, exponent)
 
 
 def _bare(text: str) -> str:

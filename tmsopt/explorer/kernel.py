@@ -28,21 +28,21 @@ def kernel_script(degree: int) -> str:
     """
     a = [f"a{k}" for k in range(degree + 1)]
     parts = [
-        _traced("factorAbscissa", ["p", "q"], lambda p, q: [_OF.abscissa(p, q)]),
-        _traced("factorDamping", ["p", "q"], lambda p, q: [_OF.damping_ratio(p, q)]),
-        _traced("factorRoots", ["p", "q"], _OF.root_pair, "z"),
+        _trace_function("factorAbscissa", ["p", "q"], lambda p, q: [_OF.abscissa(p, q)]),
+        _trace_function("factorDamping", ["p", "q"], lambda p, q: [_OF.damping_ratio(p, q)]),
+        _trace_function("factorRoots", ["p", "q"], _OF.root_pair, "z"),
     ]
     if degree < _QUARTIC:
-        parts.append(_traced("stableBySigns", a, lambda *c: [_stable(c)]))
+        parts.append(_trace_function("stableBySigns", a, lambda *c: [_stable(c)]))
     if degree == _QUARTIC:
         rules = f"good: {GOOD}, accepted: {quartic.ACCEPTED}, steps: {quartic.STEPS}"
         b = ["b1", "b2", "b3", "b4", "p1", "q1", "p2", "q2"]
         parts += [
             f"const QUARTIC = {{{rules}}};",
-            _traced("stableBySigns", a, lambda *c: [_OF.stable(*c)]),
-            _traced("quarticClass", a, _packed),
-            _traced("quarticStart", a, _started, "f"),
-            _traced("quarticStep", b, _stepped, "g"),
+            _trace_function("stableBySigns", a, lambda *c: [_OF.stable(*c)]),
+            _trace_function("quarticClass", a, _pack_classes),
+            _trace_function("quarticStart", a, _start_roots, "f"),
+            _trace_function("quarticStep", b, _step_roots, "g"),
         ]
     return "\n".join(parts) + "\n"
 
@@ -56,18 +56,18 @@ _KNOWN |= {"where": _where, "one": lambda condition: _where(condition, 1, 0)}
 _OF = SimpleNamespace(**_KNOWN)
 
 
-def _started(*a: Any) -> Sequence[Any]:
+def _start_roots(*a: Any) -> Sequence[Any]:
     monic = _OF.monic(*a)
     found = _OF.start(*monic)
     return [*monic, *found, _OF.error(*monic, *found)]
 
 
-def _stepped(*given: Any) -> list[Any]:
+def _step_roots(*given: Any) -> list[Any]:
     found = _OF.newton(*given)
     return [*found, _OF.error(*given[:4], *found)]
 
 
-def _packed(*a: Any) -> list[Any]:
+def _pack_classes(*a: Any) -> list[Any]:
     kind, count, doubtful = _OF.classes(*a)
     return [_where(doubtful, 64.0, kind + 8.0 * count)]
 
@@ -82,7 +82,7 @@ def _stable(c: Sequence[Any]) -> Any:
     return held
 
 
-def _traced(name: str, arguments: Sequence[str], compute: Callable[..., Sequence[Any]], into: str = "") -> str:
+def _trace_function(name: str, arguments: Sequence[str], compute: Callable[..., Sequence[Any]], into: str = "") -> str:
     traced = trace(lambda x: compute(*x.values()), arguments)
     taken = [*arguments, into] if into else arguments
     return function(f"function {name}", taken, traced, {n: n for n in arguments}, fills=bool(into))

@@ -68,7 +68,7 @@ def known_designs(
 
 
 def _of_solution(solution: Solution) -> Known:
-    """What was found, with how good it is known to be."""
+    """The solution, with how good it is known to be."""
     problem = solution.problem.posed
     names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
     words = describe_status(solution), describe_verdict(solution)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt.analysis import structure_line
 from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.explorer.file_text import around
+from tmsopt.explorer.file_text import surrounding_lines
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
 from tmsopt.guide import exact_value
@@ -68,9 +68,9 @@ def subject(
         "designs": [_design(problem, k) for k in designs],
         "start": [start[n] for n in of.names],
         "plane": [of.names.index(n) for n in plane],
-        "over": of.names.index(_over(problem)),
+        "over": of.names.index(_default_axis(problem)),
         "curves": list(_curves(problem, plane, start)) if trace_curves else [],
-        "toml": around(problem, model),
+        "toml": surrounding_lines(problem, model),
         "others": [n for n in problem.conditions if n not in script.constraints],
         "nominal": problem.nominal is not problem,
         "shown": [_MIDDLE] if problem.free and not solved else [],
@@ -129,7 +129,7 @@ def _constraint(problem: Posed, name: str) -> dict[str, Any]:
 
 def _design(problem: Posed, known: Known) -> dict[str, Any]:
     structure = known.structure
-    roots = list(_drawn(problem, structure))
+    roots = list(_list_roots(problem, structure))
     return {
         "name": known.name,
         "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
@@ -144,7 +144,7 @@ def _design(problem: Posed, known: Known) -> dict[str, Any]:
     }
 
 
-def _drawn(problem: Posed, found: Structure) -> Iterator[list[float]]:
+def _list_roots(problem: Posed, found: Structure) -> Iterator[list[float]]:
     """Growth rate, frequency and multiplicity of each root, of conjugates of one; of a complex H Im ω and Re ω."""
     own = [[w.im, w.re, w.multiplicity] for w in eigenfrequencies(problem.model, found.roots)]
     yield from own or ([r.re, r.im, r.multiplicity] for r in found.roots if r.im >= 0)
@@ -157,7 +157,7 @@ def _by_interest(problem: Posed) -> list[str]:
     return sorted(names, key=lambda n: (n not in problem.free, rank.get(n, 2)))
 
 
-def _over(problem: Posed) -> str:
+def _default_axis(problem: Posed) -> str:
     """The speed of a bicycle, or else what comes first."""
     speeds = [n for n in problem.parameter_set.names if n in _SPEEDS and problem.model.statement is None]
     return (speeds or _by_interest(problem))[0]

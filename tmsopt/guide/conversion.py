@@ -18,7 +18,7 @@ _PER_WHEELBASE = {"B": (1 / 2, 1 / 4, 3 / 8), "H": (1 / 8, 1 / 8, 3 / 8)}
 """Body → length, width and height of its box, per wheelbase, unless its size is given."""
 
 _INSIDE = 0.9
-"""Of the range of an inertia that an equality ties to a mass: the ends of the mass bind first."""
+"""Share of the range of an inertia that an equality ties to a mass, so that the ends of the mass are active first."""
 
 _WORDS = {
     "Fr": "(v/sqrt(g*w))",
@@ -82,16 +82,16 @@ def convert(
     if faults:
         raise InputError(faults)
     fixed, free, limits = dict(problem.fixed), dict(problem.free), dict(problem.constraints)
-    limits = {name: _translated(problem, text) for name, text in limits.items()}
+    limits = {name: _translate(problem, text) for name, text in limits.items()}
     for which, size in sizes.items():
         for axes, share in _per_mass(size).items():
             name, mass = f"I_{which}{axes}", f"m_{which}"
             if mass in problem.free:
                 low, high = problem.free[mass]
-                free[name] = (_rounded(_INSIDE * share * low), _rounded(share * high / _INSIDE))
+                free[name] = (_round(_INSIDE * share * low), _round(share * high / _INSIDE))
                 limits[_new(f"box_{name}", limits)] = f"{name} == {share:.12g}*{mass}"
             else:
-                fixed[name] = _rounded(share * problem.fixed[mass])
+                fixed[name] = _round(share * problem.fixed[mass])
     return replace(
         problem.problem,
         model=whipple,
@@ -173,7 +173,7 @@ def _counterparts(problem: Posed) -> dict[str, str]:
     return {**{name: name for name in in_si}, **_WORDS}
 
 
-def _translated(problem: Posed, text: str) -> str:
+def _translate(problem: Posed, text: str) -> str:
     words = _counterparts(problem)
     return _WORD.sub(lambda word: words[word[0]], text)
 
@@ -182,7 +182,7 @@ def _objective(problem: Posed, text: str | None) -> str | None:
     """An objective; the abscissa alone stays as it is where √(g/w) is but a factor."""
     if text is None or (text.strip() == "abscissa" and not {"g", "w"} & {*problem.free, *problem.scenarios}):
         return text
-    return _translated(problem, text)
+    return _translate(problem, text)
 
 
 def _sizes(problem: Posed, given: Mapping[str, str | Size | None]) -> dict[str, Size]:
@@ -193,7 +193,7 @@ def _sizes(problem: Posed, given: Mapping[str, str | Size | None]) -> dict[str, 
             length, width, height = (share * _middle(problem, "w") for share in _PER_WHEELBASE[which])
             centre = f"z_{which}"
             least = -problem.free[centre][1] if centre in problem.free else -problem.fixed[centre]
-            found[which] = (_rounded(length), _rounded(width), _rounded(min(height, 2 * least)))
+            found[which] = (_round(length), _round(width), _round(min(height, 2 * least)))
         else:
             try:
                 found[which] = _size(size)
@@ -231,7 +231,7 @@ def _middle(problem: Posed, name: str) -> float:
     return sum(problem.free[name]) / 2 if name in problem.free else problem.fixed[name]
 
 
-def _rounded(x: float) -> float:
+def _round(x: float) -> float:
     return float(f"{x:.6g}")
 
 

@@ -35,12 +35,12 @@ def describe(given: Given | Model) -> Description:
     More: docs/reference/quantities.md
     """
     if isinstance(given, Model):
-        return _described(given, None, {})
+        return _describe(given, None, {})
     if isinstance(given, str) and given in MODELS:
-        return _described(MODELS[given], None, {})
+        return _describe(MODELS[given], None, {})
     if isinstance(given, Problem | Posed | Solution):
         posed = pose(given)
-        return _described(posed.model, posed, {})
+        return _describe(posed.model, posed, {})
     if not isinstance(given, str | PathLike):
         accepted = f"the name of a model ({', '.join(MODELS)}), the path of a file, a Model, a Problem, or a Solution"
         raise input_error(f"found {short(given)}; accepted: {accepted}", "given")
@@ -48,7 +48,7 @@ def describe(given: Given | Model) -> Description:
         problem, typed = _read(given)
     except InputError as error:
         raise _with_models(error, given) from None
-    return _described(problem.model, problem.posed, typed)
+    return _describe(problem.model, problem.posed, typed)
 
 
 def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
@@ -63,14 +63,14 @@ def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
 
 
 def _with_models(error: InputError, given: str | PathLike[str]) -> InputError:
-    """Of a word that is no file, also which models there are."""
+    """For a word that is no file, the error names the models too."""
     if "." in str(given) or len(error.faults) != 1:
         return error
     (fault,) = error.faults
     return InputError([Fault(f"{fault.message}; models: {' '.join(MODELS)}", fault.key, fault.file, fault.line)])
 
 
-def _described(model: Model, problem: Posed | None, typed: Typed) -> Description:
+def _describe(model: Model, problem: Posed | None, typed: Typed) -> Description:
     size = model.degree if model.carrier is None else model.degree // 2
     return Description(
         model=model.name,
@@ -85,12 +85,12 @@ def _described(model: Model, problem: Posed | None, typed: Typed) -> Description
         conventions=model.conventions,
         sketch=model.sketch,
         matrices=Table(dict(_matrices(model, typed))),
-        asked=Table(_asked(problem, typed) if problem else {}),
+        asked=Table(_list_question(problem, typed) if problem else {}),
     )
 
 
 def _words(model: Model, of: ParameterSet, problem: Posed | None, typed: Typed) -> Words:
-    written = _written(typed).get("quantities", (model.statement or {}).get("quantities", {}))
+    written = _model_table(typed).get("quantities", (model.statement or {}).get("quantities", {}))
     quantities = [s for n, s in vocabulary(model, of).items() if n not in of.names]
     return Words(
         of.name,
@@ -115,7 +115,7 @@ def _quantity(q: Parameter | Quantity, formula: str) -> Word:
 
 def _parameter(p: Parameter, problem: Posed | None, of_user: bool) -> Word:
     meaning = "" if of_user else p.meaning  # only its name is known
-    return Word(p.name, p.unit, meaning, _limits(p), _given(p, problem))
+    return Word(p.name, p.unit, meaning, _limits(p), _describe_value(p, problem))
 
 
 def _limits(p: Parameter) -> str:
@@ -127,7 +127,7 @@ def _limits(p: Parameter) -> str:
     return f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
 
 
-def _given(p: Parameter, problem: Posed | None) -> str:
+def _describe_value(p: Parameter, problem: Posed | None) -> str:
     """What a parameter is, or may be, in the unit in which it was typed."""
     if problem is None:
         return "" if p.default is None else f"{p.default:.12g} if left out"
@@ -140,20 +140,20 @@ def _number(value: Any, unit: Unit) -> str:
     return value if isinstance(value, str) else unit.show(value, 12)
 
 
-def _written(typed: Typed) -> Mapping[str, Any]:
+def _model_table(typed: Typed) -> Mapping[str, Any]:
     """The table [model] of a file."""
     model = typed.get("model")
     return model if isinstance(model, dict) else {}
 
 
 def _matrices(model: Model, typed: Typed) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
-    for name, rows in (_written(typed) or model.statement or {}).items():
+    for name, rows in (_model_table(typed) or model.statement or {}).items():
         if isinstance(rows, list) and name not in ("parameters", "shared"):
             listed = rows if all(isinstance(row, list) for row in rows) else [rows]
             yield name, tuple(tuple(str(entry) for entry in row) for row in listed)
 
 
-def _asked(problem: Posed, typed: Typed) -> dict[str, Table[str]]:
+def _list_question(problem: Posed, typed: Typed) -> dict[str, Table[str]]:
     """What a problem asks, section by section."""
     if problem.pareto:
         objective = {"pareto": ", ".join(problem.pareto)}

@@ -56,7 +56,7 @@ def schema() -> Schema:
         "title": "tmsopt",
         "description": "A problem file or a study file of tmsopt.",
         "type": "object",
-        **_shown(_ref("problem"), _ref("study_file")),
+        **_offer(_ref("problem"), _ref("study_file")),
         "if": _OF_STUDY,
         "then": _ref("study_file"),
         "else": _ref("problem"),
@@ -68,7 +68,7 @@ def _ref(name: str) -> Schema:
     return {"$ref": f"#/$defs/{name}"}
 
 
-def _shown(*several: Schema) -> Schema:
+def _offer(*several: Schema) -> Schema:
     """What an editor may offer, without a word on what is wrong: the last one always holds."""
     return {"anyOf": [*several, {}]}
 
@@ -112,7 +112,7 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
         for end in ("min", "max", "start"):
             shape["properties"].get(end, {})["pattern"] = _WITH_UNIT
     defs["Band"]["properties"]["points"] |= {"minimum": 2, "maximum": 99}
-    defs["Objective"]["properties"]["locate"] |= {**_shown({"enum": list(pattern_names(4))}), "pattern": _PATTERN}
+    defs["Objective"]["properties"]["locate"] |= {**_offer({"enum": list(pattern_names(4))}), "pattern": _PATTERN}
     defs["Objective"]["properties"]["pareto"] |= {"minItems": 2, "maxItems": 3, "uniqueItems": True}
     defs["Objective"]["not"] = {"required": ["minimize", "maximize"]}
     keys["objective"] = {"description": defs["Objective"]["description"], **defs.pop("Objective")}
@@ -121,16 +121,16 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
     keys["model"] = {
         "description": f"{keys['model']['description']} {titles}.",
         "default": "tms",
-        **_shown({"enum": list(MODELS)}),
+        **_offer({"enum": list(MODELS)}),
         "if": {"type": "string"},
         "then": {"enum": list(MODELS)},
         "else": _model_table(),
     }
     tables = [*(_ref(f"parameters_{name}") for name in MODELS), _ref("parameters_own")]
     described = keys["parameters"]["description"]
-    keys["parameters"] = {"description": described, "type": "object", **_shown(*tables)}
+    keys["parameters"] = {"description": described, "type": "object", **_offer(*tables)}
     gains = map(_ref, (f"feedback_{name}" for name in MODELS))
-    keys["feedback"] = {"description": keys["feedback"]["description"], "type": "object", **_shown(*gains)}
+    keys["feedback"] = {"description": keys["feedback"]["description"], "type": "object", **_offer(*gains)}
     _, listed = keys["scenarios"]["additionalProperties"]["anyOf"]
     keys["scenarios"]["additionalProperties"] = _either(defs.pop("Band"), listed)
     del problem["required"]  # of parameters, which a measured bicycle has in its own file
@@ -240,7 +240,7 @@ def _refine_study(study: Schema, defs: dict[str, Schema]) -> None:
     keys["study"] = {"description": keys["study"]["description"], **options}
     keys["problem"] = {
         "description": keys["problem"]["description"],
-        **_shown(_ref("problem")),
+        **_offer(_ref("problem")),
         "if": {"type": "object"},
         "then": _ref("problem"),
         "else": {"type": "string"},

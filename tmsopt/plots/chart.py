@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tmsopt.charts.chart import Chart
 from tmsopt.errors import input_error, suggest
 from tmsopt.models import Model, in_words_of, tms
-from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, events_of, finished, plane_over
+from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, events_of, finish_axes, plane_over
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
@@ -84,10 +84,10 @@ def domain_curves(ax: Axes, domain: Domain | None, plane: PlaneAxes, model: Mode
             style, how = _KINDS.get(arc.kind, ("-", ""))
             around = withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)
             look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width}
-            ax.plot(*plane.of(arc.points), path_effects=[around], **look)
+            ax.plot(*plane.to_axis(arc.points), path_effects=[around], **look)
             handles.append(Line2D([], [], label=words + how, **look))
     for corner in domain.corners:
-        x, y = plane.of(corner.parameters)
+        x, y = plane.to_axis(corner.parameters)
         ax.plot(x, y, "o", color=MARK, markersize=4, zorder=5)
         names.append(Name(in_words_of(model, corner.name), x, y))
     return names, handles
@@ -136,7 +136,7 @@ def draw_domain(
     plane = plane_over(problem.posed if problem else None, horizontal, vertical, *varying)
     drawn = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
     plane.label(drawn)
-    return finished(drawn, ax is None, *domain_curves(drawn, data, plane, problem.model if problem else tms))
+    return finish_axes(drawn, ax is None, *domain_curves(drawn, data, plane, problem.model if problem else tms))
 
 
 def draw_chart(
@@ -144,7 +144,7 @@ def draw_chart(
 ) -> Axes:
     """A chart with its exact boundaries on top, hatched where a constraint is violated.
 
-    The Axes show the plane in the units of the file. Of the abscissa, blue decays and red grows, white is 0, contours
+    The Axes show the plane in the units of the file. For the abscissa, blue decays and red grows, white is 0, contours
     have their numbers, and a star marks the optimum where the problem asks for one (it is solved for it), else the
     least abscissa of the grid among what the constraints allow.
 
@@ -174,15 +174,15 @@ def draw_chart(
         _fill_layer(drawn, data, plane, layer)
     names, curves = domain_curves(drawn, data.domain, plane, data.problem.model)
     classes = class_handles(data.kind, data.problem.model) if layer == "kind" else []
-    handles: list[Artist] = [*classes, *curves, *_violated(drawn, data, plane)]
+    handles: list[Artist] = [*classes, *curves, *_hatch_violations(drawn, data, plane)]
     if layer == "abscissa" and optimum:
         handles += _optimum(drawn, data, plane)
     if design is not None:
-        x, y = at = plane.of(design.parameters)
+        x, y = at = plane.to_axis(design.parameters)
         handles += _mark(drawn, at, "D", f"the design ({design.structure})")
         names.append(Name("design", x, y))
     frame(drawn, data, plane)
-    return finished(drawn, ax is None, names, handles)
+    return finish_axes(drawn, ax is None, names, handles)
 
 
 def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = None) -> Figure:
@@ -199,11 +199,11 @@ def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = No
 
 
 def _grid(chart: Chart, plane: PlaneAxes) -> tuple[Array, Array]:
-    first, second = (scale.of(values) for scale, values in zip(plane, chart.grid, strict=True))
+    first, second = (scale.to_axis(values) for scale, values in zip(plane, chart.grid, strict=True))
     return first, second
 
 
-def _violated(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Patch]:
+def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Patch]:
     """Hatching where a constraint does not hold, and a line where it just does; its legend entry."""
     if "satisfied" not in chart.layers or chart.satisfied.all():
         return []
@@ -257,7 +257,7 @@ def _optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
         if found.status == "optimal":
             word = "abscissa" if problem.model.carrier is None else "largest Im ω"
             label = f"optimum ({found.structure}), {word} {found.abscissa:.4g}"
-            return _mark(ax, plane.of(found.parameters), "*", label)
+            return _mark(ax, plane.to_axis(found.parameters), "*", label)
     allowed = chart.satisfied if "satisfied" in chart.layers else np.ones(chart.abscissa.shape, bool)
     values = np.where(allowed & np.isfinite(chart.abscissa), chart.abscissa, np.inf)
     row, column = np.unravel_index(int(values.argmin()), values.shape)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.fronts.front import Front, FrontPoint
-from tmsopt.plots.labels import Name, finished, scale_of
+from tmsopt.plots.labels import Name, finish_axes, scale_of
 from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
@@ -59,7 +59,7 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
     """
     drawn = on_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
     scales = [scale_of(data.problem.posed, text) for text in data.objectives]
-    values = np.stack([s.of([p.objectives[k] for p in data.points]) for k, s in enumerate(scales)], axis=-1)
+    values = np.stack([s.to_axis([p.objectives[k] for p in data.points]) for k, s in enumerate(scales)], axis=-1)
     drawn.set(xlabel=scales[0].label, ylabel=scales[1].label)
     if len(scales) == 2:
         _draw_curve(drawn, data, values)
@@ -70,7 +70,7 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
     if len(rings):  # not stable, or not known to be
         drawn.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
     drawn.margins(0.08)
-    return finished(drawn, ax is None, _names(data.points, values))
+    return finish_axes(drawn, ax is None, _names(data.points, values))
 
 
 def front_figure(front: Front) -> Figure:
@@ -108,7 +108,7 @@ def _draw_curve(ax: Axes, front: Front, values: Array) -> None:
 
 
 def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:
-    """Of the ends, and of kinks at which the structure changes; limits that begin to bind stand in the table."""
+    """Names of the ends, and of kinks at which the structure changes; the table has limits that become active."""
     words = [[w for w in p.label.split("; ") if "->" in w or w.startswith(("least", "greatest"))] for p in points]
     return [
         Name(", ".join(w).replace("->", "→"), *map(float, at[:2])) for w, at in zip(words, values, strict=True) if w

@@ -10,7 +10,7 @@ from matplotlib.typing import LineStyleType
 
 from tmsopt.dynamics.growth import SPEEDS, Growth, growth
 from tmsopt.dynamics.modes import Mode
-from tmsopt.plots.labels import OF_H, AxisScale, Name, events_of, finished, place_all, scale_over
+from tmsopt.plots.labels import OF_H, AxisScale, Name, events_of, finish_axes, place_all, scale_over
 from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
@@ -68,7 +68,7 @@ def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
 
     The Axes show Re s, in 1/s for a problem in SI, over the parameter in the unit of the problem's file: each mode with
     its name, bands of stability and heavy damping, lines at the values where a mode loses stability and at the
-    design's own, all with their numbers in the legend, and circles where roots meet. Of a complex H they show Im ω of
+    design's own, all with their numbers in the legend, and circles where roots meet. For a complex H they show Im ω of
     every eigenfrequency, to the ends of all curves.
 
     Example:
@@ -78,7 +78,7 @@ def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/weave_and_capsize.md
     """
-    return _drawn(data, ax, "real")
+    return _draw(data, ax, "real")
 
 
 def draw_frequencies(data: Growth | Solution, ax: Axes | None = None) -> Axes:
@@ -94,7 +94,7 @@ def draw_frequencies(data: Growth | Solution, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/weave_and_capsize.md
     """
-    return _drawn(data, ax, "imag")
+    return _draw(data, ax, "imag")
 
 
 def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: float | None = None) -> Figure:
@@ -121,34 +121,34 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
     return figure
 
 
-def _drawn(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
+def _draw(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
     data = growth(data) if isinstance(data, Solution) else data
     drawn = on_axes(ax, 6.4, 4.4, data.problem.title)
-    return finished(drawn, ax is None, _curves(drawn, data, part))
+    return finish_axes(drawn, ax is None, _curves(drawn, data, part))
 
 
 def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     """Everything but the legend; the names of the modes, to place."""
     scale = scale_over(data.problem.posed, data.over)
-    draw_bands(ax, scale.of(data.stable), scale.of(data.heavily_damped))
-    names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _reached(m, data.design))))
+    draw_bands(ax, scale.to_axis(data.stable), scale.to_axis(data.heavily_damped))
+    names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _rank_mode(m, data.design))))
     shown = [m for m in data.modes if part == "real" or _of_H(data) or m.roots.imag.any()]
     curves = [(m, _heights(data, m.values, m.roots, part)) for m in shown]
     for mode, y in curves:
         colour, style = _STYLES.get(mode.name, _OTHERS[names.index(mode.name) % len(_OTHERS)])
         level = 2 + 0.01 * names.index(mode.name)  # whole lines below dashed ones
-        ax.plot(scale.of(mode.values), y, color=colour, linewidth=1.4, linestyle=style, zorder=level)
+        ax.plot(scale.to_axis(mode.values), y, color=colour, linewidth=1.4, linestyle=style, zorder=level)
     _marks(ax, data, scale, part)
     label = _LABELS[part][data.rate is not None]
     first = min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0]
-    ax.set(ylabel=OF_H[part] if _of_H(data) else label, xlabel=scale.label, xlim=scale.of([first, data.values[-1]]))
+    ax.set(ylabel=OF_H[part] if _of_H(data) else label, xlabel=scale.label, xlim=scale.to_axis([first, data.values[-1]]))
     ax.set_ylim(_focus(data, curves, part))
     found = _names(ax, scale, curves, names)
     if _of_H(data):
         kind = "EP{}" if "EP" in data.structure else "{}-fold"
         for root, (own, z) in zip(data.multiple, _multiple(data), strict=True):
             height = float(_heights(data, own, z, part).item())
-            found.append(Name(kind.format(root.multiplicity), float(scale.of(own)), height))
+            found.append(Name(kind.format(root.multiplicity), float(scale.to_axis(own)), height))
     return found
 
 
@@ -168,19 +168,19 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     unit = f" {scale.unit.text}" if scale.unit.text else ""
     words = events_of(data.problem.model)
     for kind, (colour, style) in EVENTS.items():
-        at = scale.of([c.at for c in data.events if c.kind == kind])
+        at = scale.to_axis([c.at for c in data.events if c.kind == kind])
         label = f"{words[kind]} at {', '.join(dict.fromkeys(f'{x:.4g}' for x in at))}{unit}"
         for k, x in enumerate(at):
             ax.axvline(x, color=colour, linewidth=1.1, linestyle=style, label=None if k else label)
     structure = f" ({data.structure})" if "EP" in data.structure else ""
     own = data.design if abs(data.design) > _NOTHING * np.ptp(data.values) else 0.0
-    label = f"design at {scale.of(own):.4g}{unit}{structure}"
-    ax.axvline(float(scale.of(data.design)), color=LINE, linewidth=1.2, linestyle=":", label=label)
+    label = f"design at {scale.to_axis(own):.4g}{unit}{structure}"
+    ax.axvline(float(scale.to_axis(data.design)), color=LINE, linewidth=1.2, linestyle=":", label=label)
     met = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind] + _multiple(data)
     if met:
         places, roots = zip(*met, strict=True)
         label = "eigenfrequencies meet" if _of_H(data) else "roots meet"
-        x, y = scale.of(places), _heights(data, places, roots, part)
+        x, y = scale.to_axis(places), _heights(data, places, roots, part)
         ax.plot(x, y, "o", markersize=4.5, color=LINE, markerfacecolor="white", zorder=4, label=label)
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
@@ -211,7 +211,7 @@ def _names(ax: Axes, scale: AxisScale, curves: Sequence[_Curve], names: Sequence
     for k, name in enumerate(names):
         pieces = []
         for mode, y in curves:
-            x = scale.of(mode.values)
+            x = scale.to_axis(mode.values)
             seen = (x > left) & (x < right) & (y > bottom) & (y < top)
             if mode.name == name and seen.any():
                 pieces.append((x[seen], y[seen]))
@@ -228,7 +228,7 @@ def _multiple(data: Growth) -> list[tuple[float, complex]]:
     return [(data.design, complex(r.re, r.im)) for r in data.multiple if r.im >= 0 or _of_H(data)]
 
 
-def _reached(mode: Mode, design: float) -> tuple[float, float]:
+def _rank_mode(mode: Mode, design: float) -> tuple[float, float]:
     """By which modes are put in order: how near they come to the design, and from the right there."""
     near = np.abs(mode.values - design)
     return round(float(near.min()) / (1e-3 + abs(design)), 3), -float(mode.roots[near.argmin()].real)

@@ -60,7 +60,7 @@ class AxisScale(NamedTuple):
         """Symbol and unit."""
         return self.symbol + (f" in {self.unit.text}" if self.unit.text else "")
 
-    def of(self, values: ArrayLike) -> Array:
+    def to_axis(self, values: ArrayLike) -> Array:
         """Numbers as they stand on the axis."""
         return np.asarray(values, dtype=float) / self.unit.one
 
@@ -71,9 +71,9 @@ class PlaneAxes(NamedTuple):
     horizontal: AxisScale
     vertical: AxisScale
 
-    def of(self, values: Mapping[str, ArrayLike]) -> Array:
+    def to_axis(self, values: Mapping[str, ArrayLike]) -> Array:
         """Where points stand on both axes, of shape (2, …), by the values of what is on them."""
-        return np.array([axis.of(values[axis.name]) for axis in self])
+        return np.array([axis.to_axis(values[axis.name]) for axis in self])
 
     def label(self, ax: Axes) -> None:
         """Write what is on the axes."""
@@ -122,7 +122,7 @@ def events_of(model: Model) -> dict[str, str]:
     return {**words_of(model), "infinity": "root at infinity"}
 
 
-def finished(ax: Axes, own: bool, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:
+def finish_axes(ax: Axes, own: bool, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:
     """The Axes with their legend, below a figure of their own, and names beside their points."""
     shown = ax.get_legend_handles_labels()[0] if handles is None else handles
     if own:
@@ -161,8 +161,8 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
     if not merged:
         return
     places = np.array([place for place, _ in merged])
-    with settled(figure_of(ax)):
-        curves = [xy for line in ax.get_lines() for xy in _seen(ax, line.get_xydata())]
+    with freeze_layout(figure_of(ax)):
+        curves = [xy for line in ax.get_lines() for xy in _visible_pieces(ax, line.get_xydata())]
         textalloc.allocate(
             ax,
             places[:, 0],
@@ -182,13 +182,13 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
 
 def place_all(found: Sequence[tuple[Axes, Sequence[Name]]]) -> None:
     """The same in several Axes of one figure."""
-    with settled(figure_of(found[0][0])):
+    with freeze_layout(figure_of(found[0][0])):
         for ax, names in found:
             place_names(ax, names)
 
 
 @contextmanager
-def settled(figure: Figure) -> Iterator[None]:
+def freeze_layout(figure: Figure) -> Iterator[None]:
     """The layout as it is when drawn, and with it how large a text is in the axes; drawn again, it is not sought anew.
 
     Inside another of these nothing is left to do.
@@ -208,7 +208,7 @@ def settled(figure: Figure) -> Iterator[None]:
         figure.set_layout_engine(engine)
 
 
-def _seen(ax: Axes, xy: ArrayLike) -> list[Array]:
+def _visible_pieces(ax: Axes, xy: ArrayLike) -> list[Array]:
     """The pieces of a curve inside the figure, by as few points as show it to a tenth of a pixel."""
     width, height = figure_of(ax).canvas.get_width_height(physical=True)
     drawn = Path(np.asarray(xy, dtype=float)).to_polygons(ax.transData, width, height, closed_only=False)

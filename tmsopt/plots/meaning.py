@@ -12,7 +12,7 @@ from tmsopt.boundaries import Nearest, Robustness
 from tmsopt.evaluation.law_rows import SAME_LAW
 from tmsopt.models import words_of
 from tmsopt.paper import Comparison, Ledger
-from tmsopt.plots.labels import Name, abscissa_label, finished, scale_of
+from tmsopt.plots.labels import Name, abscissa_label, finish_axes, scale_of
 from tmsopt.plots.style import CRITICAL, STABLE, note, on_axes
 from tmsopt.search import Every
 
@@ -47,7 +47,7 @@ def draw_rounding(data: Explanation, ax: Axes | None = None) -> Axes:
     decades = [np.floor(np.log10(min(sizes, default=1.0))), np.ceil(np.log10(max(sizes, default=1.0)) + 1e-9)]
     ax.set(xscale="log", xlim=np.power(10.0, decades), xlabel="change of the abscissa")
     ax.xaxis.set_minor_formatter(NullFormatter())
-    return finished(ax, own)
+    return finish_axes(ax, own)
 
 
 def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
@@ -83,7 +83,7 @@ def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
         ax.text(0.5, 0.5, said, transform=ax.transAxes, horizontalalignment="center", fontsize=9)
     towards = f"change towards {words.get(nearest.kind, nearest.kind)}"
     ax.set_xlabel(f"{towards} in {'%' if relative else 'units of the weights'}")
-    return finished(ax, own)
+    return finish_axes(ax, own)
 
 
 def draw_comparison(data: Comparison, ax: Axes | None = None) -> Axes:
@@ -107,7 +107,7 @@ def draw_comparison(data: Comparison, ax: Axes | None = None) -> Axes:
     _bars(ax, names, [max(abs(row.relative), _LEAST) for row in rows], agree, ("differs", "agrees"))
     ax.axvline(SAME_LAW, color="black", linestyle="--", linewidth=1, label=f"agrees up to {SAME_LAW:g}")
     ax.set(xscale="log", xlim=(_LEAST, None), xlabel="relative difference from the law")
-    return finished(ax, own)
+    return finish_axes(ax, own)
 
 
 def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
@@ -128,7 +128,7 @@ def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
         note(ax, str(n), (n, k), (4, 0), verticalalignment="center")
     ax.margins(x=0.12)
     ax.set_xlabel("claims")
-    return finished(ax, own)
+    return finish_axes(ax, own)
 
 
 def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
@@ -150,7 +150,7 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
     problem = data.solutions[0].problem
     ax = on_axes(ax, 6.0, 4.4, problem.title)
     scales = [scale_of(problem.posed, name) for name in [*problem.free][:2]]
-    points = np.stack([s.of([d.parameters[s.name] for d in data.solutions]) for s in scales], axis=-1)
+    points = np.stack([s.to_axis([d.parameters[s.name] for d in data.solutions]) for s in scales], axis=-1)
     if len(scales) < 2:
         ax.set_ylabel(abscissa_label(problem.posed))
         points = np.stack([points[:, 0], [d.abscissa for d in data.solutions]], axis=-1)
@@ -160,9 +160,9 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
         if len(own_points):
             ax.plot(*own_points.T, "o", color=CRITICAL, markerfacecolor=inside, label=label, linestyle="none")
     for scale, letter in zip(scales, "xy", strict=False):
-        ax.set(**{f"{letter}label": scale.label, f"{letter}lim": scale.of(problem.free[scale.name])})
+        ax.set(**{f"{letter}label": scale.label, f"{letter}lim": scale.to_axis(problem.free[scale.name])})
     names = [Name(f"{d.abscissa:.4g}", float(x), float(y)) for d, (x, y) in zip(data.solutions, points, strict=True)]
-    return finished(ax, own, names)
+    return finish_axes(ax, own, names)
 
 
 def _bars(

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.dynamics import Simulation
-from tmsopt.plots.labels import finished
+from tmsopt.plots.labels import finish_axes
 from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, new_figure, on_axes
 
 _COLOURS = (CRITICAL, MARK, REAL, HEAVY, COMPLEX, LINE)
@@ -29,7 +29,7 @@ def draw_motion(motion: Simulation, ax: Axes | None = None) -> Axes:
     own = ax is None
     ax = on_axes(ax, 6.4, 3.2, motion.problem.title)
     _angles(motion, ax)
-    return finished(ax, own)
+    return finish_axes(ax, own)
 
 
 def motion_figure(motion: Simulation) -> Figure:
@@ -49,7 +49,7 @@ def motion_figure(motion: Simulation) -> Figure:
     axes[0].set_title(motion.problem.title, fontsize=_TITLE)
     for draw, ax in zip(parts, axes, strict=True):
         draw(motion, ax)
-        finished(ax, False)
+        finish_axes(ax, False)
     return figure
 
 

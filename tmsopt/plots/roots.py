@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tmsopt.analysis import Diagnosis, Optimality
-from tmsopt.plots.labels import OF_H, finished
+from tmsopt.plots.labels import OF_H, finish_axes
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, note, on_axes
 from tmsopt.problem.solution import Solution
 from tmsopt.proofs import Proof
@@ -62,7 +62,7 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
         ax.plot(*place, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
         if m > 1:
             note(ax, f"{m}-fold", place, (7, 7), fontsize=9)
-    return finished(ax, own)
+    return finish_axes(ax, own)
 
 
 def _frame_frequencies(ax: Axes, found: Iterable[tuple[float, float]], scale: float) -> None:
@@ -115,4 +115,4 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
             ax.loglog(eps, shift, style, color=_COLOURS[k % 5], label=label, markevery=[1], markersize=4)
     farthest = "root" if omega is None else "eigenfrequency"
     ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {farthest}")
-    return finished(ax, own)
+    return finish_axes(ax, own)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from tmsopt.dynamics.speeds import Speeds
 from tmsopt.plots.growth import EVENTS
-from tmsopt.plots.labels import events_of, finished, scale_over
+from tmsopt.plots.labels import events_of, finish_axes, scale_over
 from tmsopt.plots.style import LINE, REAL, draw_bands, note, on_axes
 
 _LEVELS = 3  # heights at which names stand in turn
@@ -34,16 +34,16 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
     last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
     high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)
     stable, damped = (np.minimum(bands, high) for bands in (data.stable, data.heavily_damped))
-    draw_bands(ax, scale.of(stable), scale.of(damped), (1, 1), 0.25)
+    draw_bands(ax, scale.to_axis(stable), scale.to_axis(damped), (1, 1), 0.25)
     for k, event in enumerate(data.found):
-        x, height = float(scale.of(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
+        x, height = float(scale.to_axis(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
         colour, _ = EVENTS.get(event.kind, (REAL, ""))
         ax.plot([x, x], [0, height], color=colour, linewidth=2.0 if event.changes else 0.9)
         side = 3 if event.at < (data.lower + high) / 2 else -3
         note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")
     if data.parameter in data.parameters:
         label = f"design at {scale.unit.show(at, 4)}"
-        ax.plot([scale.of(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False)
-    ax.set(xlim=scale.of([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
+        ax.plot([scale.to_axis(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False)
+    ax.set(xlim=scale.to_axis([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
     ax.spines[["left", "right", "top"]].set_visible(False)
-    return finished(ax, own)
+    return finish_axes(ax, own)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from tmsopt.plots.labels import abscissa_label, finished, scale_of
+from tmsopt.plots.labels import abscissa_label, finish_axes, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
 from tmsopt.problem import status_text
 from tmsopt.records import Array, Truth
@@ -38,15 +38,15 @@ def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
     title = data.study.title or data.study.problem.title
     share = _drawn_around(drawn, data) if data.study.method == "monte_carlo" else _over_what_varies(drawn, data)
     drawn.set_title("\n".join(filter(None, (title if ax is None else "", share))), fontsize=10)
-    return finished(drawn, ax is None)
+    return finish_axes(drawn, ax is None)
 
 
 def _drawn_around(ax: Axes, data: Results) -> str:
     problem, rows = data.study.problem, data.rows
     rate, names = problem.posed.parameter_set.rate, problem.posed.parameter_set.names
     values = rows.values("abscissa")
-    values = _shown(values, {n: rows.values(header("parameters", n)) for n in names}, rate)
-    known, near = np.isfinite(values), _near(values)
+    values = _convert_rate(values, {n: rows.values(header("parameters", n)) for n in names}, rate)
+    known, near = np.isfinite(values), _find_comparable(values)
     stable = rows.column("stable").filled(False)
     nominal = solve(problem, throw=False, interruptible=False)
     edges = _edges(values[near])
@@ -56,7 +56,7 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     ):
         if chosen.any():
             ax.hist(values[chosen], edges, color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label)
-    at = float(_shown(np.float64(nominal.abscissa), nominal.parameters, rate))
+    at = float(_convert_rate(np.float64(nominal.abscissa), nominal.parameters, rate))
     ax.axvline(at, color=LINE, linestyle="--", linewidth=1.2, label=f"nominal design, {at:.4g}")
     ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
     words = abscissa_label(problem.posed) if rate is None else "decay rate in 1/s (negative: growth)"
@@ -67,12 +67,12 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     return share + left_out
 
 
-def _shown(abscissa: Any, parameters: Mapping[str, Any], rate: object) -> Any:
+def _convert_rate(abscissa: Any, parameters: Mapping[str, Any], rate: object) -> Any:
     """The abscissa, or the decay rate in 1/s where there is a unit of time."""
     return np.where(np.isfinite(abscissa), -abscissa * rate(parameters), abscissa) if callable(rate) else abscissa
 
 
-def _near(values: Array) -> Truth:
+def _find_comparable(values: Array) -> Truth:
     """Which values are not so far from the others that they would hide them."""
     known = values[np.isfinite(values)]
     low, high = np.percentile(known, (25, 75)) if known.size else (0.0, 0.0)
@@ -96,9 +96,9 @@ def _over_what_varies(ax: Axes, data: Results) -> str:
     sense = problem.minimize or problem.maximize
     found = rows.values("status") == "optimal"
     scale = scale_of(problem, sense or "abscissa")
-    y = scale.of(rows.values("objective" if sense else "abscissa")[found])
+    y = scale.to_axis(rows.values("objective" if sense else "abscissa")[found])
     axes = [scale_of(problem, name) for name in [*study.columns][:2]]
-    varied = [axis.of(rows.values(header("varied", axis.name))[found]) for axis in axes]
+    varied = [axis.to_axis(rows.values(header("varied", axis.name))[found]) for axis in axes]
     x, *colours = varied or [rows.numbers[found]]
     if colours and found.any():
         drawn = ax.scatter(x, y, c=colours[0], s=26, cmap="cividis", edgecolors="0.3")

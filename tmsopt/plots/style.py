@@ -127,10 +127,10 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
     ending = path.suffix.lstrip(".").lower()
     with write_atomic(path) as temporary:
-        temporary.write_bytes(rendered(figure, ending))
+        temporary.write_bytes(render(figure, ending))
 
 
-def rendered(figure: Figure, ending: str) -> bytes:
+def render(figure: Figure, ending: str) -> bytes:
     """A figure as what a file of that ending holds."""
     sink = BytesIO()
     with warnings.catch_warnings():

@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from tmsopt.models import Model, in_words_of, tms
-from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, finished, plane_over
+from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, finish_axes, plane_over
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, figure_of, on_axes
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
@@ -49,12 +49,12 @@ def draw_trace(data: Trace, ax: Axes | None = None, horizontal: str | None = Non
     for branch in data.branches:
         draw_branch(drawn, branch, plane, width=1.2, tint=LINE, model=model)
     names = [
-        Name(in_words_of(model, e.name), *plane.of(e.parameters)) for e in data.events if e.name not in _UNLABELLED
+        Name(in_words_of(model, e.name), *plane.to_axis(e.parameters)) for e in data.events if e.name not in _UNLABELLED
     ]
     for name in names:
         drawn.plot(name.x, name.y, "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
     plane.label(drawn)
-    return finished(drawn, ax is None, names)
+    return finish_axes(drawn, ax is None, names)
 
 
 def draw_branch(
@@ -65,7 +65,7 @@ def draw_branch(
     Args:
         model: in whose words.
     """
-    points = plane.of(branch.parameters)
+    points = plane.to_axis(branch.parameters)
     states = list(zip(kinds_along(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
     events = {e.index for e in branch.events}
     start, said = 0, {True: (), False: ("constraint violated",)}
@@ -109,7 +109,7 @@ def _bands(ax: Axes, data: Trace, plane: PlaneAxes) -> None:
     """Segments coloured by the abscissa of their ends, with the colour bar."""
     segments, values, widths = [], [], []
     for branch in data.branches:
-        points = plane.of(branch.parameters).T
+        points = plane.to_axis(branch.parameters).T
         segments.append(np.stack([points[:-1], points[1:]], axis=1))
         values.append((branch.abscissa[:-1] + branch.abscissa[1:]) / 2)
         widths += [_BANDS[bool(s)] for s in branch.stable[:-1] & branch.stable[1:]]

@@ -96,10 +96,10 @@ def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any,
     """
     return (
         M[0][0] * M[1][1] - M[0][1] * M[1][0],
-        _mixed(M, C1),
-        _mixed(M, K0),
-        _mixed(M, K2) - C1[0][1] * C1[1][0],
-        _mixed(C1, K0),
+        _mixed_determinant(M, C1),
+        _mixed_determinant(M, K0),
+        _mixed_determinant(M, K2) - C1[0][1] * C1[1][0],
+        _mixed_determinant(C1, K0),
         -C1[1][0] * K2[0][1],
         K0[0][0] * K0[1][1] - K0[0][1] * K0[1][0],
         K0[0][0] * K2[1][1] - K0[1][0] * K2[0][1],
@@ -119,6 +119,6 @@ def carvallo_whipple(v: Any, g: Any, **others: Any) -> list[Any]:
     return [b[0], v * b[1], g * b[2] + v2 * b[3], v * (g * b[4] + v2 * b[5]), g * (g * b[6] + v2 * b[7])]
 
 
-def _mixed(A: Matrix, B: Matrix) -> Any:
+def _mixed_determinant(A: Matrix, B: Matrix) -> Any:
     """The part of det(A + B) that is linear in A and in B."""
     return A[0][0] * B[1][1] + A[1][1] * B[0][0] - A[0][1] * B[1][0] - A[1][0] * B[0][1]

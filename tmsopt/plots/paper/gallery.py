@@ -124,7 +124,7 @@ def pictures(items: Sequence[Item], endings: Sequence[str]) -> Generator[tuple[i
 
 def _picture(asked: tuple[str, str]) -> bytes:
     """A figure by its name, and the ending of its file."""
-    from tmsopt.plots.style import rendered
+    from tmsopt.plots.style import render
 
     name, ending = asked
-    return rendered(GALLERY[name].make(), ending)
+    return render(GALLERY[name].make(), ending)

@@ -41,7 +41,7 @@ def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
     for patch in data.patches:
         pieces = quadrilaterals(np.stack([patch.points[n] for n in data.axes], axis=-1))
         quads.append(pieces)
-        colours.append(_shaded(pieces / width, HEAVY if patch.heavily_damped else STABLE))
+        colours.append(_shade_faces(pieces / width, HEAVY if patch.heavily_damped else STABLE))
     fills = np.concatenate(colours)
     ax.add_collection3d(Poly3DCollection(np.concatenate(quads), facecolors=fills, edgecolors=fills, linewidths=0.7))
     _edges(ax, data.cusps, data.axes, {"EP3": (LINE, "-")})
@@ -101,7 +101,7 @@ def _edges(ax: Axes3D, trace: Trace, axes: Sequence[str], styles: dict[str, tupl
             ax.plot(*columns, color=colour, linestyle=line, linewidth=1.8, zorder=9)
 
 
-def _shaded(faces: Array, colour: str) -> Array:
+def _shade_faces(faces: Array, colour: str) -> Array:
     """The colour of each face, darker where it turns away from the light on either side."""
     normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
     length = np.linalg.norm(normal, axis=1, keepdims=True)

@@ -61,7 +61,7 @@ def draw_box(ax: Axes3D, paths: Sequence[UniversalPath], faces: Sequence[Array])
     for path, colour in zip(paths, _COLOURS, strict=True):
         A = path.A[_inside(path.A)]  # a 3-D plot does not clip
         curve(A, color=colour, linewidth=1.5, zorder=5, gid="path")
-        start, end = A[_along(A, 1 / 3) :][:2]
+        start, end = A[_index_along(A, 1 / 3) :][:2]
         x, z, y = start
         dx, dz, dy = 0.9 * (end - start) / np.linalg.norm(end - start)
         ax.quiver(x, y, z, dx, dy, dz, color=colour, arrow_length_ratio=0.9, linewidth=1.5, zorder=5)
@@ -88,7 +88,7 @@ def draw_section(ax: Axes, paths: Sequence[UniversalPath]) -> None:
         ax.plot(*path.A.T[:2], color=colour, linewidth=1.5, gid="path")
         shown = path.A[_inside(path.A), :2]
         for fraction in (0.2, 0.8):
-            k = _along(shown / (_LIMIT, _HIGH), fraction)
+            k = _index_along(shown / (_LIMIT, _HIGH), fraction)
             arrow(ax, shown[k], shown[k + 1], color=colour)
         for marker, fill, at, name in _events(path):
             ax.plot(*at[:2], marker, mfc=fill, mec=colour, markersize=6.5, mew=1.2, zorder=5, gid=name)
@@ -145,7 +145,7 @@ def _inside(A: Array) -> Any:
     return (x <= _LIMIT) & (y <= _LIMIT) & (z >= _LOW) & (z <= _HIGH)
 
 
-def _along(points: Array, fraction: float) -> int:
+def _index_along(points: Array, fraction: float) -> int:
     """The point at a fraction of the way along a curve."""
     length = np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))
     return int(np.searchsorted(length, fraction * length[-1]))

@@ -90,7 +90,7 @@ def quartic_factors(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, 
     """
     a, shape = flatten_columns(a0, a1, a2, a3, a4)
     p, q = np.empty((2, a[0].size, 2))
-    fallbacks = _fill((p, q), a, _split)
+    fallbacks = _fill((p, q), a, _split_product)
     return Factors(p.reshape(*shape, 2), q.reshape(*shape, 2), fallbacks)
 
 
@@ -195,7 +195,7 @@ def _scale_roots(c: Array) -> tuple[Array, NDArray[np.int_]]:
     return np.ldexp(c[1:], -exponent[0] - unit * power) / lead, unit
 
 
-def _split(p1: Array, q1: Array, p2: Array, q2: Array, unit: Any) -> tuple[Array, Array]:
+def _split_product(p1: Array, q1: Array, p2: Array, q2: Array, unit: Any) -> tuple[Array, Array]:
     p, q = np.ldexp([p1, p2], unit), np.ldexp([q1, q2], 2 * unit)
     return p.T, q.T
 
