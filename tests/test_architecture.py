@@ -313,7 +313,7 @@ def test_files_are_written_whole():
         "tmsopt.files.write_atomic",  # itself
         "tmsopt.documents.html._draw_thumbnail",
         "tmsopt.documents.html._save_image",
-        "tmsopt.plots.style.rendered",  # in memory
+        "tmsopt.plots.style.render",  # in memory
         "tmsopt.killable.serve",  # a pipe
         "tmsopt.studies.export._csv",
         "tmsopt.studies.export._netcdf",

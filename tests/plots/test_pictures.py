@@ -445,7 +445,7 @@ def test_every_picture_is_drawn_on_the_axes_given_or_on_its_own(results, name):
 
 def test_one_design_far_away_hides_no_other():
     """Forty values within 1 of 3, one at −1700: that one is counted, not shown."""
-    near = import_module("tmsopt.plots.study")._near
+    near = import_module("tmsopt.plots.study")._find_comparable
     values = np.append(np.linspace(2.0, 4.0, 40), (-1700.0, np.nan))
     assert near(values).tolist() == [True] * 40 + [False, False]
 

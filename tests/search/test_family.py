@@ -124,7 +124,7 @@ def test_a_number_is_a_parameter_unless_it_is_nothing():
     lighter = formulate(with_fixed(EP4, chi_H=1.02, mu=0.0).posed)
     assert len(lighter.formula.steps) < len(ours.formula.steps)
     x = np.linspace(0.3, 1.2, len(ours.variables))
-    own = np.array([ours.at(x)[0], *ours.at(x)[1]])
+    own = np.array([ours.evaluate(x)[0], *ours.evaluate(x)[1]])
     np.testing.assert_allclose(own, np.array(ours.fold(x, FLOATS), dtype=float), rtol=1e-12, atol=1e-13)
 
 
