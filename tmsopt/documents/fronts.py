@@ -39,7 +39,7 @@ def write_front(front: Front, level: Level) -> Iterator[Chapter]:
     labelled = frozenset(k for k, p in enumerate(front.points) if p.label)
     rows = list_points(front, full)
     objectives = len(front.objectives)
-    needs = [9] * objectives + [7, 6] + [4] * (len(rows[0]) - objectives - 4) + [5, 3]
+    needs = [9] * objectives + [7, 6] + [5] * (len(rows[0]) - objectives - 4) + [4, 3]
     grid = TableBlock(rows, "Points of the front", needs, _ROWS, labelled, "--full, --csv")
     yield Chapter("rows", (grid,), "Points", "whole")
     notes = [Sentence(gap.reason, "gap") for gap in front.gaps] + [Sentence(note, "note") for note in front.notes]
