@@ -31,12 +31,11 @@ COPIED = {
     "problems/paper.md": "ledger",
 }
 FACES = {
-    "tmsopt": "What is reached as ``tmsopt.…``, by the package it is from.",
+    "tmsopt": "Everything reached as ``tmsopt.…``, by the package it comes from.",
     "laws": "The closed forms of the paper, each named after its equation; they import nothing of tmsopt.",
     "models": "Bicycles, and systems of your own.",
     "roots": "Polynomials, their roots, and which of them meet.",
     "plots": "Pictures, drawn into given Axes of Matplotlib.",
-    "report": "The texts that commands print, in parts.",
 }
 _EXAMPLES = "Examples run at the root of the repository, after ``import tmsopt``."
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:)([^)#\s]*)(#[^)\s]*)?(?=\))")
