@@ -108,7 +108,7 @@ def build_command(kind: type[Command], name: str) -> click.Command:
     options = {f.name for f in fields(kind) if "text" in f.metadata}  # type: ignore[arg-type]
     summary, _, rest = (getdoc(kind) or "").partition("\n\n")
     parameters = [*map(_build_parameter, fields(kind)), colour_option()]  # type: ignore[arg-type]
-    return _ShortHelp(name, params=parameters, callback=call, help=summary, epilog=rest.replace("\n\nExit", "\nExit"))
+    return _ShortHelp(name, params=parameters, callback=call, help=summary, epilog=rest)
 
 
 class _Option(click.Option):
@@ -127,7 +127,8 @@ class _ShortHelp(click.Command):
             formatter.write_dl([record for record in options if record], _COLUMN)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        formatter.write(f"\n{self.epilog}\nMore: docs/reference/commands.md\n")
+        text = (self.epilog or "").replace("\n\nExit", "\nExit")
+        formatter.write(f"\n{text}\nMore: docs/reference/commands.md\n")
 
 
 def _flag_of(name: str) -> str:
