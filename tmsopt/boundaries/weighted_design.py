@@ -95,7 +95,9 @@ class WeightedDesign:
     def heavily_damped(self) -> bool:
         """Whether all roots are real and negative, multiple ones included."""
         degree = len(self._scaled_weights) - 1
-        return self.is_on_damping_edge or bool(self._scaled_weights[0] != 0 and real_roots(self._scaled_weights)[0] == degree)
+        return self.is_on_damping_edge or bool(
+            self._scaled_weights[0] != 0 and real_roots(self._scaled_weights)[0] == degree
+        )
 
     @cached_property
     def is_on_damping_edge(self) -> bool:

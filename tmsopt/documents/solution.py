@@ -76,13 +76,19 @@ def summarise_solution(solution: Solution) -> Iterator[Badge]:
 
 
 def write_solution(
-    solution: Solution, level: Level, *, full: bool = False, si: Mapping[str, float] | None = None
+    solution: Solution,
+    level: Level,
+    *,
+    full: bool = False,
+    si: Mapping[str, float] | None = None,
+    tabulated: bool = False,
 ) -> Iterator[Chapter]:
     """The parts of the report in order.
 
     Args:
         full: of a page, whether it has all that takes long.
         si: parameters in SI, such as `si_parameters` gives for another scale: a brief report shows them then.
+        tabulated: whether a brief report, too, has every parameter with its meaning.
     """
     analysis, scaled = solution.analysis, si or convert_to_si(solution)
     full, page, brief = full or level == "full", level == "page", level == "brief"
@@ -91,7 +97,12 @@ def write_solution(
     if page:
         yield from write_bicycle(solution)
     notes = (Sentence(note, "note") for note in solution.notes)
-    yield Chapter("design", (*_write_design(solution, scaled, brief, si is not None), *notes), "Parameters", "wide")
+    yield Chapter(
+        "design",
+        (*_write_design(solution, scaled, brief and not tabulated, si is not None), *notes),
+        "Parameters",
+        "wide",
+    )
     yield Chapter("motion", tuple(_write_motion(solution, analysis, scaled, brief)))
     if page:
         yield from write_growth_picture(solution)

@@ -51,7 +51,7 @@ def _lay_out(document: Document, width: int, ascii_only: bool) -> Iterator[Line]
         shown = [block for block in section.blocks if not isinstance(block, Figure)]
         if not shown:
             continue
-        if full:
+        if full and len(document.sections) > 1:
             yield from (("", ""), (section.title, "answer"), ("-" * len(section.title), ""))
         for block in shown:
             yield from _lay_out_block(block, width, ascii_only, full)

@@ -141,7 +141,9 @@ def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     _marks(ax, data, scale, part)
     label = _LABELS[part][data.rate is not None]
     first = min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0]
-    ax.set(ylabel=OF_H[part] if _of_H(data) else label, xlabel=scale.label, xlim=scale.to_axis([first, data.values[-1]]))
+    ax.set(
+        ylabel=OF_H[part] if _of_H(data) else label, xlabel=scale.label, xlim=scale.to_axis([first, data.values[-1]])
+    )
     ax.set_ylim(_focus(data, curves, part))
     found = _names(ax, scale, curves, names)
     if _of_H(data):

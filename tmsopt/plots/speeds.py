@@ -43,7 +43,9 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
         note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")
     if data.parameter in data.parameters:
         label = f"design at {scale.unit.show(at, 4)}"
-        ax.plot([scale.to_axis(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False)
+        ax.plot(
+            [scale.to_axis(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False
+        )
     ax.set(xlim=scale.to_axis([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
     ax.spines[["left", "right", "top"]].set_visible(False)
     return finish_axes(ax, own)
