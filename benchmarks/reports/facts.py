@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -119,7 +120,7 @@ def _answer(verb: str, path: str, kept: dict[str, Any]) -> Any:
     """What a verb answers: to the file, or to the design or the chart that an earlier verb kept."""
     import tmsopt
 
-    calls = {
+    calls: dict[str, Callable[[], Any]] = {
         "solve": lambda: tmsopt.solve(path, throw=False),
         "study": lambda: tmsopt.run_study(tmsopt.load_study(path), workers=1),
         "chart": lambda: tmsopt.chart(path, points=(40, 30)),

@@ -8,7 +8,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 MODULES = sorted((ROOT / "tmsopt").rglob("*.py"))
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+WRITTEN = sorted(p for p in (ROOT / "docs").rglob("*.md") if p.parent.name not in ("generated", "gallery"))
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *WRITTEN]
 
 BARE = re.compile(
     r"above|along|among|around|at|before|behind|below|beside|between|beyond|by|for|from|in|into|near|of|off|on|onto|"

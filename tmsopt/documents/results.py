@@ -126,7 +126,7 @@ def to_notebook(result: Any) -> str:
     """A result for a notebook: its words, its brief document, its picture."""
     from tmsopt.documents.html import to_fragment
 
-    options = {"tabulated": True} if type(result).__name__ == "Solution" else {}
+    options: dict[str, Any] = {"tabulated": True} if type(result).__name__ == "Solution" else {}
     return to_fragment(document_of(result, **options), lambda: draw(result))
 
 
