@@ -27,7 +27,7 @@ PUBLIC = re.compile(
 """Attributes that versions promise, and words that are nouns or verbs too."""
 
 HABIT = re.compile(
-    r"(?:^|(?<=[.!?:;] )|(?<=\n\n))(?:Of (?:a|an|the|two|each|every|all|those|which|what|whom|it|them)|That of|"
+    r"(?:^|(?<=[.!?:;] )|(?<=\n\n))(?:Of (?:a|an|the|two|each|every|all|those|which|what|whom|it|them)\b|That of\b|"
     r"What (?:is|was)\b(?![^.]*\?)|Likewise\b)"
 )
 """A sentence whose subject does not come first."""
