@@ -19,6 +19,11 @@ from benchmarks.reports.tables import Asked
 
 HERE = Path(__file__).parents[2]
 
+_ABOUT = """\
+Numbers with their units, verdicts and names in the short and the full text of every verb on every file of `problems/`,
+at an earlier checkout and now; a fact counts once for each verb. Written by `TMSOPT_BEFORE=CHECKOUT python -m benchmarks
+--only facts`."""
+
 VERBS = (
     "solve",
     "solve_all",
@@ -99,7 +104,7 @@ def report(asked: Asked) -> str:
             gone = {v: m for v, t in old.items() if v != "names" and (m := missing(t, new.get(v, ""), names))}
             rows.append(f"| {Path(name).stem} | {len(old) - 1} | {total} | {sum(map(len, gone.values()))} |")
             lost += [f"- {Path(name).stem}, {verb}: {', '.join(some)}" for verb, some in gone.items()]
-    head = ["## Facts", "", "| file | verbs | facts | missing |", "| --- | --- | --- | --- |"]
+    head = ["## Facts", "", _ABOUT, "", "| file | verbs | facts | missing |", "| --- | --- | --- | --- |"]
     return "\n".join([*head, *rows, "", "### Missing", "", *(lost or ["None."])])
 
 
