@@ -21,8 +21,8 @@ HERE = Path(__file__).parents[2]
 
 _ABOUT = """\
 Numbers with their units, verdicts and names in the short and the full text of every verb on every file of `problems/`,
-at an earlier checkout and now; a fact counts once for each verb. Written by `TMSOPT_BEFORE=CHECKOUT python -m benchmarks
---only facts`."""
+at an earlier checkout and now; a fact counts once for each verb. Written by `TMSOPT_BEFORE=CHECKOUT python -m
+benchmarks --only facts`."""
 
 VERBS = (
     "solve",
