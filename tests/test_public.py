@@ -251,3 +251,15 @@ def test_a_study_may_be_given_by_its_file(tmp_path):
     assert [row.abscissa for row in results.rows] == [same] * 2
     with pytest.raises(tmsopt.InputError, match="accepted: a Study"):
         tmsopt.run_study(3)  # type: ignore[arg-type]
+
+
+def test_names_of_the_last_version_still_answer():
+    """With a warning that names the new one."""
+    branch = tmsopt.trace("problems/ep_set.toml", starts=4).branches[0]
+    with pytest.warns(DeprecationWarning, match="pattern_unknowns"):
+        assert branch.told == branch.pattern_unknowns
+    pattern = tmsopt.roots.pattern("EP4", 4)
+    with pytest.warns(DeprecationWarning, match="distinct_factors"):
+        assert pattern.counted([-1.0]) == pattern.distinct_factors([-1.0])
+    with pytest.warns(DeprecationWarning, match=r"call \.report\(\)"):
+        assert tmsopt.report.trace_table(branch) == branch.report()

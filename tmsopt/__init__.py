@@ -27,8 +27,14 @@ def __getattr__(name: str) -> object:
 
     import lazy_loader
 
-    found = lazy_loader.attach_stub(__name__, __file__)
-    globals().update(zip(("__getattr__", "__dir__", "__all__"), found, strict=True))
+    from tmsopt.deprecated import ReportModule
+
+    read, names, listed = lazy_loader.attach_stub(__name__, __file__)
+
+    def find(name: str) -> object:
+        return ReportModule() if name == "report" else read(name)
+
+    globals().update({"__getattr__": find, "__dir__": names, "__all__": listed})
     return getattr(import_module(__name__), name)
 
 

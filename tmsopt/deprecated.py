@@ -1,4 +1,4 @@
-"""Options without effect and moved attributes of earlier versions."""
+"""Options without effect, and names of earlier versions."""
 
 import warnings
 from collections.abc import Callable
@@ -22,6 +22,27 @@ def ignore_option(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
         return call
 
     return decorate
+
+
+def rename_attribute(old: str, new: str) -> Any:
+    """A property under the name of an earlier version, which warns and gives the attribute under its new name."""
+
+    def read(owner: Any) -> Any:
+        message = f"{type(owner).__name__}.{old} is now {type(owner).__name__}.{new}"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return getattr(owner, new)
+
+    return property(read)
+
+
+class ReportModule:
+    """`tmsopt.report` of 1.1: whatever is called in it gives the report of the last result among its arguments."""
+
+    def __getattr__(self, name: str) -> Callable[..., str]:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        warnings.warn(f"tmsopt.report.{name} is gone: call .report() of the result", DeprecationWarning, stacklevel=2)
+        return lambda *given, full=False, **_: str([x for x in given if hasattr(x, "report")][-1].report(full=full))
 
 
 def no_longer_needed(option: str) -> str:

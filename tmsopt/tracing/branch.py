@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.deprecated import rename_attribute
 from tmsopt.files import write_csv
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.unit_system import units_of
@@ -93,6 +94,8 @@ class Branch(Tabular):
     def pattern_unknowns(self) -> Mapping[str, Array]:
         """The unknowns of the pattern; for a complex system, the multiple eigenfrequency."""
         return self.unknowns if self.eigenfrequency is None else self.eigenfrequency
+
+    told = rename_attribute("told", "pattern_unknowns")
 
     def records(self) -> Iterable[dict[str, Any]]:
         """One record per point, as written to CSV."""

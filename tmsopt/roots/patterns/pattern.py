@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.deprecated import rename_attribute
 from tmsopt.roots.polynomial import product
 from tmsopt.roots.stability import hurwitz_minors
 
@@ -97,6 +98,10 @@ class Pattern:
         samples = [tuple(f) for f in self.factors(_UNRELATED[: len(self.unknowns)])]
         factors = self.factors(unknowns)
         return [(factors[samples.index(s)], samples.count(s)) for s in dict.fromkeys(samples)]
+
+    counted = rename_attribute("counted", "distinct_factors")
+    reduced = rename_attribute("reduced", "scaled_unknowns")
+    remaining = rename_attribute("remaining", "remaining_factors")
 
     def remaining_factors(self, unknowns: Sequence[Any]) -> list[list[Any]]:
         """The factors whose roots must lie left of the imaginary axis if the pattern is stable or bounds stability."""
