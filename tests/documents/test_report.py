@@ -2,10 +2,12 @@
 
 import json
 import math
+import pickle
 import re
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 
 import pytest
 from helpers.designs import ROBOT
@@ -273,3 +275,18 @@ def test_a_radius_out_of_reach_says_how_near_a_design_comes():
     assert "--certify" not in report
     there = tmsopt.robustness(tmsopt.Problem(tms, fixed=dict(found.parameters), minimize="abscissa"))
     assert float(said) == pytest.approx(there.radius, rel=1e-3)
+
+
+def test_what_a_report_needs_is_computed_once(monkeypatch):
+    """Also for the page and the notebook; a pickled solution has it still."""
+    room, calls = import_module("tmsopt.documents.analysis"), []
+    for name in ("explain", "find_stability_margins", "stable_speeds"):
+        made = getattr(room, name)
+        monkeypatch.setattr(room, name, lambda *a, _n=name, _f=made, **k: (calls.append(_n), _f(*a, **k))[1])
+    design = tmsopt.solve("problems/benchmark.toml")
+    assert repr(design)
+    assert not calls
+    texts = {str(design), design.report(), str(pickle.loads(pickle.dumps(design)))}
+    design._repr_html_()
+    assert len(texts) == 1
+    assert sorted(calls) == ["explain", "find_stability_margins", "stable_speeds"]

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from tmsopt.analysis import Diagnosis, Explanation, diagnose, explain, infeasible_sentences
 from tmsopt.boundaries import Robustness, find_stability_margins, robustness
@@ -38,13 +37,6 @@ class Analysis:
             yield self
         finally:
             self._progress = None
-
-    def skip(self) -> None:
-        """Leave out what is not computed yet, for a user who does not want to wait."""
-        empty: dict[str, Any] = {"diagnoses": (), "obstacles": ((), ())}
-        for name, part in vars(Analysis).items():
-            if isinstance(part, cached_property):
-                vars(self).setdefault(name, empty.get(name))
 
     @cached_property
     def explanation(self) -> Explanation | None:

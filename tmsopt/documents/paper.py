@@ -4,7 +4,18 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Listing, Sentence, TableBlock, count_things
+from tmsopt.documents.blocks import (
+    Badge,
+    Block,
+    Cell,
+    Chapter,
+    Level,
+    Listing,
+    Sentence,
+    TableBlock,
+    Tone,
+    count_things,
+)
 from tmsopt.documents.maker import Maker
 from tmsopt.documents.solution import list_branches, write_headline
 from tmsopt.models import tms
@@ -24,7 +35,8 @@ def summarise_comparison(comparison: Comparison) -> Iterator[Badge]:
     """How many laws apply and agree."""
     applying = [row for row in comparison.laws if row.applies]
     agree = sum(row.agrees is True for row in applying)
-    yield Badge(f"{agree} of {len(applying)} laws agree", "good" if agree == len(applying) else "bad")
+    tone: Tone = "doubt" if not applying else "good" if agree == len(applying) else "bad"
+    yield Badge(f"{agree} of {len(applying)} laws agree", tone)
     yield Badge(f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation")
 
 
