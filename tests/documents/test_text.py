@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from test_results import RESULTS, made
 
+import tmsopt
 from tmsopt.documents import Cell, Chapter, Document, Listing, Sentence, TableBlock, document_of, to_text
 from tmsopt.problem import Unit
 
@@ -109,3 +110,14 @@ def test_labels_stand_above_each_other():
 
 def test_what_a_terminal_would_obey_is_shown_as_a_mark():
     assert "\x1b" not in to_text(replace(page(Sentence("\x1b[31mred\u202e")), title="\x07"), colour=False)
+
+
+def test_a_solution_is_green_only_where_it_is_stable_and_no_limit_is_violated():
+    stable, unstable = made("Solution"), made("Solution, not stable")
+    swing = tmsopt.models.from_coefficients([1, "c", 1])  # ± i for c = 0
+    edge = tmsopt.solve(tmsopt.Problem(swing, fixed={"c": 0.0}))
+    cases = ((stable, "good"), (unstable, "bad"), (edge, "doubt"), (replace(stable, status="not_converged"), "bad"))
+    for solution, tone in cases:
+        document = document_of(solution)
+        first = document.sections[0].blocks[0]
+        assert (first.tone, document.words[-1].tone) == (tone, tone), first.text
