@@ -36,11 +36,11 @@ def report(asked: Asked) -> str:
         "answered",
         *(f"false: {kind}" for kind in KINDS),
         "limits missed, as it says",
-        "a better one is likely",
+        "a better design is likely",
     ]
     rows = [_row(family, {n: v for n, v in verdicts.items() if n.split("/")[0] == family}) for family in FAMILIES]
     lines = [
-        f"- {name}: {kind}: {words}{'; it says that a better one is likely' * v.doubtful}"
+        f"- {name}: {kind}: {words}{'; it says that a better design is likely' * v.doubtful}"
         for name, v in verdicts.items()
         for kind, words in v.false.items()
     ]

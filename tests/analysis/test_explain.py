@@ -94,7 +94,7 @@ def test_least_speed_of_an_ep4_beside_its_closed_form():
     assert equality.predicted == pytest.approx(least(1.2, -1.5) - least(1.2, -1.48), rel=1e-8)
     assert equality.resolved == pytest.approx(equality.predicted, rel=1e-8)
     assert equality.sentence.startswith("moving decay (omega0 == -1.5) by 0.02 gains 0.0219")
-    assert explanation.summary.startswith("four roots meet in one (EP4): the smallest Fr found is 1.64")
+    assert explanation.summary.startswith("four roots coincide (EP4): the smallest Fr found is 1.64")
     assert [w for w in explanation.warnings if "chi_B.min = 1.2" in w]
     assert not [w for w in explanation.warnings if "decay" in w]  # a named constraint is meant
 
@@ -258,7 +258,7 @@ def test_violations_of_rounding_are_named(realistic):
 def test_nothing_to_warn_of_at_a_free_optimum(ep4):
     _, explanation, levers = ep4
     assert (explanation.warnings, levers) == ((), {})
-    assert explanation.summary == "four roots meet in one (EP4): no design within the limits decays faster (proved)"
+    assert explanation.summary == "four roots coincide (EP4): no design within the limits decays faster (proved)"
     assert explanation.bound.proven
 
 
@@ -316,7 +316,7 @@ def test_located_only():
     free = {"chi_B": (1.0, 3.0), "mu": (0.001, 100.0), "Fr": (0.01, 10.0), "lambda_s": (0.02, 1.5)}
     _, explanation, levers = explained(fixed=fixed, free=free, locate="EP4", constraints={"decay": "omega0 == -1"})
     assert levers == {}
-    assert explanation.summary == "four roots meet in one (EP4): a design with EP4, as asked"
+    assert explanation.summary == "four roots coincide (EP4): a design with EP4, as asked"
     assert all("decay" in row.violations for row in explanation.precision)  # an equality bears no rounding
 
 
@@ -346,9 +346,9 @@ def test_the_command_says_what_it_means():
 
     data, text = json.loads(printed("--json", "--full")), printed("--full")
     meaning = data["meaning"]
-    assert meaning["summary"].startswith("four roots meet in one (EP4)")
+    assert meaning["summary"].startswith("four roots coincide (EP4)")
     assert [row["digits"] for row in meaning["precision"]] == [2, 3, 4, 6]
-    assert re.search(r"minimize abscissa = -1.8803015; as stored -1.8[\d]+; four roots meet in one \(EP4\)", text)
+    assert re.search(r"minimize abscissa = -1.8803015; as stored -1.8[\d]+; four roots coincide \(EP4\)", text)
     for words in ("lambda_s alone  23.5 deg", "4-fold root -1.8803015: defective", "holds for ε > 0"):
         assert words in text
     assert [(d["algebraic"], d["geometric"], d["partial"]) for d in data["diagnosis"]] == [(4, 1, [4])]

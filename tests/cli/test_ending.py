@@ -279,7 +279,7 @@ def test_what_is_said_beside_a_design_may_be_stopped(run, monkeypatch):
     )
     status, out, err = run("solve", "problems/ep4.toml")
     assert (status, err) == (130, "")
-    assert "four roots meet in one (EP4)" in out
+    assert "four roots coincide (EP4)" in out
 
 
 @pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")

@@ -238,7 +238,7 @@ def test_charts_and_pages_take_a_complex_system():
     off = np.minimum(np.abs(gain - loss), np.abs(gain * loss - 1)) > 1e-9
     assert np.array_equal((names == "stable")[off], ((gain < loss) & (gain * loss < 1))[off])
     page = tmsopt.explore("problems/loss_only_dimer.toml").html
-    assert "both eigenfrequencies meet in one (EP2)" in page
+    assert "both eigenfrequencies coincide (EP2)" in page
 
 
 LASER = [["d + 1j*g", "k"], ["k", "-1j*l"]]
@@ -346,7 +346,7 @@ def test_words_of_a_matrix_with_gain():
     model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
     told, chart = import_module("tmsopt.models.user_spectrum"), import_module("tmsopt.plots.chart")
     lossy, gaining = (told.describe_user_structure(model, "EP2", gain) for gain in (False, True))
-    assert lossy == "the two least damped eigenfrequencies meet in one (EP2)"
-    assert gaining == "the two eigenfrequencies of most gain meet in one (EP2)"
+    assert lossy == "the two least damped eigenfrequencies coincide (EP2)"
+    assert gaining == "the two eigenfrequencies of most gain coincide (EP2)"
     (patch,) = chart.class_handles(np.array([chart.CLASSES.index("weave")], dtype=np.int8), model)
     assert patch.get_label() == "gain, beyond threshold"

@@ -162,7 +162,7 @@ def test_what_another_stage_accepts_is_rechecked_inside_the_box():
 def test_a_search_that_ends_early_is_not_sure():
     hasty = tmsopt.solve(problem(), policy=replace(POLICY, enough=lambda state: True))
     assert hasty.starts.runs == 1
-    assert hasty.starts.sureness[-1] == "a better one is possible"
+    assert hasty.starts.sureness[-1] == "a better design is possible"
     whole = tmsopt.solve(problem())
     assert whole.starts.runs >= whole.starts.optima + 2
     assert len(whole.starts.sureness) == 1

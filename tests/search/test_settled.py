@@ -81,11 +81,11 @@ def test_the_words_follow_from_the_numbers():
     def words(tried, at_best, optima):
         return ", ".join(tmsopt.Starts(tried, tried, at_best, optima=optima, runs=tried).sureness)
 
-    assert words(64, 1, 30) == "found by 1 of 64 starts, a better one is likely"
-    assert words(64, 40, 3) == "found by 40 of 64 starts"
-    assert words(3, 3, 1) == "found by 3 of 3 starts, a better one is possible"
+    assert words(64, 1, 30) == "found from 1 of 64 starts, a better design is likely"
+    assert words(64, 40, 3) == "found from 40 of 64 starts"
+    assert words(3, 3, 1) == "found from 3 of 3 starts, a better design is possible"
     assert words(0, 0, 0) == ""
     one_run = tmsopt.Starts(39, 39, 39, optima=1, runs=1)  # the others were only seen to lead there
-    assert one_run.sureness == ("found by 39 of 39 starts", "a better one is possible")
+    assert one_run.sureness == ("found from 39 of 39 starts", "a better design is possible")
     assert not expects_few_better(4, 1)
     assert tmsopt.Starts(3, 3, 3, optima=1).expected_unseen == float("inf")

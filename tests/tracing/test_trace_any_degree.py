@@ -373,12 +373,12 @@ def test_a_swallowtail_takes_degree_4():
 
 
 def test_structures_in_words():
-    assert describe_structure("EP4") == "four roots meet in one (EP4)"
-    assert describe_structure("EP2", 2) == "both roots meet in one (EP2)"
-    assert describe_structure("EP6", 6) == "all six roots meet in one (EP6)"
-    assert describe_structure("EP4", 6) == "the four rightmost roots meet in one (EP4)"
-    assert describe_structure("CEP3", 6) == "three complex pairs meet in one (CEP3)"
-    words = "a double complex pair, two complex pairs and a real root have one decay rate"
+    assert describe_structure("EP4") == "four roots coincide (EP4)"
+    assert describe_structure("EP2", 2) == "both roots coincide (EP2)"
+    assert describe_structure("EP6", 6) == "all six roots coincide (EP6)"
+    assert describe_structure("EP4", 6) == "the four rightmost roots coincide (EP4)"
+    assert describe_structure("CEP3", 6) == "three complex pairs coincide (CEP3)"
+    words = "a double complex pair, two complex pairs and a real root share one decay rate"
     assert describe_structure("CEP2+two pairs+real", 9) == f"{words} (CEP2+two pairs+real)"
 
 

@@ -75,7 +75,7 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
 
     Example:
         >>> print(tmsopt.explain("problems/ep4.toml").summary)
-        four roots meet in one (EP4): no design within the limits decays faster (proved)
+        four roots coincide (EP4): no design within the limits decays faster (proved)
 
     More: docs/how_to/report.md
     """

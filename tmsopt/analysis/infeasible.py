@@ -34,7 +34,7 @@ def infeasible_sentences(solution: Solution, full: bool = False) -> list[str]:
         lines.append(f"{words}: {', '.join(_describe_limit(problem, n) for n in names)}")
     changes = [" and ".join(_describe_change(problem, *one) for one in found.items()) for found in relaxation.remedies]
     if not changes:
-        return lines if need and need.found else [*lines, "no change of limits that helps was found"]
+        return lines if need and need.found else [*lines, "of the changes of limits that were tried, none helps"]
     return [*lines, f"smallest change found: {changes[0]}", *(f"or alone: {text}" for text in changes[1:] if full)]
 
 

@@ -75,9 +75,11 @@ class Lever:
         is_resolved = math.isfinite(self.resolved)
         predicted = self.gained.show(self.predicted, 3)
         gain = self.gained.show(self.resolved, 3) if is_resolved else predicted
-        verb = "loses" if gain.startswith("-") else "gains"
-        order = f"first order {predicted}" if is_resolved else "first order"
-        return f"{self.move} {verb} {gain.lstrip('-')} ({order})" + (f"; {self.reason}" if self.reason else "")
+        verb = "worsens" if gain.startswith("-") else "improves"
+        order = f"first-order estimate {predicted}" if is_resolved else "first-order estimate"
+        return f"{self.move} {verb} the objective by {gain.lstrip('-')} ({order})" + (
+            f"; {self.reason}" if self.reason else ""
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""

@@ -222,7 +222,7 @@ def _verdict(
         return STRICT, 1, f"{name} a strict {extreme}: {active} none of the {unknowns} unknowns free{idle}"
     bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
     free = f"{active} some of the {unknowns} unknowns free"
-    return STRICT, 2, f"{name} a strict {extreme}: {free}, along which the objective curves {bend}{idle}"
+    return STRICT, 2, f"{name} a strict {extreme}: {free}, and the objective curves {bend} in the free directions{idle}"
 
 
 def _find_doubt(program: LocalProgram, found: Conditions) -> str:

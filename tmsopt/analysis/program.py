@@ -27,7 +27,7 @@ import numpy as np
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.solution import Solution
-from tmsopt.program.formulate import formulate_abscissa, variables_of
+from tmsopt.program.formulate import formulate_by_factors, variables_of
 from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import Root, product, shift
@@ -96,7 +96,7 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
     Raises:
         NotCovered: if the damping ratio or frequency is active, or the abscissa is not.
     """
-    nlp, values, free = formulate_abscissa(problem), problem.values(solution.parameters), problem.free
+    nlp, values, free = formulate_by_factors(problem), problem.values(solution.parameters), problem.free
     values = values.with_known({"abscissa": solution.abscissa})
     units = {"abscissa": nlp.unit, ANGULAR_FREQUENCY: nlp.unit}
     at = dict(zip(free, variables_of(problem, solution.parameters), strict=True))

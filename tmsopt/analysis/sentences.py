@@ -58,8 +58,8 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         unit = common_unit(problem, text)
         value, gap = unit.show(bound.value, 6), unit.show(bound.gap, 2)
         known = f"{no_design(problem)} is {_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
-        return _append(known, not_covered or _advise_certify(bound, "--certify closes it"))
-    advice = not_covered or _advise_certify(bound, "--certify proves it or finds a better one")
+        return _append(known, not_covered or _advise_certify(bound, "--certify tries to close it"))
+    advice = not_covered or _advise_certify(bound, "--certify looks for a proof or a better design")
     return _append(f"not proved to be the best{_search_effort(bound)}", advice)
 
 

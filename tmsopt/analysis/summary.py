@@ -95,7 +95,8 @@ def _active_bound_warning(solution: Solution) -> Iterator[str]:
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
     if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
         listed = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
-        yield f"these limits are active: {listed}; relax the arbitrary ones, and write the real ones as constraints"
+        advice = "widen the ends that are guesses, and state real limits under [constraints]"
+        yield f"the answer depends on these ends of ranges: {listed}; {advice}"
 
 
 def _describe_bound(problem: Posed, bound: str) -> str:
@@ -108,7 +109,7 @@ def _touched_bound_warnings(solution: Solution, name: str) -> Iterator[str]:
     for end, limit in zip(("min", "max"), problem.free[name], strict=True):
         bound = f"{name}.{end}"
         if bound not in solution.active and abs(x - limit) <= _AT * max(abs(limit), _AT):
-            why = "relaxing it gains nothing to first order" if problem.objective else "nothing was optimised"
+            why = "to first order, relaxing it improves nothing" if problem.objective else "nothing was optimised"
             yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {why}"
 
 

@@ -11,7 +11,13 @@ import numpy as np
 from tmsopt.boundaries.approach import SAME_DISTANCE, EdgePoint, Method, make_approach
 from tmsopt.boundaries.boundaries import Edge, list_edges
 from tmsopt.boundaries.exact_check import is_boundary, is_exactly_stable
-from tmsopt.boundaries.rays import RayCrossing, draw_points, find_crossings_before, find_most_damped, find_ray_crossings
+from tmsopt.boundaries.rays import (
+    RayCrossing,
+    draw_points,
+    find_crossings_on_segment,
+    find_most_damped,
+    find_ray_crossings,
+)
 from tmsopt.boundaries.weighted_design import WeightedDesign, weight_design
 from tmsopt.errors import InputError, input_error, suggest, table_faults
 from tmsopt.problem.files import Given, pose
@@ -223,7 +229,7 @@ def _survey_boundaries(base: WeightedDesign, kinds: Sequence[str] = KINDS, metho
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, but no ray crossed it
         u = np.array([limit.direction[n] for n in base.weights])
-        crossings = sorted([*crossings, *find_crossings_before(base, u, with_damping)], key=lambda c: c.distance)
+        crossings = sorted([*crossings, *find_crossings_on_segment(base, u, with_damping)], key=lambda c: c.distance)
         found = [_nearest(base, crossings, kind, method) for kind in kinds]
     stable = base.stable and not base.edges
     own = Table(base.parameters), Table(base.weights)
@@ -279,7 +285,7 @@ def _nearest(base: WeightedDesign, crossings: list[RayCrossing], kind: str, meth
         best = EdgePoint(own[0].u, False)
     if not best.u.size or not is_boundary(base, best.u, heavy):
         return Nearest(kind)
-    direct = not find_crossings_before(base, best.u, heavy)
+    direct = not find_crossings_on_segment(base, best.u, heavy)
     direction = Table(dict(zip(base.weights, best.u.tolist(), strict=True)))
     reached = {n: 0.0 if abs(x) <= _NOTHING * base.weights.get(n, 0.0) else x for n, x in base.design(best.u).items()}
     return Nearest(kind, best.distance, Table(reached), direction, best.refined, direct)
@@ -298,7 +304,7 @@ def _find_nearest_on_edge(
             best = run(u, best)
         if not best.u.size:
             break
-        crossings = find_crossings_before(base, best.u, edge.real)
+        crossings = find_crossings_on_segment(base, best.u, edge.real)
         starts = [c.u for c in crossings if (c.edge, c.sign) == (edge.name, sign)]
         if edge.name == "real" and best.distance < before:  # no rays lead there, and similar starts end alike
             starts += draw_points(base, best.distance, round_number)

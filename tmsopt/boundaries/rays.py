@@ -1,4 +1,7 @@
-"""Where rays from a design first cross the boundaries: upper bounds of the distances, and starts for an optimiser."""
+"""Finds where rays from a design first cross an edge of stability or of heavy damping.
+
+The crossings give upper bounds of the distances to the edges, and starts for an optimiser.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,23 +17,28 @@ from tmsopt.roots import is_stable, roots
 
 _DIRECTIONS = 1000
 _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
-_COARSE, _FINE = (16, 2), (256, 6)  # (parts, rounds) for all crossings, and for those kept, to all digits
-_KEPT = 5
+_COARSE, _FINE = (
+    (16, 2),
+    (256, 6),
+)  # (parts, rounds) of the bracketing: for all crossings, and to full precision for the selected ones
+_MOST_CROSSINGS = 5  # of one edge
 _SAME_DIRECTION = 0.9  # cosine above which two directions count as one
-_DRAWN = 4  # random starts; 4 led 11 of 196 random systems of degrees 6 to 8 to nearer points, 6 found no more
-_POINTS = 400  # tested on the straight way to a nearest point
+_RANDOM_STARTS = 4  # with 4, nearer points were found for 11 of 196 random systems of degrees 6 to 8; with 6, no more
+_POINTS = 400  # tested on the segment from the design to a nearest point
 _RADII_AROUND = np.array([0.1, 0.3, 1.0])
-_STEP = 1e-6  # of finite differences, which only choose directions
+_STEP = 1e-6  # finite differences with this step only select directions
 _stable = partial(is_stable, exact=False)  # up to rounding
 
 
 @dataclass(frozen=True)
 class RayCrossing:
-    """A point just beyond an edge.
+    """A point just outside an edge of stability or of heavy damping.
 
     Attributes:
         edge: name of the edge.
         sign: sign of a0 on the stable, or heavily damped, side.
+        u: displacement from the design in weights.
+        distance: length of u.
     """
 
     edge: str
@@ -48,8 +56,8 @@ def find_ray_crossings(base: WeightedDesign, with_damping: bool = True) -> list[
     return find_crossings(base, list_directions(base), _RADII, with_damping)
 
 
-def find_crossings_before(base: WeightedDesign, u: Array, with_damping: bool) -> list[RayCrossing]:
-    """Crossings on the straight way to u, before its end."""
+def find_crossings_on_segment(base: WeightedDesign, u: Array, with_damping: bool) -> list[RayCrossing]:
+    """Crossings on the segment from the design to u, without its end."""
     return find_crossings(base, u[None, :], np.linspace(0.0, 1.0, _POINTS)[:-1], with_damping)
 
 
@@ -65,12 +73,12 @@ def find_crossings(base: WeightedDesign, rays: Array, t: Array, with_damping: bo
         distance = np.linalg.norm(base.clip_rays(brackets.rays, brackets.high), axis=1)
         for name in sorted({n for each in names for n in each}):
             rows = [k for k in np.argsort(distance, kind="stable") if name in names[k]]
-            found += brackets.rows(_select_different(brackets.rays, rows)).narrow(*_FINE).crossings(heavy)
+            found += brackets.select(_select_different(brackets.rays, rows)).narrow(*_FINE).crossings(heavy)
     return sorted(found, key=lambda x: x.distance)
 
 
 def list_directions(base: WeightedDesign) -> Array:
-    """Unit vectors: the axes, the gradients of the boundaries both ways, and random ones."""
+    """Unit vectors along ± each axis, along ± the gradient of each edge function, and in random directions."""
     axes = np.eye(len(base.lower))
     random = np.random.default_rng(0).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
     near = base.coefficients(_STEP * np.concatenate([axes, -axes]))
@@ -78,12 +86,12 @@ def list_directions(base: WeightedDesign) -> Array:
     slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
     largest = np.abs(slopes).max(axis=1, keepdims=True, initial=0.0)
     slopes = np.ldexp(slopes, -np.frexp(largest)[1])  # so that squares do not overflow
-    every = np.concatenate([axes, -axes, slopes, -slopes, random])
-    return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
+    rays = np.concatenate([axes, -axes, slopes, -slopes, random])
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 def find_most_damped(base: WeightedDesign, sign: float) -> list[Array]:
-    """The design, and points around it whose smallest damping ratio is largest, for a given sign of a0."""
+    """The design, and the points around it with the largest damping ratio among those where a0 has the given sign."""
     rays = list_directions(base)
     u = base.clip_rays(rays[:, None, :], _RADII_AROUND).reshape(-1, rays.shape[1])
     c = sign * base.coefficients(u)
@@ -96,37 +104,37 @@ def find_most_damped(base: WeightedDesign, sign: float) -> list[Array]:
 
 def draw_points(base: WeightedDesign, distance: float, seed: int) -> list[Array]:
     """A few points at a distance in random directions, stable or not."""
-    rays = np.random.default_rng(seed).standard_normal((_DRAWN, len(base.lower)))
+    rays = np.random.default_rng(seed).standard_normal((_RANDOM_STARTS, len(base.lower)))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    return [*base.clip_rays(rays, np.full(_DRAWN, distance))]
+    return [*base.clip_rays(rays, np.full(_RANDOM_STARTS, distance))]
 
 
 def _edge_functions(c: Array) -> Array:
     """Functions that vanish on the edges: a0, aₙ, ∏ −(zᵢ + zⱼ) and ∏ (zᵢ − zⱼ)² over pairs of roots, shape (…, 4).
 
-    The last two are Δₙ₋₁ (Orlando) and the discriminant without powers of a0.
+    By Orlando's formula the third is Δₙ₋₁ divided by a power of a0; the fourth is the discriminant divided by one.
     """
     proper = np.all(np.isfinite(c), axis=-1) & (c[..., 0] != 0)
     z = roots(np.where(proper[..., None], c, np.eye(c.shape[-1])[0]))
     first, second = np.triu_indices(z.shape[-1], 1)
     sums, differences = z[..., first] + z[..., second], z[..., first] - z[..., second]
-    pair, double = np.prod(-sums, axis=-1).real, np.prod(differences * differences, axis=-1).real
-    return np.stack([c[..., 0], c[..., -1], *(np.where(proper, x, np.nan) for x in (pair, double))], axis=-1)
+    hurwitz, discriminant = np.prod(-sums, axis=-1).real, np.prod(differences * differences, axis=-1).real
+    return np.stack([c[..., 0], c[..., -1], *(np.where(proper, x, np.nan) for x in (hurwitz, discriminant))], axis=-1)
 
 
 def _select_different(rays: Array, rows: list[int]) -> NDArray[np.int_]:
-    """The first few of the rows whose directions differ."""
+    """The first few of these rows of `rays` that have clearly different directions."""
     unit = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     kept: list[int] = []
     for k in rows:
-        if len(kept) < _KEPT and all(float(unit[k] @ unit[other]) < _SAME_DIRECTION for other in kept):
+        if len(kept) < _MOST_CROSSINGS and all(float(unit[k] @ unit[selected]) < _SAME_DIRECTION for selected in kept):
             kept.append(k)
     return np.array(kept, dtype=int)
 
 
 @dataclass(frozen=True)
 class _Bracket:
-    """Points t · ray on either side of a change of a test, which is `inside` at `low` and not at `high`."""
+    """Rays with an interval low < t < high in which the result of a test changes; it is `inside` at t = low."""
 
     base: WeightedDesign
     test: Callable[[Array], Truth]
@@ -135,8 +143,8 @@ class _Bracket:
     high: Array
     inside: Truth
 
-    def rows(self, k: NDArray[np.int_]) -> "_Bracket":
-        """The selected rays."""
+    def select(self, k: NDArray[np.int_]) -> "_Bracket":
+        """The rays with these indices."""
         return replace(self, rays=self.rays[k], low=self.low[k], high=self.high[k], inside=self.inside[k])
 
     def coefficients(self, t: Array) -> Array:
@@ -144,31 +152,29 @@ class _Bracket:
         rays = self.rays if t.ndim == 1 else self.rays[:, None, :]
         return self.base.coefficients(self.base.clip_rays(rays, t))
 
-    def narrow(self, parts: int, times: int) -> "_Bracket":
+    def narrow(self, parts: int, rounds: int) -> "_Bracket":
         """Narrow each bracket to its first change, testing several points per call."""
         low, high = self.low, self.high
-        every = np.arange(len(low))
-        for _ in range(times):
+        rays = np.arange(len(low))
+        for _ in range(rounds):
             t = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, parts + 1)
-            other = self.test(self.coefficients(t[:, 1:-1])) != self.inside[:, None]
-            first = np.where(other.any(axis=1), other.argmax(axis=1) + 1, parts)
-            low, high = t[every, first - 1], t[every, first]
+            changed = self.test(self.coefficients(t[:, 1:-1])) != self.inside[:, None]
+            first = np.where(changed.any(axis=1), changed.argmax(axis=1) + 1, parts)
+            low, high = t[rays, first - 1], t[rays, first]
         return replace(self, low=low, high=high)
 
     def sides(self) -> tuple[Array, Array]:
-        """Coefficients beyond the edge, times the sign of a0 on the side where the test holds; that sign."""
-        within, beyond = (
-            self.coefficients(np.where(self.inside == side, self.low, self.high)) for side in (True, False)
-        )
-        sign = np.sign(within[:, 0])
-        return sign[:, None] * beyond, sign
+        """Coefficients outside the edge times a sign, and that sign: the one of a0 on the inner side."""
+        inner, outer = (self.coefficients(np.where(self.inside == side, self.low, self.high)) for side in (True, False))
+        sign = np.sign(inner[:, 0])
+        return sign[:, None] * outer, sign
 
     def crossings(self, heavy: bool) -> list[RayCrossing]:
         """The crossings, one for each ray and edge."""
-        beyond, sign = self.sides()
+        outer, sign = self.sides()
         u = self.base.clip_rays(self.rays, self.high)
         return [
             RayCrossing(name, float(sign[k]), u[k], float(np.linalg.norm(u[k])))
-            for k, c in enumerate(beyond)
+            for k, c in enumerate(outer)
             for name in find_crossed_edges(c, heavy)
         ]

@@ -51,10 +51,10 @@ def write_trace(trace: Trace, level: Level) -> Iterator[Chapter]:
 def describe_trace(trace: Trace) -> str:
     """How many branches and points, and what they took."""
     per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
-    points = f", {trace.points} points at {per_point:.0f} µs each" if trace.points else ""
+    points = f", {trace.points} points, {per_point:.0f} µs per point" if trace.points else ""
     count = count_things(len(trace.branches), "branch", "branches")
     pattern = in_words_of(trace.problem.model, trace.pattern)
-    return f"{pattern}: {count}{points}, searched from {trace.starts} starts; {trace.seconds:.2f} s"
+    return f"{pattern}: {count}{points}, found from {trace.starts} starts; {trace.seconds:.2f} s"
 
 
 def _describe_branch(branch: Branch, trace: Trace) -> str:
@@ -64,9 +64,9 @@ def _describe_branch(branch: Branch, trace: Trace) -> str:
     if any(not c.equality for c in trace.problem.posed.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"
-    met = "met" if branch.residual <= _FITTING else "met only"
+    doubt = "" if branch.residual <= _FITTING else " (too large)"
     kinds = in_words_of(trace.problem.model, " and ".join(dict.fromkeys(kinds_along(branch))))
-    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {branch.residual:.0e}"
+    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficient error {branch.residual:.0e}{doubt}"
 
 
 def list_events(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[Sequence[Cell | str]]:
@@ -115,7 +115,7 @@ def summarise_branch(branch: Branch) -> Iterator[Badge]:
 def write_branch(branch: Branch, _level: Level) -> Iterator[Chapter]:
     """One branch with its events, in the free parameters."""
     form = "closed" if branch.closed else "open"
-    found = f"{branch.pattern}: {len(branch)} points, {form}, coefficients met to {branch.residual:.0e}"
+    found = f"{branch.pattern}: {len(branch)} points, {form}, coefficient error {branch.residual:.0e}"
     yield Chapter("answer", (Sentence(found, tone="answer"),))
     units = dict.fromkeys((*branch.tangent, "abscissa"), Unit())
     yield Chapter("events", (TableBlock(list_events(branch, units), "Events along the branch"),))

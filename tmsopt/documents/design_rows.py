@@ -169,7 +169,7 @@ def _describe_ballast(solution: Solution, each: Sequence[Mapping[str, Any]], lif
         needed = f"{max(float(values[f'ballast_{lifted}']) for values in each):.4g} m_B"
     else:
         return ""
-    return f", unless ballast of {needed} is at the {lifted} contact, which does not change the motion"
+    return f"; ballast of {needed} at the {lifted} contact prevents this and does not change lean and steer"
 
 
 def describe_inertia(solution: Solution) -> str:
@@ -177,7 +177,7 @@ def describe_inertia(solution: Solution) -> str:
     length, parts = unit_of(solution.problem.posed, "w"), []
     for name, inertia in (solution.inertia_margin or {}).items():
         radius = "" if inertia is None else length.show(math.sqrt(inertia / solution.parameters[INERTIAS[name]]), 3)
-        parts.append(f"{name} {inertia:.4g} kg m^2 ({radius})" if radius else f"{name} none")
+        parts.append(f"{name} {inertia:.4g} kg m^2 ({radius})" if radius else f"{name} without limit")
     return ", ".join(parts)
 
 
@@ -231,7 +231,7 @@ def describe_stored(solution: Solution) -> Iterator[str]:
     ideal, stored = (x if abs(x) > NOTHING * size else 0.0 for x in (solution.abscissa, solution.abscissa_realised))
     realised = unit_at(problem, "abscissa", at).number(stored, ALL)
     shown = show_at(problem, "abscissa", at, ideal, ALL)
-    yield f"abscissa {shown}; of the parameters as rounded to doubles {realised}"
+    yield f"abscissa {shown}; with the parameters rounded to doubles {realised}"
     yield ": ".join(describe_roots(solution, ALL))
 
 

@@ -41,7 +41,7 @@ def write_explanation(found: Explanation, _level: Level) -> Iterator[Chapter]:
         "meaning", (Sentence(found.summary, "meaning", "answer"), *explain_optimality(found.optimality), *warnings)
     )
     if found.levers:
-        head = Sentence("what moving a limit buys, solved again from the optimum:")
+        head = Sentence("improvement if a limit is relaxed, from a new solution near the optimum:")
         yield Chapter("limits", (head, *(Sentence(lever.sentence) for lever in found.levers)))
     yield Chapter("rounding", tuple(_write_rounding(found)))
 
@@ -50,7 +50,7 @@ def _write_rounding(found: Explanation) -> Blocks:
     if found.precision:
         yield tabulate_rounding(found)
     if found.worst:
-        yield Sentence(f"rounding {found.worst} alone to {ALONE} digits costs most")
+        yield Sentence(f"rounding {found.worst} alone to {ALONE} digits has the largest effect")
 
 
 def describe_rounding(found: Explanation) -> str:
@@ -67,14 +67,14 @@ def describe_rounding(found: Explanation) -> str:
     three = next((row for row in rows if row.digits == ALONE), None)
     parts, unstable = [], False
     if stable and three and three.realised < 0 and (enough is None or enough.digits > ALONE):
-        parts.append(f"{ALONE} digits {_describe_cost(three, found)}")
+        parts.append(f"to {ALONE} digits the design {_describe_cost(three, found)}")
     if stable and three and not three.realised < 0:
         alone, unstable = found.rounding.get(found.worst), True
         worst = f" ({found.worst} alone: {alone.written[found.worst]})" if alone else ""
-        parts.append(f"{ALONE} digits make it unstable{worst}")
+        parts.append(f"to {ALONE} digits the design is unstable{worst}")
     last = enough or rows[-1]
-    parts.append(f"{last.digits} digits {(_describe_benefit if enough else _describe_cost)(last, found)}")
-    needs = f"; {found.worst} needs the most" if found.worst and not unstable else ""
+    parts.append(f"to {last.digits} digits the design {(_describe_benefit if enough else _describe_cost)(last, found)}")
+    needs = f"; {found.worst} needs the most digits" if found.worst and not unstable else ""
     return f"{'; '.join(parts)}{needs}"
 
 
@@ -91,25 +91,27 @@ def _is_near(row: RoundedDesign, found: Explanation) -> bool:
 
 def _describe_benefit(row: RoundedDesign, found: Explanation) -> str:
     if found.abscissa >= -_NIL:
-        return f"move the rightmost root by {row.loss:.2g}" if row.loss > _NIL else "change next to nothing"
+        return f"shifts its rightmost root by {row.loss:.2g}" if row.loss > _NIL else "hardly changes"
     share = min(math.floor(round(100 * row.realised / found.abscissa, 6)), 100)
-    return f"keep {share} % of the decay"
+    return f"keeps {share} % of the decay rate"
 
 
 def _describe_cost(row: RoundedDesign, found: Explanation) -> str:
     """What digits that are not enough do."""
     if found.abscissa < -_NIL and row.realised >= 0:
-        return "make it unstable"
+        return "is unstable"
     if _is_near(row, found) or found.abscissa >= -_NIL:
         cost = _describe_benefit(row, found)
     else:
-        cost = f"lose {100 * row.loss / -found.abscissa:.2g} % of the decay"
-    return f"{cost} but violate {', '.join(row.violations)}" if row.violations else cost
+        cost = f"keeps {100 * row.realised / found.abscissa:.2g} % of the decay rate"
+    return f"{cost} and violates the limit {', '.join(row.violations)}" if row.violations else cost
 
 
 def tabulate_rounding(found: Explanation) -> TableBlock:
     """The design rounded, one parameter alone and then all together."""
-    rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
+    rows: list[Sequence[str]] = [
+        ("parameter", "rounded to", "abscissa", "abscissa rises by", "damping_ratio", "violated limits")
+    ]
     rows += [_list_rounded(f"{name} alone", row.written[name], row) for name, row in found.rounding.items()]
     rows += [_list_rounded("all", f"{row.digits} digits", row) for row in found.precision]
     known = any(math.isfinite(row.damping_ratio) for row in (*found.rounding.values(), *found.precision))
@@ -144,10 +146,12 @@ def explain_optimality(found: Optimality) -> Blocks:
     if found.roots:
         of_H = found.roots[0].eigenfrequency is not None
         root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
-        balance = f"they balance within {found.residual:.1g}"
-        yield Sentence(f"what it costs, per unit, to change {root} ({balance}):")
-        head = ("root", f"to move it {'down' if of_H else 'left'}", "share of all", "to part it")
-        yield TableBlock((head, *map(_list_root, found.roots)), "Multipliers")
+        balance = f"the optimality conditions hold within {found.residual:.1g}"
+        yield Sentence(f"cost in the objective per unit of each change of {root}; {balance}:")
+        head = ("root", f"shift {'down' if of_H else 'to the left'}", "share of all shifts", "split of a multiple root")
+        rows = [head, *map(_list_root, found.roots)]
+        is_multiple = any(root.multiplicity > 1 for root in found.roots)
+        yield TableBlock(rows if is_multiple else [row[:-1] for row in rows], "Multipliers")
 
 
 def _list_root(root: RightmostRoot) -> tuple[str, ...]:

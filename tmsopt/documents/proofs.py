@@ -130,15 +130,18 @@ def _describe_method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
     if proof.method == "exact factorisation":
         yield Sentence("square-free factorisation of the polynomial, whose coefficients are fractions", "method")
     elif not proof.moved and proof.method != "Krawczyk":
-        yield Sentence("roots of the design as stored, isolated in balls", "method")
+        yield Sentence("roots of the stored design, isolated by interval arithmetic", "method")
     else:
         equations = len(proof.unknowns) + len(proof.moved) > problem.model.degree
         also = " and the == constraints" if equations else ""
-        yield Sentence(f"Krawczyk's interval Newton test on a_k = a0 c_k{also}", "method")
-        alone = f"the only one within {proof.uniqueness:.2g}"
-        yield Sentence(f"located to {proof.radius:.1e} before rounding to these digits; {alone}")
-        explained = f"rounding explains up to {proof.explained:.1e}"
-        yield Sentence(f"the stored design is {proof.distance:.1e} from it; {explained}")
+        yield Sentence(
+            f"Krawczyk's interval Newton test on the equations a_k = a0 c_k, c_k the coefficients of the pattern{also}",
+            "method",
+        )
+        alone = f"no other such design within {proof.uniqueness:.2g} in each number"
+        yield Sentence(f"error at most {proof.radius:.1e} before rounding to these digits; {alone}")
+        explained = f"rounding to doubles can explain {proof.explained:.1e}"
+        yield Sentence(f"the stored design differs from it by {proof.distance:.1e}; {explained}")
 
 
 def _write_facts(proof: Proof) -> Iterator[Sentence]:
@@ -157,7 +160,7 @@ def _write_exact_numbers(problem: Posed, proof: Proof) -> Iterator[Sentence]:
     """Numbers that were taken exactly, and a word on angles."""
     exact = [*(f"{name} = {_format_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
     if exact:
-        yield Sentence(", ".join(exact), "taken exactly")
+        yield Sentence(", ".join(exact), "exact numbers")
     of = problem.parameter_set
     angles = [n for n in proof.held if n in of.names and of[n].tangent and n not in proof.stated]
     if angles := [n for n in angles if proof.parameters[n].value != "0"]:
@@ -174,11 +177,11 @@ def _format_fraction(text: str) -> str:
 
 
 def _format_ball(number: Number) -> tuple[str, str]:
-    return number.value, "exact" if number.radius == "0" else f"± {number.radius}"
+    return number.value if float(number.value) else "0", "exact" if number.radius == "0" else f"± {number.radius}"
 
 
 def _write_verdict(label: str, verdict: Verdict) -> Sentence:
-    answer = {True: "yes", False: "no", None: "cannot be told"}[verdict.holds]
+    answer = {True: "yes", False: "no", None: "not decided"}[verdict.holds]
     return Sentence(f"{answer}, {verdict.words}", label)
 
 
@@ -197,10 +200,10 @@ def write_every(every: Every, _level: Level) -> Iterator[Chapter]:
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if not found:
         none = f"no design in the box and within the limits has the pattern (proved; {effort})"
-        answer = Sentence(none if complete else "no single solution was met", tone="answer")
+        answer = Sentence(none if complete else "no isolated solution was found", tone="answer")
         yield Chapter("answer", (answer,))
     else:
-        all_of_them = f"these are all: {many} in the box (proved; {effort})"
+        all_of_them = f"{many} in the box, no other exists (proved; {effort})"
         located = all_of_them if complete else f"{many} in the box"
         yield Chapter("answer", (Sentence(located, f"locate {found[0].problem.locate}", "answer"),))
         yield Chapter("designs", (TableBlock(_list_designs(every, complete), "Designs with the pattern"),), "", "wide")
@@ -230,7 +233,7 @@ def _describe_proof(proof: Completeness, effort: str) -> Iterator[str]:
     if proof.complete:
         return
     many = f"; {len(proof.designs)} proved" if proof.designs else ""
-    yield f"proof that these are all: none, {proof.reason}{f' ({effort}{many})' if proof.boxes else ''}"
+    yield f"no proof that these are all: {proof.reason}{f' ({effort}{many})' if proof.boxes else ''}"
     for place in proof.undecided:
         yield f"undecided: {', '.join(f'{n} {Cell(lo)} … {Cell(hi)}' for n, (lo, hi) in place.ranges.items())}"
 

@@ -17,8 +17,6 @@ _LITTLE = 1e-3
 """Share of the largest change below which one is 0."""
 _NAMED = 3
 """Parameters named in the headline at most."""
-_VERBS = {"divergence": "diverge", "threshold": "reach its threshold"}
-"""Of words that are no verbs."""
 _OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
@@ -51,7 +49,7 @@ def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
             return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
         return f"none, on the edge of stability already, with {on}"
     if on_edge:
-        return "none, on the edge of stability already, as far as rounding tells"
+        return "none, on the edge of stability already, as far as rounding errors allow to say"
     limit, other = found.limit, "unstable" if found.stable else "stable"
     if not limit.found:
         return f"{'' if found.stable else 'not stable; '}no change in reach of the search makes it {other}"
@@ -61,10 +59,8 @@ def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
 
 
 def _describe_event(model: Model, kind: str) -> str:
-    if kind == "infinity":
-        return "takes a root through infinity (a0 = 0)"
-    word = words_of(model)[kind]
-    return f"makes it {_VERBS.get(word, word)}"
+    how = "a root passes through infinity, a0 = 0" if kind == "infinity" else words_of(model)[kind]
+    return f"makes it unstable ({how})"
 
 
 def tabulate_boundaries(found: Robustness) -> TableBlock:
@@ -72,7 +68,7 @@ def tabulate_boundaries(found: Robustness) -> TableBlock:
     names = list(found.weights)
     kinds: tuple[Nearest, ...] = (found.weave, found.capsize, found.infinity, found.heavy_damping)
     kinds = kinds if found.problem.model.carrier is None else kinds[:1]
-    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
+    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes over weights", "distance", *names)]
     for n in kinds:
         moves = _format_moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
         rows.append((_name_row(n, found), _format_distance(n, found), *moves))
@@ -80,9 +76,8 @@ def tabulate_boundaries(found: Robustness) -> TableBlock:
     rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
     for n in kinds:
         if n.found and n.distance > 0:
-            at = "at" if n.kind == "infinity" else "with"
             word = in_words_of(found.problem.model, n.kind)
-            rows.append((f"{at} {word}", "", *(units[name].show(n.parameters[name], 8) for name in names)))
+            rows.append((f"values at {word}", "", *(units[name].show(n.parameters[name], 8) for name in names)))
     transposed = len(names) > _WIDE
     return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
 
@@ -106,10 +101,14 @@ def write_nearest(found: Nearest, _level: Level) -> Iterator[Chapter]:
 
 
 def _name_row(n: Nearest, found: Robustness) -> str:
-    to = "at the edge of" if n.distance == 0 else "to"
+    to = "at the edge of" if n.distance == 0 else "change to"
     if n.kind != "heavy damping":
         return f"{to} {in_words_of(found.problem.model, n.kind)}"
-    return f"{to} {n.kind}" if n.distance == 0 else f"{'out of' if found.heavily_damped else 'into'} {n.kind}"
+    return (
+        f"{to} {n.kind}"
+        if n.distance == 0
+        else f"{'change out of' if found.heavily_damped else 'change into'} {n.kind}"
+    )
 
 
 def _format_distance(n: Nearest, found: Robustness) -> str:
@@ -132,12 +131,12 @@ def _name_largest(limit: Nearest) -> str:
     changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
     largest = abs(changes[0][1])
     named = [n for n, x in changes if largest > 0 and abs(x) >= _MAIN * largest]
-    return f", mostly {', '.join(named[:_NAMED])}" if named and len(changes) > 1 else ""
+    return f"; largest changes: {', '.join(named[:_NAMED])}" if named and len(changes) > 1 else ""
 
 
 def _describe_size(found: Robustness) -> str:
     if found.relative:
-        return f"{_format_percent(found.limit.distance)} of change"
+        return f"a change of {_format_percent(found.limit.distance)}"
     return f"a change of {found.limit.distance:.2g} in {'your' if found.problem.weights else 'the'} weights"
 
 

@@ -161,7 +161,7 @@ def write_headline(solution: Solution) -> tuple[Sentence, Sentence]:
     located = f"locate {problem.locate}" if problem.locate else ""
     sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
-    ended = ": ".join(part for part in (describe_status(solution), describe_verdict(solution)) if part)
+    ended = "; ".join(part for part in (describe_status(solution), describe_verdict(solution)) if part)
     structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
     structure += ROUNDED if solution.multiple_as_rounded else ""
     found = "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
@@ -221,7 +221,7 @@ def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scal
         for p in of.parameters
         if name_role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
     ]
-    more = f", and {len(rest) - _FIXED} more" if len(rest) > _FIXED else ""
+    more = f", and {len(rest) - _FIXED} more parameters" if len(rest) > _FIXED else ""
     if rest:
         yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
 
@@ -240,7 +240,7 @@ def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float
     if omits := solution.problem.model.omits:
         yield Sentence(omits, "model")
     if inertia := describe_inertia(solution):
-        yield Sentence(inertia, "inertia at which it is no longer stable, each alone (radius of gyration)")
+        yield Sentence(inertia, "largest inertia before it becomes unstable, one at a time (radius of gyration)")
 
 
 def _write_cases(solution: Solution) -> Blocks:
@@ -249,16 +249,17 @@ def _write_cases(solution: Solution) -> Blocks:
         return
     of, cover = solution.problem, solution.cover
     yield Sentence(
-        f"{_describe_case(solution, solution.worst)}; motion and roots are those there, the rest nominal", "worst case"
+        f"{_describe_case(solution, solution.worst)}; motion and roots are of this case, all else is nominal",
+        "worst case",
     )
     if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
         label = "least damped case found" if of.tolerances else "least damped case"
-        yield Sentence(f"{_describe_case(solution, solution.least_damped)}; the damping ratio is that there", label)
+        yield Sentence(f"{_describe_case(solution, solution.least_damped)}; the damping ratio is of this case", label)
     if solution.fastest is not None and solution.fastest != solution.worst:
-        text = f"{_describe_case(solution, solution.fastest)}; limits on the frequency are on that there"
+        text = f"{_describe_case(solution, solution.fastest)}; limits on the frequency apply to this case"
         yield Sentence(text, "fastest case")
     if cover is not None:
-        means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
+        means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "by a search, not proved"
         unit = common_unit(of.posed, "abscissa")
         yield Sentence(f"abscissa at most {Cell(cover.limit, unit, named=True)}, {means}", "every case")
 
@@ -278,7 +279,7 @@ def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool
         yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
     if found is not None and found.levers:
         worth = [list_lever(solution, lever) for lever in found.levers]
-        head = ("active limit", "stands at", "a move of it", "buys, to first order")
+        head = ("active limit", "value", "if relaxed by", "improvement (first order)")
         yield TableBlock((head, *worth), "What the active limits are worth", most=_LIMITS)
         yield from (Sentence(lever.sentence) for lever in found.levers if full)
     yield from (Sentence(text, "warning", "doubt") for text in (found.warnings if found else ()))
@@ -347,7 +348,9 @@ def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: b
 
 def _write_roots(solution: Solution, analysis: Analysis) -> Blocks:
     if solution.multiple_as_rounded:
-        yield Sentence("roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed")
+        yield Sentence(
+            "roots meet as far as rounding errors allow to say; tmsopt prove tells it of the numbers as typed"
+        )
     for diagnosis in analysis.diagnoses:
         yield from explain_diagnosis(diagnosis, full=True)
 
@@ -361,9 +364,9 @@ def _write_search(solution: Solution) -> Blocks:
     yield from map(Sentence, list_branches(solution))
     if starts.tried:
         led = starts.tried - starts.runs
-        also = f", {led} of which lead{'s' * (led == 1)} straight to where others ended" if starts.runs and led else ""
-        sampled = f"; {starts.looked} designs of a sample" if starts.looked else ""
-        tried = f"{starts.tried} tried{also}, {starts.converged} converged, {starts.at_best} at the best"
+        also = f" ({led} skipped, because they lead to a known optimum)" if starts.runs and led else ""
+        sampled = f"; sample of {starts.looked} designs" if starts.looked else ""
+        tried = f"{starts.tried}{also}, {starts.converged} converged, {starts.at_best} reached the best design"
         yield Sentence(f"{tried}{sampled}; {solution.seconds:.2f} s", "starts")
 
 
@@ -387,7 +390,9 @@ def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
         "trace": bool(problem.locate) and solution.freedom.count == 1,
     }
     named = ", ".join(name for name, answers in commands.items() if answers)
-    return Sentence(f"--full; then tmsopt {named} with the same file" if named else "--full", "more", "dim")
+    return Sentence(
+        f"--full prints everything; tmsopt {named} with the same file" if named else "--full", "more", "dim"
+    )
 
 
 MAKERS: Mapping[str, Maker] = {"Solution": Maker(summarise_solution, write_solution, "draw_growth")}

@@ -140,7 +140,7 @@ def _write_facts(study: Study, found: Summary) -> Iterator[Sentence]:
         each = zip(found.product.abscissa, values, strict=True)
         at = ", ".join(f"{100 * float(q):g} % {Cell(value, digits=_DIGITS)}" for q, value in each)
         unit = "1/s" if "quantiles" in found.clocked else unit_of(problem, "abscissa").text
-        yield Sentence(at, f"abscissa{f' in {unit}' if unit else ''} at most, for a share of all rows")
+        yield Sentence(at, f"percentiles of the abscissa{f' in {unit}' if unit else ''}")
     for cause, count in islice(found.causes.items(), _CAUSES):
         yield Sentence(f"{count} × {cause}")
     if len(found.causes) > _CAUSES:

@@ -166,7 +166,7 @@ def growth(
     )
     many = [c.at for c in events if _has_many_roots(c.kind)] + [at] * _has_many_roots(design.structure)
     followed = follow_modes(
-        values, found, at, many, bicycle=is_bicycle(model) and model.degree == _BICYCLE, speed=speed
+        values, found, at, many, is_bicycle=is_bicycle(model) and model.degree == _BICYCLE, over_speed=speed
     )
     if model.carrier is not None:
         found = user_root_array(model, found)

@@ -1,4 +1,4 @@
-"""Roots followed over a parameter as named modes, from one meeting of roots to the next."""
+"""Follows roots over a parameter, and names them as modes. A mode ends where two roots meet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array, Complex
 
-_LEAST, _SHORT = 3, 1e-4  # fewest points of a piece, and its least share of the range; rounding causes shorter ones
-_APART = 0.5  # distance of two roots, relative to that of a third one, up to which the two meet alone
+_MIN_POINTS, _MIN_SHARE = (
+    3,
+    1e-4,
+)  # of a piece, and of the range; rounding errors make shorter pieces, which are ignored
+_ISOLATED = 0.5  # two roots meet without a third if their distance is at most this share of the distance to the third
 
 
 @dataclass(frozen=True)
@@ -33,39 +36,41 @@ class _Piece:
 
 def follow_modes(
     values: Array,
-    found: Complex,
+    roots: Complex,
     design: float,
-    crowds: Sequence[float],
+    multiple_meetings: Sequence[float],
     *,
-    bicycle: bool,
-    speed: bool,
+    is_bicycle: bool,
+    over_speed: bool,
 ) -> tuple[Mode, ...]:
     """Every root between meetings, with the name of its mode.
 
-    A root keeps its name past meetings of other roots. For a bicycle, naming starts at one pair and two real roots, at
-    the highest speed or at the design: the pair is weave, the left real root castering, the right one capsize. If two
-    pairs have no such start, the rightmost one is weave. For other models, roots are numbered from the right at the
-    design. A pair formed by two real roots is named after both. Where more than two roots meet, as at EP3 and EP4,
-    naming starts anew.
+    A root keeps its name where other roots meet. For a bicycle, names begin in a piece with one pair and two real
+    roots: the piece of the design, or over the speed the fastest one. The pair is weave, the left real root castering,
+    the right real root capsize. If there is no such piece, the rightmost pair is weave. For other models, roots are
+    numbered from right to left at the design. A pair that two real roots form has both their names. Where more than two
+    roots meet, as at EP3 and EP4, new names begin.
 
     Args:
         values: values of the parameter, ascending, shape (n,).
-        found: roots, shape (n, degree).
-        design: value of the design.
-        crowds: values where more than two roots meet.
+        roots: shape (n, degree).
+        design: value of the parameter at the design.
+        multiple_meetings: values where more than two roots meet.
+        is_bicycle: whether modes have the names of a bicycle.
+        over_speed: whether the parameter is the speed.
     """
-    parts = _split_pieces(values, found, crowds)
+    parts = _split_pieces(values, roots, multiple_meetings)
     if not parts:
         return ()
-    usual = [k for k, part in enumerate(parts) if bicycle and part.roots.shape[1] == 3 and part.real == 2]
-    here = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
-    first = here if not usual or (not speed and here in usual) else usual[-1]
-    names = {first: _name_modes(parts[first], design, bicycle)}
+    typical = [k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real == 2]
+    nearest = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
+    first = nearest if not typical or (not over_speed and nearest in typical) else typical[-1]
+    names = {first: _name_modes(parts[first], design, is_bicycle)}
     for order in (range(first, len(parts)), range(first, -1, -1)):
         for before, k in pairwise(order):
-            passed = _pass_names(parts[before], names[before], parts[k], forward=k > before)
-            mixed = bicycle and any("weave +" in name or "+ weave" in name for name in passed)
-            names[k] = passed if passed and not mixed else _name_modes(parts[k], design, bicycle)
+            new_names = _pass_names(parts[before], names[before], parts[k], forward=k > before)
+            is_mixed = is_bicycle and any("weave +" in name or "+ weave" in name for name in new_names)
+            names[k] = new_names if new_names and not is_mixed else _name_modes(parts[k], design, is_bicycle)
     return tuple(
         Mode(name, part.values, column)
         for k, part in enumerate(parts)
@@ -73,64 +78,64 @@ def follow_modes(
     )
 
 
-def _split_pieces(values: Array, found: Complex, crowds: Sequence[float]) -> list[_Piece]:
-    real = np.count_nonzero(found.imag == 0, axis=1)
-    cuts = np.union1d(np.flatnonzero(np.diff(real)) + 1, np.searchsorted(values, crowds))
+def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[float]) -> list[_Piece]:
+    real = np.count_nonzero(roots.imag == 0, axis=1)
+    cuts = np.union1d(np.flatnonzero(np.diff(real)) + 1, np.searchsorted(values, multiple_meetings))
     parts = []
-    for run in np.split(np.arange(len(values)), cuts):
-        if len(run) < _LEAST or np.ptp(values[run]) < _SHORT * np.ptp(values):
+    for rows in np.split(np.arange(len(values)), cuts):
+        if len(rows) < _MIN_POINTS or np.ptp(values[rows]) < _MIN_SHARE * np.ptp(values):
             continue
-        own, count = found[run], int(real[run[0]])
-        reals = np.sort(own.real[own.imag == 0].reshape(len(run), count), axis=1)
-        pairs = np.sort_complex(own[own.imag > 0].reshape(len(run), -1))
-        for k in range(1, len(run)) if pairs.shape[1] > 1 else ():
-            ahead = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
-            pairs[k] = pairs[k][_match(ahead, pairs[k])]
-        parts.append(_Piece(values[run], np.concatenate([reals, pairs], axis=1), count))
+        inside, count = roots[rows], int(real[rows[0]])
+        reals = np.sort(inside.real[inside.imag == 0].reshape(len(rows), count), axis=1)
+        pairs = np.sort_complex(inside[inside.imag > 0].reshape(len(rows), -1))
+        for k in range(1, len(rows)) if pairs.shape[1] > 1 else ():
+            predicted = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
+            pairs[k] = pairs[k][_match(predicted, pairs[k])]
+        parts.append(_Piece(values[rows], np.concatenate([reals, pairs], axis=1), count))
     return parts
 
 
 def _match(a: Complex, b: Complex) -> NDArray[np.intp]:
     """Indices of b matched one to one to a, with the least sum of squared distances."""
-    apart = np.abs(a[:, None] - b) ** 2
+    squares = np.abs(a[:, None] - b) ** 2
     if len(a) <= 2:  # always so for a bicycle
         order = np.arange(len(a))
-        return order[::-1] if apart[order, order[::-1]].sum() < apart.trace() else order
+        return order[::-1] if squares[order, order[::-1]].sum() < squares.trace() else order
     from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import, and is rarely needed
 
-    return np.asarray(linear_sum_assignment(apart)[1])
+    return np.asarray(linear_sum_assignment(squares)[1])
 
 
-def _name_modes(part: _Piece, design: float, bicycle: bool) -> list[str]:
-    """New names: words for a bicycle, otherwise numbers from the right at the value nearest to the design."""
+def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
+    """Names of a bicycle, or numbers from right to left at the value nearest to the design."""
     count, row = part.real, part.roots[np.abs(part.values - design).argmin()]
     pairs = len(row) - count
-    if bicycle and (count, pairs) == (2, 1):
+    if is_bicycle and (count, pairs) == (2, 1):
         return ["castering", "capsize", "weave"]
-    if bicycle and (count, pairs) == (0, 2):
-        last = part.roots.real.max(axis=0).argmax()
-        return ["weave" if k == last else "second pair" for k in range(2)]
+    if is_bicycle and (count, pairs) == (0, 2):
+        rightmost = part.roots.real.max(axis=0).argmax()
+        return ["weave" if k == rightmost else "second pair" for k in range(2)]
     rank = np.argsort(np.argsort(-row[count:].real)) + 1
     return [f"real {count - k}" for k in range(count)] + [f"pair {k}" for k in rank]
 
 
 def _pass_names(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[str]:
-    """Names passed on across a meeting of two roots; empty if more roots meet."""
+    """Names of the next piece, from those of the previous one, if just two roots meet between them; else empty."""
     if abs(old.real - new.real) != 2:
         return []
-    many, few = (old, new) if old.real > new.real else (new, old)
+    many, few = (old, new) if old.real > new.real else (new, old)  # real roots
     r, p = (part.roots[-1 if (part is old) == forward else 0] for part in (many, few))
-    i = int(np.diff(r[: many.real].real).argmin())
+    i = int(np.diff(r[: many.real].real).argmin())  # real roots i and i + 1 form the pair j
     j = few.real + int(p[few.real :].imag.argmin())
     others, rest = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
-    apart = [np.abs(x - y).min(initial=np.inf) for x, y in ((r[others], r[i : i + 2].mean()), (p[rest], p[j].real))]
-    if abs(r[i + 1] - r[i]) > _APART * apart[0] or 2 * p[j].imag > _APART * apart[1]:
+    distances = [np.abs(x - y).min(initial=np.inf) for x, y in ((r[others], r[i : i + 2].mean()), (p[rest], p[j].real))]
+    if abs(r[i + 1] - r[i]) > _ISOLATED * distances[0] or 2 * p[j].imag > _ISOLATED * distances[1]:
         return []
     rest[few.real :] = rest[few.real :][_match(r[others[few.real :]], p[rest[few.real :]])]  # real ones stay in order
     if many is old:
         both = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
-        found = {j: both} | {b: names[a] for a, b in zip(others, rest, strict=True)}
+        new_names = {j: both} | {b: names[a] for a, b in zip(others, rest, strict=True)}
     else:
         upper, _, lower = names[j].partition(" + ")
-        found = {i: lower or upper, i + 1: upper} | {a: names[b] for a, b in zip(others, rest, strict=True)}
-    return [found[k] for k in range(len(found))]
+        new_names = {i: lower or upper, i + 1: upper} | {a: names[b] for a, b in zip(others, rest, strict=True)}
+    return [new_names[k] for k in range(len(new_names))]

@@ -139,13 +139,13 @@ def abscissa_as_stored(solution: Solution) -> str:
     problem = solution.problem.posed
     unit = unit_at(problem, "abscissa", at)
     first = "" if problem.goal == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
-    return f"{first}as stored {unit.number(realised, _SHOWN)}"
+    return f"{first}{unit.number(realised, _SHOWN)} with the parameters rounded to doubles"
 
 
 def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
     """A sentence on the limits that the parameters miss as stored; none if they miss none."""
-    why = "no doubles nearby that meet every limit were found" if problem.free else "the ideal design does not"
-    return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
+    why = "no doubles nearby that satisfy every limit were found" if problem.free else "the ideal design satisfies them"
+    return (f"rounded to doubles, the parameters violate {amounts_text(problem, amounts)}; {why}",) if amounts else ()
 
 
 def _clusters(

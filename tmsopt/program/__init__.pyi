@@ -1,5 +1,5 @@
 from .formulate import (
-    formulate as formulate, formulate_abscissa as formulate_abscissa, formulate_matching as formulate_matching,
+    formulate as formulate, formulate_by_factors as formulate_by_factors, formulate_matching as formulate_matching,
 )
 from .ipopt import forget_solvers as forget_solvers
 from .nlp import NLP as NLP, Factor as Factor, Scale as Scale, objective_size as objective_size, scale_of as scale_of

@@ -1,8 +1,10 @@
-"""Writes a problem as plain NLP data: factors of the characteristic polynomial, no eigenvalue, no division.
+"""Formulates a problem as a nonlinear program (NLP) without eigenvalues and without divisions.
 
-`formulate_abscissa` expresses root quantities by factor coefficients; `formulate_matching` equates the coefficients
-with those of a pattern. Both share the parameters, quantities and constraints. Every case has its own factors; all
-cases share the design and the root quantities.
+Root quantities (abscissa, damping ratio, angular frequency) are expressed by the coefficients of polynomial factors in
+`formulate_by_factors`; `formulate_matching` equates the coefficients with those of a pattern. Both have the same
+parameters, quantities and constraints. A case is one variation of the design, by a scenario or a tolerance. Each case
+has its own factors; all cases share the design and the root quantities. To lift a quantity means to add variables and
+rows that define it.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -51,12 +53,14 @@ from tmsopt.records import Table
 from tmsopt.roots import Pattern
 
 LiftFunction = Callable[["Builder"], LiftedQuantity]
-"""Adds the variables and rows of a root quantity, the worst over the covered cases."""
+"""Adds the variables and rows that define a root quantity as its worst value over the covered cases."""
 
 LIMIT = ".limit"
-"""Suffix of the name of a constraint's limit among the numbers."""
+"""The limit of a constraint `x` is the number `x.limit`."""
 
-_LEEWAY = 1e-9  # slack below a constant piece, so that a limit equal to it keeps its own multiplier
+_LEEWAY = (
+    1e-9  # a constant branch of a maximum is lowered by this, so that a limit of the same value keeps its multiplier
+)
 
 
 def formulate(
@@ -66,27 +70,28 @@ def formulate(
     damping_ratio: float | None = None,
     lead: int = 0,
 ) -> NLP:
-    """Formulate the problem: by its pattern if it has one, else by factors; kinks become variables.
+    """Formulate a problem, by its pattern if it has one, else by factors, with a variable for each max, min and abs.
 
     Args:
-        cases: the variations the design must withstand; by default the nominal design alone.
-        elastic: keep every constraint as a row that can be relaxed.
-        damping_ratio: fix the damping ratio at 1 (real roots only) or −1; the recheck decides whether it is met.
-        lead: sign of a0, if the NLP shall reach a0 = 0.
+        cases: the variations that the design must withstand; by default only the nominal design.
+        elastic: keep every constraint as a row, so that it can be relaxed.
+        damping_ratio: fix the damping ratio at 1 (all roots real and negative) or −1 (a positive real root). The
+            recheck tests whether the solution has it.
+        lead: sign of a0 in an NLP whose feasible set includes a0 = 0; 0 otherwise.
     """
     matched = formulate_matching(problem, cases=cases) if problem.pattern else None
-    nlp = matched or formulate_abscissa(problem, cases, elastic, damping_ratio, lead)
+    nlp = matched or formulate_by_factors(problem, cases, elastic, damping_ratio, lead)
     return epigraph_form(nlp, needs_two_sided_bounds(problem))
 
 
-def formulate_abscissa(
+def formulate_by_factors(
     problem: Posed,
     cases: Sequence[Case] = (),
     elastic: bool = False,
     damping_ratio: float | None = None,
     lead: int = 0,
 ) -> NLP:
-    """Optimise the objective with every root quantity expressed by factors, in every case."""
+    """Optimise the objective, with every root quantity expressed by factors in every case."""
     build = Builder(problem, cases, lead=lead)
     if damping_ratio == 1 or (damping_ratio is None and not elastic and demands_heavy_damping(problem)):
         build.require_real_roots()
@@ -102,8 +107,9 @@ def formulate_abscissa(
 def formulate_matching(problem: Posed, pattern: Pattern | None = None, cases: Sequence[Case] = ()) -> NLP:
     """Match coefficients with a pattern: a_k = a0 · c_k(unknowns).
 
-    A square system has the equations alone. An under-determined one also minimises the objective, or the distance to
-    the start relative to the box. An over-determined one minimises the squared mismatch.
+    If there are as many equations as unknowns, the NLP has no objective. With fewer equations it minimises the
+    objective of the problem, or without one the distance to the start in widths of the ranges. With more equations it
+    minimises the sum of the squared mismatches.
     """
     pattern = pattern or problem.pattern
     if pattern is None:
@@ -111,25 +117,25 @@ def formulate_matching(problem: Posed, pattern: Pattern | None = None, cases: Se
     build = Builder(problem, cases)
     build.add_pattern(pattern)
     build.add_constraints()
-    left = degrees_of_freedom(problem).count
-    if problem.objective is not None and left >= 0:
+    freedom = degrees_of_freedom(problem).count
+    if problem.objective is not None and freedom >= 0:
         build.add_objective()
-    elif left > 0:
+    elif freedom > 0:
         build.minimise_distance(default_start(problem))
     return build.finish("matching")
 
 
 def variables_of(problem: Posed, design: Mapping[str, float]) -> list[float]:
     """The values of the free parameters as the first variables of the NLP."""
-    of = problem.parameter_set
-    return [float(np.tan(design[n])) if of[n].tangent else float(design[n]) for n in problem.free]
+    parameters = problem.parameter_set
+    return [float(np.tan(design[n])) if parameters[n].tangent else float(design[n]) for n in problem.free]
 
 
 def design_of(problem: Posed, x: Sequence[float]) -> dict[str, float]:
     """The free parameters from the variables of the NLP, clipped to their ranges."""
-    of = problem.parameter_set
-    plain = {n: float(np.arctan(v)) if of[n].tangent else float(v) for n, v in zip(problem.free, x, strict=False)}
-    return {n: min(max(v, problem.free[n][0]), problem.free[n][1]) for n, v in plain.items()}
+    parameters, pairs = problem.parameter_set, zip(problem.free, x, strict=False)
+    values = {n: float(np.arctan(v)) if parameters[n].tangent else float(v) for n, v in pairs}
+    return {n: min(max(v, problem.free[n][0]), problem.free[n][1]) for n, v in values.items()}
 
 
 def default_start(problem: Posed) -> dict[str, float]:
@@ -141,20 +147,20 @@ class Builder:
     """Collects the variables and rows of one NLP.
 
     Args:
-        lifts: root quantity → the function that expresses it by variables; by default by factors.
-        lead: sign of a0 in an NLP that reaches a0 = 0.
+        lift_functions: root quantity → the function that adds it to the NLP; by default as factors.
+        lead: sign of a0 in an NLP whose feasible set includes a0 = 0; 0 otherwise.
     """
 
     def __init__(
         self,
         problem: Posed,
         cases: Sequence[Case],
-        lifts: Mapping[str, LiftFunction] | None = None,
+        lift_functions: Mapping[str, LiftFunction] | None = None,
         lead: int = 0,
     ) -> None:
         self.problem, self.lead = problem, lead
         self.numbers = numbers_of(problem)
-        self.lift_functions = _LIFT_FUNCTIONS if lifts is None else lifts
+        self.lift_functions = _LIFT_FUNCTIONS if lift_functions is None else lift_functions
         self.cases = tuple(cases)
         self.names: list[str] = []
         self.x: list[Any] = []
@@ -168,21 +174,22 @@ class Builder:
         self.objective: Any = 0
         self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
         nominal = problem.ordered({**self.design, **{n: symbol(n) for n in problem.fixed if n in self.numbers}})
-        directed = [k for k, case in enumerate(self.cases, start=1) if case.direction]
-        radius = self.variable(RADIUS, 0.0) if directed else constant(0)
+        # Cases with a direction belong to a limit on the robustness radius; those with an edge end on a boundary.
+        radius_cases = [k for k, case in enumerate(self.cases, start=1) if case.direction]
+        radius = self.variable(RADIUS, 0.0) if radius_cases else constant(0)
         edges = {k: case.edge for k, case in enumerate(self.cases, start=1) if case.edge}
         displacements = {k: {n: self.variable(f"{n}.{k}") for n in self.cases[k - 1].direction} for k in edges}
-        moved = [
-            replace(case, direction=displacements.get(k, case.direction)) for k, case in enumerate(self.cases, start=1)
-        ]
-        varied = [case.applied(nominal, radius, problem.weights) for case in moved]
-        self.values = [self.derive_values(k, parameters) for k, parameters in enumerate([nominal, *varied])]
+        parameters = [nominal]
+        for k, case in enumerate(self.cases, start=1):
+            displaced = replace(case, direction=displacements.get(k, case.direction))
+            parameters.append(displaced.applied(nominal, radius, problem.weights))
+        self.values = [self.derive_values(k, each) for k, each in enumerate(parameters)]
         self.scale = scale_of(problem)
         self.a = self.polynomial(0)
         self.covered_cases = [k for k, case in enumerate(self.cases, start=1) if not case.direction] or [0]
-        if directed:
+        if radius_cases:
             self.lifts.append(lift_displacements(problem.weights, displacements))
-            self.lifts.append(lift_radius(self, [k for k in directed if k not in displacements]))
+            self.lifts.append(lift_radius(self, [k for k in radius_cases if k not in displacements]))
             self.quantities[RADIUS] = radius
         if displacements:
             numeric_inputs = partial(_numeric_inputs, problem)
@@ -197,7 +204,7 @@ class Builder:
         return self.scale.lead
 
     def polynomial(self, case: int) -> list[Any]:
-        """Scaled coefficients in one case, for which roots and leading coefficients are near 1."""
+        """Coefficients in one case, scaled so that the roots and the leading coefficient are near 1."""
         return self.scale.scale_coefficients(self.values[case].coefficients)
 
     @property
@@ -206,9 +213,9 @@ class Builder:
 
     def derive_values(self, case: int, parameters: Mapping[str, Any]) -> Values:
         """The quantities of the design in one case."""
-        of = self.problem.parameter_set
-        lift = partial(self._lift, case)
-        return Values(self.problem.model, of, parameters, extra=(*ROOT_QUANTITIES, NO_RADIUS), lift=lift)
+        problem, lift = self.problem, partial(self._lift, case)
+        extra = (*ROOT_QUANTITIES, NO_RADIUS)
+        return Values(problem.model, problem.parameter_set, parameters, extra=extra, lift=lift)
 
     def variable(self, name: str, lower: float = -np.inf, upper: float = np.inf) -> Any:
         self.names.append(name)
@@ -226,29 +233,29 @@ class Builder:
         self.rows.append((name, constant(expression), lower, upper))
 
     def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
-        """Equate coefficient lists; the leading coefficients agree by construction."""
+        """Equate two lists of coefficients except the leading ones, which agree by construction."""
         for a, b in zip(left[1:], right[1:], strict=True):
             self.row(name, a - b, 0.0, 0.0)
 
     def require_real_roots(self) -> None:
         """Require real roots in every case."""
         expressions = (self.problem.objective, *self.problem.conditions.values())
-        line = any("abscissa" in expression.names for expression in expressions if expression)
-        lifted = lift_real_roots(self, line)
+        has_abscissa = any("abscissa" in expression.names for expression in expressions if expression)
+        lifted = lift_real_roots(self, has_abscissa)
         self.lifts.append(lifted.lift)
         self.fix_quantity("damping_ratio", 1.0)
         self.fix_quantity(ANGULAR_FREQUENCY, 0.0)
-        if line:
+        if has_abscissa:
             self.contacts["abscissa"] = lifted.contacts
             self.quantities["abscissa"] = lifted.symbol
 
     def fix_quantity(self, name: str, value: float) -> None:
-        """Replace a root quantity by a number. Constraints on it alone are dropped; the recheck tests them."""
+        """Replace a root quantity by a number. Constraints on this quantity alone are left to the recheck."""
         self.quantities[name] = constant(value)
         self.fixed_quantities.add(name)
 
     def add_constraints(self, without: Collection[str] = ()) -> None:
-        """Add a row for each constraint in each case in which it differs."""
+        """Add a row for each constraint, or a row for each case if the constraint depends on the case."""
         for name, condition in self.problem.conditions.items():
             if name in without:
                 continue
@@ -259,7 +266,7 @@ class Builder:
                 self.row(name, value, *condition.allowed)
 
     def add_objective(self) -> None:
-        """Add the objective; if it differs between cases, the worst of them."""
+        """Add the objective; if it depends on the case, its worst value over the cases."""
         expression = self.problem.objective
         if expression is None:
             return
@@ -274,7 +281,7 @@ class Builder:
                 self.row("objective", value - self.objective, -np.inf, 0.0)
 
     def evaluate_cases(self, expression: Expression, limit: Any = None) -> list[Any]:
-        """The expression in every case in which it differs, else in the nominal one; `limit`: minus the limit."""
+        """The expression in each covered case if it depends on the case, else in the nominal one; less a limit."""
         cases = self.covered_cases if depends_on_case(self.problem, expression, self.cases) else [0]
         each = [self.values[k] for k in cases]
         return [expression(v) if limit is None else expression.difference(v, limit) for v in each]
@@ -328,12 +335,12 @@ class Builder:
         Raises:
             NotAccepted: for an operation that interval arithmetic lacks.
         """
-        enclose = {variable_name(k): ball(ends) for k, ends in enumerate(self.bounds)}
+        ranges = {variable_name(k): ball(ends) for k, ends in enumerate(self.bounds)}
         numbers = {n: INTERVALS.constant(decimal(x)) for n, x in self.numbers.items()}
-        return [interval(x) for x in fold(formula(expressions), enclose | numbers, INTERVALS)]
+        return [interval(x) for x in fold(formula(expressions), ranges | numbers, INTERVALS)]
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:
-        """A quantity as a variable, bounded by factors or by its division-free equation."""
+        """A variable for a quantity that has factors or an equation without division; None if its formula is used."""
         name = quantity.name
         if name in self.quantities:
             return self.quantities[name]
@@ -365,13 +372,12 @@ _LIFT_FUNCTIONS: Mapping[str, LiftFunction] = {
 
 
 def _numeric_inputs(problem: Posed, values: Values) -> dict[str, float]:
-    """The first variables of a numeric design and the fixed numbers, by their names in formulas."""
-    own = {variable_name(k): x for k, x in enumerate(variables_of(problem, values))}
-    return {**own, **{n: float(values[n]) for n in problem.fixed}}
+    """Name in the formulas → value of each free parameter of a design and of each fixed parameter."""
+    free = {variable_name(k): x for k, x in enumerate(variables_of(problem, values))}
+    return {**free, **{n: float(values[n]) for n in problem.fixed}}
 
 
 def numbers_of(problem: Posed) -> Mapping[str, float]:
-    """Numbers that a program takes as parameters: fixed values and limits. A 0 is built in as a constant instead."""
+    """Numbers that an NLP takes as parameters: fixed values and limits. A 0 is a constant of the formulas instead."""
     limits = {name + LIMIT: limit_value(text) for name, text in problem.constraints.items()}
-    every = {**problem.fixed, **limits}
-    return Table({name: float(x) for name, x in every.items() if x})
+    return Table({name: float(x) for name, x in {**problem.fixed, **limits}.items() if x})

@@ -57,7 +57,11 @@ def eigenvector_verdict(problem: Posed, design: ExactDesign, found: ProvedDesign
     at = pencil(of.native(found.parameters))
     roots = [flint.acb(z.re, z.im) for f in repeated for z in factor_roots(f) or ()]
     one = bool(roots) and all(has_one_eigenvector(at, s) for s in roots)
-    words = "one eigenvector: a minor of the matrices is not 0, in balls" if one else "every minor may be 0"
+    words = (
+        "one eigenvector, because a minor of the matrix is not 0 (interval arithmetic)"
+        if one
+        else "every minor may be 0"
+    )
     return (1 if one else None), Verdict(True if one else None, words)
 
 
@@ -72,9 +76,11 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
         one, right, left, below = "an eigenfrequency", "above the real axis", "below the real axis", "below the axis"
     if factorisation.stable:
         every = "all eigenfrequencies" if of_H else "all roots"
-        return Verdict(True, f"{every} are {left} (Routh–Hurwitz signs in balls)")
+        return Verdict(True, f"{every} are {left} (signs of Routh–Hurwitz expressions, by interval arithmetic)")
     if factorisation.stable is None:
-        return Verdict(None, "a Routh–Hurwitz expression may be 0; ask for more digits")
+        return Verdict(
+            None, "a Routh–Hurwitz expression is 0 up to its error: more --digits decide unless it is exactly 0"
+        )
     roots = factorisation.roots or ()
     axis = [z for z in roots if z.re == 0]
     if not axis or any(z.re > 0 for z in roots):
@@ -87,7 +93,7 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
 def heavy_damping_verdict(factorisation: Factorisation) -> Verdict:
     """Whether all roots are real and negative, and whether strictly."""
     if factorisation.heavily_damped is None:
-        return Verdict(None, "some roots may be real or complex; ask for more digits")
+        return Verdict(None, "some roots may be real or complex: more --digits decide unless they coincide")
     if not factorisation.heavily_damped:
         return Verdict(False, "a root is complex" if factorisation.stable else "a root is not negative")
     if any(multiplicity > 1 for _, multiplicity in factorisation.factors) or factorisation.roots is None:
@@ -142,11 +148,11 @@ def limit_verdicts(problem: Posed, found: ProvedDesign) -> dict[str, str]:
 def _equality_verdict(difference: Any, equations: bool) -> str:
     if difference == 0 or (equations and difference.contains(0)):
         return "met"
-    off = "cannot be told" if not difference.is_finite() else f"met but for {abs(float(difference.mid())):.1e}"
+    off = "not decided" if not difference.is_finite() else f"met but for {abs(float(difference.mid())):.1e}"
     return off if abs(difference) <= BINDS or not difference.is_finite() else "violated"
 
 
 def _inequality_verdict(room: Any) -> str:
     if abs(room) <= BINDS:
         return "binds"
-    return "met" if room > 0 else "violated" if room < 0 else "cannot be told"
+    return "met" if room > 0 else "violated" if room < 0 else "not decided"

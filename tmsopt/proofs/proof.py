@@ -84,7 +84,7 @@ class Proof(Printable):
         stable: whether all roots lie left of the imaginary axis.
         heavily_damped: whether all roots are real and negative.
         inside: whether the proved design lies in the problem's box.
-        limits: inequality of the problem → ``met``, ``violated``, ``binds`` or ``cannot be told``, at this design.
+        limits: inequality of the problem → ``met``, ``violated``, ``binds`` or ``not decided``, at this design.
         seconds: time used.
         problem: the problem of the design.
 

@@ -11,15 +11,15 @@ from tmsopt.algebra.rounding import Bounded
 from tmsopt.records import Array
 from tmsopt.roots.polynomial import Coefficients, determinant
 
-_LARGEST_CLOSED = 4
-"""Highest degree for the Liénard–Chipart conditions; above it, Routh's scheme takes fewer operations."""
+_MAX_LIENARD_CHIPART_DEGREE = 4
+"""Highest degree for which the Liénard–Chipart conditions are used; above it, Routh's scheme takes fewer operations."""
 
 
 def hurwitz_minors(coefficients: Coefficients) -> list[Any]:
     """Leading principal minors Δ1 … Δn of the Hurwitz matrix of a polynomial of degree n, for numbers of any kind.
 
     Example:
-        >>> tmsopt.roots.hurwitz_minors([1, 2, 3, 4])  # a1, a1 a2 - a0 a3, a3 times that
+        >>> tmsopt.roots.hurwitz_minors([1, 2, 3, 4])  # a1, a1 a2 - a0 a3, a3 (a1 a2 - a0 a3)
         [2, 2, 8]
 
     More: docs/explanation/factors.md
@@ -32,11 +32,11 @@ def _hurwitz_minor(coefficients: Coefficients, m: int) -> Any:
     match m, list(coefficients):
         case 1, [_, a1, *_]:
             return a1
-        case 2, [a0, a1, a2, *more]:
-            return a1 * a2 - more[0] * a0 if more else a1 * a2
-        case 3, [a0, a1, a2, a3, *more]:  # often computed, so with few products
-            minor = a1 * (a2 * a3 - more[0] * a1 if more else a2 * a3) - a3 * (a0 * a3)
-            return minor + more[1] * (a0 * a1) if more[1:] else minor
+        case 2, [a0, a1, a2, *higher]:
+            return a1 * a2 - higher[0] * a0 if higher else a1 * a2
+        case 3, [a0, a1, a2, a3, *higher]:  # computed often, therefore written with few products
+            minor = a1 * (a2 * a3 - higher[0] * a1 if higher else a2 * a3) - a3 * (a0 * a3)
+            return minor + higher[1] * (a0 * a1) if higher[1:] else minor
 
     def entry(i: int, j: int) -> list[Any]:
         k = 2 * (j + 1) - (i + 1)
@@ -63,8 +63,9 @@ def lienard_chipart(coefficients: Coefficients) -> list[Any]:
 def routh(coefficients: Coefficients) -> list[Any]:
     """First column of Routh's scheme after a0: all positive if and only if every root has Re s < 0, given a0 > 0.
 
-    The numbers must allow division: floats, arrays, fractions or balls. Routh's scheme takes fewer operations than
-    `lienard_chipart`, which needs no division. Entries after a 0 have no meaning.
+    The numbers must allow division: floats, arrays, fractions or balls (intervals with a midpoint and a radius).
+    Routh's scheme takes fewer operations than `lienard_chipart`, which needs no division. Entries after a 0 have no
+    meaning.
 
     Example:
         >>> tmsopt.roots.routh([1.0, 2.0, 3.0, 4.0])
@@ -76,7 +77,7 @@ def routh(coefficients: Coefficients) -> list[Any]:
 
 
 def _iterate_routh(coefficients: Coefficients) -> Iterator[Any]:
-    """Yield the entries of `routh` one by one, each before it becomes a divisor."""
+    """Yield the entries of `routh` one by one, so that the caller can stop before a division by 0."""
     above, row = list(coefficients[0::2]), list(coefficients[1::2])
     while row:
         yield row[0]
@@ -91,8 +92,8 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     A polynomial with a leading coefficient 0 has a root at infinity and counts as unstable.
 
     Args:
-        exact: above degree 4, whether exact arithmetic decides, from the coefficients as stored, where rounding could
-            change a sign; about 0.1 ms each. Up to degree 4 the signs of the rounded conditions decide.
+        exact: whether exact arithmetic decides if rounding errors could change a sign, in about 0.1 ms a polynomial;
+            the given doubles count as exact. Only for degrees above 4: up to 4, the conditions in doubles decide.
 
     Raises:
         ValueError: for fewer than two coefficients.
@@ -107,7 +108,7 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     if c.ndim == 0 or c.shape[-1] < 2:
         raise ValueError(f"is_stable needs two or more coefficients, descending; found shape {c.shape}")
     sign = np.sign(c[..., 0])
-    if c.shape[-1] - 1 > _LARGEST_CLOSED:
+    if c.shape[-1] - 1 > _MAX_LIENARD_CHIPART_DEGREE:
         return _is_stable_by_routh(sign[..., None] * c, exact)
     normalised = [sign * c[..., k] for k in range(c.shape[-1])]
     stable = sign != 0
@@ -138,9 +139,9 @@ def _is_stable_by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
 def discriminant(coefficients: Coefficients) -> Any:
     """Discriminant of a polynomial of degree 2 or more, zero if and only if two roots coincide; numbers of any kind.
 
-    For a quartic it is (4 I³ − J²)/27 with the invariants I and J, and keeps its sign across the sets 2EP2 and CEP2,
-    where a squared factor is 0. From degree 5 it is the Bézout determinant of p′ and n p − s p′, divided by n^(n−2);
-    this takes n 2ⁿ products and no other division.
+    For a quartic it is (4 I³ − J²)/27 with the invariants I and J, and does not change sign at the sets 2EP2
+    and CEP2, where it has a squared factor. From degree 5 it is the Bézout determinant of p′ and n p − s p′, divided by
+    n^(n−2); this takes n 2ⁿ products, and this division is the only one.
 
     Raises:
         ValueError: for degree 0 or 1.
@@ -167,16 +168,16 @@ def discriminant(coefficients: Coefficients) -> Any:
 
 def _bezout_discriminant(c: Coefficients) -> Any:
     n = len(c) - 1
-    slope = [(n - k) * c[k] for k in range(n)][::-1]  # ascending, as in Bézout's matrix
-    other = [(k + 1) * c[k + 1] for k in range(n)][::-1]
+    derivative = [(n - k) * c[k] for k in range(n)][::-1]  # ascending, as in Bézout's matrix
+    remainder = [(k + 1) * c[k + 1] for k in range(n)][::-1]
 
     def entry(i: int, j: int) -> list[Any]:
         terms = [
-            slope[i + j + 1 - k] * other[k] - slope[k] * other[i + j + 1 - k]
+            derivative[i + j + 1 - k] * remainder[k] - derivative[k] * remainder[i + j + 1 - k]
             for k in range(max(0, i + j + 2 - n), min(i, j) + 1)
         ]
         return [sum(terms[1:], terms[0])]
 
-    size = range(n - 1)
-    value = determinant([[entry(i, j) for j in size] for i in size])[0] / n ** (n - 2)
+    indices = range(n - 1)
+    value = determinant([[entry(i, j) for j in indices] for i in indices])[0] / n ** (n - 2)
     return value if n % 2 else -value

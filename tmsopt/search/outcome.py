@@ -15,7 +15,7 @@ from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.problem.solution import OtherBranch
-from tmsopt.program.formulate import formulate_abscissa, formulate_matching
+from tmsopt.program.formulate import formulate_by_factors, formulate_matching
 from tmsopt.program.ipopt import Point, relaxation_gain
 from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import choose_starts, initial_point
@@ -91,7 +91,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
     branches: tuple[OtherBranch, ...] = ()
     if counted.kind == "square":
         equations = (
-            nlp if not nlp.kinks else formulate_matching(problem) if problem.pattern else formulate_abscissa(problem)
+            nlp if not nlp.kinks else formulate_matching(problem) if problem.pattern else formulate_by_factors(problem)
         )
         branches = _find_other_branches(problem, equations, parameters)
     active = _find_active_limits(problem, nlp, trial.point)

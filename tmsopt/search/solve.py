@@ -266,21 +266,23 @@ def _describe_sides(problem: Posed, found: Sequence[SearchedPart], best: Outcome
     won = next((state.side for state, o in found if o and o.parameters == best.parameters), None)
     if len(found) == 1 or won is None or best.status != "optimal":
         return ()
-    sentences = [f"both signs were searched: {won} wins"]
+    sentences = [f"both signs of the tilt were searched: {won} is better"]
     for state, outcome in found:
         if state.side == won:
             continue
         if outcome is None or outcome.checked.violations:
             stable = "stable and " if problem.asks_radius else ""
-            sentences.append(f"with {state.side} nothing {stable}feasible was found")
+            sentences.append(f"no {stable}feasible design with {state.side} was found")
         elif problem.objective is None:
             sentences.append(f"{state.side} has a solution too")
         elif same_objective(outcome.checked.objective, best.checked.objective, objective_size(problem)):
-            return (f"both signs were searched: {state.side} is as good as {won}",)
+            return (f"both signs of the tilt were searched: {state.side} is as good as {won}",)
         else:
-            which = "the best" if outcome.status == "optimal" else "what was found"
+            which = "the best design" if outcome.status == "optimal" else "the design found"
             unit = unit_at(problem, problem.minimize or problem.maximize or "", outcome.parameters)
-            sentences.append(f"{which} with {state.side} is {unit.show(outcome.checked.objective, 6)}")
+            sentences.append(
+                f"{which} with {state.side} has {problem.goal} = {unit.show(outcome.checked.objective, 6)}"
+            )
     return ("; ".join(sentences),)
 
 

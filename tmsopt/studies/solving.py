@@ -167,7 +167,7 @@ def _cause(solution: Solution) -> str:
     """Why a solution is not optimal, or what the stored doubles miss."""
     if solution.status == "optimal":
         amounts = amounts_text(solution.problem.posed, solution.missed)
-        return f"as stored in doubles, misses {amounts}" if amounts else ""
+        return f"rounded to doubles, violates {amounts}" if amounts else ""
     violated = amounts_text(solution.problem.posed, solution.violations)
     conflict = solution.relaxation.conflict if solution.relaxation else ()
     causes = [

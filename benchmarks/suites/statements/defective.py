@@ -25,7 +25,7 @@ def _none(answer: Answer) -> str:
     text = answer.stdout
     if "none found" not in text and "infeasible" not in text:
         return f"headline: {text.splitlines()[1]}"
-    told = "meet in one" not in text or "not an EP" in text
+    told = "coincide" not in text or "not an EP" in text
     return "" if told else "it does not say what the crossing is"
 
 

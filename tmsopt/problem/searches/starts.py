@@ -71,14 +71,14 @@ class Starts:
 
         Example:
             >>> tmsopt.Starts(tried=64, converged=64, at_best=1, optima=30, runs=64).sureness
-            ('found by 1 of 64 starts', 'a better one is likely')
+            ('found from 1 of 64 starts', 'a better design is likely')
 
         More: docs/explanation/proofs.md
         """
         if not self.tried:
             return ()
-        by = f"found by {self.at_best} of {self.tried} start{'' if self.tried == 1 else 's'}"
+        by = f"found from {self.at_best} of {self.tried} start{'' if self.tried == 1 else 's'}"
         if self.at_best and self.suffice():
             return (by,)
         likely = self.at_best == 1 and not expects_few_better(self.converged, self.optima, _LIKELY)
-        return by, f"a better one is {'likely' if likely else 'possible'}"
+        return by, f"a better design is {'likely' if likely else 'possible'}"

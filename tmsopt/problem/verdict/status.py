@@ -20,9 +20,8 @@ def describe_status(solution: "Solution") -> str:
     problem, bound, status = solution.problem, solution.bound, solution.status
     if solution.interrupted and status != "optimal":
         return "stopped before the end, the best design so far"
-    proved = ", proved" if bound.proven else ""
     if status == "infeasible":
-        return f"infeasible{'' if problem.free else ' as given'}{proved}"
+        return f"infeasible{'' if problem.free else ' as given'}{' (proved)' if bound.proven else ''}"
     if solution.without_best:
         return "no best design exists"
     if status != "optimal":
@@ -30,7 +29,8 @@ def describe_status(solution: "Solution") -> str:
     if problem.posed.objective is None or not problem.free:
         return "found" if problem.free else "as given"
     unproved = "stopped before it was proved" if solution.interrupted else "not proved"
-    return ", ".join(["optimal", *(["proved"] if bound.proven else [*solution.starts.sureness, unproved])])
+    known = ["proved"] if bound.proven else [*solution.starts.sureness, unproved]
+    return f"optimal ({', '.join(known)})"
 
 
 def describe_verdict(solution: "Solution") -> str:
@@ -40,8 +40,10 @@ def describe_verdict(solution: "Solution") -> str:
     if located_none or (solution.status == "infeasible" and known is not False):
         return ""
     limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
-    none = f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
-    others = none if known is False else "" if solution.interrupted else "no stable design found, not proved"
+    limits = " and satisfies the constraints" if limited else ""
+    none = f"no design within the ranges is stable{limits} (proved)"
+    unknown = "" if solution.interrupted else "no stable design was found, but not proved that none exists"
+    others = none if known is False else unknown
     sought = solution.stability_sought and not known
     if found.verdict != UNSTABLE:
         model = problem.model
@@ -50,8 +52,8 @@ def describe_verdict(solution: "Solution") -> str:
         )
         return f"{words}; {others}" if found.on_edge and sought and others else words
     if known:
-        return "not stable, though there are stable designs in the box"
-    return others if known is False or (sought and others) else "not stable"
+        return "not stable, although some designs within the ranges are stable"
+    return f"not stable: {others}" if known is False or (sought and others) else "not stable"
 
 
 class NotSolved(RuntimeError):

@@ -58,7 +58,7 @@ def complex_name(name: str) -> str:
 
 def as_complex_pattern(real: Pattern) -> Pattern:
     """A pattern of the real system as a pattern of H."""
-    words = real.meaning.replace(" on one vertical line", " with one decay rate")
+    words = real.meaning.replace(" on one vertical line", " that share one decay rate")
     words = words.replace("complex double", "double complex")
     words = re.sub(r"(complex )?pair(s?)", lambda m: "eigenfrequencies" if m[2] else "eigenfrequency", words)
     return replace(real, name=complex_name(real.name), meaning=words, marks={}, doubles=real.form)
@@ -83,7 +83,7 @@ def describe_complex_structure(structure: str, size: int, gain: bool = False) ->
         order = int(match[1])
         most = " of most gain" if gain and order != size else ""
         which = select_in_words(order, size, "" if gain else "least damped")
-        return f"{which} eigenfrequencies{most} meet in one ({structure})"
+        return f"{which} eigenfrequencies{most} coincide ({structure})"
     each = join_in_words([_describe_part(part) for part in structure.split("+")])
     return f"{each} have one {'gain' if gain else 'decay rate'} ({structure})"
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from tmsopt.roots.patterns.components import NUMBERS, count_in_words, multiplicity_in_words
 
 STRUCTURES = {
-    "EP4": "four roots meet in one (EP4)",
+    "EP4": "four roots coincide (EP4)",
     "2EP2": "the roots meet two by two in two real ones (2EP2)",
     "EP2": "the two rightmost roots meet in a real one (EP2)",
     "pair": "one complex pair is rightmost (pair)",
@@ -28,10 +28,10 @@ def describe_structure(structure: str, degree: int = 4) -> str:
     only = parts[0] if len(parts) == 1 else None
     if only and only["kind"] == "EP" and not only["count"]:
         order = int(only["order"])
-        return f"{select_in_words(order, degree, 'rightmost')} roots meet in one ({structure})"
+        return f"{select_in_words(order, degree, 'rightmost')} roots coincide ({structure})"
     if only and only["kind"] == "CEP" and not only["count"]:
-        return f"{NUMBERS[int(only['order'])]} complex pairs meet in one ({structure})"
-    return f"{join_in_words([_describe_part(part) for part in parts if part])} have one decay rate ({structure})"
+        return f"{NUMBERS[int(only['order'])]} complex pairs coincide ({structure})"
+    return f"{join_in_words([_describe_part(part) for part in parts if part])} share one decay rate ({structure})"
 
 
 def select_in_words(order: int, degree: int, which: str) -> str:
