@@ -208,7 +208,7 @@ def test_what_is_to_be_built_is_on_the_screen_however_crowded_it_is():
     assert len(told) <= 36
     for name in (*design.problem.free, "fixed: w = "):
         assert sum(line.lstrip().startswith(name) or f"  {name}  " in line for line in told) >= 1, name
-    assert any("both signs were searched" in line for line in told)
+    assert any("both signs of the tilt" in line for line in told)
 
 
 @pytest.mark.slow

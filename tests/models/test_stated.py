@@ -425,7 +425,7 @@ product = "m*a >= 1"
     assert design.abscissa == pytest.approx(-4, abs=1e-9)
     result = command("solve", file)
     assert result.exit_code == 0
-    assert "robustness: 100 % of change makes it diverge" in result.output
+    assert "robustness: a change of 100 % makes it unstable (divergence)" in result.output
     assert command("prove", file).exit_code == 0
 
 

@@ -194,14 +194,14 @@ locate = "CEP2"
         sorted([meeting(0.3, 1.2)[0], -meeting(0.3, 1.2)[0]]), abs=1e-11
     )
     text = CliRunner().invoke(main, ["solve", str(file), "--all"]).output
-    assert "locate CEP2: these are all: 2 solutions in the box (proved; " in text
+    assert "locate CEP2: 2 solutions in the box, no other exists (proved; " in text
     assert data["completeness"]["complete"]
     assert (data["complete"], data["undecided"]) == (True, 0)
     assert [s["proved"] for s in data["solutions"]] == [True, True]
     assert data["coverage"] is None
     text = CliRunner().invoke(main, ["solve", str(file), "--all", "--seconds", "0.001"]).output
     assert "locate CEP2: 2 solutions in the box" in text
-    assert "proof that these are all: none, time limit reached" in text
+    assert "no proof that these are all: time limit reached" in text
     assert "undecided: c1 -2 … 2, c2 -2 … 2" in text
     assert "95 % confidence; no proof" in text
     data = json.loads(CliRunner().invoke(main, ["solve", str(file), "--all", "--json", "--seconds", "0.001"]).stdout)
