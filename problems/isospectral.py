@@ -1,7 +1,7 @@
-"""Which bicycles have the same four roots, all at s = -1? A study of one family, isospectral and yet all different.
+"""Which bicycles have the same four roots, all at s = -1? A study of one family of bicycles with the same roots.
 
-The paper's optimised benchmark is one of them. Each row takes other heights of the two masses, solves for the bicycle
-whose roots all meet at -1, and sets its mass ratio beside the closed form `tmsopt.laws.ep4`.
+The paper's optimised benchmark is one of these bicycles. Each row has other heights of the two masses. It solves for
+the bicycle whose four roots coincide at -1, and compares its mass ratio with the closed form `tmsopt.laws.ep4`.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ problem = tmsopt.load("problems/optimised_benchmark.toml")
 
 print("zeta_B  zeta_H  chi_B     mu (solved)       mu (law)          tilt/deg  Fr        ballast  abscissa")
 for zeta_B, zeta_H in [(-0.4, -0.2), (-0.4, -0.3), (-0.6, -0.3), (-0.8, -0.4), (-1.0, -0.5), (-1.158, -0.526)]:
-    # The same question of another bicycle: four conditions for the four parameters that are free.
+    # The same problem for another bicycle: four conditions for four free parameters.
     heights = {"zeta_B": zeta_B, "zeta_H": zeta_H}
     design = tmsopt.solve(replace(problem, fixed={**problem.fixed, **heights}))
 

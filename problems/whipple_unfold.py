@@ -1,13 +1,14 @@
-"""How the EP4 of the two-mass-skate bicycle unfolds when it is given wheels and trail, and how it is tuned back.
+"""How does the EP4 of the two-mass-skate bicycle separate if the bicycle gets wheels and trail? How can you restore it?
 
-A mass at a wheel contact has no part in the lateral motion, so wheels can grow from points: radius 0.3 m times eps, a
-hoop of 1 kg each, and a trail of 50 mm times eps. At eps = 0 that is the bicycle of ep4.toml for a frame of 10 kg. A
-4-fold root r leaves as s = r + (kappa^4 eps)^(1/4), with kappa^4 = -p'(r)/a0, p' the derivative by eps: along the axes
-and to the right where kappa^4 > 0, as from trail, on the diagonals where it is negative, as from wheels. A trail of
-1.65 wheel radii holds p(r) to first order, and three roots leave as eps^(1/3). With speed, frame and tilt tuned again
-the EP4 is there at every eps up to wheels of 90 mm, and from 30 mm on the bicycle stands on both of them.
+A mass at a wheel contact has no effect on the lateral motion, so wheels can grow from points. Their radius is 0.3 m
+times eps, and each is a hoop of 1 kg. The trail is 50 mm times eps. At eps = 0 this is the bicycle of ep4.toml for a
+frame of 10 kg. A 4-fold root r moves to s = r + (kappa^4 eps)^(1/4), with kappa^4 = -p'(r)/a0, where p' is the
+derivative by eps. If kappa^4 > 0, as for trail, the roots move along the axes, and one of them to the right. If
+kappa^4 < 0, as for wheels, they move along the diagonals. With a trail of 1.65 wheel radii, p(r) does not change to
+first order, and three roots move as eps^(1/3). If speed, frame and tilt are tuned again, the EP4 exists at every eps
+up to wheels with a radius of 90 mm. With a radius of 30 mm or more the bicycle stands on both wheels.
 
-Run it with the name of a figure to draw: python problems/whipple_unfold.py whipple_unfold.png
+To draw the figure, give its name: python problems/whipple_unfold.py whipple_unfold.png
 """
 
 import sys

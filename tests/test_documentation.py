@@ -265,7 +265,7 @@ def test_the_first_python_example_runs(monkeypatch):
     ("line", "constants"),
     [
         ("problem, study and bicycle files", "files.LARGEST problem.toml.MOST_DEEP problem.toml.MOST_PARTS"),
-        ("faults that are listed", "errors.LISTED"),
+        ("errors that are listed", "errors.LISTED"),
         (
             "expressions",
             "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE",
@@ -276,7 +276,7 @@ def test_the_first_python_example_runs(monkeypatch):
             "CSV files of rows",
             "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS",
         ),
-        ("a store that is received", "files.LARGEST_JSON studies.store.LARGEST"),
+        ("a store from another person", "files.LARGEST_JSON studies.store.LARGEST"),
         ("a chart", "charts.survey.MOST charts.survey.MOST_TILES"),
     ],
 )

@@ -21,8 +21,8 @@ EXAMPLES = ROOT / "build" / "examples"
 _HEAD = """Gallery
 =======
 
-Every problem that comes with tmsopt, solved when this page was made: the file, the answer, its picture, and its
-explorer.
+This gallery shows every problem that comes with tmsopt: the problem file, the answer, its picture, and the explorer. The
+problems were solved when this page was made.
 """
 
 _ASKED = {
