@@ -21,7 +21,7 @@ EXAMPLES = ROOT / "build" / "examples"
 _HEAD = """Gallery
 =======
 
-This gallery shows every problem that comes with tmsopt: the problem file, the answer, its picture, and the explorer. The
+This gallery shows every problem that comes with tmsopt: its file, its answer, its picture and the explorer. The
 problems were solved when this page was made.
 """
 

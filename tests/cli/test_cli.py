@@ -76,7 +76,7 @@ def test_table_of_solve_shows_both_scales(run):
     assert "1.4142  " in out  # chi_B
     assert "x_B = 2.8284 m" in out  # chi_B w
     assert "23.53 deg" in out  # the tilt, atan(15/4 - 75 sqrt(2)/32) = 23.5300893
-    assert "optimal, proved" in out
+    assert "optimal (proved)" in out
 
 
 def test_benchmark_prints_the_published_critical_speed(run):

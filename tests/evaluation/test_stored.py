@@ -87,8 +87,8 @@ def test_the_headline_has_the_abscissa_of_the_doubles_too():
     found = tmsopt.solve("problems/ep4.toml")
     assert abs(found.abscissa_realised - found.abscissa) > 1e-6
     for text in (repr(found), found.report()):
-        assert f"as stored {found.abscissa_realised:.7g}" in text
-    assert "as stored" not in repr(tmsopt.solve("problems/least_speed.toml"))  # of simple roots
+        assert f"{found.abscissa_realised:.7g} in double precision" in text
+    assert "double precision" not in repr(tmsopt.solve("problems/least_speed.toml"))  # of simple roots
 
 
 def test_roots_near_a_4_fold_one_are_those_of_the_doubles():

@@ -62,7 +62,7 @@ def test_a_defective_root_on_the_axis_grows(model, fixed, growth):
     assert data["verdict"] == ("growing" if growth else "marginally stable")
     assert data.get("growth", "") == growth
     assert {r.get("growth", "") for r in data["roots"]} == {growth}
-    assert "as far as rounding tells" not in report
+    assert "up to rounding errors" not in report
     assert ("neither" in report) is not bool(growth)
     assert (f"growing as {growth}" in repr(found)) is bool(growth)
 
@@ -104,7 +104,7 @@ def test_growth_is_hedged_unless_fractions_show_it(model, at, growth, exact):
         assert lines
         assert all(("as far as" in line) is not exact for line in lines)  # the short form may end there
     moved = [line for line in report.splitlines() if line.startswith("grows as t")]
-    assert all(("as far as rounding tells" in line) is not exact for line in moved)
+    assert all(("up to rounding errors" in line) is not exact for line in moved)
 
 
 @pytest.mark.parametrize(("k", "exact"), [("1/4", True), ("1/4 + 1e-13", False), ("sqrt(2)/4*sqrt(2)/2", False)])
@@ -114,7 +114,7 @@ def test_roots_meet_as_far_as_rounding_tells(k, exact):
     assert found.structure == "EP2"
     assert found.multiple_as_rounded is not exact
     assert ("multiplicity_is_exact" in found.to_json()) is not exact
-    assert ("as far as rounding tells" in found.report(full=True)) is not exact
+    assert ("up to rounding errors" in found.report(full=True)) is not exact
 
 
 @pytest.mark.parametrize("sizes", [(1,), (3,), (2, 1), (2, 2), (3, 1), (1, 1, 1), (3, 2, 1)])

@@ -49,7 +49,7 @@ def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
             return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
         return f"none, on the edge of stability already, with {on}"
     if on_edge:
-        return "none, on the edge of stability already, as far as rounding errors allow to say"
+        return "none, on the edge of stability already, up to rounding errors"
     limit, other = found.limit, "unstable" if found.stable else "stable"
     if not limit.found:
         return f"{'' if found.stable else 'not stable; '}no change in reach of the search makes it {other}"

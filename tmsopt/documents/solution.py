@@ -348,9 +348,7 @@ def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: b
 
 def _write_roots(solution: Solution, analysis: Analysis) -> Blocks:
     if solution.multiple_as_rounded:
-        yield Sentence(
-            "roots meet as far as rounding errors allow to say; tmsopt prove tells it of the numbers as typed"
-        )
+        yield Sentence("roots coincide up to rounding errors; tmsopt prove tells it of the numbers as typed")
     for diagnosis in analysis.diagnoses:
         yield from explain_diagnosis(diagnosis, full=True)
 

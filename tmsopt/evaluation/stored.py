@@ -139,7 +139,7 @@ def abscissa_as_stored(solution: Solution) -> str:
     problem = solution.problem.posed
     unit = unit_at(problem, "abscissa", at)
     first = "" if problem.goal == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
-    return f"{first}{unit.number(realised, _SHOWN)} with the parameters rounded to doubles"
+    return f"{first}{unit.number(realised, _SHOWN)} in double precision"
 
 
 def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ STABLE, MARGINAL, GROWING, EDGE, UNSTABLE = (
 CROSSING = "diabolic point (semisimple), not an EP"
 """Name of a multiple root with as many eigenvectors as its multiplicity."""
 
-ROUNDED = ", as far as rounding errors allow to say"
+ROUNDED = ", up to rounding errors"
 """Added to a verdict that holds in doubles but was not confirmed in exact arithmetic."""
 
 _TIMES, _FAINT = 2.0, 1e-6

@@ -53,7 +53,9 @@ def describe_verdict(solution: "Solution") -> str:
         return f"{words}; {others}" if found.on_edge and sought and others else words
     if known:
         return "not stable, although some designs within the ranges are stable"
-    return f"not stable: {others}" if known is False or (sought and others) else "not stable"
+    if not (known is False or (sought and others)):
+        return "not stable"
+    return others if solution.status == "infeasible" else f"not stable: {others}"
 
 
 class NotSolved(RuntimeError):
