@@ -30,7 +30,7 @@ def write_speeds(found: Speeds, level: Level) -> Iterator[Chapter]:
     end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
     within = f" {unit.text}" if unit.text else ""
     asked = f"{unit.number(found.lower, 6)} < {found.parameter}{end}{within}"
-    answer: list[Block] = [Sentence(f"{asked}, by exact root isolation for the numbers as stored")]
+    answer: list[Block] = [Sentence(f"{asked}, by exact root isolation, with the parameters in double precision")]
     answer += [Sentence(found.problem.model.omits, "model")] if found.problem.model.omits else []
     yield Chapter("range", tuple(answer), "Answer")
     yield Chapter("speeds", (_tabulate_crossings(found, unit, real),), "Critical speeds", "wide")
