@@ -44,7 +44,7 @@ class _Line:
 
     def close(self) -> None:
         self._closed.set()
-        self.hold(0)
+        self.hold(1)
 
     def _keep_drawing(self) -> None:
         while not self._closed.wait(_NEXT):
@@ -53,7 +53,7 @@ class _Line:
     def _draw(self) -> None:
         with self._lock:
             now = time.perf_counter()
-            if now >= self._due and not self._holders and not self._closed.is_set():
+            if now >= self._due and not self._holders:
                 self._due, self._is_drawn = now + _NEXT, True
                 text = describe_progress(self._progress, now - self._since, count_columns(self._stream) - 1)
                 self._write(f"\r{text}\033[K")

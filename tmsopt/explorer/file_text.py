@@ -41,21 +41,17 @@ def _model(table: Mapping[str, Any]) -> Iterator[str]:
 
 def model_table(problem: Posed) -> dict[str, Any]:
     """The table of a model that was made in Python, with every shared part written out."""
-    said = dict(problem.model.statement or {})
-    shared, said["name"] = said.pop("shared"), problem.model.name
-    del said["parameters"]
+    said = {n: v for n, v in (problem.model.statement or {}).items() if n != "parameters"}
+    shared = said.pop("shared")
 
-    def whole(text: str) -> str:
-        return _SHARED.sub(lambda found: whole(shared[int(found[1]) - 1]), text)
-
-    def write_value(value: Any) -> Any:
+    def write(value: Any) -> Any:
         if isinstance(value, str):
-            return whole(value)
+            return _SHARED.sub(lambda found: write(shared[int(found[1]) - 1]), value)
         if isinstance(value, Mapping):
-            return {n: write_value(v) for n, v in value.items()}
-        return [write_value(v) for v in value]
+            return {n: write(v) for n, v in value.items()}
+        return [write(v) for v in value]
 
-    found = {n: v if n == "name" else write_value(v) for n, v in said.items() if v}
+    found = {n: write(v) for n, v in said.items() if v} | {"name": problem.model.name}
     return found | {n: rows[0] for n, rows in found.items() if n == "coefficients"}
 
 

@@ -44,11 +44,11 @@ def model_script(problem: Posed) -> Script:
     coefficients = coefficient_formula(model, of.name)
     quantities = tuple(q.name for q in (*model.quantities, *of.quantities))
     limits = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
-    derived = [*nodes_of(problem, dict(zip(quantities, quantities, strict=True))).values()]
-    margins = zip(limits.values(), nodes_of(problem, limits).values(), strict=True)
-    derived += [x if c.sign < 0 or c.equality else -x for c, x in margins]
+    derived = [*nodes_of(problem, {n: n for n in quantities}).values()]
+    for condition, node in zip(limits.values(), nodes_of(problem, limits).values(), strict=True):
+        derived.append(node if condition.sign < 0 or condition.equality else -node)
     entries = {n: f"x[{k}]" for k, n in enumerate(of.names)}
-    every = entries | {n: f"r[{k}]" for k, n in enumerate(q.name for q in ROOT_QUANTITIES)}
+    every = entries | {q.name: f"r[{k}]" for k, q in enumerate(ROOT_QUANTITIES)}
     pencil, size, order = _pencil(problem)
     rate = trace(lambda p: [math.nan if of.rate is None else of.rate(p)], of.names)
     ride = trace(partial(_ride, problem), of.names) if is_bicycle(problem) else None

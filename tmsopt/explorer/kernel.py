@@ -4,8 +4,9 @@ The names `where` and `one` mean something else in these functions. Those of qua
 `tmsopt.roots.quartics`; the conditions of stability of the lower degrees from `lienard_chipart`.
 """
 
+import operator
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import partial, reduce
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
@@ -32,17 +33,16 @@ def kernel_script(degree: int) -> str:
         _trace_function("factorDamping", ["p", "q"], lambda p, q: [_OF.damping_ratio(p, q)]),
         _trace_function("factorRoots", ["p", "q"], _OF.root_pair, "z"),
     ]
-    if degree < _QUARTIC:
-        parts.append(_trace_function("stableBySigns", a, lambda *c: [_stable(c)]))
+    if degree <= _QUARTIC:
+        is_stable = _OF.stable if degree == _QUARTIC else _is_stable
+        parts.append(_trace_function("stableBySigns", a, lambda *c: [is_stable(*c)]))
     if degree == _QUARTIC:
         rules = f"good: {GOOD}, accepted: {quartic.ACCEPTED}, steps: {quartic.STEPS}"
-        b = ["b1", "b2", "b3", "b4", "p1", "q1", "p2", "q2"]
         parts += [
             f"const QUARTIC = {{{rules}}};",
-            _trace_function("stableBySigns", a, lambda *c: [_OF.stable(*c)]),
             _trace_function("quarticClass", a, _pack_classes),
             _trace_function("quarticStart", a, _start_roots, "f"),
-            _trace_function("quarticStep", b, _step_roots, "g"),
+            _trace_function("quarticStep", ["b1", "b2", "b3", "b4", "p1", "q1", "p2", "q2"], _step_roots, "g"),
         ]
     return "\n".join(parts) + "\n"
 
@@ -72,14 +72,12 @@ def _pack_classes(*a: Any) -> list[Any]:
     return [_where(doubtful, 64.0, kind + 8.0 * count)]
 
 
-def _stable(c: Sequence[Any]) -> Any:
+def _is_stable(*c: Any) -> Any:
     """As `tmsopt.roots.is_stable` up to degree 4: the signs of the rounded conditions."""
     up, down = c[0] > 0.0, c[0] < 0.0
     sign = _where(up, 1.0, -1.0)
-    held = up | down
-    for condition in lienard_chipart([sign * x for x in c]):
-        held = held & (condition > 0.0)
-    return held
+    conditions = (condition > 0.0 for condition in lienard_chipart([sign * x for x in c]))
+    return reduce(operator.and_, conditions, up | down)
 
 
 def _trace_function(name: str, arguments: Sequence[str], compute: Callable[..., Sequence[Any]], into: str = "") -> str:
