@@ -30,6 +30,11 @@ def page_script(problem):
     return "\n".join([model_script(problem.posed).text, kernel_script(problem.model.degree), page.read_text("utf-8")])
 
 
+def ask(problem, answer, given):
+    """The value of a JavaScript function of the given data, after model, kernel and numerics of a problem's page."""
+    return run([page_script(problem)], answer, given)
+
+
 def run(scripts, answer, given):
     """The value of a JavaScript function of the given data, in a program of the scripts; nan and inf come as text.
 

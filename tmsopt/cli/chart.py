@@ -1,6 +1,5 @@
 """`tmsopt chart`: stability over a plane or a space of parameters."""
 
-import math
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
@@ -73,8 +72,10 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             sys.exit(INTERRUPTED)
 
     def _chart(self, folder: Path | None) -> Reply:
-        from tmsopt.charts import USUAL, axes_of
+        from tmsopt.charts import USUAL, axes_of, check_netcdf
 
+        if self.output is not None and self.output.suffix.lower() == ".nc":
+            check_netcdf()
         problem = take_nominal(tmsopt.load(self.file).posed)
         names, layers = axes_of(problem, self.axes), self.layers or USUAL
         is_whole = folder is None and len(names) == 2  # in memory, shown with all its layers and boundaries
@@ -86,7 +87,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
                 problem,
                 names,
                 folder=folder,
-                points=self._choose_sizes(len(names), folder),
+                points=self.points * len(names) if self.points and len(self.points) == 1 else self.points,
                 layers=(*_LAYERS, *layers) if is_whole else layers,
                 workers=self.workers,
                 fresh=self.fresh,
@@ -124,19 +125,6 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             if not low <= held[name] <= high:
                 raise input_error(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
         return held
-
-    def _choose_sizes(self, axes: int, folder: Path | None) -> tuple[int, ...]:
-        """Points along each axis, unless memory or the format of the file cannot take them."""
-        from tmsopt.charts import LARGEST, USUAL_POINTS, check_netcdf
-
-        sizes: tuple[int, ...] = self.points or USUAL_POINTS[axes]
-        sizes = sizes * axes if len(sizes) == 1 else sizes
-        if folder is None and (designs := math.prod(sizes)) > LARGEST:
-            message = f"{designs:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
-            raise input_error(message, "--points")
-        if self.output is not None and self.output.suffix.lower() == ".nc":
-            check_netcdf()
-        return sizes
 
 
 @contextmanager

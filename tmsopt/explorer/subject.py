@@ -1,17 +1,18 @@
 """What a page is about, as plain data: parameters with their ranges, limits, known designs, traced curves."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import starmap
 from typing import Any
 
 import numpy as np
 
 from tmsopt.analysis import structure_line
 from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.explorer.file_text import surrounding_lines
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
-from tmsopt.guide import exact_value
+from tmsopt.guide import exact_value, toml_key, toml_text
 from tmsopt.models import Parameter, words_of
 from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
 from tmsopt.problem import Posed, degrees_of_freedom, limit_value, unit_of
@@ -28,6 +29,7 @@ _USUAL = {"m": 0.5, "kg": 5.0, "kg m^2": 1.0, "rad": 0.5, "m/s": 5.0}
 _IMPULSE = "m_B g w √(w/g)"
 """Unit of an impulse of torque, of two masses on skates without units."""
 
+_SHARED = re.compile(r"\[(\d+)\]")  # a part of a stated model that several places refer to
 _MIDDLE = "nothing was solved here, so the page opens in the middle of the box"
 
 
@@ -172,3 +174,54 @@ def _curves(problem: Posed, plane: Sequence[str], start: Mapping[str, float]) ->
         x, y = ([float(f"{v:.{_DIGITS}g}") for v in columns[n][some].tolist()] for n in plane)
         axes = {"axes": [*map(index, plane)], "along": [*map(index, along)]}
         yield {"kind": kind, "set": title, **axes, "x": x, "y": y}
+
+
+# The text of a problem file around its parameters, so that a design seen on a page can be solved and shared
+
+
+def surrounding_lines(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
+    """What stands before and after the lines of [parameters].
+
+    Args:
+        model: the table that states the model, as typed; without one it is written from the model itself.
+    """
+    before = [_write_line("title", problem.title)]
+    if problem.model.statement is None:
+        before.append(_write_line("model", problem.model.name))
+    else:
+        before += ["", *_write_model(model or model_table(problem))]
+    after = []
+    for name in ("constraints", "weights"):
+        if entries := getattr(problem, name):
+            after += ["", f"[{name}]", *starmap(_write_line, entries.items())]
+    if problem.nominal is not problem:
+        before.append("# one design, at its nominal values: bands and tolerances are left out")
+    return {"before": "\n".join([*before, "", "[parameters]", ""]), "after": "\n".join([*after, ""])}
+
+
+def _write_model(table: Mapping[str, Any]) -> Iterator[str]:
+    yield "[model]"
+    inner = {n: v for n, v in table.items() if isinstance(v, Mapping)}
+    yield from (_write_line(n, v) for n, v in table.items() if n not in inner)
+    for name, values in inner.items():
+        yield from ("", f"[model.{toml_key(name)}]", *starmap(_write_line, values.items()))
+
+
+def model_table(problem: Posed) -> dict[str, Any]:
+    """The table of a model that was made in Python, with every shared part written out."""
+    said = {n: v for n, v in (problem.model.statement or {}).items() if n != "parameters"}
+    shared = said.pop("shared")
+
+    def write(value: Any) -> Any:
+        if isinstance(value, str):
+            return _SHARED.sub(lambda found: write(shared[int(found[1]) - 1]), value)
+        if isinstance(value, Mapping):
+            return {n: write(v) for n, v in value.items()}
+        return [write(v) for v in value]
+
+    found = {n: write(v) for n, v in said.items() if v} | {"name": problem.model.name}
+    return found | {n: rows[0] for n, rows in found.items() if n == "coefficients"}
+
+
+def _write_line(key: str, value: Any) -> str:
+    return f"{toml_key(key)} = {toml_text(value)}"
