@@ -116,9 +116,9 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open: list[str] = []
-        self.tags: list[str] = []
-        self.said: list[str] = []
+        self.open = []
+        self.tags = []
+        self.said = []
         self.feed(text)
         self.close()
 

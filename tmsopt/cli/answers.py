@@ -40,6 +40,7 @@ class Reply:
     Attributes:
         result: a result, or a text.
         data: the JSON; by default the `to_json` of the result.
+        level: of its document and its page, brief or full.
         draw, write_csv: make the figure and the table; by default `plot` and `write_csv` of the result.
         page: options of `tmsopt.save_report`.
         shown: on stdout instead of the result: its document, or a list of results and texts.
@@ -72,8 +73,10 @@ def write_files(command: Any, found: Reply, *files: Path) -> None:
         texts = {file.name: read_text(str(file), "TOML problem file") for file in files or [command.file]}
         line = shlex.join(["tmsopt", *click.get_current_context().meta.get(WORDS, ())])
         seed = {"seed": command.seed} if hasattr(command, "seed") else {}
-        options = {"files": texts, "command": line, "progress": progress_listener(), **seed, **found.page}
-        tmsopt.save_report(result, path, **options)
+        is_full, progress = found.level == "full", progress_listener()
+        tmsopt.save_report(
+            result, path, command=line, files=texts, full=is_full, progress=progress, **seed, **found.page
+        )
 
     def write_table(path: Path) -> None:
         (found.write_csv or result.write_csv)(path)

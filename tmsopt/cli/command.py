@@ -213,7 +213,7 @@ def _build_parameter(of: Field[Any]) -> click.Parameter:
 def _type_of(hint: Any) -> Any:
     if get_origin(hint) is Literal:
         return click.Choice(get_args(hint))
-    return {Path: click.Path(path_type=Path), bool: None, Any: str}.get(hint, hint)
+    return click.Path(path_type=Path) if hint is Path else hint
 
 
 def _parse_pairs(flag: str, texts: Sequence[str], kind: Any, example: str) -> dict[str, Any]:

@@ -107,7 +107,7 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
                 return replace(self._show(error.solution, *scale), without="csv plot")
             figure = partial(tmsopt.plots.front_figure, front)
             status = INTERRUPTED if front.interrupted else 0
-            return Reply(front, status, None, self._level, figure, page={"full": self.full})
+            return Reply(front, status, None, self._level, figure)
         solution = tmsopt.solve(problem, throw=False, **self.search)
         if self.certify and not solution.interrupted:
             solution = tmsopt.certify(solution, seconds=self.certify, progress=progress_listener())
@@ -136,8 +136,7 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
         if self.plot and without:
             click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         status = INTERRUPTED if solution.interrupted else STATUSES[solution.status]
-        page = {"full": self.full}
-        return Reply(solution, status, shown, draw=draw, page=page, without=without, shown=shown)
+        return Reply(solution, status, shown, self._level, draw, without=without, shown=shown)
 
     def _make_json(self, solution: "tmsopt.Solution") -> dict[str, Any]:
         """The keys of the contract; with --full all of them, and what the analysis finds."""
@@ -169,7 +168,7 @@ class ExploreCommand(WithSearch, OnFile):
     Exit status: 0 done, whatever the search found, 2 bad input.
     """
 
-    output: Path | None = option("The page.  [default: FILE's name, .html]", None, "-o", endings=PAGES)
+    output: Path | None = option("The page.  [default: FILE's name, .html]", None, "-o")
     open: bool = option("Show it in the browser.")
 
     def run(self) -> None:
