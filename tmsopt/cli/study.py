@@ -66,14 +66,14 @@ class StudyCommand(WithPage, WithPlot, OnFile):
             self._answer(results, path, is_stopped)
         for target in self.export if len(results.rows) else ():
             write_file("--export", target, lambda path: results.export(path, progress_listener()))
-        write_files(self, Reply(results), *(path for path in self._list_files() if path.suffix != ".csv"))
+        write_files(self, Reply(results), *self._list_files(with_rows=False))
         if is_stopped:
             click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         return INTERRUPTED if is_stopped else 0
 
     def _check_apart(self, store: Path) -> None:
         """Refuse to write a file twice, or one that the study is read from."""
-        taken = {realpath(path): "what the study is read from" for path in self._list_files()}
+        taken = {realpath(path): "what the study is read from" for path in self._list_files(with_rows=True)}
         exports = [("--export", target) for target in self.export]
         for name, path in [("--store", store), *exports, ("--plot", self.plot), ("--report", self.report)]:
             if path and (place := realpath(path)) in taken:
@@ -81,10 +81,10 @@ class StudyCommand(WithPage, WithPlot, OnFile):
             if path:
                 taken[place] = f"what {name} writes"
 
-    def _list_files(self) -> list[Path]:
-        """The study, the problem and the table of rows if it names them."""
+    def _list_files(self, with_rows: bool) -> list[Path]:
+        """The study, and the problem and the table of rows if it names them."""
         tables = tomllib.loads(read_text(str(self.file), "TOML study file"))
-        named = tables.get("problem"), tables.get("study", {}).get("csv")
+        named = [tables.get("problem"), tables.get("study", {}).get("csv") if with_rows else None]
         return [self.file, *(self.file.parent / name for name in named if isinstance(name, str))]
 
     def _solve_rows(self, study: "tmsopt.Study", path: Path) -> "tuple[tmsopt.Results, bool]":
