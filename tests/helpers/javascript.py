@@ -24,15 +24,11 @@ fs.writeFileSync(process.argv[3], JSON.stringify(answer(given), plain));
 """Reads what is given and writes the answer, after the scripts under test."""
 
 
-def page_script(problem):
-    """Model, kernel and numerics of the page of a problem."""
-    page = files("tmsopt.explorer") / "page" / "numerics.js"
-    return "\n".join([model_script(problem.posed).text, kernel_script(problem.model.degree), page.read_text("utf-8")])
-
-
 def ask(problem, answer, given):
     """The value of a JavaScript function of the given data, after model, kernel and numerics of a problem's page."""
-    return run([page_script(problem)], answer, given)
+    page = files("tmsopt.explorer") / "page" / "numerics.js"
+    scripts = model_script(problem.posed).text, kernel_script(problem.model.degree), page.read_text("utf-8")
+    return run(scripts, answer, given)
 
 
 def run(scripts, answer, given):
