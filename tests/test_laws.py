@@ -172,17 +172,13 @@ def test_the_benchmark_equations_are_the_general_ones():
 
 def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio():
     """The paper's uniqueness claim, by exact elimination; `ep4` returns both solutions."""
+    printed = (
+        "-0.432*T - 0.0272 + 0.08*Fr**2 + 0.004*mu",
+        "0.368*T - 0.02*mu - 0.0032",
+        "0.192*T - 0.0048 - 0.136*Fr + 0.08*Fr**2 - 0.016*mu",
+    )
+    system = [sympy.sympify(left, rational=True) for left in printed]
     Fr, mu, T = sympy.symbols("Fr mu T")
-    decimal = sympy.Rational
-    system = [
-        decimal("-0.432") * T - decimal("0.0272") + decimal("0.08") * Fr**2 + decimal("0.004") * mu,
-        decimal("0.368") * T - decimal("0.02") * mu - decimal("0.0032"),
-        decimal("0.192") * T
-        - decimal("0.0048")
-        - decimal("0.136") * Fr
-        + decimal("0.08") * Fr**2
-        - decimal("0.016") * mu,
-    ]
     solutions = sorted(sympy.solve(system, [Fr, mu, T], dict=True), key=lambda solution: -solution[mu])
     assert [solution[mu] > 0 for solution in solutions] == [True, False]
     for design, solution in zip(laws.ep4(-1, ZB, ZH, 1.02), solutions, strict=True):

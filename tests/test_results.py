@@ -104,21 +104,9 @@ RESULTS = {
     "Ledger": lambda: tmsopt.verify(only=["lscf-*"]),
     "Description": lambda: tmsopt.describe(plane()),
 }
-TITLED = {
-    "Solution",
-    "Front",
-    "Trace",
-    "Chart",
-    "Speeds",
-    "Simulation",
-    "Comparison",
-    "Results",
-    "Proof",
-    "Swallowtail",
-    "Every",
-    "Robustness",
-    "Description",
-}
+TITLED = (
+    "Solution Front Trace Chart Speeds Simulation Comparison Results Proof Swallowtail Every Robustness Description"
+)
 made = cache(lambda name: RESULTS[name]())
 each = pytest.mark.parametrize("name", RESULTS)
 
@@ -128,9 +116,9 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open: list[str] = []
-        self.tags: list[str] = []
-        self.said: list[str] = []
+        self.open = []
+        self.tags = []
+        self.said = []
         self.feed(text)
         self.close()
 
@@ -200,7 +188,7 @@ def test_its_page_is_whole_and_escaped(name):
     assert page.open == []
     assert "script" not in page.tags
     assert {"div", "strong"} <= set(page.tags)
-    assert TITLE in page.said or type(made(name)).__name__ not in TITLED
+    assert TITLE in page.said or type(made(name)).__name__ not in TITLED.split()
     last = next(word for word in reversed(str(made(name)).split()) if word.isalnum())
     assert any(last in text for text in page.said)
 

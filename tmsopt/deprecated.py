@@ -50,29 +50,9 @@ def no_longer_needed(option: str) -> str:
     return f"{option} is no longer needed: NumPy computes every chart; leave it out"
 
 
-MOVED_TO_POSED = frozenset(
-    (
-        "asked_of_roots",
-        "asks",
-        "asks_radius",
-        "cases",
-        "conditions",
-        "exactly",
-        "heading",
-        "located",
-        "nominal",
-        "objective",
-        "objectives",
-        "ordered",
-        "parameter_set",
-        "pattern",
-        "read",
-        "sense",
-        "sign",
-        "typed",
-        "values",
-        "vocabulary",
-    )
+MOVED_TO_POSED = (
+    "asked_of_roots asks asks_radius cases conditions exactly heading located nominal objective objectives ordered "
+    "parameter_set pattern read sense sign typed values vocabulary"
 )
 """Attributes of a `Problem` in 1.1 that have moved to `Problem.posed`."""
 
@@ -83,7 +63,7 @@ def read_from_posed(problem: Any, name: str) -> Any:
     Raises:
         AttributeError: if `name` is not one of these.
     """
-    if name not in MOVED_TO_POSED:
+    if name not in MOVED_TO_POSED.split():
         raise AttributeError(f"'{type(problem).__name__}' object has no attribute '{name}'", name=name, obj=problem)
     warnings.warn(f"Problem.{name} has moved; write problem.posed.{name}", DeprecationWarning, stacklevel=3)
     return getattr(problem.posed, name)

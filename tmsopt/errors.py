@@ -2,6 +2,7 @@
 
 import math
 import re
+import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -160,7 +161,7 @@ def limit_advice(advise: Callable[..., str]) -> Callable[..., str]:
 
 def short(value: Any) -> str:
     """A value as text of up to 60 characters, control characters as escapes."""
-    return _cut(escape_unprintable(_text(value, _WIDTH)), _WIDTH)
+    return _cut(escape_unprintable(_SHORT.repr(value)), _WIDTH)
 
 
 def _cut(text: str, most: int) -> str:
@@ -170,23 +171,17 @@ def _cut(text: str, most: int) -> str:
     return f"{text[: most - 3]}…" if most <= _WIDTH else f"{text[: most // 2]} … {text[-most // 2 :]}"
 
 
-def _text(value: Any, room: int) -> str:
+class _Short(reprlib.Repr):
     """`repr` of a value, cut early: a file may hold numbers and lists of any size and depth."""
-    if type(value) in (list, tuple, dict) and value:
-        entries = value.items() if isinstance(value, dict) else ((None, x) for x in value)
-        texts = [
-            _text(x, room // 4) if k is None else f"{_text(k, 0)}: {_text(x, room // 4)}"
-            for k, x in islice(entries, room)
-        ]
-        inner = ", ".join([*texts, "…"] if len(value) > room else texts)
-        if isinstance(value, dict):
-            return f"{{{inner}}}"
-        return f"[{inner}]" if isinstance(value, list) else f"({inner}{',' * (len(value) == 1)})"
-    if isinstance(value, str | bytes):
-        return repr(value[: _WIDTH + 1])
-    if isinstance(value, int) and value.bit_length() > 4 * _WIDTH:
-        return f"a whole number of about {round(value.bit_length() * math.log10(2))} digits"
-    return repr(value)
+
+    def repr_int(self, x: int, level: int) -> str:
+        if x.bit_length() > 4 * _WIDTH:
+            return f"a whole number of about {round(x.bit_length() * math.log10(2))} digits"
+        return repr(x)
+
+
+_SHORT = _Short()
+vars(_SHORT).update(maxlevel=3, maxlist=15, maxtuple=15, maxdict=15, maxstring=_WIDTH, maxother=_WIDTH, fillvalue="…")
 
 
 def import_optional(module: str, otherwise: str = "") -> Any:

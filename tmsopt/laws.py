@@ -86,14 +86,8 @@ def _stack(*parts: Real) -> Array:
     return np.stack(np.broadcast_arrays(*parts))
 
 
-def _tan(angle: Real) -> Real:
-    tangent: Real = np.tan(angle)
-    return tangent
-
-
-def _sqrt(square: Real) -> Real:
-    root: Real = np.sqrt(square)
-    return root
+_tan: Callable[[Real], Real] = np.tan
+_sqrt: Callable[[Real], Real] = np.sqrt
 
 
 # The model and its stability

@@ -433,7 +433,7 @@ def test_three_axes_in_one_file(ending, tmp_path, run):
         (["problems/realistic.toml"], "two or three free parameters"),
         (["problems/chart.toml", "--points", "4x4x4"], "accepted: two whole numbers"),
         (["problems/chart.toml", "--points", "4x4x4x4"], "accepted: two whole numbers"),
-        (["problems/chart.toml", "--points", "10000x10000"], "give an --output that ends in chart"),
+        (["problems/chart.toml", "--points", "10000x10000"], "give a folder x.chart"),
         (["problems/chart.toml", "--quantity", "Fr*2"], "accepted: NAME=VALUE"),
         (["problems/chart.toml", "--quantity", "x=Frr"], "unknown name 'Frr'"),
         (["problems/chart.toml", "--layers", "kind,gamma"], "found 'gamma'; accepted: kind"),

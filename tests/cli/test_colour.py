@@ -3,51 +3,17 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from helpers.terminal import ROOT, environment, on_a_terminal
 
-if os.name == "posix":
-    import fcntl
-    import pty
-    import struct
-    import termios
-
-ROOT = Path(__file__).resolve().parents[2]
 EP4 = str(ROOT / "problems" / "ep4.toml")
-COMMAND = [sys.executable, "-m", "tmsopt"]
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
 
 
-def environment(**own):
-    """Variables of a terminal with colours, and those given."""
-    kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLUMNS")}
-    return kept | {"PYTHONPATH": str(ROOT), "TERM": "xterm"} | own
-
-
-def on_a_terminal(*words, columns=100, program=COMMAND, **own):
-    """What a command writes to a terminal that is stdout and stderr."""
-    leader, follower = pty.openpty()
-    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("4H", 24, columns, 0, 0))
-    process = subprocess.Popen([*program, *words], env=environment(**own), stdout=follower, stderr=follower)
-    os.close(follower)
-    written = b""
-    while True:
-        try:
-            text = os.read(leader, 100_000)
-        except OSError:  # as Linux says that nobody writes any more
-            break
-        if not text:
-            break
-        written += text
-    os.close(leader)
-    assert process.wait() == 0
-    return written.decode().replace("\r\n", "\n")
-
-
 def in_a_pipe(*words, **own):
-    done = subprocess.run([*COMMAND, *words], env=environment(**own), capture_output=True, check=True)
-    return done.stdout
+    command = [sys.executable, "-m", "tmsopt", *words]
+    return subprocess.run(command, env=environment(**own), capture_output=True, check=True).stdout
 
 
 def is_coloured(text):
@@ -65,8 +31,9 @@ def is_coloured(text):
         (("--colour=always",), {"NO_COLOR": "1"}, True),
     ],
 )
-def test_a_terminal_has_colours_unless_somebody_objects(words, own, coloured):
-    assert is_coloured(on_a_terminal("solve", EP4, *words, **own)) is coloured
+def test_a_terminal_has_colours_unless_somebody_objects(words, own, coloured, tmp_path):
+    seen = on_a_terminal(["solve", EP4, *words], tmp_path, whole=True, **own)
+    assert (seen.status, is_coloured(seen.text)) == (0, coloured)
 
 
 @pytest.mark.parametrize(
@@ -90,9 +57,9 @@ def test_another_word_for_colours_is_refused(run):
 
 
 @pytest.mark.parametrize("columns", [80, 60])
-def test_a_report_fits_the_terminal(columns):
-    lines = on_a_terminal("speeds", EP4, "--color=never", columns=columns).split("\033[K")[-1].splitlines()
-    assert max(map(len, lines)) <= columns
+def test_a_report_fits_the_terminal(columns, tmp_path):
+    seen = on_a_terminal(["speeds", EP4, "--color=never"], tmp_path, columns=columns, whole=True)
+    assert max(map(len, seen.text.split("\033[K")[-1].splitlines())) <= columns
 
 
 def test_a_narrow_encoding_gets_its_own_letters():
@@ -115,10 +82,8 @@ main(prog_name="tmsopt")
 """
 
 
-def test_progress_is_gone_before_the_answer():
+def test_progress_is_gone_before_the_answer(tmp_path):
     """Also where stdout and stderr are one terminal."""
-    written = on_a_terminal("example", program=[sys.executable, "-c", SLOW_EXAMPLES])
-    assert "starting" in written
-    before, _, after = written.rpartition("\033[K")
+    before, _, after = on_a_terminal(["example"], tmp_path, SLOW_EXAMPLES, whole=True).text.rpartition("\033[K")
     assert "starting" in before
     assert after.startswith("balance_assist")

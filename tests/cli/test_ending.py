@@ -373,10 +373,14 @@ def shell(line, folder, **variables):
     done = subprocess.run(
         ["bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
-    left = [p.name for p in folder.rglob("*") if p.name.startswith(".tmsopt-") or p.suffix == ".lock"]
-    left = [name for name in left if name != "chart.lock"]  # of the folder of a chart, which stays in it
-    assert left == []
+    assert leftovers(folder) == []
     return int((folder / "status").read_text()), done.stdout, done.stderr
+
+
+def leftovers(folder):
+    """Temporary files, and locks but that of the folder of a chart, which stays in it."""
+    files = (p for p in folder.rglob("*") if p.name.startswith(".tmsopt-") or p.suffix == ".lock")
+    return [p for p in files if p.name != "chart.lock"]
 
 
 def pairs(every, chosen):
@@ -482,9 +486,7 @@ def test_every_command_ends_soon(name, seconds, number, status, tmp_path):
         json.loads(out)
     time.sleep(0.5)
     assert [p for p in Path("/proc").glob("[0-9]*/environ") if group in _text(p)] == []
-    left = [p.name for p in tmp_path.rglob("*") if p.name.startswith(".tmsopt-") or p.suffix == ".lock"]
-    left = [name for name in left if name != "chart.lock"]  # of the folder of a chart, which stays in it
-    assert left == []
+    assert leftovers(tmp_path) == []
 
 
 def _text(path):

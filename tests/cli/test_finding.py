@@ -11,14 +11,6 @@ from tmsopt.cli import main
 from tmsopt.guide import example, examples, new_problem, schema_text
 
 
-@pytest.mark.parametrize("command", ["describe", "schema", "new", "example"])
-def test_help_has_examples_and_exit_status(run, command):
-    status, out, _ = run(command, "--help")
-    assert status == 0
-    assert f"tmsopt {command}" in out.split("Examples:")[1]
-    assert "Exit status: 0 done, 2 bad input" in out
-
-
 @pytest.mark.parametrize("what", ["tms", "whipple", "problems/ep4.toml", "problems/coupled_pair.toml"])
 def test_describe_writes_the_report_or_json(run, what):
     found = tmsopt.describe(what)
@@ -91,7 +83,7 @@ def test_bad_input_is_answered(run, tmp_path, monkeypatch, arguments, said):
 
 def test_a_missing_file_names_three_close_ones_at_most(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("robot1", "robot2", "robot3", "robot4", "robots", "absorber"):
+    for name in ["robot1", "robot2", "robot3", "robot4", "robots", "absorber"]:
         (tmp_path / f"{name}.toml").write_text("")
     status, out, err = run("solve", "robot.toml")
     assert (status, out) == (2, "")

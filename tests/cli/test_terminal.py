@@ -1,29 +1,17 @@
 """What a terminal shows while commands work, and what a pipe does not."""
 
 import os
-import re
-import select
-import signal
 import subprocess
-import sys
 import time
-from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 
 import pytest
+from helpers.terminal import ROOT, command, environment, on_a_terminal
 
 from tmsopt import Progress
 
-if os.name == "posix":
-    import fcntl
-    import pty
-    import struct
-    import termios
-
 describe_progress = import_module("tmsopt.cli.terminal").describe_progress
 
-ROOT = Path(__file__).resolve().parents[2]
 PROBLEMS = ROOT / "problems"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
 
@@ -102,75 +90,8 @@ FILES = {
 }
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What a command did with a terminal as its stderr: its status, its answer, and what was written when."""
-
-    status: int
-    answer: str
-    written: list[tuple[float, str]]
-    seconds: float
-
-    @property
-    def lines(self):
-        """Every line of progress that was drawn, and when."""
-        drawn = [(at, part) for at, text in self.written for part in re.findall(r"\r([^\r\n\033]+)\033\[K", text)]
-        return [(at, line) for at, line in drawn if line]
-
-    @property
-    def screen(self):
-        """What stands there in the end."""
-        left, line, column = [], "", 0
-        for character in re.findall(r"\033\[K|.|\n", "".join(text for _, text in self.written).replace("\r\n", "\n")):
-            if character == "\n":
-                left.append(line)
-                line, column = "", 0
-            elif character == "\r":
-                column = 0
-            elif character == "\033[K":
-                line = line[:column]
-            else:
-                line, column = line[:column] + character + line[column + 1 :], column + 1
-        return "".join(f"{one}\n" for one in left) + line
-
-
-def command(how, args):
-    return [sys.executable, *(["-c", how] if how else ["-m", "tmsopt"]), *args]
-
-
-def on_a_terminal(args, folder, how="", columns=80, stop=""):
-    """Run a command; with Ctrl-C once `stop` is shown."""
-    leader, follower = pty.openpty()
-    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("4H", 24, columns, 0, 0))
-    written = []
-    began = time.monotonic()
-    with open(folder / "answer", "w+", encoding="utf-8") as out:
-        process = subprocess.Popen(command(how, args), cwd=folder, env=_named(), stdout=out, stderr=follower)
-        os.close(follower)
-        while process.poll() is None or select.select([leader], [], [], 0)[0]:
-            if not select.select([leader], [], [], 0.02)[0]:
-                continue
-            try:
-                text = os.read(leader, 100_000).decode()
-            except OSError:  # as Linux says that nobody writes any more
-                break
-            written.append((time.monotonic() - began, text))
-            if stop and stop in text:
-                process.send_signal(signal.SIGINT)
-                stop = ""
-        status = process.wait()
-        out.seek(0)
-        answer = out.read()
-    os.close(leader)
-    return Seen(status, answer, written, time.monotonic() - began)
-
-
 def into_pipes(args, folder):
-    return subprocess.run(command("", args), cwd=folder, env=_named(), capture_output=True, text=True, check=False)
-
-
-def _named():
-    return {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"}
+    return subprocess.run(command("", args), cwd=folder, env=environment(), capture_output=True, text=True, check=False)
 
 
 def _loaded(folder):
@@ -250,9 +171,8 @@ def test_a_second_one_that_is_not_heard_leaves_no_line(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path, monkeypatch):
-    monkeypatch.setitem(globals(), "_named", lambda: {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "dumb"})
-    seen = on_a_terminal(["compare", str(PROBLEMS / "ep4.toml")], tmp_path, SLOW_AT_WORK)
+def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path):
+    seen = on_a_terminal(["compare", str(PROBLEMS / "ep4.toml")], tmp_path, SLOW_AT_WORK, TERM="dumb")
     assert (seen.status, seen.written) == (0, [])
 
 

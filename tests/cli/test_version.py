@@ -63,7 +63,6 @@ def test_the_version_of_ipopt_is_the_one_that_solves(capfd):
     with pytest.raises(SystemExit):
         main(args=["--version", "--json"], prog_name="tmsopt")
     told = json.loads(capfd.readouterr().out)["packages"]["ipopt"]
-    assert banner is not None
     assert told in (banner[1], None)
 
 

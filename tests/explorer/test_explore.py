@@ -13,7 +13,6 @@ import pytest
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.cli import main
 from tmsopt.explorer import page_of
 from tmsopt.roots import hurwitz_minors
 
@@ -25,9 +24,7 @@ HOSTILE = "</script><script>alert(1)</script>&<b>"
 def data_of(html):
     """What the page says of itself."""
     found = re.search(r"^const DATA = (.*);$", html, re.MULTILINE)
-    assert found is not None
-    data = json.loads(found[1])
-    return data
+    return json.loads(found[1])
 
 
 def design(data, name):
@@ -43,7 +40,6 @@ def ep4():
 def test_it_opens_at_the_optimum(ep4):
     data = data_of(ep4.html)
     values, optimum = design(data, "optimum")
-    assert ep4.solution is not None
     assert values == dict(ep4.solution.parameters)
     assert data["start"] == optimum["values"]
     point = laws.ep4_chi_H_1(values["zeta_B"], values["zeta_H"])
@@ -160,29 +156,23 @@ def test_it_is_saved_whole_under_a_name_of_a_page(ep4, tmp_path):
 
 
 def test_a_solution_is_not_solved_again(ep4):
-    assert ep4.solution is not None
     again = tmsopt.explore(ep4.solution)
     assert again.solution is ep4.solution
     assert data_of(again.html)["designs"] == data_of(ep4.html)["designs"]
 
 
-def test_the_command_writes_a_page_beside_you(tmp_path, monkeypatch, capsys):
+def test_the_command_writes_a_page_beside_you(tmp_path, monkeypatch, run):
     shown = []
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(webbrowser, "open", lambda url: bool(shown.append(url)) or True)
-    with pytest.raises(SystemExit) as ended:
-        main(["explore", str(PROBLEMS / "chart.toml"), "--open"])
-    assert ended.value.code == 0
+    assert run("explore", PROBLEMS / "chart.toml", "--open") == (0, "", "wrote chart.html\n")
     assert shown == [(tmp_path / "chart.html").as_uri()]
     assert data_of((tmp_path / "chart.html").read_text(encoding="utf-8"))["model"] == "tms"
-    assert "wrote chart.html" in capsys.readouterr().err
 
 
-def test_the_command_refuses_what_is_no_page(tmp_path, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["explore", str(PROBLEMS / "chart.toml"), "--output", str(tmp_path / "page.pdf")])
-    assert ended.value.code == 2
-    assert "html" in capsys.readouterr().err
+def test_the_command_refuses_what_is_no_page(tmp_path, run):
+    status, _, err = run("explore", PROBLEMS / "chart.toml", "--output", tmp_path / "page.pdf")
+    assert (status, "html" in err) == (2, True)
 
 
 def test_the_file_of_a_stated_model_is_kept_as_typed():

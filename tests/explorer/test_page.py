@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.browser import drawn
+from helpers.browser import drawn, press
 
 import tmsopt
 from tmsopt.problem import array_function
@@ -39,18 +39,11 @@ def explored(request, made):
 
 def values_of(page):
     """The parameters that the page shows, in SI."""
-    found = page.evaluate("[...state.x]")
-    return found
+    return page.evaluate("[...state.x]")
 
 
 def verdict(page):
-    text = page.locator("#verdict").inner_text()
-    return " ".join(text.split())
-
-
-def press(page, name):
-    page.get_by_role("button", name=name, exact=True).click()
-    drawn(page)
+    return " ".join(page.inner_text("#verdict").split())
 
 
 def typed(page, name, text):
@@ -61,8 +54,7 @@ def typed(page, name, text):
 
 
 def parameters(page):
-    found = page.evaluate("DATA.parameters")
-    return found
+    return page.evaluate("DATA.parameters")
 
 
 def kind(roots):
@@ -163,7 +155,7 @@ def test_a_drag_is_one_step(show):
         for k in range(10):
             page.mouse.move(across + 5 * k, down)
         drawn(page)
-        assert page.locator("#said").inner_text() == ""  # a screen reader is spared what passes by
+        assert page.inner_text("#said") == ""  # a screen reader is spared what passes by
         page.mouse.up()
         drawn(page)
         after = values_of(page)
@@ -198,7 +190,7 @@ def test_it_goes_to_known_designs(show, explored):
             assert page.evaluate("drawingOf().motion[0]") == design["abscissa"]
             assert page.evaluate("allRoots(drawingOf().meetings).re.length") == page.evaluate("MODEL.degree")
             multiple = [n for _, im, n in design["roots"] if n > 1 and im >= 0]
-            assert page.locator(".roots").inner_text().count("-fold") == len(multiple)
+            assert page.inner_text(".roots").count("-fold") == len(multiple)
         assert start == page.evaluate("DATA.designs[0].values")  # so that a button "start" would say nothing new
         assert page.get_by_role("button", name="start", exact=True).count() == 0
 
@@ -211,7 +203,7 @@ def test_a_number_field_refuses_nonsense(show):
             typed(page, "Fr", text)
             assert values_of(page) == before
             assert field.get_attribute("aria-invalid") == "true"
-            assert page.locator(f"#{field.get_attribute('aria-describedby')}").inner_text()
+            assert page.inner_text(f"#{field.get_attribute('aria-describedby')}")
         field.press("Escape")
         assert field.get_attribute("aria-invalid") == "false"
         typed(page, "Fr", "2,5")
@@ -228,7 +220,7 @@ def test_a_number_field_refuses_nonsense(show):
         drawn(page)
         assert 25 in values_of(page)
         assert page.get_by_role("slider", name=re.compile("^Fr, ")).input_value() == "1000"
-        assert "beyond" in page.locator(f"#{field.get_attribute('aria-describedby')}").inner_text()
+        assert "beyond" in page.inner_text(f"#{field.get_attribute('aria-describedby')}")
 
 
 def test_a_number_field_takes_what_people_write(show):
@@ -238,7 +230,7 @@ def test_a_number_field_takes_what_people_write(show):
             typed(page, "v", text)
             assert values_of(page)[at["v"]] == value
         typed(page, "v", "3.5 km/s")
-        assert "a number in m/s is wanted" in page.locator("#controls .message:visible").inner_text()
+        assert "a number in m/s is wanted" in page.inner_text("#controls .message:visible")
 
 
 def test_a_number_field_shows_what_it_holds(show, explored):
@@ -302,13 +294,12 @@ def test_the_verdict_has_its_unit_and_its_reserve(show, made):
     for name in ("ep4", "whipple_ep4", "point_mass_robot"):
         with show(name) as page:
             of[name] = verdict(page)
-            assert "--certify" not in page.locator("main").inner_text()
-            assert "(equation" not in page.locator("main").inner_text()
-            assert ("first it grows" in page.locator("#quantities").inner_text()) == (name != "ep4")
+            assert "--certify" not in page.inner_text("main")
+            assert "(equation" not in page.inner_text("main")
+            assert ("first it grows" in page.inner_text("#quantities")) == (name != "ep4")
     robot = made("point_mass_robot")[0].solution
     rate = robot.abscissa * math.sqrt(robot.parameters["g"] / robot.parameters["w"])
     shown = re.search(r"slowest as t3 e−([\d.]+) t, t in s", of["point_mass_robot"])
-    assert shown is not None
     assert -float(shown[1]) == pytest.approx(rate, rel=5e-4)
     assert "e−1.88 t · the rear wheel would lift (load −38 %)" in of["ep4"]
     assert "would lift" not in of["whipple_ep4"]
@@ -319,7 +310,6 @@ def test_limits_of_shares_are_read_in_percent(show, made):
     with show(path) as page:
         rear = page.locator("#limits li", has=page.get_by_text("rear", exact=True)).locator(".margin").inner_text()
         shown = re.fullmatch(r"holds by ([\d.]+) %", rear)
-        assert shown is not None
         assert float(shown[1]) == pytest.approx(
             100 * (explorer.problem.posed.values(explorer.solution.parameters)["load_rear"] - 0.1), rel=1e-3
         )
@@ -360,7 +350,7 @@ def test_a_link_restores_the_state(show, explored):
         state, link = page.evaluate(saved), page.evaluate("location.hash").removeprefix("#")
     with show(path, link=link) as page:
         assert page.evaluate(saved) == state
-        assert page.locator("#note").inner_text() == ""
+        assert page.inner_text("#note") == ""
         page.evaluate("location.hash = ''")
         drawn(page)
         assert page.evaluate("fragmentOf(state)") == ""
@@ -385,7 +375,7 @@ def test_what_a_link_says_wrongly_is_ignored_and_said(show):
         start[names.index("chi_B")] = 1.75
         assert values_of(page) == start
         assert page.evaluate("DATA.parameters[state.over].name") == "mu"
-        note = page.locator("#note").inner_text()
+        note = page.inner_text("#note")
         assert all(part.split("%")[0] in note for part in wrong)
 
 
@@ -401,7 +391,7 @@ def test_the_link_is_copied_or_shown(show, made):
         )
         press(page, "copy link")
         assert page.evaluate("copied").endswith("#Fr=3.25")
-        assert page.locator("#note").inner_text() == "Link copied."
+        assert page.inner_text("#note") == "Link copied."
 
 
 def test_a_saved_design_is_solved(show, explored, tmp_path):
@@ -434,11 +424,11 @@ def test_text_is_no_markup(show, tmp_path):
     assert changed.count(meaning) == 2
     (tmp_path / "hostile.html").write_text(changed)
     with show(tmp_path / "hostile.html") as page:
-        assert page.locator("h1").inner_text() == f"{MARKUP} /* script */ <!-- title -->"
+        assert page.inner_text("h1") == f"{MARKUP} /* script */ <!-- title -->"
         assert page.title() == f"{MARKUP} /* script */ <!-- title -->"
-        assert page.locator("#about").inner_text() == MARKUP
+        assert page.inner_text("#about") == MARKUP
         assert page.locator("img").count() == 0
-        assert "<img src=x onerror=alert(1)>" in page.locator("#controls").inner_text()
+        assert "<img src=x onerror=alert(1)>" in page.inner_text("#controls")
         assert page.evaluate("document.querySelectorAll('script').length") == 1
 
 
@@ -517,15 +507,13 @@ def test_it_works_in_a_sandbox(show, made, tmp_path):
     (tmp_path / "notebook.html").write_text(f"<!DOCTYPE html><title>notebook</title>{explorer._repr_html_()}")
     with show(tmp_path / "notebook.html") as host:
         frame = host.frames[1]
-        said = frame.locator("#verdict").inner_text()
-        frame.get_by_role("button", name="benchmark", exact=True).click()
-        drawn(frame)
-        assert frame.locator("#verdict").inner_text() != said
-        frame.get_by_role("button", name="undo (Ctrl+Z)").click()
-        drawn(frame)
-        assert frame.locator("#verdict").inner_text() == said
-        frame.get_by_role("button", name="copy link").click()
-        assert "no address" in frame.locator("#note").inner_text()
+        said = frame.inner_text("#verdict")
+        press(frame, "benchmark")
+        assert frame.inner_text("#verdict") != said
+        press(frame, "undo (Ctrl+Z)")
+        assert frame.inner_text("#verdict") == said
+        press(frame, "copy link")
+        assert "no address" in frame.inner_text("#note")
         with host.expect_download() as waiting:
             frame.get_by_role("button", name="save design").click()
         assert tmsopt.load(waiting.value.path().rename(tmp_path / "saved.toml")).fixed == explorer.solution.parameters
@@ -537,7 +525,7 @@ def test_a_picture_that_fails_says_so_alone(show):
         page.evaluate("() => { survey = () => { throw new Error('out of paper'); }; }")
         typed(page, "chi_B", "1.5")
         drawn(page)
-        assert "out of paper" in page.locator("#chart .message").inner_text()
+        assert "out of paper" in page.inner_text("#chart .message")
         assert page.locator("#plane .message:visible").count() == 0
         assert 1.5 in values_of(page)
     assert faults  # the browser may tell of one twice, or of a picture that was tried again
@@ -566,7 +554,6 @@ def test_limits_are_lit(show, made):
                 row = page.locator("#limits li", has=page.get_by_text(name, exact=True))
                 assert row.get_attribute("class") == ("holds" if margin >= 0 else "broken")
                 shown = re.search(r"(holds|violated) by ([\d.]+)", row.inner_text().replace("·10", "e"))
-                assert shown is not None
                 scale = 100 if name == "steer_arm" else 1  # in cm, as the file has lengths
                 assert float(shown[2]) == pytest.approx(abs(margin) * scale, rel=1e-4)
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.browser import drawn
+from helpers.browser import drawn, press
 from scipy.integrate import solve_ivp
 
 import tmsopt
@@ -56,7 +56,6 @@ def equations(explorer, values):
         M, C1, K0, K2 = (np.array(m) for m in BENCHMARK.values())
         return first_order(M, values["v"] * C1, 9.81 * K0 + values["v"] ** 2 * K2), np.linalg.solve(M, [0, 1])
     of, pencil = explorer.problem.posed.parameter_set, explorer.problem.model.pencil
-    assert pencil is not None
     M, D, K = (np.array(m, dtype=float) for m in pencil(of.native(values)))
     rate, torque = (float(f(values)) if f else 1.0 for f in (of.rate, of.torque))
     in_file = (M * torque / rate**2, D * torque / rate, K * torque)  # N m per rad, N m s per rad, …
@@ -64,8 +63,7 @@ def equations(explorer, values):
 
 
 def shown(page):
-    found = page.evaluate("Object.fromEntries(DATA.parameters.map(({name}, k) => [name, state.x[k]]))")
-    return found
+    return page.evaluate("Object.fromEntries(DATA.parameters.map(({name}, k) => [name, state.x[k]]))")
 
 
 @pytest.mark.parametrize("name", BICYCLES)
@@ -116,7 +114,7 @@ def test_a_slow_bicycle_falls_and_the_page_says_so(show, made):
     with show(path, reduced_motion="reduce") as page:
         page.evaluate("tmsopt.set({v: 0.5})")
         drawn(page)
-        assert "It falls" in page.locator("#bicycle .reading").inner_text()
+        assert "It falls" in page.inner_text("#bicycle .reading")
         end, falls = page.evaluate("[motionFrom(state, drawingOf()).end, tmsopt.motion({seconds: 3}).falls]")
         A, _ = equations(explorer, shown(page))
 
@@ -127,29 +125,33 @@ def test_a_slow_bicycle_falls_and_the_page_says_so(show, made):
         truth = solve_ivp(
             lambda _, z: A @ z, (0, 20), [np.radians(5), 0, 0, 0], "DOP853", events=fallen, rtol=1e-12, atol=1e-14
         )
-        assert truth.t_events is not None
         assert end == pytest.approx(truth.t_events[0][0], rel=1e-4)
         assert falls == pytest.approx(end, rel=1e-4)
-        page.locator("#bicycle select").select_option("1")
-        page.get_by_role("button", name="Play", exact=True).click()
+        page.select_option("#bicycle select", "1")
+        press(page, "Play")
         page.wait_for_timeout(1000 * end + 1500)
         assert page.evaluate("clock.time") == end  # and stands
         assert page.get_by_role("button", name="Play", exact=True).is_visible()
         page.wait_for_timeout(500)
-        assert page.locator("#bicycle canvas").first.get_attribute("aria-label").endswith("the bicycle falls.")
+        assert page.get_attribute("#bicycle canvas", "aria-label").endswith("the bicycle falls.")
         page.evaluate("tmsopt.set({v: 5})")  # within the band of stable speeds, 4.292 to 6.024 m/s
         drawn(page)
-        assert "It falls" not in page.locator("#bicycle").inner_text()
+        assert "It falls" not in page.inner_text("#bicycle")
 
 
 def test_a_start_is_typed_and_kept(show, made):
     _, path = made("whipple_benchmark")
     start = "[state.lean, state.push]"
     with show(path, reduced_motion="reduce") as page:
-        for words, text in (("start lean", "−2,5°"), ("steer push", "1.5 N·m·s")):
+
+        def typed(words, text):
             field = page.locator("#bicycle").get_by_role("textbox", name=re.compile(words))
             field.fill(text)
             field.press("Enter")
+            return field
+
+        typed("start lean", "−2,5°")
+        typed("steer push", "1.5 N·m·s")
         drawn(page)
         assert page.evaluate(start) == [-2.5, 1.5]
         A, impulse = equations(made("whipple_benchmark")[0], shown(page))
@@ -157,10 +159,7 @@ def test_a_start_is_typed_and_kept(show, made):
         truth = integrated(A, [np.radians(-2.5), 0, *(1.5 * impulse)], [0, last[0]])[-1, 0]
         assert last[1] == pytest.approx(truth, abs=1e-5)  # where it falls, between two of 601 times
         for text in ("30", "-31", "abc", ""):
-            field = page.locator("#bicycle").get_by_role("textbox", name=re.compile("start lean"))
-            field.fill(text)
-            field.press("Enter")
-            assert field.get_attribute("aria-invalid") == "true"
+            assert typed("start lean", text).get_attribute("aria-invalid") == "true"
         assert page.evaluate(start) == [-2.5, 1.5]
         link = page.evaluate("fragmentOf(state)")
         page.keyboard.press("Tab")
@@ -170,7 +169,7 @@ def test_a_start_is_typed_and_kept(show, made):
         assert page.evaluate(start) == [-2.5, 1.5]
     with show(path, link=".lean=30&.push=x&.lean=") as page:
         assert page.evaluate(start) == [5, 0]
-        assert page.locator("#note").inner_text().startswith("Ignored in the link: ")
+        assert page.inner_text("#note").startswith("Ignored in the link: ")
 
 
 def test_play_pause_restart_and_the_slider_by_keys(show, made):
@@ -206,12 +205,12 @@ def test_play_pause_restart_and_the_slider_by_keys(show, made):
 
 def test_a_stated_system_starts_from_each_of_its_states(show):
     with show(PAIR) as page:
-        assert not page.locator("#bicycle").is_visible()
+        assert not page.is_visible("#bicycle")
         assert page.evaluate("tmsopt.motion({lean: 5})") is None
         c = shown(page)["c"]
         A = first_order([[1, 0], [0, 2]], [[c, 0], [0, 0.3]], [[3, -1], [-1, 2]])
         for k, name in enumerate(["coordinate 1", "coordinate 2", "rate of coordinate 1", "rate of coordinate 2"]):
-            page.locator("#motion select").select_option(name)
+            page.select_option("#motion select", name)
             times, values = page.evaluate("""() => {
                 const { seconds, at } = motionFrom(state, drawingOf());
                 return [seconds, seconds.map((time) => [at(0, time), at(1, time)])];
@@ -222,7 +221,7 @@ def test_a_stated_system_starts_from_each_of_its_states(show):
 
 def test_a_model_by_its_coefficients_has_no_motion(show):
     with show('[model]\ncoefficients = ["1", "c", "1"]\n[parameters]\nc = { min = 0, max = 1 }\n') as page:
-        assert not page.locator("#motion").is_visible()
+        assert not page.is_visible("#motion")
         assert page.evaluate("tmsopt.motion()") is None
 
 
@@ -232,7 +231,6 @@ def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(show, tmp_
     whipple = tmsopt.models.whipple
 
     def pencil(p):
-        assert whipple.pencil is not None
         (a, b), (c, d) = whipple.pencil(p)[0]
         inverse = [[d / (a * d - b * c), -b / (a * d - b * c)], [-c / (a * d - b * c), a / (a * d - b * c)]]
         rows = [[0, 0, -1, 0, 0], [0, 0, 0, -1, 0]]
@@ -243,7 +241,6 @@ def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(show, tmp_
         return identity, [*rows, [0, 0, gain / lag, 0, 1 / lag]]
 
     def feedback(p):
-        assert whipple.pencil is not None
         return SimpleNamespace(mass=whipple.pencil(p)[0])  # what the page asks of it
 
     posed = tmsopt.load(PROBLEMS / "whipple_benchmark.toml")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.browser import drawn
+from helpers.browser import drawn, press
 
 import tmsopt
 
@@ -157,7 +157,7 @@ def test_arrow_keys_move_the_design_over_the_grid(show):
     with show("chart") as page:
         before = np.array(page.evaluate("state.plane.map((k) => state.x[k])"))
         steps = np.array([(high - low) / (GRID - 1) for low, high in page.evaluate("state.plane.map(rangeOf)")])
-        page.locator("#chart canvas").first.focus()
+        page.focus("#chart canvas")
         for key in ("ArrowRight", "ArrowRight", "Shift+ArrowDown"):
             page.keyboard.press(key)
         after = np.array(page.evaluate("state.plane.map((k) => state.x[k])"))
@@ -222,7 +222,7 @@ def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(show):
         page.mouse.up()
         dragged = page.evaluate("state.x[state.over]")
         assert dragged == pytest.approx(low + 0.25 * (high - low), abs=0.005 * (high - low))
-        page.locator("#growth canvas").first.focus()
+        page.focus("#growth canvas")
         page.keyboard.press("ArrowRight")
         assert page.evaluate("state.x[state.over]") == pytest.approx(dragged + (high - low) / 200, rel=1e-12)
 
@@ -255,9 +255,9 @@ def test_motion_waits_where_the_reader_wants_none(show):
     with show("whipple_benchmark", reduced_motion="reduce") as page:
         page.wait_for_timeout(1200)
         assert page.evaluate("clock.time") == 0
-        page.get_by_role("button", name="Play", exact=True).click()
+        press(page, "Play")
         wait_until(page, "clock.time > 0.2")
-        page.get_by_role("button", name="Pause", exact=True).click()
+        press(page, "Pause")
         paused = page.evaluate("clock.time")
         page.wait_for_timeout(200)
         assert page.evaluate("clock.time") == paused
@@ -292,14 +292,14 @@ def test_pictures_stand_undefined_designs(show, layer):
         drawn(page)
         page.wait_for_timeout(600)
         assert not page.locator(".message:visible").count()
-        assert "undefined" in page.locator("#chart canvas").first.get_attribute("aria-label")
-        assert not page.locator("#bicycle").is_visible()
+        assert "undefined" in page.get_attribute("#chart canvas", "aria-label")
+        assert not page.is_visible("#bicycle")
 
 
 def test_a_model_of_one_parameter_has_no_chart_and_says_so(show):
     with show(ALONE) as page:
-        assert "needs two parameters" in page.locator("#chart").inner_text()
-        assert page.locator("#growth canvas").first.is_visible()
+        assert "needs two parameters" in page.inner_text("#chart")
+        assert page.is_visible("#growth canvas")
 
 
 def test_pictures_say_what_they_show(show):
@@ -308,11 +308,11 @@ def test_pictures_say_what_they_show(show):
         assert pictures.count() == 6
         for k in range(6):
             assert len(pictures.nth(k).get_attribute("aria-label")) > 40
-        assert "is stable" in page.locator("#chart canvas").first.get_attribute("aria-label")
+        assert "is stable" in page.get_attribute("#chart canvas", "aria-label")
         page.evaluate("change({x: [[state.over, 3]]})")
         page.wait_for_timeout(900)
-        assert "is unstable by weave" in page.locator("#chart canvas").first.get_attribute("aria-label")
-        assert "is unstable by weave" in page.locator("#growth canvas").first.get_attribute("aria-label")
+        assert "is unstable by weave" in page.get_attribute("#chart canvas", "aria-label")
+        assert "is unstable by weave" in page.get_attribute("#growth canvas", "aria-label")
 
 
 def growth_sentence(page, change="{}"):
@@ -328,10 +328,10 @@ def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(show):
         over_mass = growth_sentence(page, f"{{over: {index % 'ms'}}}")
         assert over_mass.startswith("Stable throughout")
         assert "a 3-fold root at 250 (this design)" in over_mass
-        assert "edge of heavy damping" in page.locator("#chart .reading").inner_text()
+        assert "edge of heavy damping" in page.inner_text("#chart .reading")
         growth_sentence(page, f"{{x: [[{index % 'c'}, 0]]}}")
-        assert "marginal" in page.locator("#chart .reading").inner_text()
-        assert "within a multiple" not in page.locator("#motion").inner_text()
+        assert "marginal" in page.inner_text("#chart .reading")
+        assert "within a multiple" not in page.inner_text("#motion")
 
 
 def test_roots_that_cross_0_are_told_where_all_is_unstable(show):
@@ -352,10 +352,9 @@ def test_roots_that_cross_0_are_told_where_all_is_unstable(show):
 def test_an_envelope_is_drawn_where_it_is_one(show):
     """Where four roots meet a push goes as t^3 e^(abscissa t), which no multiple of e^(abscissa t) bounds."""
     with show("ep4") as page:
-        assert "within a multiple" not in page.locator("#motion").inner_text()
-        page.get_by_role("button", name="benchmark").click()
-        drawn(page)
-        assert "within a multiple" in page.locator("#motion").inner_text()
+        assert "within a multiple" not in page.inner_text("#motion")
+        press(page, "benchmark")
+        assert "within a multiple" in page.inner_text("#motion")
 
 
 def test_one_pole_does_not_set_the_scale_of_the_growth_rates(show):
@@ -371,7 +370,7 @@ def test_one_pole_does_not_set_the_scale_of_the_growth_rates(show):
         assert high <= 60
         page.evaluate(f"change({{ x: [[{wheelbase}, 10]] }})")
         drawn(page)
-        assert "exact edges are hidden: other values are set" in page.locator("#chart .legend").inner_text()
+        assert "exact edges are hidden: other values are set" in page.inner_text("#chart .legend")
         fork = page.evaluate("""bicycleLines(bicycleShape(state.x), 0).filter(({ kind }) => kind === "fork")
             .flatMap(({ points }) => points.map((point) => point[2]))""")
         assert max(fork) <= 0  # none of it in the ground

@@ -76,3 +76,9 @@ def drawn(page):
     page.evaluate(
         "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
     )
+
+
+def press(page, name):
+    """Press the button of a name, and wait."""
+    page.get_by_role("button", name=name, exact=True).click()
+    drawn(page)

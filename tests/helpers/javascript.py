@@ -24,10 +24,11 @@ fs.writeFileSync(process.argv[3], JSON.stringify(answer(given), plain));
 """Reads what is given and writes the answer, after the scripts under test."""
 
 
-def page_script(problem):
-    """Model, kernel and numerics of the page of a problem."""
+def ask(problem, answer, given):
+    """The value of a JavaScript function of the given data, after model, kernel and numerics of a problem's page."""
     page = files("tmsopt.explorer") / "page" / "numerics.js"
-    return "\n".join([model_script(problem.posed).text, kernel_script(problem.model.degree), page.read_text("utf-8")])
+    scripts = model_script(problem.posed).text, kernel_script(problem.model.degree), page.read_text("utf-8")
+    return run(scripts, answer, given)
 
 
 def run(scripts, answer, given):
@@ -60,5 +61,4 @@ Object.assign(globalThis, {window: globalThis, location: {hash: ""}, matchMedia:
 def said_by(html, answer):
     """An expression in a whole page, whose pictures draw nowhere."""
     script = re.search(r"<script>(.*)</script>", html, re.DOTALL)
-    assert script is not None
     return run([_STUB, script[1]], f"() => ({answer})", None)

@@ -227,7 +227,7 @@ def chart(
     work = plan_survey(problem, axes, points, wanted, quantities, single)
     path, grid = None if folder is None else as_path(folder, "a folder"), work.grid
     if path is None and grid.size > LARGEST:
-        message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or at most {LARGEST:.0e} designs"
+        message = f"{grid.size:.3g} designs do not fit into memory; give a folder x.chart, or at most {LARGEST:.0e}"
         raise input_error(message, "points")
     about = _describe(work, tile)
     grid.tiles(tile)  # raises for too many tiles

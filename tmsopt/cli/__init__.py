@@ -45,7 +45,7 @@ def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "
                 every.main(args, prog_name)
         except SystemExit as end:
             status = end.code
-        if heard.number is not None:
+        if heard.status:
             status = heard.status
             if args is None:
                 exit_now(heard.status)

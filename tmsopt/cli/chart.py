@@ -1,27 +1,21 @@
 """`tmsopt chart`: stability over a plane or a space of parameters."""
 
-import math
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Reply
-from tmsopt.cli.command import OnFile, WithPage, WithPlot, option
+from tmsopt.cli.answers import Reply, write_file
+from tmsopt.cli.command import OnFile, WithPage, WithPlot, option, parse_number, split_names, take_nominal
 from tmsopt.cli.ending import INTERRUPTED
-from tmsopt.cli.outputs import check_output, report_writing
-from tmsopt.cli.problems import parse_number, split_names, take_nominal
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.deprecated import no_longer_needed
 from tmsopt.errors import input_error, suggest
-
-if TYPE_CHECKING:
-    from tmsopt.problem import Posed
 
 _LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
 _DRAWN = (800, 600)
@@ -48,10 +42,10 @@ class ChartCommand(WithPage, WithPlot, OnFile):
     Exit status: 0 done, 2 bad input.
     """
 
-    points: Any = option("Points.  [default: 400x300, 120x100x80]", parse=_parse_points, metavar="N[xM[xL]]")
-    axes: str | None = option("Parameters, the horizontal one first.")
-    output: Path | None = option("Write the arrays (npz, nc, chart).", None, "-o")
-    layers: str | None = option("Arrays of --output, e.g. kind,abscissa.")
+    points: Any = option("Points.  [default: 400x300, 120x100x80]", type=_parse_points, metavar="N[xM[xL]]")
+    axes: Any = option("Parameters, the horizontal one first.", type=split_names, metavar="NAMES")
+    output: Path | None = option("Write the arrays (npz, nc, chart).", None, "-o", endings=("npz", "nc", "chart"))
+    layers: Any = option("Arrays of --output, e.g. kind,abscissa.", type=split_names, metavar="NAMES")
     quantity: Mapping[str, str] = option(
         "Compute an expression too.", metavar="NAME=EXPRESSION", example="excess=Fr - Fr_c"
     )
@@ -68,72 +62,47 @@ class ChartCommand(WithPage, WithPlot, OnFile):
     def run(self) -> Reply:
         if self.engine is not None:
             click.echo(no_longer_needed("--engine"), err=True)
+        folder = self.output if self.output is not None and self.output.suffix.lower() == ".chart" else None
         try:
-            return self._chart()
+            return self._chart(folder)
         except KeyboardInterrupt:
-            is_kept = self._folder is not None and self._folder.exists()
-            kept = f"the tiles done so far are in {self.output}; the same command goes on"
+            is_kept = folder is not None and folder.exists()
+            kept = f"the tiles done so far are in {folder}; the same command goes on"
             click.echo(f"stopped: {kept if is_kept else 'nothing was written'}", err=True)
             sys.exit(INTERRUPTED)
 
-    def _chart(self) -> Reply:
-        from tmsopt.charts import USUAL, axes_of
+    def _chart(self, folder: Path | None) -> Reply:
+        from tmsopt.charts import USUAL, axes_of, check_netcdf
 
-        check_output("--output", self.output, ("npz", "nc", "chart"), folders=("chart",))
+        if self.output is not None and self.output.suffix.lower() == ".nc":
+            check_netcdf()
         problem = take_nominal(tmsopt.load(self.file).posed)
-        names = axes_of(problem, split_names(self.axes) if self.axes is not None else None)
-        layers = split_names(self.layers) if self.layers is not None else USUAL
-        is_whole = self._folder is None and len(names) == 2  # in memory, shown with all its layers and boundaries
+        names, layers = axes_of(problem, self.axes), self.layers or USUAL
+        is_whole = folder is None and len(names) == 2  # in memory, shown with all its layers and boundaries
         self._check_plot(len(names))
         held = self._read_slice(problem)
-        sizes = self._choose_sizes(len(names))
-        options: dict[str, Any] = {"quantities": self.quantity, "single": self.single}
-        with self._report_moved():
+        options: dict[str, Any] = {"quantities": self.quantity, "single": self.single, "progress": progress_listener()}
+        with _report_folder(folder) if folder else nullcontext():
             chart = tmsopt.chart(
                 problem,
                 names,
-                folder=self._folder,
-                points=sizes,
+                folder=folder,
+                points=self.points * len(names) if self.points and len(self.points) == 1 else self.points,
                 layers=(*_LAYERS, *layers) if is_whole else layers,
-                **options,
                 workers=self.workers,
                 fresh=self.fresh,
                 boundaries=self.boundaries and is_whole,
-                progress=progress_listener(),
+                **options,
             )
-        if self.output is not None and self._folder is None:
-            with report_writing("--output", self.output):
-                chart.save(self.output, (*dict.fromkeys(layers), *self.quantity))
-        if self._folder is not None:
-            click.echo(f"wrote {self._folder}", err=True)
+        if folder is None:
+            write_file("--output", self.output, lambda path: chart.save(path, (*dict.fromkeys(layers), *self.quantity)))
 
         def draw() -> Any:
-            more = options | {"boundaries": self.boundaries, "progress": progress_listener()}
+            more = options | {"boundaries": self.boundaries}
             drawn = chart if is_whole else tmsopt.chart(**_cut_plane(chart, held), **more)
             return tmsopt.plots.chart_figure(drawn, self.layer)
 
         return Reply(chart, draw=draw)
-
-    @property
-    def _folder(self) -> Path | None:
-        """The folder that --output names, if it names one."""
-        return self.output if self.output is not None and self.output.suffix.lower() == ".chart" else None
-
-    @contextmanager
-    def _report_moved(self) -> Iterator[None]:
-        """Say where an old folder of that name went, or why the new one cannot be written."""
-        folder = self._folder
-        if folder is None:
-            yield
-            return
-        before = {folder, *folder.parent.glob("*.chart")}
-        try:
-            yield
-        except OSError as error:
-            message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
-            raise input_error(message, "--output") from None
-        for moved in sorted(set(folder.parent.glob("*.chart")) - before):
-            click.echo(f"moved the old folder to {moved}", err=True)
 
     def _check_plot(self, axes: int) -> None:
         accepted = (*_LAYERS[:4], *self.quantity)
@@ -145,7 +114,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
         if self.slice and axes == 2:
             raise input_error("two parameters are free, so there is nothing to hold; leave it out", "--slice")
 
-    def _read_slice(self, problem: "Posed") -> dict[str, float]:
+    def _read_slice(self, problem: Any) -> dict[str, float]:
         """The parameter that a figure holds, as a number in its range."""
         held = {}
         for name, text in self.slice.items():
@@ -157,18 +126,19 @@ class ChartCommand(WithPage, WithPlot, OnFile):
                 raise input_error(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
         return held
 
-    def _choose_sizes(self, axes: int) -> tuple[int, ...]:
-        """Points along each axis, unless memory or the format of the file cannot take them."""
-        from tmsopt.charts import LARGEST, USUAL_POINTS, check_netcdf
 
-        sizes: tuple[int, ...] = self.points or USUAL_POINTS[axes]
-        sizes = sizes * axes if len(sizes) == 1 else sizes
-        if self._folder is None and (designs := math.prod(sizes)) > LARGEST:
-            message = f"{designs:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
-            raise input_error(message, "--points")
-        if self.output is not None and self.output.suffix.lower() == ".nc":
-            check_netcdf()
-        return sizes
+@contextmanager
+def _report_folder(folder: Path) -> Iterator[None]:
+    """Name the folder that was written, and where an old one went, or say why it was not written."""
+    before = {folder, *folder.parent.glob("*.chart")}
+    try:
+        yield
+    except OSError as error:
+        message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
+        raise input_error(message, "--output") from None
+    for moved in sorted(set(folder.parent.glob("*.chart")) - before):
+        click.echo(f"moved the old folder to {moved}", err=True)
+    click.echo(f"wrote {folder}", err=True)
 
 
 def _cut_plane(chart: Any, held: dict[str, float]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Commands as frozen dataclasses: a field states an argument or an option once, the docstring is the help."""
 
 import sys
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from inspect import getdoc
 from pathlib import Path
@@ -9,13 +9,11 @@ from typing import Any, Literal, dataclass_transform, get_args, get_origin
 
 import click
 
-from tmsopt.cli.context import colour_option
-from tmsopt.cli.outputs import FIGURES, PAGES, check_output
+from tmsopt.cli.answers import FIGURES, PAGES, Reply, check_output, deliver
 from tmsopt.cli.terminal import progress_listener
-from tmsopt.errors import MOST_STARTS, Fault, InputError
+from tmsopt.errors import MOST_STARTS, Fault, InputError, input_error
 
-_COLUMN = 32  # columns of an option in a help
-_OWN = {"text", "names", "endings", "example", "parse"}  # settings of tmsopt; click knows the others
+_OWN = {"names", "endings", "example"}  # settings of tmsopt; click knows the others
 
 
 def argument(default: Any = MISSING, **settings: Any) -> Any:
@@ -29,10 +27,10 @@ def option(text: str, default: Any = None, *names: str, **settings: Any) -> Any:
     Args:
         text: its help.
         names: further names.
-        settings: `endings` of a file to write; an `example` of NAME=VALUE; a function that `parse`s the text; or
-            settings of `click.Option`, such as the `type` of a number in a range.
+        settings: `endings` of a file to write; an `example` of NAME=VALUE; or settings of `click.Option`, such as the
+            `type`: a number in a range, or a function of the text.
     """
-    return field(default=default, metadata={"text": text, "names": names, **settings})
+    return field(default=default, metadata={"help": text, "names": names, **settings})
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(argument, option))
@@ -92,23 +90,88 @@ class WithIpopt(WithSearch):
     linear_solver: Literal["mumps", "spral"] = option("Linear solver of IPOPT.", "mumps")
 
 
+# What options say
+
+
+def parse_number(text: str, unit: str, *key: str) -> float:
+    """A number of the command line, plain or with a unit."""
+    from tmsopt.problem.units import parse_quantity
+
+    try:
+        return float(text)
+    except ValueError:
+        try:
+            return parse_quantity(text, unit)
+        except ValueError as error:
+            raise input_error(str(error), *key) from None
+
+
+def split_names(text: str) -> tuple[str, ...]:
+    """Names separated by commas."""
+    return tuple(name.strip() for name in text.split(","))
+
+
+def take_nominal(problem: Any) -> Any:
+    """The posed problem about one design; a note on stderr says that scenarios and tolerances are left out."""
+    if problem.nominal is not problem:
+        values = _list_scenarios(problem)
+        click.echo(f"scenarios and tolerances are left aside{': ' + values if values else ''}", err=True)
+    return problem.nominal
+
+
+def note_scenarios(problem: Any, varied: Iterable[str] = ()) -> None:
+    """Say on stderr in which scenario the design for several is looked at."""
+    if values := _list_scenarios(problem, varied):
+        click.echo(f"the design for all scenarios, looked at for {values}", err=True)
+
+
+def _list_scenarios(problem: Any, varied: Iterable[str] = ()) -> str:
+    return ", ".join(f"{n} = {problem.fixed[n]:.6g}" for n in problem.scenarios if n not in varied)
+
+
+# Commands of click
+
+
 def build_command(kind: type[Command], name: str) -> click.Command:
     """The command of a class."""
-    from tmsopt.cli.answers import Reply, deliver
+    of = fields(kind)  # type: ignore[arg-type]
+    options = {f.name for f in of if "help" in f.metadata}
 
     def call(**values: Any) -> None:
+        for f in of:  # a value is refused before any work is done
+            flag, value = _flag_of(f.name), values[f.name]
+            if "endings" in f.metadata:
+                check_output(flag, value, f.metadata["endings"])
+            if "example" in f.metadata:
+                texts = [value] if isinstance(value, str) else value or ()
+                values[f.name] = _parse_pairs(flag, texts, get_args(f.type)[1], f.metadata["example"])
         command = kind(**values)
         try:
             found = command.run()
         except InputError as error:
-            raise InputError([_name_option(fault, options) for fault in error.faults]) from error
+            raise InputError([name_option(fault) for fault in error.faults]) from error
         if status := deliver(command, found) if isinstance(found, Reply) else found:
             sys.exit(status)
 
-    options = {f.name for f in fields(kind) if "text" in f.metadata}  # type: ignore[arg-type]
+    def name_option(fault: Fault) -> Fault:
+        """The fault of an argument of the library, under the option that gave it."""
+        first, *rest = fault.key or ("",)
+        return replace(fault, key=(_flag_of(first), *rest)) if first in options and not fault.file else fault
+
     summary, _, rest = (getdoc(kind) or "").partition("\n\n")
-    parameters = [*map(_build_parameter, fields(kind)), colour_option()]  # type: ignore[arg-type]
-    return _ShortHelp(name, params=parameters, callback=call, help=summary, epilog=rest)
+    parameters = [*map(_build_parameter, of), colour_option()]
+    return _Command(name, params=parameters, callback=call, help=summary, epilog=rest)
+
+
+def colour_option() -> click.Option:
+    """--color of every command, and of all of them."""
+
+    def keep(context: click.Context, _: click.Parameter, value: str | None) -> None:
+        if value:
+            context.color = {"always": True, "never": False}.get(value)
+
+    kind, text = click.Choice(["auto", "always", "never"]), "Colour the text.  [default: auto]"
+    return click.Option(["--color"], type=kind, callback=keep, expose_value=False, help=text)
 
 
 class _Option(click.Option):
@@ -118,13 +181,8 @@ class _Option(click.Option):
         return {key: value for key, value in super().get_help_extra(ctx).items() if key != "range"}
 
 
-class _ShortHelp(click.Command):
-    """A command whose help has one line for each option, and the examples as they stand."""
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        options = (p.get_help_record(ctx) for p in self.get_params(ctx) if isinstance(p, click.Option))
-        with formatter.section("Options"):
-            formatter.write_dl([record for record in options if record], _COLUMN)
+class _Command(click.Command):
+    """A command whose help has the examples as they stand."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         text = (self.epilog or "").replace("\n\nExit", "\nExit")
@@ -135,19 +193,12 @@ def _flag_of(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _name_option(fault: Fault, options: Container[str]) -> Fault:
-    """The fault of an argument of the library, under the option that gave it."""
-    name, *rest = fault.key or ("",)
-    return replace(fault, key=(_flag_of(name), *rest)) if name in options and not fault.file else fault
-
-
 def _build_parameter(of: Field[Any]) -> click.Parameter:
-    about = of.metadata
-    settings = {key: value for key, value in about.items() if key not in _OWN}
     hint, default = of.type, None if of.default is MISSING else of.default
+    settings = {key: value for key, value in of.metadata.items() if key not in _OWN}
     if type(None) in get_args(hint):
         hint = get_args(hint)[0]
-    if "text" not in about:
+    if "help" not in settings:
         return click.Argument([of.name], type=_type_of(hint), required=of.default is MISSING, **settings)
     flag, kind = _flag_of(of.name), hint
     if get_origin(hint) in (tuple, Mapping):
@@ -155,27 +206,17 @@ def _build_parameter(of: Field[Any]) -> click.Parameter:
     elif hint is bool:
         settings["is_flag"], default = True, bool(default)
         flag += f"/--no-{of.name}" if default else ""
-
-    def read(_context: click.Context, option: click.Parameter, value: Any) -> Any:
-        """Refuse a value before any work is done."""
-        if "endings" in about:
-            check_output(option.opts[0], value, about["endings"])
-        if "example" in about:
-            texts = [value] if isinstance(value, str) else value or ()
-            return _parse_pairs(option.opts[0], texts, get_args(hint)[1], about["example"])
-        return about["parse"](value) if "parse" in about and value is not None else value
-
     settings = {"type": _type_of(kind), "show_default": hint is not bool, **settings}
-    return _Option([of.name, flag, *about["names"]], default=default, help=about["text"], callback=read, **settings)
+    return _Option([of.name, flag, *of.metadata["names"]], default=default, **settings)
 
 
 def _type_of(hint: Any) -> Any:
     if get_origin(hint) is Literal:
         return click.Choice(get_args(hint))
-    return {Path: click.Path(path_type=Path), bool: None, Any: str}.get(hint, hint)
+    return click.Path(path_type=Path) if hint is Path else hint
 
 
-def _parse_pairs(option: str, texts: Sequence[str], kind: Any, example: str) -> dict[str, Any]:
+def _parse_pairs(flag: str, texts: Sequence[str], kind: Any, example: str) -> dict[str, Any]:
     """The values of NAME=VALUE by name."""
     pairs: dict[str, Any] = {}
     faults = []
@@ -183,11 +224,11 @@ def _parse_pairs(option: str, texts: Sequence[str], kind: Any, example: str) -> 
         try:
             if not (name and text) or name in pairs:
                 accepted = f"accepted: NAME=VALUE, such as {example}, each name once"
-                faults.append(Fault(f"found '{name}'; {accepted}", (option,)))
+                faults.append(Fault(f"found '{name}'; {accepted}", (flag,)))
             else:
                 pairs[name] = kind(text)
         except ValueError:
-            faults.append(Fault(f"found '{text}'; accepted: a number", (option, name)))
+            faults.append(Fault(f"found '{text}'; accepted: a number", (flag, name)))
     if faults:
         raise InputError(faults)
     return pairs

@@ -1,5 +1,6 @@
 """All commands as one group, which loads the module of a command when it is first used."""
 
+import logging
 import os
 import sys
 from collections.abc import Iterator, Mapping
@@ -11,31 +12,38 @@ from typing import Any
 import click
 
 from tmsopt import __version__
-from tmsopt.cli.context import SPELLINGS, WORDS, colour_option
+from tmsopt.cli.answers import WORDS, answer
+from tmsopt.cli.command import build_command, colour_option
 from tmsopt.cli.ending import BAD_INPUT, STATUSES, report_end
 from tmsopt.errors import InputError
 
-_COMMANDS = {
-    "solve": ("solve", "Find the best design, or the front of the best ones."),
-    "explore": ("explore", "Write a page with sliders that shows why a design is stable."),
-    "compare": ("proofs", "Compare the optimum with the closed-form laws."),
-    "prove": ("proofs", "Prove that the solution exists, and whether it is stable."),
-    "diagnose": ("proofs", "Show how each multiple root splits."),
-    "speeds": ("motion", "Find every weave and capsize speed."),
-    "simulate": ("motion", "Show the motion after a lean, a push, or in noise."),
-    "trace": ("trace", "Trace a root pattern through parameter space."),
-    "chart": ("chart", "Chart stability over two or three parameters."),
-    "study": ("study", "Solve a problem for every row of a table or sample."),
-    "figure": ("paper", "Draw the figures of the paper."),
-    "verify": ("paper", "Recompute every number of the paper."),
-    "import": ("guide", "Make a problem file from a measured bicycle."),
-    "convert": ("guide", "Make a bicycle with inertia from one of point masses."),
-    "new": ("guide", "Write a commented problem to start from."),
-    "example": ("guide", "List the examples that come with tmsopt, or write one here."),
-    "describe": ("guide", "Show what a model or a file is made of."),
-    "schema": ("guide", "Write the JSON Schema of problem files, for editors."),
+_MODULES: Mapping[str, Mapping[str, str]] = {
+    "designs": {
+        "solve": "Find the best design, or the front of the best ones.",
+        "explore": "Write a page with sliders that shows why a design is stable.",
+        "compare": "Compare the optimum with the closed-form laws.",
+        "prove": "Prove that the solution exists, and whether it is stable.",
+        "diagnose": "Show how each multiple root splits.",
+        "speeds": "Find every weave and capsize speed.",
+        "simulate": "Show the motion after a lean, a push, or in noise.",
+        "trace": "Trace a root pattern through parameter space.",
+    },
+    "chart": {"chart": "Chart stability over two or three parameters."},
+    "study": {"study": "Solve a problem for every row of a table or sample."},
+    "guide": {
+        "figure": "Draw the figures of the paper.",
+        "verify": "Recompute every number of the paper.",
+        "import": "Make a problem file from a measured bicycle.",
+        "convert": "Make a bicycle with inertia from one of point masses.",
+        "new": "Write a commented problem to start from.",
+        "example": "List the examples that come with tmsopt, or write one here.",
+        "describe": "Show what a model or a file is made of.",
+        "schema": "Write the JSON Schema of problem files, for editors.",
+    },
 }
-"""Command → its module, which has a class of that name with `Command`, and its line in `tmsopt --help`."""
+"""Module → its commands, each a class of that name with `Command`, with their lines in `tmsopt --help`."""
+
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
 
 _FRONT = 'tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE'
 _HINTS = {
@@ -53,27 +61,25 @@ Exit status:
 
 More: docs/reference/commands.md
 """
-_JSON = "tmsopt.version.json"
+
+
+@cache
+def _load_command(name: str) -> click.Command:
+    home = import_module(f"tmsopt.cli.{_HOMES[name]}")
+    return build_command(getattr(home, f"{name.capitalize()}Command"), name)
 
 
 class _Commands(Mapping[str, click.Command]):
     """Every command by its name, built when it is first asked for."""
 
     def __getitem__(self, name: str) -> click.Command:
-        return _load_command(_COMMANDS[name][0], name)
+        return _load_command(name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_COMMANDS)
+        return iter(_HOMES)
 
     def __len__(self) -> int:
-        return len(_COMMANDS)
-
-
-@cache
-def _load_command(module: str, name: str) -> click.Command:
-    from tmsopt.cli.command import build_command
-
-    return build_command(getattr(import_module(f"tmsopt.cli.{module}"), f"{name.capitalize()}Command"), name)
+        return len(_HOMES)
 
 
 class _Group(click.Group):
@@ -86,7 +92,11 @@ class _Group(click.Group):
         """Keep the words for a report, and refuse those that a program may give but no shell."""
         with report_end():
             for word in args:
-                if "\0" in word or not _is_encodable(word):
+                try:
+                    is_accepted = b"\0" not in os.fsencode(word)
+                except UnicodeEncodeError:
+                    is_accepted = False
+                if not is_accepted:
                     accepted = "words without NUL, in the encoding of file names"
                     raise click.UsageError(f"found {word!r}; accepted: {accepted}")
             words = tuple(args)  # click takes them from the list
@@ -101,7 +111,7 @@ class _Group(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in _COMMANDS.items()])
+            formatter.write_dl([line for lines in _MODULES.values() for line in lines.items()])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         formatter.write(_STATUSES)
@@ -114,13 +124,12 @@ class _Group(click.Group):
                 click.echo(f"{error}{_offer_example(error)}", err=True)
                 sys.exit(BAD_INPUT)
             except RuntimeError as error:
-                from tmsopt import NotSolved
-
-                if not isinstance(error, NotSolved):
+                found = getattr(error, "solution", None)  # of NotSolved, whose module takes long to load
+                if found is None:
                     raise
-                problem, status = error.solution.problem, error.solution.status
-                click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)
-                sys.exit(STATUSES[status])
+                status = found.status.replace("_", " ")
+                click.echo(f"{found.problem.title}: {status}; there is no design to look at", err=True)
+                sys.exit(STATUSES[found.status])
 
 
 def _offer_example(error: InputError) -> str:
@@ -134,46 +143,22 @@ def _offer_example(error: InputError) -> str:
     return f"; tmsopt example {name} writes it here" if name in examples() else ""
 
 
-def _keep_json(ctx: click.Context, _: click.Parameter, given: bool) -> None:
-    ctx.meta[_JSON] = given  # click reads it before --version, wherever it stands
-
-
-def _show_version(ctx: click.Context, _: click.Parameter, given: bool) -> None:
-    if ctx.resilient_parsing:
-        return
-    as_json = ctx.meta.get(_JSON, False)
-    if given:
-        from tmsopt.cli.answers import answer
-        from tmsopt.versions import SCHEMA, environment
-
-        data = {"schema": SCHEMA, "tmsopt": __version__}
-        answer(as_json, f"tmsopt, version {__version__}", lambda: data | environment())
-        ctx.exit()
-    if as_json:
-        raise click.NoSuchOption("--json", possibilities=["--version"], ctx=ctx)
-
-
-def _is_encodable(word: str) -> bool:
-    try:
-        os.fsencode(word)
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
 @click.group(
-    "tmsopt", cls=_Group, commands=_Commands(), context_settings={"help_option_names": ["-h", "--help"], **SPELLINGS}
+    "tmsopt",
+    cls=_Group,
+    commands=_Commands(),
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "token_normalize_func": lambda word: "color" if word == "colour" else word,
+    },
+    invoke_without_command=True,
+    no_args_is_help=True,
+    subcommand_metavar="COMMAND [ARGS]...",
 )
-@click.option("--version", is_flag=True, expose_value=False, callback=_show_version, help="Show the version and exit.")
-@click.option(
-    "--json",
-    is_flag=True,
-    expose_value=False,
-    is_eager=True,
-    callback=_keep_json,
-    help="With --version: also those of Python and the libraries.",
-)
-def every() -> None:
+@click.option("--version", is_flag=True, help="Show the version and exit.")
+@click.option("--json", is_flag=True, help="With --version: also those of Python and the libraries.")
+@click.pass_context
+def every(ctx: click.Context, version: bool, json: bool) -> None:
     """Design self-stable bicycles under your own constraints, and find exceptional points.
 
     \b
@@ -182,11 +167,18 @@ def every() -> None:
       tmsopt example ep4 && tmsopt prove ep4.toml
       tmsopt chart problems/chart.toml --plot chart.png
     """
-    import logging
+    if version:
+        from tmsopt.versions import SCHEMA, environment
 
-    logging.getLogger("matplotlib").setLevel(
-        logging.ERROR
-    )  # it may find no folder for its cache: figures stay the same
+        data = {"schema": SCHEMA, "tmsopt": __version__}
+        answer(json, f"tmsopt, version {__version__}", lambda: data | environment())
+        ctx.exit()
+    if json:
+        raise click.NoSuchOption("--json", possibilities=["--version"], ctx=ctx)
+    if ctx.invoked_subcommand is None:
+        ctx.fail("Missing command.")
+    # It may find no folder for its cache: figures stay the same.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
 every.params.append(colour_option())

@@ -40,29 +40,23 @@ class Signals:
     """The signals that one command receives.
 
     Attributes:
-        number: of the first one; None before.
+        status: of a program that the first one ended; 0 before.
     """
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        self.number: int | None = None
-        self._held, self._due, self._again = False, False, 0.0
-
-    @property
-    def status(self) -> int:
-        """The exit status of a program that a signal ended."""
-        return 128 + (self.number or 0)
+        self.status, self._held, self._due, self._again = 0, False, False, 0.0
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        if self.number is not None and time.monotonic() < self._again:
-            return
-        if self.number is not None:
+        now = time.monotonic()
+        if not self.status:
+            self.status, self._due, self._again = 128 + number, True, now + _AGAIN
+            self.interrupt(number, frame)
+        elif now >= self._again:
             threading.Thread(target=self._exit_soon, daemon=True).start()
             raise SystemExit(self.status)
-        self.number, self._due, self._again = number, True, time.monotonic() + _AGAIN
-        self.interrupt(number, frame)
 
     def interrupt(self, _number: int, frame: FrameType | None) -> None:
         """Raise the interrupt that is due, but later while compiled modules load or CasADi calls, which lose it."""
@@ -76,7 +70,7 @@ class Signals:
 
     def recover(self, event: Any) -> None:
         """Raise an interrupt again that Python could not raise where it was; the hook of unraisable exceptions."""
-        if self.number is None or not isinstance(event.exc_value, KeyboardInterrupt):
+        if not self.status or not isinstance(event.exc_value, KeyboardInterrupt):
             sys.__unraisablehook__(event)
         elif hasattr(signal, "setitimer"):
             self._due = True
@@ -104,12 +98,10 @@ class Signals:
         os._exit(self.status)
 
 
-_SIGNALS_HEARD = Signals()
+_HEARD = Signals()
 
-
-def hold_signals() -> Any:
-    """A context in which an answer is written as a whole: the first signal waits."""
-    return _SIGNALS_HEARD.hold()
+hold_signals = _HEARD.hold
+"""A context in which an answer is written as a whole: the first signal waits."""
 
 
 @contextmanager
@@ -119,18 +111,17 @@ def handle_signals(for_good: bool) -> Iterator[Signals]:
     Args:
         for_good: the process ends afterwards, and later signals do not change its status.
     """
-    heard = _SIGNALS_HEARD
-    heard.reset()
+    _HEARD.reset()
     if threading.current_thread() is not threading.main_thread():
-        yield heard
+        yield _HEARD
         return
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
-    before = {number: handler for number, handler in before.items() if handler not in (signal.SIG_IGN, None)}
-    hook, sys.unraisablehook = sys.unraisablehook, heard.recover
+    found = {number: signal.getsignal(number) for number in _SIGNALS}
+    before = {number: handler for number, handler in found.items() if handler not in (signal.SIG_IGN, None)}
+    hook, sys.unraisablehook = sys.unraisablehook, _HEARD.recover
     for number in before:
-        signal.signal(number, heard.handle)
+        signal.signal(number, _HEARD.handle)
     try:
-        yield heard
+        yield _HEARD
     finally:
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if for_good else handler)

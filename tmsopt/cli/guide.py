@@ -1,17 +1,30 @@
-"""`tmsopt new`, `example`, `describe`, `schema`, `convert` and `import`: files to start from, and what they mean."""
+"""Files to start from and what they mean, the paper: `tmsopt new`, `example`, `describe`, `schema`, `convert`,
+`import`, `figure`, `verify`."""
 
+from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
 import tmsopt
 from tmsopt import guide
-from tmsopt.cli.answers import answer
-from tmsopt.cli.command import Command, OnFile, argument, option
-from tmsopt.cli.outputs import check_output, print_or_write, write_file, write_new
+from tmsopt.cli.answers import (
+    FIGURES,
+    Reply,
+    answer,
+    check_output,
+    print_or_write,
+    report_writing,
+    write_file,
+    write_new,
+)
+from tmsopt.cli.command import Command, OnFile, WithPlot, argument, option
+from tmsopt.cli.terminal import progress_listener
 from tmsopt.errors import input_error
-from tmsopt.files import write_text
+from tmsopt.files import write_atomic, write_text
+from tmsopt.progress import start_steps
 
 
 class NewCommand(OnFile):
@@ -142,3 +155,92 @@ class ImportCommand(WithToml, OnFile):
         if self.output is None:
             click.echo(text, nl=False)
         write_file("--output", self.output, lambda path: write_text(path, text))
+
+
+class FigureCommand(Command):
+    """Draw the figure NAME of the paper, or all of them.
+
+    NAME is one that --list shows, its label in the paper such as fig3, or 'all'.
+
+    Examples:
+      tmsopt figure --list
+      tmsopt figure fig3 --output locus.pdf
+      tmsopt figure all --output figures --format svg
+
+    Exit status: 0 drawn, 2 bad input.
+    """
+
+    name: str | None = argument(None)
+    output: Path | None = option("File, or with 'all' a folder.  [default: NAME.png]")
+    format: Literal["png", "pdf", "svg"] | None = option("[default: as --output ends, or png]")
+    json: bool = option("Write names, captions and files as JSON.")
+    list: bool = option("List the figures and draw nothing.")
+
+    def run(self) -> None:
+        from tmsopt.plots.paper import GALLERY, find
+
+        if not (self.name or self.list):  # no label of the paper is empty either
+            raise input_error(f"missing; accepted: {' '.join(GALLERY)} all", "NAME")
+        every = self.list or self.name == "all"
+        items = [*GALLERY.values()] if every else [find(str(self.name))]
+        data = [{"name": item.name, "alias": item.alias, "caption": item.caption} for item in items]
+        if not self.list:
+            files = self._choose_files([f"{item.name}.{self.format or 'png'}" for item in items], every)
+            _draw_items(items, files)
+            data = [{**one, "file": str(path)} for one, path in zip(data, files, strict=True)]
+        if self.json or self.list:
+            text = "\n".join(map(_describe_item, items))
+            answer(self.json, text, lambda: {"schema": 1, "figures": data})
+
+    def _choose_files(self, names: Sequence[str], every: bool) -> Sequence[Path]:
+        """The files to write, unless one of them cannot be."""
+        files = [self.output or Path(names[0])]
+        if every:
+            folder = self.output or Path()
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise input_error(f"'{folder}' cannot be a directory: {error.strerror}", "--output") from None
+            files = [folder / name for name in names]
+        for path in files:
+            check_output("--output", path, (self.format,) if self.format else FIGURES)
+        return files
+
+
+def _describe_item(item: Any) -> str:
+    name = f"{item.name} ({item.alias})" if item.alias else item.name
+    return f"{name}\n{click.wrap_text(item.caption, 100, '    ', '    ')}"
+
+
+def _draw_items(items: Sequence[Any], files: Sequence[Path]) -> None:
+    from tmsopt.plots.paper import pictures
+
+    steps = start_steps(progress_listener(), "drawing", "figure")
+    with closing(pictures(items, [path.suffix[1:].lower() for path in files])) as drawn:
+        for done, (k, picture) in enumerate(drawn, start=1):
+            with report_writing("--output", files[k]), write_atomic(files[k]) as temporary:
+                temporary.write_bytes(picture)
+            if steps:
+                steps(done, len(items), items[k].name)
+
+
+class VerifyCommand(WithPlot):
+    """Recompute every number and statement of the source paper, with a verdict on each.
+
+    Examples:
+      tmsopt verify --only 'tab1-*' --only epset
+      tmsopt verify --json > ledger.json
+      tmsopt verify --markdown problems/paper.md
+
+    Exit status: 0 when the ledger was computed, whatever the verdicts; 2 bad input.
+    """
+
+    markdown: Path | None = option("Write the ledger as a page (md).", endings=("md",))
+    only: tuple[str, ...] = option("Compute these entries; * and ? are wildcards.", metavar="KEY")
+
+    def run(self) -> Reply:
+        from tmsopt.documents import write_ledger_page
+
+        ledger = tmsopt.verify(progress_listener(), self.only)
+        write_file("--markdown", self.markdown, lambda path: write_text(path, write_ledger_page(ledger)))
+        return Reply(ledger)

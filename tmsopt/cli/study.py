@@ -7,22 +7,18 @@ from dataclasses import replace
 from functools import partial
 from os.path import realpath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import tmsopt
-from tmsopt.cli.answers import Reply, answer, answer_rows, write_files
+from tmsopt.cli.answers import Reply, answer, answer_rows, check_output, write_file, write_files
 from tmsopt.cli.command import OnFile, WithPage, WithPlot, option
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, hold_signals
-from tmsopt.cli.outputs import check_output, report_writing
 from tmsopt.cli.terminal import progress_listener, show_step
 from tmsopt.errors import input_error
 from tmsopt.files import read_text
 from tmsopt.progress import Progress
-
-if TYPE_CHECKING:
-    from tmsopt.studies import Results
 
 
 class StudyCommand(WithPage, WithPlot, OnFile):
@@ -69,18 +65,15 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         with hold_signals():
             self._answer(results, path, is_stopped)
         for target in self.export if len(results.rows) else ():
-            with report_writing("--export", target):
-                results.export(target, progress_listener())
-        write_files(self, Reply(results), *self._list_files())
+            write_file("--export", target, lambda path: results.export(path, progress_listener()))
+        write_files(self, Reply(results), *self._list_files(with_rows=False))
         if is_stopped:
             click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         return INTERRUPTED if is_stopped else 0
 
     def _check_apart(self, store: Path) -> None:
         """Refuse to write a file twice, or one that the study is read from."""
-        rows = self._read_tables().get("study", {}).get("csv")
-        read = [*self._list_files(), *([self.file.parent / rows] if isinstance(rows, str) else [])]
-        taken = {realpath(path): "what the study is read from" for path in read}
+        taken = {realpath(path): "what the study is read from" for path in self._list_files(with_rows=True)}
         exports = [("--export", target) for target in self.export]
         for name, path in [("--store", store), *exports, ("--plot", self.plot), ("--report", self.report)]:
             if path and (place := realpath(path)) in taken:
@@ -88,15 +81,13 @@ class StudyCommand(WithPage, WithPlot, OnFile):
             if path:
                 taken[place] = f"what {name} writes"
 
-    def _list_files(self) -> list[Path]:
-        """The study, and the problem if it names one."""
-        named = self._read_tables().get("problem")
-        return [self.file, *([self.file.parent / named] if isinstance(named, str) else [])]
+    def _list_files(self, with_rows: bool) -> list[Path]:
+        """The study, and the problem and the table of rows if it names them."""
+        tables = tomllib.loads(read_text(str(self.file), "TOML study file"))
+        named = [tables.get("problem"), tables.get("study", {}).get("csv") if with_rows else None]
+        return [self.file, *(self.file.parent / name for name in named if isinstance(name, str))]
 
-    def _read_tables(self) -> dict[str, Any]:
-        return tomllib.loads(read_text(str(self.file), "TOML study file"))
-
-    def _solve_rows(self, study: tmsopt.Study, path: Path) -> "tuple[Results, bool]":
+    def _solve_rows(self, study: "tmsopt.Study", path: Path) -> "tuple[tmsopt.Results, bool]":
         """The study with its rows, and whether it was stopped on the way."""
         from tmsopt.executor import EngineError
         from tmsopt.studies import read_results
@@ -121,7 +112,7 @@ class StudyCommand(WithPage, WithPlot, OnFile):
             click.echo(f"{error}; the rows solved so far are in {path}", err=True)
             sys.exit(BAD_INPUT)
 
-    def _answer(self, results: "Results", path: Path, is_stopped: bool) -> None:
+    def _answer(self, results: "tmsopt.Results", path: Path, is_stopped: bool) -> None:
         solved, seconds = results.solved, results.seconds
         if self.json:
             run: dict[str, Any] = {"store": str(path), "rows_found": results.found}
@@ -138,18 +129,18 @@ class StudyCommand(WithPage, WithPlot, OnFile):
             shown.append(f"{solved} rows solved in {seconds:.3g} s, {engine}; store: {path}")
         answer(False, shown, dict)
 
-    def _answer_row(self, study: tmsopt.Study, number: int) -> None:
+    def _answer_row(self, study: "tmsopt.Study", number: int) -> None:
         from tmsopt.documents import describe_row
         from tmsopt.studies import solve_row
 
         show_step("solving the row")
-        row, solution = (solved := solve_row(study, number)).row, solved.solution
-        found = {"solution": solution} if solution is not None else {}
-        data = {"schema": 1, **row.to_json(), **{name: one.to_json() for name, one in found.items()}}
-        answer(self.json, [describe_row(study, row), *found.values()], lambda: data)
+        solved = solve_row(study, number)
+        found = {"solution": solved.solution} if solved.solution is not None else {}
+        data = {"schema": 1, **solved.row.to_json(), **{name: one.to_json() for name, one in found.items()}}
+        answer(self.json, [describe_row(study, solved.row), *found.values()], lambda: data)
 
 
-def _plan_rows(stated: tmsopt.Study | tmsopt.Sampling) -> tmsopt.Study:
+def _plan_rows(stated: "tmsopt.Study | tmsopt.Sampling") -> "tmsopt.Study":
     """The study with its rows; the design of a Monte Carlo one is solved first."""
     from tmsopt.studies import plan_study
 

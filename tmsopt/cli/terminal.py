@@ -44,7 +44,7 @@ class _Line:
 
     def close(self) -> None:
         self._closed.set()
-        self.hold(0)
+        self.hold(1)
 
     def _keep_drawing(self) -> None:
         while not self._closed.wait(_NEXT):
@@ -53,7 +53,7 @@ class _Line:
     def _draw(self) -> None:
         with self._lock:
             now = time.perf_counter()
-            if now >= self._due and not self._holders and not self._closed.is_set():
+            if now >= self._due and not self._holders:
                 self._due, self._is_drawn = now + _NEXT, True
                 text = describe_progress(self._progress, now - self._since, count_columns(self._stream) - 1)
                 self._write(f"\r{text}\033[K")
@@ -120,24 +120,22 @@ def count_columns(stream: Any) -> int:
 
 def describe_progress(told: Progress, since: float = 0.0, width: int = 1000) -> str:
     """A record as one line, some seconds after it was told; if it does not fit, a shorter one."""
-    text = _describe_whole(told, since)
-    if len(text) > width and told.unit and math.isfinite(told.done):
-        most = f"/{told.most:,.0f}" if math.isfinite(told.most) else f" {told.unit}"
-        left = f", {_format_time(max(told.left - since, 1))} left" if math.isfinite(told.left) else ""
-        text = f"{told.what}: {told.done:,.0f}{most}{left}"
-    return text[:width]
-
-
-def _describe_whole(told: Progress, since: float) -> str:
-    seconds, text, has_end = told.seconds + since, told.what, math.isfinite(told.most)
+    has_end, is_counted = math.isfinite(told.most), bool(told.unit) and math.isfinite(told.done)
+    seconds, text = told.seconds + since, told.what
     if told.unit == "s" and has_end:
         text += f": {min(told.done + since, told.most):.0f} of {told.most:.0f} s"
-    elif told.unit and math.isfinite(told.done):
+    elif is_counted:
         text += f": {told.done:,.0f}{f' of {told.most:,.0f}' * has_end} {told.unit}"
         text += "s" * ((told.most if has_end else told.done) != 1)
         text += f", about {_format_time(told.left - since)} left" if told.left > since else ""
     text += f"; {told.note}" if told.note else ""
-    return text if told.unit == "s" or seconds < 1 else f"{text} ({_format_time(math.floor(seconds))})"
+    if told.unit != "s" and seconds >= 1:
+        text += f" ({_format_time(math.floor(seconds))})"
+    if len(text) > width and is_counted:
+        most = f"/{told.most:,.0f}" if has_end else f" {told.unit}"
+        left = f", {_format_time(max(told.left - since, 1))} left" if math.isfinite(told.left) else ""
+        text = f"{told.what}: {told.done:,.0f}{most}{left}"
+    return text[:width]
 
 
 def _format_time(seconds: float) -> str:

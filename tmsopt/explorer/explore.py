@@ -1,23 +1,35 @@
 """One page for a problem: solved where it asks something, with what is worth going to."""
 
-from collections.abc import Mapping, Sequence
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from importlib.metadata import version
+from importlib.resources import files
 from os import PathLike
-from typing import Unpack
+from typing import Any, Unpack
 
 from tmsopt.errors import input_error
-from tmsopt.explorer.known import known_designs
-from tmsopt.explorer.page import html_of
+from tmsopt.explorer.javascript import kernel_script, model_script
+from tmsopt.explorer.known import Known, known_designs
+from tmsopt.explorer.subject import subject
 from tmsopt.files import as_path, write_text
 from tmsopt.problem import Given, Posed, Problem, Solution, pose
 from tmsopt.problem.toml import read_page
 from tmsopt.program.options import CommonOptions
 from tmsopt.progress import start_steps
+from tmsopt.records import plain
 from tmsopt.search import solve
 
 _HEIGHT = 900  # pixels of the frame in a notebook: header and the first row of pictures
 _ENDINGS = (".html", ".htm")
+
+_COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
+_BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
+_TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')
+_AROUND = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")  # in a script
+_PARTS = "numerics state axes chart plane growth bicycle motion controls facts api main"
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,7 +102,7 @@ def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
     start_steps(told, "looking for designs worth going to")
     designs = known_designs(posed, solution, search=True)
     start_steps(told, "writing the page")
-    html = html_of(posed, designs, model if isinstance(model, dict) else {}, trace_curves=True)
+    html = _write_html(posed, designs, model if isinstance(model, dict) else {}, trace_curves=True)
     return Explorer(posed.problem, solution, html)
 
 
@@ -107,7 +119,7 @@ def page_of(
         trace_curves: whether to trace what bounds stability around the design that the page opens at.
     """
     problem, solution = pose(design), design if isinstance(design, Solution) else None
-    return html_of(problem, known_designs(problem, solution, search=False, others=others), {}, trace_curves)
+    return _write_html(problem, known_designs(problem, solution, search=False, others=others), {}, trace_curves)
 
 
 def frame(html: str, title: str) -> str:
@@ -116,3 +128,51 @@ def frame(html: str, title: str) -> str:
         f'<iframe title="{escape(title or "explorer")}" sandbox="allow-scripts allow-downloads" '
         f'style="width:100%;height:{_HEIGHT}px;border:0" srcdoc="{escape(html)}"></iframe>'
     )
+
+
+# The page as one file: what is the same in every page, with the formulas and the data of this one
+
+
+def _write_html(problem: Posed, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
+    """The page of a problem; arguments as of `subject`."""
+    script = model_script(problem)
+    data = subject(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
+    own = script.text, kernel_script(problem.model.degree), f"const DATA = {_json(data)};"
+    parts = [*own, *(_read(f"{name}.js") for name in _PARTS.split())]
+    marks = {
+        "<!-- title -->": escape(problem.title or problem.model.title),
+        "/* style */": _BLANKS.sub(r"\1\2", _read("page.css")),
+        "/* script */": "\n".join(parts),
+    }
+    either = "|".join(map(re.escape, marks))
+    return re.sub(either, lambda mark: marks[mark[0]], _read("page.html"))  # at once: a title may look like a mark
+
+
+def _read(name: str) -> str:
+    """A file of the page without what only its readers need: indentation, comments, ends of lines, blanks."""
+    text = (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
+    lines = [line.strip() for line in text.splitlines()]
+    text = re.sub(r" // .*", "", _COMMENT.sub("", "\n".join(lines)))
+    if name.endswith(".js"):
+        text = "\n".join(_tight(text.splitlines()))
+    return re.sub(r",?\n+(?=[)}\]])|(?<=[,;({\[])\n+", "", re.sub(r"\n{2,}", "\n", text)).strip()
+
+
+def _tight(lines: Sequence[str]) -> Iterator[str]:
+    """Lines of a script without the blanks around operators; those with a template, or of one, as they stand."""
+    inside = False
+    for line in lines:
+        inside ^= line.count("`") % 2 == 1
+        if inside or "`" in line:
+            yield line
+        else:
+            parts = _TEXT.split(line)
+            yield "".join(t if k % 2 else _AROUND.sub(r"\1\2", t) for k, t in enumerate(parts))
+
+
+def _json(data: Mapping[str, Any]) -> str:
+    """JSON that no text in it can end or change a script with; a number that does not exist is null."""
+    text = json.dumps(plain(data), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for letter in "<>&\u2028\u2029":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return text

@@ -1,7 +1,7 @@
 """Designs worth going to: the optimum, an exceptional point of the box, the published benchmark."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -57,14 +57,17 @@ def known_designs(
         search: whether to look for an exceptional point, unless the optimum is one or no design is stable.
         others: names and parameters of designs that were found otherwise, which are answers too.
     """
-    optimum = _of_solution(solution) if solution is not None else None
-    worth = solution is None or (solution.stable and "EP" not in solution.structure)
-    found = _exceptional(problem) if search and worth else None
-    named = [Known(name, values, _structure(problem, values), (), True) for name, values in others]
-    every = [k for k in (optimum, *named, found, _benchmark(problem)) if k is not None]
     of = problem.nominal
-    own = [k.meetings or meetings(of, k.parameters, of.values(k.parameters)["structure"].roots) for k in every]
-    return [replace(k, meetings=met) for k, met in zip(every, own, strict=True)]
+    named = [Known(name, values, _structure(problem, values), (), True) for name, values in others]
+    found = [*([] if solution is None else [_of_solution(solution)]), *named]
+    if search and (solution is None or (solution.stable and "EP" not in solution.structure)):
+        found += _exceptional(problem)
+    return [
+        known
+        if known.meetings
+        else replace(known, meetings=meetings(of, known.parameters, of.values(known.parameters)["structure"].roots))
+        for known in [*found, *_benchmark(problem)]
+    ]
 
 
 def _of_solution(solution: Solution) -> Known:
@@ -87,40 +90,37 @@ def _of_solution(solution: Solution) -> Known:
     return Known(name, solution.parameters, known, (*facts, proof), True, proved, said, met)
 
 
-def _benchmark(problem: Posed) -> Known | None:
-    """The published bicycle of the problem's model in its own parameters, without a controller; None without one."""
+def _benchmark(problem: Posed) -> Iterator[Known]:
+    """The published bicycle of the problem's model in its own parameters, without a controller, if there is one."""
     of = problem.parameter_set
     if problem.model.name not in _BENCHMARKS:
-        return None
+        return
     try:
-        faults, found = problem_from_tables(tomllib.loads(example(_BENCHMARKS[problem.model.name])), "")
+        text = example(_BENCHMARKS[problem.model.name])
     except InputError:  # an installation without the examples
-        return None
-    if faults or found is None:
-        return None
-    values, rest = found.posed.values(found.fixed), {p.name: problem.fixed.get(p.name, 0.0) for p in of.parameters}
-    rest |= {p.name: p.default for p in of.parameters if p.default is not None}
+        return
+    _, found = problem_from_tables(tomllib.loads(text), "")
+    assert found is not None
+    values = found.posed.values(found.fixed)
+    rest = {p.name: problem.fixed.get(p.name, 0.0) if p.default is None else p.default for p in of.parameters}
     parameters = {n: float(values[n] if n in values else rest[n]) for n in of.names}
-    return Known("benchmark", parameters, _structure(problem, parameters), (found.title,))
+    yield Known("benchmark", parameters, _structure(problem, parameters), (found.title,))
 
 
-def _exceptional(problem: Posed) -> Known | None:
-    """The highest exceptional point that the freedom of a problem allows, limits left aside; None where none is found.
+def _exceptional(problem: Posed) -> Iterator[Known]:
+    """The highest exceptional point that the freedom of a problem allows, limits left aside, if one is found.
 
     A k-fold root takes k − 1 free parameters.
     """
     order = min(problem.model.degree, len(problem.free) + 1, _ORDER)
-    if order < 2:
-        return None
     alone: dict[str, Any] = {"constraints": {}, "minimize": None, "maximize": None, "pareto": (), "start": {}}
-    asked = problem.nominal.derive(**alone, locate=f"EP{order}")
-    if degrees_of_freedom(asked).count < 0:
-        return None
+    asked = problem.nominal.derive(**alone, locate=f"EP{order}") if order > 1 else None
+    if asked is None or degrees_of_freedom(asked).count < 0:
+        return
     found = solve(asked, throw=False, starts=_STARTS, stability=0.0, alone=False)
-    if found.status != "optimal" or "EP" not in found.structure:
-        return None
-    facts = ("limits left aside",) if problem.constraints else ()
-    return Known(found.structure, found.parameters, Structure(found.structure, found.roots, 0.0), facts)
+    if found.status == "optimal" and "EP" in found.structure:
+        facts = ("limits left aside",) if problem.constraints else ()
+        yield Known(found.structure, found.parameters, Structure(found.structure, found.roots, 0.0), facts)
 
 
 def _structure(problem: Posed, parameters: Mapping[str, float]) -> Structure:

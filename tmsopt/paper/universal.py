@@ -4,11 +4,11 @@ With s = |ω0| σ and ω0⁴ = a4/a0 it is σ⁴ + A1 σ³ + A2 σ² + A3 σ + 1
 fixed sets of (A1, A2, A3), the same for every model.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from tmsopt.models import tms
 from tmsopt.paper.locus import sweep_Fr
@@ -86,20 +86,17 @@ def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
     The double root is the largest, the smallest, or between the two others. Along the first axis a face goes from
     EP4 to the limit; along the second from one edge to the next: 2EP2 to EP3, 2EP2 to EP3, EP3 to EP3.
     """
-    u, v = np.meshgrid(*[np.linspace(0, 1, points)] * 2)
+    u = np.linspace(0, 1, points)
 
-    def face(m: Callable[[Array], Array], t: Callable[[Array], Array]) -> Array:
-        """Points (v m(u), v t(u)): a ray per u, along which A1 and A3 grow from 4, cut at the limit."""
-        low, high = np.zeros(points), np.full(points, 2 * np.log(limit))
-        for _ in range(60):
-            middle = (low + high) / 2
-            A = spire(middle * m(u[0]), middle * t(u[0]))
-            inside = np.maximum(A[:, 0], A[:, 2]) < limit
-            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-        return spire(v * low * m(u), v * low * t(u))
+    def face(m: Array, t: Array) -> Array:
+        """Points (v m, v t): a ray per column, along which A1 and A3 grow from 4, cut at the limit."""
 
-    return (
-        face(np.ones_like, lambda a: 2 * a),
-        face(lambda a: -np.ones_like(a), lambda a: 2 * a),
-        face(lambda a: 2 * a - 1, lambda a: 2 * np.ones_like(a)),
-    )
+        def excess(v: float, m: float, t: float) -> float:
+            return float(spire(v * m, v * t)[[0, 2]].max()) - limit
+
+        ends = [brentq(excess, 0, 2 * np.log(limit), args=slopes) for slopes in zip(m, t, strict=True)]
+        v = np.outer(u, ends)
+        return spire(v * m, v * t)
+
+    one = np.ones(points)
+    return face(one, 2 * u), face(-one, 2 * u), face(2 * u - 1, 2 * one)

@@ -1,32 +1,41 @@
-"""The algebra of `claims.toml`: exact rational functions, certified roots, and Newton's method in balls.
+"""The words of `claims.toml`, besides its definitions: every function here, and the others of `VOCABULARY`.
 
-A polynomial in s is a list of coefficients in descending powers: fractions, rational functions, or balls that contain
-the true value. A comparison of balls is true only if it is certain.
+Exact rational functions, certified roots, Newton's method in balls, and random rational bicycles. A polynomial in s is
+a list of coefficients in descending powers: fractions, rational functions, or balls that contain the true value. A
+comparison of balls is true only if it is certain.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from inspect import isfunction
 from math import prod
 from typing import Any, TypeAlias
 
 import flint
 
-from tmsopt.algebra.balls import rational
+from tmsopt import laws
+from tmsopt.algebra.balls import Tilt, rational
 from tmsopt.algebra.identity import Quotient
 from tmsopt.algebra.krawczyk import enclose_solution, refine_solution
+from tmsopt.models import copo, matrices, tms
+from tmsopt.paper.ledger.entry import judge_decimal
 from tmsopt.roots.exact import isolated_roots
-from tmsopt.roots.polynomial import determinant, product
+from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.stability import lienard_chipart
 
 PRECISION = 80
 """Decimal digits carried by balls."""
 
-Ball: TypeAlias = Any  # flint.arb
 Coefficients: TypeAlias = Sequence[Any]
 
 _SOLVED = PRECISION - 15  # decimal digits of Newton's method
 _RADIUS = 50  # decimal digits of the box in which a solution is proved
+_COUNT = 4000  # random bicycles
+_LAWS: Any = laws  # typed loosely, because the laws accept exact numbers too
 
 
+@cache
 def make_ring(names: str) -> dict[str, Quotient]:
     """The variables of a ring of rational functions by their names."""
     variables = flint.fmpq_mpoly_ctx.get(names.split(), "lex").gens()
@@ -42,14 +51,9 @@ def differentiate(x: Quotient, variable: Quotient) -> Quotient:
     return Quotient(over * x.denominator - x.numerator * under, x.denominator**2)
 
 
-def depends_on(x: Quotient, variable: Quotient) -> bool:
-    """Whether a quotient depends on a variable."""
-    return bool(differentiate(x, variable) != 0)
-
-
 def evaluate_at(x: Quotient, values: Mapping[str, Any]) -> Any:
     """A quotient at balls, fractions or quotients for all of its variables."""
-    return _evaluation(x.numerator)(values) / _evaluation(x.denominator)(values)
+    return _evaluate(x.numerator, values) / _evaluate(x.denominator, values)
 
 
 def substitute(x: Quotient, /, **values: Any) -> Any:
@@ -61,14 +65,14 @@ def substitute(x: Quotient, /, **values: Any) -> Any:
 
 def is_positive(x: Quotient) -> bool:
     """Whether all coefficients of numerator and denominator have one sign, so x > 0 for positive variables."""
-    return any(
-        all(sign * c > 0 for c in [*x.numerator.coeffs(), *x.denominator.coeffs()]) and x != 0 for sign in (1, -1)
-    )
+    coefficients = [*x.numerator.coeffs(), *x.denominator.coeffs()]
+    return x != 0 and any(all(sign * c > 0 for c in coefficients) for sign in (1, -1))
 
 
 def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:
     """Whether a quotient vanishes with a polynomial: its numerator is a multiple of it, its denominator is not."""
-    return bool(divmod(x.numerator, modulus.numerator)[1] == 0 and divmod(x.denominator, modulus.numerator)[1] != 0)
+    over, under = (divmod(part, modulus.numerator)[1] for part in (x.numerator, x.denominator))
+    return bool(over == 0 and under != 0)
 
 
 def list_coefficients(x: Quotient, variable: Quotient) -> Coefficients:
@@ -96,6 +100,15 @@ def resultant(x: Quotient, y: Quotient, variable: Quotient) -> Quotient:
     return Quotient(x.numerator.resultant(y.numerator, str(variable.numerator)))
 
 
+def _evaluate(polynomial: Any, values: Mapping[str, Any]) -> Any:
+    names = polynomial.context().names()
+    terms = (
+        prod((values[name] ** power for name, power in zip(names, powers, strict=True) if power), start=coefficient)
+        for powers, coefficient in polynomial.terms()
+    )
+    return sum(terms, start=flint.fmpq(0))
+
+
 # Polynomials in s
 
 
@@ -106,87 +119,31 @@ def is_stable(p: Coefficients) -> bool:
     return all(bool(quantity > 0) for quantity in lienard_chipart([c if p[0] > 0 else -c for c in p]))
 
 
-def certified_roots(p: Coefficients) -> list[Any]:
-    """Isolating balls of the roots of a polynomial with fractions, repeated by multiplicity."""
-    return [z for z, multiplicity in isolated_roots(p) for _ in range(multiplicity)]
-
-
 def ball_roots(p: Coefficients) -> list[Any]:
     """Isolating balls of the simple roots of a polynomial with balls for coefficients."""
     polynomial: Any = flint.acb_poly([flint.acb(c) for c in reversed(p)])
     return list(polynomial.roots())
 
 
-def count_real_roots(p: Coefficients) -> int:
-    """Number of real roots of a polynomial with fractions, with multiplicity."""
-    return sum(z.imag == 0 for z in certified_roots(p))
-
-
-def is_heavily_damped(p: Coefficients) -> bool:
-    """Whether all roots of a polynomial with fractions are simple, real and negative."""
-    return all(m == 1 and z.imag == 0 and bool(z.real < 0) for z, m in isolated_roots(p))
-
-
-# Systems of equations in balls
-
-
 def match_factors(
     p: Coefficients, parts: Sequence[Coefficients], guess: Mapping[str, float], known: Mapping[str, Any]
-) -> dict[str, Ball]:
-    """The proved unknowns near a guess for which a polynomial is its leading coefficient times monic factors.
+) -> dict[str, Any]:
+    """The proved unknowns near a guess for which a polynomial is its leading coefficient times monic factors, in balls.
 
     Raises:
         ArithmeticError: if no unique solution is proved.
     """
     names = list(guess)
-    sides = [_evaluation(equation.numerator) for equation in _differences(p, parts)]
+    sides = [(a - p[0] * m).numerator for a, m in zip(p[1:], product(*parts)[1:], strict=True)]
 
     def system(unknowns: Mapping[str, Any]) -> list[Any]:
-        return [side({**known, **unknowns}) for side in sides]
+        return [_evaluate(side, {**known, **unknowns}) for side in sides]
 
     middle = refine_solution(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
     return dict(enclose_solution(system, middle, names, _RADIUS).balls)
 
 
-def tangent(p: Coefficients, parts: Sequence[Coefficients], names: str, point: Mapping[str, Any]) -> list[Ball]:
-    """The direction, at a point, of the curve on which a polynomial has monic factors (one unknown more)."""
-    rows = [equation.numerator for equation in _differences(p, parts)]
-    return kernel([[_evaluation(row.derivative(name))(point) for name in names.split()] for row in rows])
-
-
-def kernel(matrix: Sequence[Sequence[Any]]) -> list[Any]:
-    """A null vector of a matrix with one more column than rows."""
-    leave = range(len(matrix) + 1)
-    return [(-1) ** k * det([[e for j, e in enumerate(row) if j != k] for row in matrix]) for k in leave]
-
-
-def det(matrix: Sequence[Sequence[Any]]) -> Any:
-    """A determinant."""
-    return determinant([[[entry] for entry in row] for row in matrix])[0]
-
-
-def _differences(p: Coefficients, parts: Sequence[Coefficients]) -> list[Any]:
-    """Differences between a polynomial and its leading coefficient times the product of monic factors."""
-    return [a - p[0] * m for a, m in zip(p[1:], product(*parts)[1:], strict=True)]
-
-
-def _evaluation(polynomial: Any) -> Callable[[Mapping[str, Any]], Any]:
-    """A function that evaluates a polynomial repeatedly."""
-    names = polynomial.context().names()
-    terms = [
-        (coefficient, [(name, power) for name, power in zip(names, powers, strict=True) if power])
-        for powers, coefficient in polynomial.to_dict().items()
-    ]
-
-    def value(values: Mapping[str, Any]) -> Any:
-        return sum(
-            (prod((values[n] ** power for n, power in powers), start=c) for c, powers in terms), start=flint.fmpq(0)
-        )
-
-    return value
-
-
-# Balls
+# Numbers
 
 
 def sqrt(x: Any) -> Any:
@@ -194,11 +151,70 @@ def sqrt(x: Any) -> Any:
     return (x if isinstance(x, flint.acb) else flint.arb(x)).sqrt()
 
 
-def is_zero(x: Ball) -> bool:
-    """Whether a ball contains 0 and is within 1e-40 of it."""
-    return bool(x.contains(0) and abs(x) < rational("1e-40"))
-
-
-def round_to_six(x: Ball) -> Any:
+def round_to_six(x: Any) -> Any:
     """A ball to six decimals, as a fraction."""
     return rational(f"{float(x.mid()):.6f}")
+
+
+# Random rational bicycles, each with the five printed conditions and its stability by Liénard–Chipart
+
+
+@cache
+def draw_sample() -> list[dict[str, Any]]:
+    """Bicycles in every sign regime, Fr of both signs: see `describe_design`."""
+    return [describe_design(*design) for design in _draw_designs()]
+
+
+def describe_design(*design: Any) -> dict[str, Any]:
+    """Facts about a bicycle, in fractions, from Fr, μ, χ_B, χ_H, ζ_B, ζ_H and tan λ_s.
+
+    `skew` is a1/(Fr ζ_B); `square` is Fr_c² by flus, None if infinite; `lines` are the five conditions lscf, `admitted`
+    is whether all of them hold, and `stable` is whether the bicycle is stable.
+    """
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(rational, design)
+    skew = zeta_B * chi_H - zeta_H * chi_B
+    square = _LAWS.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T)) if skew != 0 else None
+    lines = [chi_H > 1 + zeta_H * T, chi_H < 1 - zeta_B / mu * T, chi_H < chi_B, zeta_H > zeta_B]
+    lines.append(square is not None and square > 0 and Fr > 0 and Fr * Fr > square)
+    facts = {"Fr": Fr, "chi_H": chi_H, "T": T, "skew": skew, "square": square, "lines": lines}
+    return facts | {"admitted": all(lines), "stable": is_stable(copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T))}
+
+
+def _draw_designs() -> Iterator[tuple[Any, ...]]:
+    pick = random.Random(1)
+
+    def tenths(low: int, high: int) -> Any:
+        return rational(pick.randint(10 * low, 10 * high)) / 10
+
+    def one_of(*values: int) -> Any:
+        return rational(pick.choice(values))
+
+    for k in range(_COUNT):
+        chi_H = 1 + tenths(-1, 1) / 3 if k % 2 else tenths(-2, 3)
+        zeta_B, zeta_H = -rational(pick.randint(1, 40)) / 20, -rational(pick.randint(0, 40)) / 20
+        mu, T = one_of(1, 2, 5, 10, 50, 200) / 10, one_of(1, 3, 7, 15, 60) / 10
+        Fr = tenths(0, 8) + rational("1/20")
+        forward, right = one_of(1, 1, 1, -1), one_of(1, -1)
+        yield forward * Fr, mu, tenths(-2, 3) + rational("1/50"), chi_H, zeta_B, zeta_H, right * T
+
+
+_BUILT_IN: Any = (abs, all, any, dict, int, len, list, max, min, range, sum)
+_IMPORTED: Any = (copo, determinant, draw_sample, evaluate, isolated_roots, matrices, quadratic_pencil, shift, Tilt)
+
+VOCABULARY: Mapping[str, Any] = {
+    **{name: word for name, word in globals().items() if isfunction(word)},
+    **{word.__name__: word for word in (*_BUILT_IN, *_IMPORTED)},
+    "laws": vars(laws),  # as the paper prints them; laws.NAME
+    "SI_PARAMETERS": [name for name in tms.sets[1].names if name != "g"],
+    "verdict_on": lambda printed, value: judge_decimal(printed, value).verdict,
+    "ball": flint.arb,
+    "complex_ball": flint.acb,
+    "pi": flint.arb.pi,
+    "tan": lambda x: flint.arb(x).tan(),
+    "atan": lambda x: flint.arb(x).atan(),
+    "overlap": lambda x, y: flint.arb(x).overlaps(flint.arb(y)),
+    "real": lambda z: z.real,
+    "imaginary": lambda z: z.imag,
+    "middle": lambda x: float(x.mid()),
+    "rank": lambda rows: flint.fmpz_mat(rows).rank(),
+}

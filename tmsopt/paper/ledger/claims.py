@@ -12,20 +12,71 @@ A claim about a printed decimal is one table in that file, and nothing else:
     value = "ep4.Fr"
 
 The head of the file explains the other rules and the keys of a table. A computation that the expressions of `language`
-cannot express becomes a function of `algebra`, which is then a word of `vocabulary`.
+cannot express becomes a function of `algebra`, which is then a word of them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cache
 from typing import Any
 
 import flint
 
 from tmsopt.algebra.identity import Quotient
-from tmsopt.paper.ledger.entry import EXACT, Entry, format_digits, judge_decimal, judge_identity, judge_statement
+from tmsopt.errors import InputError, call_faults, input_error, list_faults
+from tmsopt.paper.ledger.algebra import PRECISION
+from tmsopt.paper.ledger.entry import (
+    EXACT,
+    Entry,
+    Ledger,
+    format_digits,
+    judge_decimal,
+    judge_identity,
+    judge_statement,
+)
 from tmsopt.paper.ledger.language import Table, are_true, compute, open_scope, read_tables
+from tmsopt.progress import Listener, start_steps
 
 _TEXTS = ("printed", "remark", "otherwise", "condition", "against")
+
+SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
+
+
+def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger:
+    """Compute the ledger, or the entries whose keys match one of the given patterns.
+
+    Args:
+        progress: called with a `tmsopt.Progress` now and then.
+        only: keys, or patterns with * and ?.
+
+    Raises:
+        InputError: for a pattern that no key matches.
+
+    Example:
+        >>> [(entry.place, entry.verdict) for entry in tmsopt.verify(only=["chib1*"]).entries]
+        [('Eq. chib1', 'exact'), ('text after Eq. chib1', 'exact')]
+
+    More: docs/explanation/paper.md
+    """
+    if faults := [*list_faults("only", only, "['lscf-*']"), *call_faults("progress", progress)]:
+        raise InputError(faults)
+    for pattern in map(str, only):
+        if not select_claims([pattern]):
+            raise input_error(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", "--only")
+    chosen, steps = select_claims(only), start_steps(progress, "recomputing claims", "claim")
+    entries = []
+    for done, claim in enumerate(chosen, 1):
+        with flint.ctx.workdps(PRECISION):
+            entries.append(compute_entry(claim))
+        if steps:
+            steps(done, len(chosen))
+    return Ledger(SOURCE, tuple(entries))
+
+
+def select_claims(only: Sequence[str] = ()) -> tuple[Table, ...]:
+    """The claims whose keys match one of the patterns; all without patterns."""
+    return tuple(c for c in list_claims() if not only or any(fnmatchcase(c["key"], pattern) for pattern in only))
 
 
 @cache

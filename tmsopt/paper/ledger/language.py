@@ -10,7 +10,7 @@ import ast
 import operator
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial
 from importlib import resources
 from typing import Any
@@ -18,10 +18,9 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.balls import rational
-from tmsopt.paper.ledger.algebra import PRECISION, make_ring, match_factors
-from tmsopt.paper.ledger.vocabulary import VOCABULARY
+from tmsopt.paper.ledger.algebra import PRECISION, VOCABULARY, make_ring, match_factors
 
-Scope = Mapping[str, Any]
+Scope = dict[str, Any]
 Table = Mapping[str, Any]
 
 _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
@@ -50,10 +49,13 @@ def read_tables() -> Table:
 
 
 @cache
-def list_definitions() -> Mapping[str, tuple[list[str], Table]]:
-    """Parameters and table of each name under ``[define]``."""
-    heads = ((re.findall(r"\w+", head), table) for head, table in read_tables()["define"].items())
-    return {name: (parameters, table) for (name, *parameters), table in heads}
+def list_definitions() -> dict[str, tuple[list[str], Table]]:
+    """Parameters and table of each name under ``[define]``; a mere expression is the value of a table."""
+    found = {}
+    for head, table in read_tables()["define"].items():
+        name, *parameters = re.findall(r"\w+", head)
+        found[name] = parameters, {"value": table} if isinstance(table, str) else table
+    return found
 
 
 def compute(text: str, scope: Scope) -> Any:
@@ -73,11 +75,10 @@ def are_true(texts: Iterable[str], scope: Scope) -> bool:
 def open_scope(table: Table, scope: Scope) -> Scope:
     """A scope with the variables and definitions of a table, after those of its setting."""
     both = read_tables()["setting"].get(table.get("setting"), {}), table
-    opened = {**scope, **make_ring(" ".join(part.get("variables", "") for part in both))}
-    for part in both:
-        for line in part.get("where", ()):
-            assignment = _parse(line)
-            opened |= _bind(assignment.targets[0], _walk(assignment.value, opened))
+    opened = scope | make_ring(" ".join(part.get("variables", "") for part in both))
+    for line in (line for part in both for line in part.get("where", ())):
+        assignment = _parse(line)
+        opened |= _bind(assignment.targets[0], _walk(assignment.value, opened))
     return opened
 
 
@@ -91,20 +92,15 @@ def _look_up(name: str, scope: Scope) -> Any:
         return scope[name]
     if name not in list_definitions():
         return VOCABULARY[name]
-    parameters, _ = list_definitions()[name]
-    return partial(_apply, name) if parameters else _apply(name)
+    return partial(_apply, name) if list_definitions()[name][0] else _apply(name)
 
 
 def _apply(name: str, *operands: Any) -> Any:
     """The result of a definition: a value, whether it holds, or a solved point."""
     parameters, table = list_definitions()[name]
-    scope = dict(zip(parameters, operands, strict=True))
-    if isinstance(table, str):
-        return compute(table, scope)
     if "guess" in table:
-        with flint.ctx.workdps(PRECISION):  # independent of the caller, because the result is cached
-            return _solve(name, *operands)
-    opened = open_scope(table, scope)
+        return _solve(name, *operands)
+    opened = open_scope(table, dict(zip(parameters, operands, strict=True)))
     return compute(table["value"], opened) if "value" in table else are_true(table["holds"], opened)
 
 
@@ -113,24 +109,21 @@ def _solve(name: str, *operands: Any) -> dict[str, Any]:
     """A point: its known values, and the proved unknowns for which its polynomial has the factors."""
     parameters, table = list_definitions()[name]
     scope = dict(zip(parameters, operands, strict=True))
-    known = {unknown: compute(text, scope) for unknown, text in table.get("known", {}).items()}
-    guess = {unknown: float(compute(str(text), scope | known)) for unknown, text in table["guess"].items()}
-    free = make_ring(" ".join([*guess, *known]))
-    return known | match_factors(compute(table["polynomial"], free), compute(table["factors"], free), guess, known)
+    with flint.ctx.workdps(PRECISION):  # independent of the caller, because the result is cached
+        known = {unknown: compute(text, scope) for unknown, text in table.get("known", {}).items()}
+        guess = {unknown: float(compute(str(text), scope | known)) for unknown, text in table["guess"].items()}
+        free = make_ring(" ".join([*guess, *known]))
+        return known | match_factors(compute(table["polynomial"], free), compute(table["factors"], free), guess, known)
 
 
-def _bind(target: ast.expr, value: Any) -> dict[str, Any]:
+def _bind(target: Any, value: Any) -> Scope:
     """Names with their values, for one or several targets."""
-    match target:
-        case ast.Name(id=name):
-            return {name: value}
-        case ast.Tuple(elts=parts):
-            pairs = zip(parts, value, strict=True)
-            return {name: found for pair in pairs for name, found in _bind(*pair).items()}
-    raise SyntaxError(f"'{ast.unparse(target)}' is not a name")
+    if hasattr(target, "elts"):
+        return dict(zip((part.id for part in target.elts), value, strict=True))
+    return {target.id: value}
 
 
-def _walk_list(nodes: list[ast.expr], scope: Scope) -> list[Any]:
+def _walk_all(nodes: Iterable[ast.AST], scope: Scope) -> list[Any]:
     """Values of the elements of a list or a call, with starred elements unpacked."""
     found: list[Any] = []
     for node in nodes:
@@ -138,16 +131,15 @@ def _walk_list(nodes: list[ast.expr], scope: Scope) -> list[Any]:
     return found
 
 
-def _walk_loops(element: ast.expr, loops: list[ast.comprehension], scope: Scope) -> list[Any]:
-    if not loops:
-        return [_walk(element, scope)]
-    first, *rest = loops
-    scopes = ({**scope, **_bind(first.target, one)} for one in _walk(first.iter, scope))
-    chosen = (inner for inner in scopes if all(_walk(condition, inner) for condition in first.ifs))
-    return [value for inner in chosen for value in _walk_loops(element, rest, inner)]
+def _walk_loops(element: ast.expr, loops: Sequence[ast.comprehension], scope: Scope) -> list[Any]:
+    scopes = [scope]
+    for loop in loops:
+        inner = [outer | _bind(loop.target, one) for outer in scopes for one in _walk(loop.iter, outer)]
+        scopes = [one for one in inner if all(_walk(condition, one) for condition in loop.ifs)]
+    return [_walk(element, one) for one in scopes]
 
 
-def _walk(node: ast.expr | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912 - one case per kind of node
+def _walk(node: ast.AST | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912 - one case per kind of node
     match node:
         case None:
             return None
@@ -162,19 +154,19 @@ def _walk(node: ast.expr | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912
         case ast.Slice(lower=lower, upper=upper, step=None):
             return slice(_walk(lower, scope), _walk(upper, scope))
         case ast.List(elts=parts):
-            return _walk_list(parts, scope)
+            return _walk_all(parts, scope)
         case ast.ListComp(elt=element, generators=loops):
             return _walk_loops(element, loops, scope)
         case ast.Call(func=function, args=parts, keywords=named):
             keywords = {str(one.arg): _walk(one.value, scope) for one in named}
-            return _walk(function, scope)(*_walk_list(parts, scope), **keywords)
+            return _walk(function, scope)(*_walk_all(parts, scope), **keywords)
+        case ast.BoolOp(op=sign, values=parts):
+            return _OPERATORS[type(sign)](_walk(part, scope) for part in parts)
         case ast.UnaryOp(op=sign, operand=operand):
             return _OPERATORS[type(sign)](_walk(operand, scope))
         case ast.BinOp(left=left, op=sign, right=right):
             return _OPERATORS[type(sign)](_walk(left, scope), _walk(right, scope))
-        case ast.BoolOp(op=sign, values=parts):
-            return _OPERATORS[type(sign)](_walk(part, scope) for part in parts)
         case ast.Compare(left=left, ops=signs, comparators=others):
-            sides = _walk_list([left, *others], scope)
+            sides = _walk_all([left, *others], scope)
             return all(_OPERATORS[type(sign)](*pair) for sign, *pair in zip(signs, sides, sides[1:], strict=False))
     raise SyntaxError(f"'{ast.unparse(node)}' is not an expression of the ledger")
