@@ -1,6 +1,7 @@
 """Rows of a study for tests of its store, also in processes that load nothing else."""
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -31,10 +32,20 @@ def part(*rows):
 
 
 def faults(call, *given, **options):
-    """What is wrong with a call."""
+    """What is wrong with a call, or with the context that it returns."""
     with pytest.raises(InputError) as caught:
-        call(*given, **options)
+        _enter(call(*given, **options))
     return str(caught.value)
+
+
+def _enter(found):
+    if isinstance(found, AbstractContextManager):
+        found.__enter__()
+
+
+def numbers_in(store):
+    """The numbers of all rows of a store."""
+    return [number for batch in store.read_batches() for number in batch["number"].tolist()]
 
 
 def flat(row):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.rows import assert_same
+from helpers.rows import assert_same, numbers_in
 
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
 from tmsopt.documents import describe_row
@@ -137,7 +137,7 @@ def test_a_store_gives_back_the_same_rows(tmp_path):
     for rows in (kept.rows, again.rows):
         assert_same(rows, plain.rows)
     with open_store(path, study) as store:
-        assert store.numbers().tolist() == list(range(60))
+        assert numbers_in(store) == list(range(60))
         assert sum(session["rows"] for session in store.sessions()) == 60
         store.forget([3, 4])
         store.add(batch_rows([kept.rows[4]]))
@@ -176,7 +176,7 @@ def test_kill_9_loses_no_block_and_doubles_none(tmp_path):
             os.kill(process.pid, signal.SIGKILL)
         process.communicate()
         with view_store(path) as store:
-            done = store.numbers()
+            done = numbers_in(store)
             assert len(done) == sum(session["rows"] for session in store.sessions())
         assert len(done) >= int(lines[-1] or 0)
         had.append(len(done))

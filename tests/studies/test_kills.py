@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from helpers.rows import assert_same
+from helpers.rows import assert_same, numbers_in
 
 from tmsopt.studies import load_study, plan_study, read_results, solve_row, view_store
 
@@ -25,7 +25,7 @@ def acknowledged_by(path):
     """Numbers of the rows that the store has acknowledged."""
     try:
         with view_store(path) as store:
-            return set(store.numbers().tolist())
+            return set(numbers_in(store))
     except ValueError:  # not made yet
         return set()
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from helpers.oracles import abscissa_60, polynomial_60
-from helpers.rows import STUDY, faults, part, row
+from helpers.rows import STUDY, faults, numbers_in, part, row
 
 from tmsopt.errors import InputError
 from tmsopt.models import tms
@@ -49,14 +49,14 @@ import os, random, sys, time
 from pathlib import Path
 sys.path.insert(0, str(Path("tests").resolve()))
 from helpers.oracles import abscissa_60, polynomial_60
-from helpers.rows import STUDY, part, row
+from helpers.rows import STUDY, numbers_in, part, row
 from tmsopt.studies import open_store
 path, task = sys.argv[1:]
 with open_store(path, STUDY) as opened:
     print(os.getpid(), flush=True)
     if task == "hold":
         time.sleep(60)
-    number = len(opened.numbers())
+    number = len(numbers_in(opened))
     while True:
         batch = [row(n) for n in range(number, number + random.randint(1, 20))]
         opened.add(part(*batch))
@@ -92,7 +92,7 @@ def test_no_acknowledged_row_is_lost_by_kill_9(path):
             printed = process.stdout.read().split("\n")[:-1]  # the last line may be cut off
         acknowledged = int(printed[-1]) if printed else acknowledged
         with view_store(path) as opened:
-            done = opened.numbers().tolist()
+            done = numbers_in(opened)
             assert len(done) >= acknowledged
             assert done == list(range(len(done)))  # batches are kept as a whole or not at all
             assert [s["ended"] for s in opened.sessions()] == [None] * len(opened.sessions())
@@ -107,7 +107,7 @@ def test_reading_while_another_process_writes(path):
         for _ in range(5):
             acknowledged = int(process.stdout.readline())
             with view_store(path) as opened:
-                there = len(opened.numbers())
+                there = len(numbers_in(opened))
                 assert there >= acknowledged
                 assert len(RowTable(STUDY, opened.read_batches())) >= there
 
@@ -124,7 +124,7 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(path):
             opened.add(part(row(0)))
             assert str(os.getpid()) in faults(open_store, path, STUDY)  # within one process too
     with open_store(path, STUDY) as opened:
-        assert opened.numbers().tolist() == [0]
+        assert numbers_in(opened) == [0]
     assert [p.name for p in path.parent.iterdir()] == [path.name]  # one plain file, which can be copied
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         assert connection.execute("SELECT number, status, abscissa FROM rows").fetchall() == [(0, "optimal", -1.0)]
@@ -173,7 +173,7 @@ def test_a_row_is_never_overwritten_and_may_be_forgotten(path):
         opened.add(part(row(1), row(2)))
         opened.add(part(row(1, seconds=9.0, host="elsewhere"), row(3)))
         opened.add(part())
-        assert opened.numbers().tolist() == [1, 2, 3]
+        assert numbers_in(opened) == [1, 2, 3]
         assert opened.sessions()[0]["rows"] == 3
         opened.forget([2])
     assert rows_of(path) == [row(1), row(3)]
@@ -231,7 +231,7 @@ def test_the_store_of_a_changed_study_is_refused(path, change, line):
     assert "--store" in message
     assert path.read_bytes() == before
     with open_store(path, SMALL) as opened:
-        assert opened.numbers().tolist() == [0]
+        assert numbers_in(opened) == [0]
 
 
 def test_fresh_moves_aside_and_never_deletes(path):
@@ -240,12 +240,12 @@ def test_fresh_moves_aside_and_never_deletes(path):
             assert opened.warnings == (
                 (f"moved the old store to {path.with_name(f'study.{number}.sqlite')}",) * (number > 0)
             )
-            assert opened.numbers().size == 0
+            assert numbers_in(opened) == []
             opened.add(part(row(number)))
     for name, number in (("study.1.sqlite", 0), ("study.2.sqlite", 1), ("study.sqlite", 2)):
         with view_store(path.with_name(name)) as opened:
             assert opened.about()["seed"] == number
-            assert opened.numbers().tolist() == [number]
+            assert numbers_in(opened) == [number]
     assert len(list(path.parent.iterdir())) == 3
 
 
@@ -256,9 +256,9 @@ def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path):
         process.wait()
     assert path.with_name("study.sqlite-wal").exists()
     with open_store(path, STUDY, fresh=True) as opened:
-        assert opened.numbers().size == 0
+        assert numbers_in(opened) == []
     with view_store(path.with_name("study.1.sqlite")) as opened:
-        assert len(opened.numbers()) >= acknowledged
+        assert len(numbers_in(opened)) >= acknowledged
 
 
 def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path):
@@ -268,7 +268,7 @@ def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path):
         process.wait()
     path.unlink()
     with open_store(path, STUDY) as opened:
-        assert opened.numbers().size == 0
+        assert numbers_in(opened) == []
     assert path.with_name("study.1.sqlite-wal").exists()
 
 
@@ -292,7 +292,8 @@ def other_database(path):
 
 
 def newer_store(path):
-    open_store(path, STUDY).close()
+    with open_store(path, STUDY):
+        pass
     spoil(path, "PRAGMA user_version=4")
 
 
@@ -309,9 +310,9 @@ def newer_store(path):
 def test_a_file_that_is_no_store_is_not_touched(path, make, expected):
     make(path)
     before = path.read_bytes()
-    calls = (lambda: view_store(path), lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True))
-    for call in calls:
-        assert expected in faults(call)
+    assert expected in faults(view_store, path)
+    for fresh in (False, True):
+        assert expected in faults(open_store, path, STUDY, fresh=fresh)
     assert path.read_bytes() == before
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
@@ -376,7 +377,7 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script, path):
         assert "--fresh" in message
         assert len(message) < 2000
     with open_store(path, STUDY, fresh=True) as opened:
-        assert opened.numbers().size == 0
+        assert numbers_in(opened) == []
     assert sorted(p.name for p in path.parent.iterdir()) == ["study.1.sqlite", "study.sqlite"]
 
 
@@ -413,10 +414,10 @@ def test_a_full_disk_costs_no_row_that_was_acknowledged(path):
             assert "disk" in str(error)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        assert opened.numbers().tolist() == list(range(acknowledged))
+        assert numbers_in(opened) == list(range(acknowledged))
         opened.add(part(row(acknowledged)))
     with view_store(path) as opened:
-        assert opened.numbers().tolist() == list(range(acknowledged + 1))
+        assert numbers_in(opened) == list(range(acknowledged + 1))
 
 
 # Stores of tmsopt 1.1, whose rows were exported by it: solved ones of schema 1, and judged ones of schema 2
@@ -491,6 +492,6 @@ def test_a_damaged_store_of_version_1_is_refused(path):
         shutil.copy(OLD / f"{name}.sqlite", path)
         spoil(path, script)
         before = path.read_bytes()
-        for call in (lambda: read_results(STUDIES[name], path), lambda: open_store(path, STUDIES[name])):  # noqa: B023
-            assert "is damaged" in faults(call)
+        assert "is damaged" in faults(read_results, STUDIES[name], path)
+        assert "is damaged" in faults(open_store, path, STUDIES[name])
         assert path.read_bytes() == before

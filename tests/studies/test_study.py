@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from helpers import oracles
-from helpers.rows import assert_same, row as row_of
+from helpers.rows import assert_same, numbers_in, row as row_of
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import laws
@@ -128,7 +128,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         run_study(GRID, path, workers=1, progress=interrupt)
     with view_store(path) as store:
-        assert store.numbers().tolist() == [0, 1, 2]
+        assert numbers_in(store) == [0, 1, 2]
     resumed = run_study(GRID, path, workers=1)
     assert resumed.solved == 3
     assert sorted(tried) == list(range(6))
@@ -465,7 +465,7 @@ def test_a_killed_command_goes_on(file, ending):
         if store.exists():
             try:
                 with view_store(store) as opened:
-                    kept = set(opened.numbers().tolist())
+                    kept = set(numbers_in(opened))
             except InputError:
                 continue  # being made
     process.send_signal(ending)

@@ -5,8 +5,7 @@ Schema 1 has a line of JSON for each row. Schema 2 also has blocks of rows evalu
 
 import sqlite3
 import zlib
-from collections.abc import Generator
-from contextlib import closing
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -16,11 +15,6 @@ from tmsopt.studies.solving import evaluated_batch
 
 _LONGEST = 1_000_000  # characters of a row, or of the head of a block
 _CHUNK = 1000  # rows copied at once
-
-
-def read_about(old: sqlite3.Connection) -> dict[str, str]:
-    """The metadata of a store."""
-    return dict(old.execute("SELECT name, value FROM about ORDER BY rowid").fetchall())
 
 
 def read_columns(old: sqlite3.Connection) -> dict[str, bytes]:
@@ -33,19 +27,18 @@ def read_columns(old: sqlite3.Connection) -> dict[str, bytes]:
     return {name: _unpack(count, doubles) for name, count, doubles in found}
 
 
-def read_batches(old: sqlite3.Connection) -> Generator[Batch]:
+def read_batches(old: sqlite3.Connection) -> Iterator[Batch]:
     """The rows of the store.
 
     Raises:
         ValueError, KeyError, TypeError: for damaged rows.
     """
-    with closing(old.execute("SELECT data FROM rows ORDER BY number")) as lines:
-        while some := lines.fetchmany(_CHUNK):
-            yield batch_rows([Row.from_json(from_json(data, _LONGEST)) for (data,) in some])
+    lines = old.execute("SELECT data FROM rows ORDER BY number")
+    while some := lines.fetchmany(_CHUNK):
+        yield batch_rows([Row.from_json(from_json(data, _LONGEST)) for (data,) in some])
     if old.execute("SELECT 1 FROM sqlite_schema WHERE name = 'blocks'").fetchall():
-        with closing(old.execute("SELECT data FROM blocks ORDER BY first")) as blocks:
-            for (data,) in blocks:
-                yield _unpack_block(data)
+        for (data,) in old.execute("SELECT data FROM blocks ORDER BY first"):
+            yield _unpack_block(data)
 
 
 def _unpack(count: int, doubles: bytes) -> bytes:
