@@ -14,14 +14,15 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from queue import Empty, SimpleQueue
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import input_error
 from tmsopt.threads import ONE_THREAD
 
 PATIENCE = 10.0
@@ -35,7 +36,9 @@ _RECENT = 64  # batches whose mean time per item predicts the next ones
 _AHEAD = 2  # batches in flight per worker: it computes one while the next travels
 _CHECK = 1.0  # s between checks of the workers; some systems ignore Ctrl-C during a wait
 _TRIES = 2  # crashes of an item, alone in flight, before it is given up
+_WORKER = "'dask worker ADDRESS --nthreads 1'"
 _START_TRIES = 3  # attempts to start a pool whose workers end at once
+_BROKEN = BrokenExecutor, OSError  # a worker has ended, perhaps during its start
 _ENVIRONMENT = ONE_THREAD | {
     "PYTHONFAULTHANDLER": "",  # or loky prints a traceback of every crash
     "LOKY_MAX_MEMORY_LEAK_SIZE": "1e15",  # or it replaces workers that have built many solvers, with a warning
@@ -57,125 +60,52 @@ class EngineError(RuntimeError):
     """The executor cannot continue. Results that it has yielded are valid; the other items can be submitted again."""
 
 
-class Executor(Protocol):
-    """Calls a function for items. It is a context manager; leaving it ends the workers."""
+def ignore_note(line: str) -> None:
+    """A `Note` that does nothing."""
 
-    def __enter__(self) -> Self: ...
 
-    def __exit__(self, *error: object) -> None: ...
+class Executor:
+    """Calls a function for items. It is a context manager; leaving it ends the workers.
+
+    Attributes:
+        name: ``in process``, ``2 processes`` or the address of a cluster.
+    """
+
+    def __init__(self, name: str, pool: "_LokyPool | _DaskPool | None" = None, note: Note = ignore_note) -> None:
+        self.name, self._pool, self._note = name, pool, note
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._pool is not None:
+            self._pool.end()
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
         """Yield the index of each item with its result or `Crash`, in the order in which they finish.
+
+        Batches of items are sent to the workers. When one ends, each batch in flight is tried again with nothing else
+        in flight, then its items one by one.
 
         Raises:
             Exception: any that the function raises.
             EngineError: if the workers cannot continue.
         """
-        ...
-
-
-def ignore_note(line: str) -> None:
-    """A `Note` that does nothing."""
-
-
-def cores() -> int:
-    """Number of usable cores, within affinity, quotas and LOKY_MAX_CPU_COUNT."""
-    import loky
-
-    return int(loky.cpu_count())
-
-
-def here() -> Executor:
-    """A loop in this process, which a crash ends."""
-    return _Loop()
-
-
-def processes(workers: int, note: Note = ignore_note) -> Executor:
-    """Processes of this machine, with one thread each.
-
-    Raises:
-        InputError: if `workers` is less than 1.
-    """
-    if workers < 1:
-        message = f"found {workers}; accepted: 1 or more; this machine has {cores()} cores"
-        raise InputError([Fault(message, ("workers",))])
-    return _Distributor(_LokyPool(workers, note), note)
-
-
-def cluster(address: str, note: Note = ignore_note) -> Executor:
-    """The workers of the Dask scheduler at an address. They may join and leave; without any, items wait.
-
-    Raises:
-        InputError: if `distributed` is not installed, no scheduler answers, or a worker has several threads or no
-            tmsopt.
-    """
-    return _Distributor(_DaskPool(address, note), note)
-
-
-class _Loop:
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        pass
-
-    def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
-        return ((place, function(item)) for place, item in enumerate(items))
-
-
-class _Died(Exception):
-    """A worker ended while it had a call; its argument is the cause."""
-
-
-class _Pool(Protocol):
-    """Workers that take calls.
-
-    Attributes:
-        workers: their present number.
-    """
-
-    workers: int
-
-    def submit(self, *call: Any) -> Any:
-        """A future of a call in a worker, with `add_done_callback`."""
-
-    def result(self, future: Any) -> Any:
-        """The result or exception of a finished future; `_Died` if its worker ended."""
-
-    def look(self) -> None:
-        """Check the workers; called about once a second."""
-
-    def end(self) -> None:
-        """End all calls and workers."""
-
-
-class _Distributor:
-    """Distributes items over the workers of a pool."""
-
-    def __init__(self, pool: _Pool, note: Note) -> None:
-        self._pool, self._note = pool, note
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._pool.end()
-
-    def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
-        """Send batches of items and yield their results.
-
-        When a worker ends, each batch in flight is tried again with nothing else in flight, then its items one by one.
-        """
+        if self._pool is None:
+            yield from enumerate(map(function, items))
+            return
         try:
-            yield from self._results(function, list(items))
+            yield from self._results(self._pool, function, list(items))
         except BaseException:  # interrupted, closed or failed: nobody reads the rest
             self._pool.end()
             raise
 
-    def _results(self, function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
+    def _results(
+        self, pool: "_LokyPool | _DaskPool", function: Callable[[Any], Any], items: Sequence[Any]
+    ) -> Generator[tuple[int, Any]]:
         import cloudpickle
 
-        pool, blob, inbox = self._pool, cloudpickle.dumps(function), SimpleQueue[Any]()
+        blob, inbox = cloudpickle.dumps(function), SimpleQueue[Any]()
         in_flight, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
         recent, first, is_alone, last_error = deque[float](maxlen=_RECENT), 0, False, None
 
@@ -188,10 +118,11 @@ class _Distributor:
             if suspects and not in_flight:
                 is_alone = True
                 send(suspects.popleft())
-            while (
-                not suspects and not is_alone and first < len(items) and len(in_flight) < _AHEAD * max(1, pool.workers)
-            ):
-                size = _batch_size(recent, len(items) - first, pool.workers)
+            while not (suspects or is_alone) and first < len(items):
+                most = _AHEAD * max(1, pool.workers)
+                if len(in_flight) >= most:
+                    break
+                size = _batch_size(recent, (len(items) - first) // most)
                 send(range(first, first + size))
                 first += size
             try:
@@ -206,13 +137,11 @@ class _Distributor:
                 cause, given_up = str(died), False
                 if not was_alone:
                     suspects.append(batch)
-                elif len(batch) > 1:
-                    suspects.extendleft((place,) for place in reversed(batch))
-                else:
+                elif len(batch) == 1:
                     crashes.update(batch)
                     given_up = crashes[batch[0]] == _TRIES
-                    if not given_up:
-                        suspects.appendleft(batch)
+                if was_alone and not given_up:
+                    suspects.extendleft((place,) for place in reversed(batch))
                 if died.__cause__ is not last_error:  # one crash may end several batches
                     action = "given up" if given_up else "tried again, alone"
                     self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
@@ -226,12 +155,48 @@ class _Distributor:
             recent.append(seconds / len(batch))
 
 
-def _batch_size(recent: Sequence[float], left: int, workers: int) -> int:
-    """Number of items for `_BATCH` seconds at the recent rate; fewer near the end, so that all workers end together."""
-    if not recent:
-        return 1
+def cores() -> int:
+    """Number of usable cores, within affinity, quotas and LOKY_MAX_CPU_COUNT."""
+    import loky
+
+    return int(loky.cpu_count())
+
+
+def here() -> Executor:
+    """A loop in this process, which a crash ends."""
+    return Executor("in process")
+
+
+def processes(workers: int, note: Note = ignore_note) -> Executor:
+    """Processes of this machine, with one thread each.
+
+    Raises:
+        InputError: if `workers` is less than 1.
+    """
+    if workers < 1:
+        message = f"found {workers}; accepted: 1 or more; this machine has {cores()} cores"
+        raise input_error(message, "workers")
+    return Executor(f"{workers} processes", _LokyPool(workers), note)
+
+
+def cluster(address: str, note: Note = ignore_note) -> Executor:
+    """The workers of the Dask scheduler at an address. They may join and leave; without any, items wait.
+
+    Raises:
+        InputError: if `distributed` is not installed, no scheduler answers, or a worker has several threads or no
+            tmsopt.
+    """
+    return Executor(address, _DaskPool(address, note), note)
+
+
+class _Died(Exception):
+    """A worker ended while it had a call; its argument is the cause."""
+
+
+def _batch_size(recent: Sequence[float], most: int) -> int:
+    """Number of items for `_BATCH` seconds at the recent rate; few near the end, so that all workers end together."""
     wanted = math.ceil(_BATCH * len(recent) / max(sum(recent), 1e-9))
-    return max(1, min(wanted, 2 * len(recent), left // (_AHEAD * max(1, workers))))
+    return max(1, min(wanted, 2 * len(recent), most))
 
 
 # In a worker
@@ -292,24 +257,41 @@ def _no_interrupt() -> Iterator[None]:
 
 
 class _LokyPool:
-    """A pool of loky, restarted when it breaks."""
+    """A pool of loky, restarted when it breaks.
 
-    def __init__(self, workers: int, note: Note) -> None:
-        self.workers, self._note, self._has_dead = workers, note, False
+    `submit` gives the future of a call in a worker; `result` its result or exception, or `_Died` if its worker ended;
+    `look` checks the workers about once a second, and `end` ends all calls and workers. `workers` is their number.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.workers, self._has_dead = workers, False
         self._pool: Any = None
 
     def submit(self, *call: Any) -> Any:
+        from loky import ProcessPoolExecutor
+
+        cause = ""
         for _ in range(_START_TRIES):
-            self._pool = self._pool or self._start()
-            with suppress(*_broken()), _no_interrupt():
-                return self._pool.submit(_call, *call)
-            self.end()
-        raise EngineError("worker processes end as soon as they start")
+            try:
+                if self._pool is None:  # its context does not run the user's script again
+                    self._pool = ProcessPoolExecutor(
+                        self.workers, initializer=_begin, initargs=(os.getpid(),), env=_ENVIRONMENT
+                    )
+                    self._send(os.getpid).result()  # a worker has started
+                return self._send(_call, *call)
+            except _BROKEN as error:
+                cause = _cause(error)
+                self.end()
+        raise EngineError(f"worker processes end before they start{f' ({cause})' if cause else ''}")
+
+    def _send(self, *call: Any) -> Any:
+        with _no_interrupt():
+            return self._pool.submit(*call)
 
     def result(self, future: Any) -> Any:
         try:
             return future.result()
-        except _broken() as error:  # `_call` itself raises nothing
+        except _BROKEN as error:  # `_call` itself raises nothing
             raise _Died(_cause(error)) from error
 
     def look(self) -> None:
@@ -326,32 +308,6 @@ class _LokyPool:
         pool, self._pool = self._pool, None
         if pool is not None:
             pool.shutdown(wait=True, kill_workers=True)
-
-    def _start(self) -> Any:
-        """A pool with a worker that has answered."""
-        from loky import ProcessPoolExecutor
-
-        cause = ""
-        for _ in range(_START_TRIES):
-            self._pool = pool = ProcessPoolExecutor(
-                self.workers, initializer=_begin, initargs=(os.getpid(),), env=_ENVIRONMENT
-            )  # its context does not run the user's script again
-            try:
-                with _no_interrupt():
-                    answer = pool.submit(os.getpid)
-                answer.result()
-                return pool
-            except _broken() as error:
-                cause = _cause(error)
-                self.end()
-        raise EngineError(f"worker processes end before they start{f' ({cause})' if cause else ''}")
-
-
-def _broken() -> tuple[type[Exception], ...]:
-    """Exceptions that mean that a worker has ended, also during its start."""
-    from loky.process_executor import BrokenProcessPool
-
-    return BrokenProcessPool, OSError
 
 
 def _cause(error: BaseException) -> str:
@@ -371,14 +327,12 @@ class _DaskPool:
     def __init__(self, address: str, note: Note) -> None:
         self._address, self._note = address, note
         self._client: Any = None
-        self._checked, self._futures = frozenset[str](), list[Any]()
+        self._checked = frozenset[str]()
         self.workers, self._last_check = -1, 0.0
 
     def submit(self, *call: Any) -> Any:
         self.look()
-        self._futures = [future for future in self._futures if not future.done()]
-        self._futures.append(self._client.submit(_call, *call, pure=False))
-        return self._futures[-1]
+        return self._client.submit(_call, *call, pure=False)
 
     def result(self, future: Any) -> Any:
         from distributed import KilledWorker
@@ -401,7 +355,10 @@ class _DaskPool:
             threads = self._client.nthreads()
         except OSError as error:
             raise self._lost_error() from error
-        _check_threads(threads)
+        wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
+        if wrong:
+            reason = f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}"
+            raise input_error(f"{reason}: start every worker with {_WORKER}", "scheduler")
         for place in threads.keys() - self._checked:
             _check_tmsopt(self._client, place)
         self._checked = frozenset(threads)
@@ -410,11 +367,9 @@ class _DaskPool:
         self.workers = len(threads)
 
     def end(self) -> None:
-        client, self._client, futures, self._futures = self._client, None, self._futures, []
+        client, self._client = self._client, None
         if client is not None:
             with suppress(Exception):  # the scheduler may be gone; if not, it drops calls not yet started
-                client.cancel(futures)
-            with suppress(Exception):
                 client.close(timeout=PATIENCE)
 
     def _lost_error(self) -> EngineError:
@@ -429,45 +384,28 @@ def _connect(address: str) -> Any:
     The address is probed first, because a `Client` that cannot connect retries and logs for long.
     """
     try:
-        import distributed
+        distributed: Any = import_module("distributed")
     except ImportError:
-        raise _scheduler_error(
-            'a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"'
-        ) from None
+        message = 'a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"'
+        raise input_error(message, "scheduler") from None
     try:
         with ThreadPoolExecutor(1) as thread:  # notebooks already run an event loop in this thread
-            kind = thread.submit(asyncio.run, _server_kind(address)).result()
+            kind = thread.submit(asyncio.run, _server_kind(distributed, address)).result()
         reason = "" if kind == "Scheduler" else f"a Dask {kind.lower()} does"
     except Exception as error:  # any program may listen there
         reason = str(error) or type(error).__name__
     if reason:
-        raise _scheduler_error(
-            f"no Dask scheduler answers at '{address}' ({reason}); start one with 'dask scheduler', which prints its "
-            "address, tcp://HOST:8786, and workers with 'dask worker ADDRESS --nthreads 1'"
-        )
-    connect: Any = distributed.Client
-    return connect(address, timeout=PATIENCE, set_as_default=False)
+        advice = "start one with 'dask scheduler', which prints its address, tcp://HOST:8786, and workers with"
+        raise input_error(f"no Dask scheduler answers at '{address}' ({reason}); {advice} {_WORKER}", "scheduler")
+    return distributed.Client(address, timeout=PATIENCE, set_as_default=False)
 
 
-async def _server_kind(address: str) -> str:
-    from distributed import Security, rpc
-
-    security: Any = Security
-    connect: Any = rpc
+async def _server_kind(distributed: Any, address: str) -> str:
+    arguments = distributed.Security().get_connection_args("client")
     with suppress(TimeoutError):
-        async with asyncio.timeout(PATIENCE):
-            async with connect(address, connection_args=security().get_connection_args("client")) as server:
-                return str((await server.identity())["type"])
+        async with asyncio.timeout(PATIENCE), distributed.rpc(address, connection_args=arguments) as server:
+            return str((await server.identity())["type"])
     raise OSError(f"nothing within {PATIENCE:.0f} s")
-
-
-def _check_threads(threads: dict[str, int]) -> None:
-    wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
-    if wrong:
-        raise _scheduler_error(
-            f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}: "
-            "start every worker with 'dask worker ADDRESS --nthreads 1'"
-        )
 
 
 def _check_tmsopt(client: Any, place: str) -> None:
@@ -478,10 +416,8 @@ def _check_tmsopt(client: Any, place: str) -> None:
 
     answer = client.run(has_tmsopt, workers=[place], on_error="return").get(place, OSError(place))
     if isinstance(answer, Exception) and not isinstance(answer, OSError):  # OSError: the worker has left
-        raise _scheduler_error(f"worker {place} does not answer: {answer!r}; it needs the same Python and packages")
+        message = f"worker {place} does not answer: {answer!r}; it needs the same Python and packages"
+        raise input_error(message, "scheduler")
     if answer is False:
-        raise _scheduler_error(f"worker {place} has no tmsopt: install the same version there and start it again")
-
-
-def _scheduler_error(message: str) -> InputError:
-    return InputError([Fault(message, ("scheduler",))])
+        message = f"worker {place} has no tmsopt: install the same version there and start it again"
+        raise input_error(message, "scheduler")

@@ -316,6 +316,8 @@ def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_pat
 class Crashing:
     """An executor whose workers die of row 3."""
 
+    name = "2 processes"
+
     def __enter__(self):
         return self
 

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, count_faults, is_number, limit_advice, short, suggest, text_faults
-from tmsopt.files import as_path
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import find_question_faults
 from tmsopt.problem.problem import Posed, Problem
@@ -77,15 +76,20 @@ class Sampling:
         object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
 
 
-def plan_study(asked: Study | Sampling, progress: Listener | None = None) -> Study:
+def plan_study(asked: Study | Sampling, progress: Listener | None = None, store: Path | None = None) -> Study:
     """The study with all its rows; for a Monte Carlo study, its nominal design is solved first.
+
+    Args:
+        store: the store that the rows will go to, if it must not be the one of another study.
 
     Raises:
         NotSolved: if the nominal design is not found.
-        InputError: if the tolerances take the design out of its physical range.
+        InputError: if the tolerances take the design out of its physical range, or for the store of another study.
     """
     if isinstance(asked, Study):
         return asked
+    if store is not None and store.exists():
+        _check_unchanged(asked, store)
     solution = solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False)
     return _draw_around(asked, solution, progress)
 
@@ -168,7 +172,7 @@ def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
     )
 
 
-def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None:
+def _check_unchanged(asked: Sampling, store: Path) -> None:
     """Refuse the store of another Monte Carlo study before the nominal design is solved.
 
     The study is compared with the store around the design of the store, so only other differences count.
@@ -176,17 +180,14 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
     Raises:
         InputError: with the differences; also if the file is not a store, or damaged.
     """
-    path = as_path(store, "an SQLite file")
-    if not isinstance(study, Sampling) or not path.exists():
-        return
-    with view_store(path) as opened:
+    with view_store(store) as opened:
         known = opened.about()["definition"]
     try:
-        design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.posed.parameter_set.names}
-        drawn = _draw_study(study, {**design, **study.problem.fixed})
+        design = {n: float(known["problem"]["fixed"][n]) for n in asked.problem.posed.parameter_set.names}
+        drawn = _draw_study(asked, {**design, **asked.problem.fixed})
     except (InputError, KeyError, TypeError, ValueError):  # of another model, or the tolerances do not fit the design
         return
-    check_same(path, drawn)
+    check_same(store, drawn)
 
 
 def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
