@@ -30,7 +30,7 @@ class Printable(Protocol):
 
     def report(self, full: bool = False) -> str:
         """The text that the command line prints; every section if `full`."""
-        return str(_documents().report(self, full))
+        return str(call_documents("report", self, full))
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the result into `ax`, or into new Axes, which a notebook and ``plt.show()`` show.
@@ -38,17 +38,17 @@ class Printable(Protocol):
         Raises:
             InputError: if results of this kind have no figure.
         """
-        axes: Axes = _documents().plot(self, ax)
+        axes: Axes = call_documents("plot", self, ax)
         return axes
 
     def __str__(self) -> str:
         return self.report()
 
     def __repr__(self) -> str:
-        return str(_documents().headline(self))
+        return str(call_documents("headline", self))
 
     def _repr_html_(self) -> str:
-        return str(_documents().to_notebook(self))
+        return str(call_documents("to_notebook", self))
 
 
 class Tabular(Printable, Protocol):
@@ -69,7 +69,7 @@ class Tabular(Printable, Protocol):
 
 def call_documents(name: str, *arguments: Any, **options: Any) -> Any:
     """Call a function of `tmsopt.documents` by name: results cannot import that package, which imports them."""
-    return getattr(_documents(), name)(*arguments, **options)
+    return getattr(import_module("tmsopt.documents"), name)(*arguments, **options)
 
 
 def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
@@ -80,10 +80,6 @@ def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
     """
     table: DataFrame = import_optional("pandas").DataFrame(rows if isinstance(rows, Mapping) else list(rows))
     return table
-
-
-def _documents() -> Any:
-    return import_module("tmsopt.documents")
 
 
 class Table(Mapping[str, V]):

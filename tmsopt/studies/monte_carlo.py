@@ -62,10 +62,8 @@ class Sampling:
 
     def __post_init__(self) -> None:
         problem = pose(self.problem)
-        object.__setattr__(self, "problem", problem.problem)
-        if not self.tolerances:
-            object.__setattr__(self, "tolerances", problem.tolerances)
-        found = [*find_question_faults(problem), *_tolerance_faults(problem, self.tolerances)]
+        tolerances = self.tolerances or problem.tolerances
+        found = [*find_question_faults(problem), *_tolerance_faults(problem, tolerances)]
         found += [*common_faults(problem, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
         found += count_faults("rows", self.rows, 1, MOST_ROWS)
         if self.distribution not in DISTRIBUTIONS:
@@ -73,7 +71,7 @@ class Sampling:
             found.append(Fault(message, ("distribution",)))
         if found:
             raise InputError(found)
-        object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
+        vars(self).update(problem=problem.problem, tolerances=Table({n: float(t) for n, t in tolerances.items()}))
 
 
 def plan_study(asked: Study | Sampling, progress: Listener | None = None, store: Path | None = None) -> Study:
@@ -146,12 +144,10 @@ def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
     Raises:
         InputError: if the tolerances take the design out of its physical range.
     """
-    problem = asked.problem
+    problem, faults = asked.problem, list[Fault]()
     equal = [name for name, condition in problem.posed.conditions.items() if condition.equality]
-    left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     kept = {n: text for n, text in problem.constraints.items() if n not in equal}
-    stated: dict[str, Any] = {"free": {}, "start": {}, "tolerances": {}, "locate": None, "constraints": kept}
-    built, faults = replace(problem, fixed=dict(design), **stated), list[Fault]()
+    built = replace(problem, fixed=design, free={}, start={}, tolerances={}, locate=None, constraints=kept)
     for name, value in asked.tolerances.items():
         try:
             replace(built, tolerances={name: value})
@@ -161,6 +157,7 @@ def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
         raise InputError(faults)
     errors = _errors(len(asked.tolerances), asked.rows, asked.seed, asked.distribution)
     each = zip(asked.tolerances.items(), errors, strict=True)
+    left_out = ", ".join([*equal, *([f"the pattern {problem.locate}"] if problem.locate else [])])
     return Study(
         problem=built,
         columns={name: Column(built.fixed[name] + tolerance * error) for (name, tolerance), error in each},
@@ -168,7 +165,7 @@ def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
         seed=asked.seed,
         report=asked.report,
         method="monte_carlo",
-        notes=[f"left out, because no drawn design satisfies it exactly: {', '.join(left_out)}"] if left_out else [],
+        notes=[f"left out, because no drawn design satisfies it exactly: {left_out}"] if left_out else [],
     )
 
 
