@@ -8,14 +8,12 @@ import asyncio
 import math
 import os
 import pickle
-import re
-import signal
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
@@ -23,7 +21,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Self
 
 from tmsopt.errors import input_error
-from tmsopt.threads import ONE_THREAD
+from tmsopt.killable import Killable, ProcessEnded
 
 PATIENCE = 10.0
 """Time limit in s for an answer of a Dask scheduler."""
@@ -37,12 +35,7 @@ _AHEAD = 2  # batches in flight per worker: it computes one while the next trave
 _CHECK = 1.0  # s between checks of the workers; some systems ignore Ctrl-C during a wait
 _TRIES = 2  # crashes of an item, alone in flight, before it is given up
 _WORKER = "'dask worker ADDRESS --nthreads 1'"
-_START_TRIES = 3  # attempts to start a pool whose workers end at once
-_BROKEN = BrokenExecutor, OSError  # a worker has ended, perhaps during its start
-_ENVIRONMENT = ONE_THREAD | {
-    "PYTHONFAULTHANDLER": "",  # or loky prints a traceback of every crash
-    "LOKY_MAX_MEMORY_LEAK_SIZE": "1e15",  # or it replaces workers that have built many solvers, with a warning
-}
+_START_TRIES = 3  # attempts to start a process that ends at once
 
 
 @dataclass(frozen=True)
@@ -71,7 +64,7 @@ class Executor:
         name: ``in process``, ``2 processes`` or the address of a cluster.
     """
 
-    def __init__(self, name: str, pool: "_LokyPool | _DaskPool | None" = None, note: Note = ignore_note) -> None:
+    def __init__(self, name: str, pool: "_ProcessPool | _DaskPool | None" = None, note: Note = ignore_note) -> None:
         self.name, self._pool, self._note = name, pool, note
 
     def __enter__(self) -> Self:
@@ -101,13 +94,13 @@ class Executor:
             raise
 
     def _results(
-        self, pool: "_LokyPool | _DaskPool", function: Callable[[Any], Any], items: Sequence[Any]
+        self, pool: "_ProcessPool | _DaskPool", function: Callable[[Any], Any], items: Sequence[Any]
     ) -> Generator[tuple[int, Any]]:
         import cloudpickle
 
         blob, inbox = cloudpickle.dumps(function), SimpleQueue[Any]()
         in_flight, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
-        recent, first, is_alone, last_error = deque[float](maxlen=_RECENT), 0, False, None
+        recent, first, is_alone = deque[float](maxlen=_RECENT), 0, False
 
         def send(batch: Sequence[int]) -> None:
             future = pool.submit(blob, cloudpickle.dumps([items[place] for place in batch]))
@@ -142,10 +135,8 @@ class Executor:
                     given_up = crashes[batch[0]] == _TRIES
                 if was_alone and not given_up:
                     suspects.extendleft((place,) for place in reversed(batch))
-                if died.__cause__ is not last_error:  # one crash may end several batches
-                    action = "given up" if given_up else "tried again, alone"
-                    self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
-                last_error = died.__cause__
+                action = "given up" if given_up else "tried again, alone"
+                self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
                 if given_up:
                     yield batch[0], Crash(cause)
                 continue
@@ -176,7 +167,7 @@ def processes(workers: int, note: Note = ignore_note) -> Executor:
     if workers < 1:
         message = f"found {workers}; accepted: 1 or more; this machine has {cores()} cores"
         raise input_error(message, "workers")
-    return Executor(f"{workers} processes", _LokyPool(workers), note)
+    return Executor(f"{workers} processes", _ProcessPool(workers), note)
 
 
 def cluster(address: str, note: Note = ignore_note) -> Executor:
@@ -226,96 +217,66 @@ def _call(blob: bytes, items: bytes) -> bytes:
     return pickled
 
 
-def _begin(parent: int) -> None:
-    """Set up a worker: it ignores Ctrl-C, prints nothing and ends with its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    silence = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silence, 1)  # only the parent writes to stdout
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_CHECK / 2)
-        os.kill(os.getpid(), signal.SIGTERM if os.name == "nt" else signal.SIGKILL)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
 # Processes of this machine
 
 
-@contextmanager
-def _no_interrupt() -> Iterator[None]:
-    """Block Ctrl-C in this thread and in the processes that it starts."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-class _LokyPool:
-    """A pool of loky, restarted when it breaks.
+class _ProcessPool:
+    """Processes that threads of this one talk to, one each; a process that ends is replaced.
 
     `submit` gives the future of a call in a worker; `result` its result or exception, or `_Died` if its worker ended;
     `look` checks the workers about once a second, and `end` ends all calls and workers. `workers` is their number.
     """
 
     def __init__(self, workers: int) -> None:
-        self.workers, self._has_dead = workers, False
-        self._pool: Any = None
+        self.workers, self._lock = workers, threading.Lock()
+        self._threads: ThreadPoolExecutor | None = None
+        self._running, self._idle = list[Killable](), list[Killable]()
 
     def submit(self, *call: Any) -> Any:
-        from loky import ProcessPoolExecutor
-
-        cause = ""
-        for _ in range(_START_TRIES):
-            try:
-                if self._pool is None:  # its context does not run the user's script again
-                    self._pool = ProcessPoolExecutor(
-                        self.workers, initializer=_begin, initargs=(os.getpid(),), env=_ENVIRONMENT
-                    )
-                    self._send(os.getpid).result()  # a worker has started
-                return self._send(_call, *call)
-            except _BROKEN as error:
-                cause = _cause(error)
-                self.end()
-        raise EngineError(f"worker processes end before they start{f' ({cause})' if cause else ''}")
-
-    def _send(self, *call: Any) -> Any:
-        with _no_interrupt():
-            return self._pool.submit(*call)
+        self._threads = self._threads or ThreadPoolExecutor(self.workers)
+        return self._threads.submit(self._answer, *call)
 
     def result(self, future: Any) -> Any:
-        try:
-            return future.result()
-        except _BROKEN as error:  # `_call` itself raises nothing
-            raise _Died(_cause(error)) from error
+        return future.result()
 
-    def look(self) -> None:
-        """Release a pool that waits for the rest of a message, because its worker was killed while writing."""
-        pool = self._pool
-        dead = pool is not None and any(worker.exitcode is not None for worker in [*pool._processes.values()])
-        if dead and self._has_dead:
-            for worker in [*pool._processes.values()]:
-                worker.terminate()  # loky workers have no kill()
-            pool._result_queue._writer.close()  # the last open writer: the pool reads the end of the file and breaks
-        self._has_dead = dead
+    def look(self) -> None: ...
 
     def end(self) -> None:
-        pool, self._pool = self._pool, None
-        if pool is not None:
-            pool.shutdown(wait=True, kill_workers=True)
+        with self._lock:
+            threads, self._threads = self._threads, None
+            running, self._running, self._idle = self._running, [], []
+        if threads is not None:
+            threads.shutdown(wait=False, cancel_futures=True)
+        for process in running:
+            process.end()
 
+    def _answer(self, *call: Any) -> Any:
+        try:
+            process = self._idle.pop()
+        except IndexError:
+            process = self._start()
+        try:
+            answer = process.answer(_call, *call)
+        except ProcessEnded as error:
+            raise _Died(process.end()) from error
+        self._idle.append(process)
+        return answer
 
-def _cause(error: BaseException) -> str:
-    """``signal 9`` or ``exit code 1``, from the text of loky's exception; empty if absent."""
-    code = re.search(r"\w+\((-?\d+)\)", str(error))
-    if code is None:
-        return ""
-    return f"signal {code[1][1:]}" if code[1].startswith("-") else f"exit code {code[1]}"
+    def _start(self) -> Killable:
+        """A process that has answered."""
+        cause = ""
+        for _ in range(_START_TRIES):
+            with self._lock:
+                if self._threads is None:  # nobody waits for the answer
+                    raise _Died(cause)
+                process = Killable()
+                self._running.append(process)
+            try:
+                process.answer(os.getpid)
+                return process
+            except ProcessEnded:
+                cause = process.end()
+        raise EngineError(f"worker processes end before they start ({cause})")
 
 
 # A Dask cluster

@@ -34,7 +34,7 @@ def workers_of(pid):
     found = subprocess.run(
         ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False
     )
-    return [int(line.split()[0]) for line in found.stdout.splitlines() if "popen_loky" in line]
+    return [int(line.split()[0]) for line in found.stdout.splitlines() if "tmsopt.killable" in line]
 
 
 @pytest.mark.long

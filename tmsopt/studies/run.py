@@ -66,6 +66,10 @@ class Results(Printable):
     found: int = 0
     about: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.rows, RowTable):
+            vars(self).update(rows=RowTable(self.study, [batch_rows(self.rows)]))
+
     def column(self, name: str) -> NDArray[Any]:
         """The values of one column, one per row, nan where absent.
 
