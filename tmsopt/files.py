@@ -225,13 +225,15 @@ def from_json(text: str, largest: int = LARGEST_JSON) -> Any:
         raise ValueError(f"more than {largest} characters of JSON, or {_MARKS} lists, tables and texts")
     with suppress(RecursionError):
         data = json.loads(text)
-        level, depth = [data], 0
-        while depth <= _DEEPEST:
-            inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, dict | list)]
-            if not inner:
-                return data
-            level, depth = [value for values in inner for value in values], depth + 1
+        if _depth(data) <= _DEEPEST:
+            return data
     raise ValueError(f"lists and tables more than {_DEEPEST} deep")
+
+
+def _depth(data: Any) -> int:
+    """Levels of lists and tables."""
+    inner = data.values() if isinstance(data, dict) else data if isinstance(data, list) else None
+    return 0 if inner is None else 1 + max((_depth(v) for v in inner if isinstance(v, dict | list)), default=0)
 
 
 def as_path(given: object, what: str) -> Path:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -115,13 +115,8 @@ class Column(Sequence[float]):
         self._values = np.array(values, dtype=np.float64)
         self._values.flags.writeable = False
 
-    @overload
-    def __getitem__(self, where: int) -> float: ...
-
-    @overload
-    def __getitem__(self, where: slice) -> "Column": ...
-
-    def __getitem__(self, where: int | slice) -> "float | Column":
+    def __getitem__(self, where: Any) -> Any:
+        """A float, or a Column for a slice."""
         return Column(self._values[where]) if isinstance(where, slice) else float(self._values[where])
 
     def __len__(self) -> int:

@@ -9,7 +9,7 @@ import pytest
 from tmsopt.errors import InputError
 from tmsopt.problem import load
 from tmsopt.records import Table
-from tmsopt.studies import Row, Study, batch_rows
+from tmsopt.studies import Row, Study, batch_rows, view_store
 
 STUDY = Study(
     load(Path(__file__).parents[2] / "problems" / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7
@@ -46,6 +46,15 @@ def _enter(found):
 def numbers_in(store):
     """The numbers of all rows of a store."""
     return [number for batch in store.read_batches() for number in batch["number"].tolist()]
+
+
+def stored(path):
+    """Numbers of the rows that a store has, which may not be made yet."""
+    try:
+        with view_store(path) as store:
+            return set(numbers_in(store))
+    except InputError:
+        return set()
 
 
 def flat(row):

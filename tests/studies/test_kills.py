@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from helpers.rows import assert_same, numbers_in
+from helpers.rows import assert_same, stored
 
 from tmsopt.studies import load_study, plan_study, read_results, solve_row, view_store
 
@@ -19,15 +19,6 @@ PAUSE = (0.3, 2.0)
 
 GRACE = 0.5  # s between the looks of a worker at its parent
 PATIENCE = 60.0  # s for the first row of a study that starts
-
-
-def acknowledged_by(path):
-    """Numbers of the rows that the store has acknowledged."""
-    try:
-        with view_store(path) as store:
-            return set(numbers_in(store))
-    except ValueError:  # not made yet
-        return set()
 
 
 def workers_of(pid):
@@ -58,7 +49,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path):
     try:
         for _ in range(KILLS):
             until = time.monotonic() + PATIENCE
-            while len(acknowledged_by(path)) <= len(acknowledged):
+            while len(stored(path)) <= len(acknowledged):
                 assert time.monotonic() < until, "no row came"
                 time.sleep(0.05)
             time.sleep(rng.uniform(*PAUSE))
@@ -73,7 +64,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path):
                 process.wait()
                 killed["study"] += 1
                 process = start()
-            now = acknowledged_by(path)
+            now = stored(path)
             assert acknowledged <= now
             acknowledged = now
         assert process.wait() == 0

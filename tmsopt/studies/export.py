@@ -129,14 +129,8 @@ def build_grid_dataset(rows: RowTable) -> Any:
 
 
 def _names(rows: RowTable) -> dict[str, str]:
-    """Unique name of a variable → header; netCDF allows no slash, and ``row`` is the dimension."""
-    names: dict[str, str] = {}
-    for head in rows.headers:
-        name = head.replace("/", " over ").strip()
-        while name in names or name == "row":
-            name += "_"
-        names[name] = head
-    return names
+    """Name of a variable → header; netCDF allows no slash, and ``row`` is the dimension."""
+    return {head.replace("/", " over ").strip() + "_" * (head == "row"): head for head in rows.headers}
 
 
 def _table(rows: RowTable) -> Any:

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, overload
 
@@ -66,14 +66,14 @@ class Row:
     abscissa_realised: float = math.nan
     damping_ratio: float = math.nan
     structure: str = ""
-    parameters: Table[float] = field(default_factory=Table)
-    reports: Table[float] = field(default_factory=Table)
+    parameters: Table[float] = Table()
+    reports: Table[float] = Table()
     bound: float = -math.inf
     gap: float = math.inf
     proven: bool = False
     method: str = "none"
-    laws: Table[float] = field(default_factory=Table)
-    violations: Table[float] = field(default_factory=Table)
+    laws: Table[float] = Table()
+    violations: Table[float] = Table()
     starts: int = 0
     warm: bool = False
     seconds: float = 0.0
