@@ -9,7 +9,7 @@ import pytest
 from tmsopt.errors import InputError
 from tmsopt.problem import load
 from tmsopt.records import Table
-from tmsopt.studies import Row, Study, batch_rows, view_store
+from tmsopt.studies import Row, Study, view_store
 
 STUDY = Study(
     load(Path(__file__).parents[2] / "problems" / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7
@@ -24,11 +24,6 @@ def row(number, study=STUDY, **given):
         given = {**study.problem.fixed, **varied}
         told = {"parameters": Table({n: given.get(n, 1.0) for n in study.problem.posed.parameter_set.names})} | told
     return Row(number, study.seed_of(number), varied, **told)
-
-
-def part(*rows):
-    """Rows as a store takes them."""
-    return batch_rows(rows)
 
 
 def faults(call, *given, **options):
