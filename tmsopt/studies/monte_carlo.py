@@ -1,7 +1,7 @@
 """Monte Carlo over tolerances: designs drawn around a nominal one."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +55,7 @@ class Sampling:
     rows: int
     seed: int = 0
     distribution: str = "uniform"
-    tolerances: Mapping[str, float] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = Table()
     title: str = ""
     starts: int = STARTS
     report: Sequence[str] = ()

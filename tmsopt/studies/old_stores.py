@@ -5,7 +5,8 @@ Schema 1 has a line of JSON for each row. Schema 2 also has blocks of rows evalu
 
 import sqlite3
 import zlib
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import closing
 
 import numpy as np
 
@@ -21,36 +22,25 @@ def read_columns(old: sqlite3.Connection) -> dict[str, bytes]:
     """The columns of the study as little-endian doubles.
 
     Raises:
-        ValueError: for damaged columns.
+        zlib.error: for damaged columns.
     """
-    found = old.execute("SELECT name, count, doubles FROM columns").fetchall()
-    return {name: _unpack(count, doubles) for name, count, doubles in found}
+    found = old.execute("SELECT name, doubles FROM columns").fetchall()
+    return {name: zlib.decompress(doubles) for name, doubles in found}
 
 
-def read_batches(old: sqlite3.Connection) -> Iterator[Batch]:
+def read_batches(old: sqlite3.Connection) -> Generator[Batch]:
     """The rows of the store.
 
     Raises:
         ValueError, KeyError, TypeError: for damaged rows.
     """
-    lines = old.execute("SELECT data FROM rows ORDER BY number")
-    while some := lines.fetchmany(_CHUNK):
-        yield batch_rows([Row.from_json(from_json(data, _LONGEST)) for (data,) in some])
+    with closing(old.execute("SELECT data FROM rows ORDER BY number")) as lines:
+        while some := lines.fetchmany(_CHUNK):
+            yield batch_rows([Row.from_json(from_json(data, _LONGEST)) for (data,) in some])
     if old.execute("SELECT 1 FROM sqlite_schema WHERE name = 'blocks'").fetchall():
-        for (data,) in old.execute("SELECT data FROM blocks ORDER BY first"):
-            yield _unpack_block(data)
-
-
-def _unpack(count: int, doubles: bytes) -> bytes:
-    """A column of the study; the size is limited, because few bytes can decompress to very many."""
-    stream = zlib.decompressobj()
-    try:
-        values = stream.decompress(doubles, 8 * count + 1)
-    except zlib.error as error:
-        raise ValueError(str(error)) from error
-    if len(values) != 8 * count or not stream.eof:
-        raise ValueError(f"found other than {count} numbers")
-    return values
+        with closing(old.execute("SELECT data FROM blocks ORDER BY first")) as blocks:
+            for (data,) in blocks:
+                yield _unpack_block(data)
 
 
 def _unpack_block(data: bytes) -> Batch:

@@ -15,7 +15,7 @@ from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, ignore_
 from tmsopt.files import as_path
 from tmsopt.problem.unit_system import units_of
 from tmsopt.progress import Listener, start_steps
-from tmsopt.records import Printable, frame
+from tmsopt.records import Printable, Table, frame
 from tmsopt.studies.export import build_grid_dataset, export
 from tmsopt.studies.files import load_study
 from tmsopt.studies.monte_carlo import Sampling, plan_study
@@ -64,7 +64,7 @@ class Results(Printable):
     seconds: float
     engine: str
     found: int = 0
-    about: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    about: Mapping[str, Any] = field(default=Table(), repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.rows, RowTable):

@@ -185,8 +185,8 @@ def _laws(solution: Solution) -> Mapping[str, float]:
 
 def can_evaluate(study: Study) -> bool:
     """Whether rows can be evaluated without a solver: only fixed parameters vary, and nothing is free."""
-    names = study.problem.posed.parameter_set.names
-    return not study.warm and can_evaluate_columns(study.problem.posed) and all(name in names for name in study.columns)
+    posed = study.problem.posed
+    return not study.warm and can_evaluate_columns(posed) and study.columns.keys() <= {*posed.parameter_set.names}
 
 
 def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:

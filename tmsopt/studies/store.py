@@ -9,6 +9,7 @@ import json
 import os
 import platform
 import sqlite3
+import zlib
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -97,7 +98,7 @@ def translate_errors(path: Path) -> Iterator[None]:
     except sqlite3.DatabaseError as error:
         meaning = _MEANINGS.get(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF, _DAMAGED)
         raise store_error(path, f"{meaning} ({error!s:.200})") from error  # limited, because it may quote the file
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, zlib.error) as error:
         raise store_error(path, f"{_DAMAGED} ({error!s:.200})") from error
     except OSError as error:
         raise store_error(path, f"cannot be written: {error.strerror or error}") from error
@@ -297,8 +298,9 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
     """Copy a store of an earlier version to an empty database."""
     _create(new, _pairs(old, "about"), read_columns(old))
     store = Store(Path("copy"), new)
-    for batch in read_batches(old):
-        store.add(batch)
+    with closing(read_batches(old)) as batches:  # an open cursor would keep the file locked
+        for batch in batches:
+            store.add(batch)
     sessions = old.execute(f"SELECT {_SESSION} FROM sessions ORDER BY id").fetchall()
     new.executemany(f"INSERT INTO sessions ({_SESSION}) VALUES (?, ?, ?, ?, ?, ?)", sessions)
 

@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -102,7 +102,7 @@ class Summary:
     laws: Table[float]
     seconds: float
     product: Yield | None = None
-    clocked: Table[tuple[float, ...]] = field(default_factory=Table)
+    clocked: Table[tuple[float, ...]] = Table()
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
