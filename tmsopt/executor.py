@@ -8,21 +8,20 @@ import asyncio
 import math
 import os
 import pickle
-import re
-import signal
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from queue import Empty, SimpleQueue
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
-from tmsopt.errors import Fault, InputError
-from tmsopt.threads import ONE_THREAD
+from tmsopt.errors import input_error
+from tmsopt.killable import Killable, ProcessEnded
 
 PATIENCE = 10.0
 """Time limit in s for an answer of a Dask scheduler."""
@@ -35,11 +34,8 @@ _RECENT = 64  # batches whose mean time per item predicts the next ones
 _AHEAD = 2  # batches in flight per worker: it computes one while the next travels
 _CHECK = 1.0  # s between checks of the workers; some systems ignore Ctrl-C during a wait
 _TRIES = 2  # crashes of an item, alone in flight, before it is given up
-_START_TRIES = 3  # attempts to start a pool whose workers end at once
-_ENVIRONMENT = ONE_THREAD | {
-    "PYTHONFAULTHANDLER": "",  # or loky prints a traceback of every crash
-    "LOKY_MAX_MEMORY_LEAK_SIZE": "1e15",  # or it replaces workers that have built many solvers, with a warning
-}
+_WORKER = "'dask worker ADDRESS --nthreads 1'"
+_START_TRIES = 3  # attempts to start a process that ends at once
 
 
 @dataclass(frozen=True)
@@ -57,127 +53,54 @@ class EngineError(RuntimeError):
     """The executor cannot continue. Results that it has yielded are valid; the other items can be submitted again."""
 
 
-class Executor(Protocol):
-    """Calls a function for items. It is a context manager; leaving it ends the workers."""
+def ignore_note(line: str) -> None:
+    """A `Note` that does nothing."""
 
-    def __enter__(self) -> Self: ...
 
-    def __exit__(self, *error: object) -> None: ...
+class Executor:
+    """Calls a function for items. It is a context manager; leaving it ends the workers.
+
+    Attributes:
+        name: ``in process``, ``2 processes`` or the address of a cluster.
+    """
+
+    def __init__(self, name: str, pool: "_ProcessPool | _DaskPool | None" = None, note: Note = ignore_note) -> None:
+        self.name, self._pool, self._note = name, pool, note
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._pool is not None:
+            self._pool.end()
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
         """Yield the index of each item with its result or `Crash`, in the order in which they finish.
+
+        Batches of items are sent to the workers. When one ends, each batch in flight is tried again with nothing else
+        in flight, then its items one by one.
 
         Raises:
             Exception: any that the function raises.
             EngineError: if the workers cannot continue.
         """
-        ...
-
-
-def ignore_note(line: str) -> None:
-    """A `Note` that does nothing."""
-
-
-def cores() -> int:
-    """Number of usable cores, within affinity, quotas and LOKY_MAX_CPU_COUNT."""
-    import loky
-
-    return int(loky.cpu_count())
-
-
-def here() -> Executor:
-    """A loop in this process, which a crash ends."""
-    return _Loop()
-
-
-def processes(workers: int, note: Note = ignore_note) -> Executor:
-    """Processes of this machine, with one thread each.
-
-    Raises:
-        InputError: if `workers` is less than 1.
-    """
-    if workers < 1:
-        message = f"found {workers}; accepted: 1 or more; this machine has {cores()} cores"
-        raise InputError([Fault(message, ("workers",))])
-    return _Distributor(_LokyPool(workers, note), note)
-
-
-def cluster(address: str, note: Note = ignore_note) -> Executor:
-    """The workers of the Dask scheduler at an address. They may join and leave; without any, items wait.
-
-    Raises:
-        InputError: if `distributed` is not installed, no scheduler answers, or a worker has several threads or no
-            tmsopt.
-    """
-    return _Distributor(_DaskPool(address, note), note)
-
-
-class _Loop:
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        pass
-
-    def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
-        return ((place, function(item)) for place, item in enumerate(items))
-
-
-class _Died(Exception):
-    """A worker ended while it had a call; its argument is the cause."""
-
-
-class _Pool(Protocol):
-    """Workers that take calls.
-
-    Attributes:
-        workers: their present number.
-    """
-
-    workers: int
-
-    def submit(self, *call: Any) -> Any:
-        """A future of a call in a worker, with `add_done_callback`."""
-
-    def result(self, future: Any) -> Any:
-        """The result or exception of a finished future; `_Died` if its worker ended."""
-
-    def look(self) -> None:
-        """Check the workers; called about once a second."""
-
-    def end(self) -> None:
-        """End all calls and workers."""
-
-
-class _Distributor:
-    """Distributes items over the workers of a pool."""
-
-    def __init__(self, pool: _Pool, note: Note) -> None:
-        self._pool, self._note = pool, note
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._pool.end()
-
-    def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
-        """Send batches of items and yield their results.
-
-        When a worker ends, each batch in flight is tried again with nothing else in flight, then its items one by one.
-        """
+        if self._pool is None:
+            yield from enumerate(map(function, items))
+            return
         try:
-            yield from self._results(function, list(items))
+            yield from self._results(self._pool, function, list(items))
         except BaseException:  # interrupted, closed or failed: nobody reads the rest
             self._pool.end()
             raise
 
-    def _results(self, function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
+    def _results(
+        self, pool: "_ProcessPool | _DaskPool", function: Callable[[Any], Any], items: Sequence[Any]
+    ) -> Generator[tuple[int, Any]]:
         import cloudpickle
 
-        pool, blob, inbox = self._pool, cloudpickle.dumps(function), SimpleQueue[Any]()
+        blob, inbox = cloudpickle.dumps(function), SimpleQueue[Any]()
         in_flight, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
-        recent, first, is_alone, last_error = deque[float](maxlen=_RECENT), 0, False, None
+        recent, first, is_alone = deque[float](maxlen=_RECENT), 0, False
 
         def send(batch: Sequence[int]) -> None:
             future = pool.submit(blob, cloudpickle.dumps([items[place] for place in batch]))
@@ -188,10 +111,11 @@ class _Distributor:
             if suspects and not in_flight:
                 is_alone = True
                 send(suspects.popleft())
-            while (
-                not suspects and not is_alone and first < len(items) and len(in_flight) < _AHEAD * max(1, pool.workers)
-            ):
-                size = _batch_size(recent, len(items) - first, pool.workers)
+            while not (suspects or is_alone) and first < len(items):
+                most = _AHEAD * max(1, pool.workers)
+                if len(in_flight) >= most:
+                    break
+                size = _batch_size(recent, (len(items) - first) // most)
                 send(range(first, first + size))
                 first += size
             try:
@@ -206,17 +130,13 @@ class _Distributor:
                 cause, given_up = str(died), False
                 if not was_alone:
                     suspects.append(batch)
-                elif len(batch) > 1:
-                    suspects.extendleft((place,) for place in reversed(batch))
-                else:
+                elif len(batch) == 1:
                     crashes.update(batch)
                     given_up = crashes[batch[0]] == _TRIES
-                    if not given_up:
-                        suspects.appendleft(batch)
-                if died.__cause__ is not last_error:  # one crash may end several batches
-                    action = "given up" if given_up else "tried again, alone"
-                    self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
-                last_error = died.__cause__
+                if was_alone and not given_up:
+                    suspects.extendleft((place,) for place in reversed(batch))
+                action = "given up" if given_up else "tried again, alone"
+                self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
                 if given_up:
                     yield batch[0], Crash(cause)
                 continue
@@ -226,12 +146,48 @@ class _Distributor:
             recent.append(seconds / len(batch))
 
 
-def _batch_size(recent: Sequence[float], left: int, workers: int) -> int:
-    """Number of items for `_BATCH` seconds at the recent rate; fewer near the end, so that all workers end together."""
-    if not recent:
-        return 1
+def cores() -> int:
+    """Number of usable cores, within affinity, quotas and LOKY_MAX_CPU_COUNT."""
+    import loky
+
+    return int(loky.cpu_count())
+
+
+def here() -> Executor:
+    """A loop in this process, which a crash ends."""
+    return Executor("in process")
+
+
+def processes(workers: int, note: Note = ignore_note) -> Executor:
+    """Processes of this machine, with one thread each.
+
+    Raises:
+        InputError: if `workers` is less than 1.
+    """
+    if workers < 1:
+        message = f"found {workers}; accepted: 1 or more; this machine has {cores()} cores"
+        raise input_error(message, "workers")
+    return Executor(f"{workers} processes", _ProcessPool(workers), note)
+
+
+def cluster(address: str, note: Note = ignore_note) -> Executor:
+    """The workers of the Dask scheduler at an address. They may join and leave; without any, items wait.
+
+    Raises:
+        InputError: if `distributed` is not installed, no scheduler answers, or a worker has several threads or no
+            tmsopt.
+    """
+    return Executor(address, _DaskPool(address, note), note)
+
+
+class _Died(Exception):
+    """A worker ended while it had a call; its argument is the cause."""
+
+
+def _batch_size(recent: Sequence[float], most: int) -> int:
+    """Number of items for `_BATCH` seconds at the recent rate; few near the end, so that all workers end together."""
     wanted = math.ceil(_BATCH * len(recent) / max(sum(recent), 1e-9))
-    return max(1, min(wanted, 2 * len(recent), left // (_AHEAD * max(1, workers))))
+    return max(1, min(wanted, 2 * len(recent), most))
 
 
 # In a worker
@@ -261,105 +217,66 @@ def _call(blob: bytes, items: bytes) -> bytes:
     return pickled
 
 
-def _begin(parent: int) -> None:
-    """Set up a worker: it ignores Ctrl-C, prints nothing and ends with its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    silence = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silence, 1)  # only the parent writes to stdout
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_CHECK / 2)
-        os.kill(os.getpid(), signal.SIGTERM if os.name == "nt" else signal.SIGKILL)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
 # Processes of this machine
 
 
-@contextmanager
-def _no_interrupt() -> Iterator[None]:
-    """Block Ctrl-C in this thread and in the processes that it starts."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+class _ProcessPool:
+    """Processes that threads of this one talk to, one each; a process that ends is replaced.
 
+    `submit` gives the future of a call in a worker; `result` its result or exception, or `_Died` if its worker ended;
+    `look` checks the workers about once a second, and `end` ends all calls and workers. `workers` is their number.
+    """
 
-class _LokyPool:
-    """A pool of loky, restarted when it breaks."""
-
-    def __init__(self, workers: int, note: Note) -> None:
-        self.workers, self._note, self._has_dead = workers, note, False
-        self._pool: Any = None
+    def __init__(self, workers: int) -> None:
+        self.workers, self._lock = workers, threading.Lock()
+        self._threads: ThreadPoolExecutor | None = None
+        self._running, self._idle = list[Killable](), list[Killable]()
 
     def submit(self, *call: Any) -> Any:
-        for _ in range(_START_TRIES):
-            self._pool = self._pool or self._start()
-            with suppress(*_broken()), _no_interrupt():
-                return self._pool.submit(_call, *call)
-            self.end()
-        raise EngineError("worker processes end as soon as they start")
+        self._threads = self._threads or ThreadPoolExecutor(self.workers)
+        return self._threads.submit(self._answer, *call)
 
     def result(self, future: Any) -> Any:
-        try:
-            return future.result()
-        except _broken() as error:  # `_call` itself raises nothing
-            raise _Died(_cause(error)) from error
+        return future.result()
 
-    def look(self) -> None:
-        """Release a pool that waits for the rest of a message, because its worker was killed while writing."""
-        pool = self._pool
-        dead = pool is not None and any(worker.exitcode is not None for worker in [*pool._processes.values()])
-        if dead and self._has_dead:
-            for worker in [*pool._processes.values()]:
-                worker.terminate()  # loky workers have no kill()
-            pool._result_queue._writer.close()  # the last open writer: the pool reads the end of the file and breaks
-        self._has_dead = dead
+    def look(self) -> None: ...
 
     def end(self) -> None:
-        pool, self._pool = self._pool, None
-        if pool is not None:
-            pool.shutdown(wait=True, kill_workers=True)
+        with self._lock:
+            threads, self._threads = self._threads, None
+            running, self._running, self._idle = self._running, [], []
+        if threads is not None:
+            threads.shutdown(wait=False, cancel_futures=True)
+        for process in running:
+            process.end()
 
-    def _start(self) -> Any:
-        """A pool with a worker that has answered."""
-        from loky import ProcessPoolExecutor
+    def _answer(self, *call: Any) -> Any:
+        try:
+            process = self._idle.pop()
+        except IndexError:
+            process = self._start()
+        try:
+            answer = process.answer(_call, *call)
+        except ProcessEnded as error:
+            raise _Died(process.end()) from error
+        self._idle.append(process)
+        return answer
 
+    def _start(self) -> Killable:
+        """A process that has answered."""
         cause = ""
         for _ in range(_START_TRIES):
-            self._pool = pool = ProcessPoolExecutor(
-                self.workers, initializer=_begin, initargs=(os.getpid(),), env=_ENVIRONMENT
-            )  # its context does not run the user's script again
+            with self._lock:
+                if self._threads is None:  # nobody waits for the answer
+                    raise _Died(cause)
+                process = Killable()
+                self._running.append(process)
             try:
-                with _no_interrupt():
-                    answer = pool.submit(os.getpid)
-                answer.result()
-                return pool
-            except _broken() as error:
-                cause = _cause(error)
-                self.end()
-        raise EngineError(f"worker processes end before they start{f' ({cause})' if cause else ''}")
-
-
-def _broken() -> tuple[type[Exception], ...]:
-    """Exceptions that mean that a worker has ended, also during its start."""
-    from loky.process_executor import BrokenProcessPool
-
-    return BrokenProcessPool, OSError
-
-
-def _cause(error: BaseException) -> str:
-    """``signal 9`` or ``exit code 1``, from the text of loky's exception; empty if absent."""
-    code = re.search(r"\w+\((-?\d+)\)", str(error))
-    if code is None:
-        return ""
-    return f"signal {code[1][1:]}" if code[1].startswith("-") else f"exit code {code[1]}"
+                process.answer(os.getpid)
+                return process
+            except ProcessEnded:
+                cause = process.end()
+        raise EngineError(f"worker processes end before they start ({cause})")
 
 
 # A Dask cluster
@@ -371,14 +288,12 @@ class _DaskPool:
     def __init__(self, address: str, note: Note) -> None:
         self._address, self._note = address, note
         self._client: Any = None
-        self._checked, self._futures = frozenset[str](), list[Any]()
+        self._checked = frozenset[str]()
         self.workers, self._last_check = -1, 0.0
 
     def submit(self, *call: Any) -> Any:
         self.look()
-        self._futures = [future for future in self._futures if not future.done()]
-        self._futures.append(self._client.submit(_call, *call, pure=False))
-        return self._futures[-1]
+        return self._client.submit(_call, *call, pure=False)
 
     def result(self, future: Any) -> Any:
         from distributed import KilledWorker
@@ -401,7 +316,10 @@ class _DaskPool:
             threads = self._client.nthreads()
         except OSError as error:
             raise self._lost_error() from error
-        _check_threads(threads)
+        wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
+        if wrong:
+            reason = f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}"
+            raise input_error(f"{reason}: start every worker with {_WORKER}", "scheduler")
         for place in threads.keys() - self._checked:
             _check_tmsopt(self._client, place)
         self._checked = frozenset(threads)
@@ -410,11 +328,9 @@ class _DaskPool:
         self.workers = len(threads)
 
     def end(self) -> None:
-        client, self._client, futures, self._futures = self._client, None, self._futures, []
+        client, self._client = self._client, None
         if client is not None:
             with suppress(Exception):  # the scheduler may be gone; if not, it drops calls not yet started
-                client.cancel(futures)
-            with suppress(Exception):
                 client.close(timeout=PATIENCE)
 
     def _lost_error(self) -> EngineError:
@@ -429,45 +345,28 @@ def _connect(address: str) -> Any:
     The address is probed first, because a `Client` that cannot connect retries and logs for long.
     """
     try:
-        import distributed
+        distributed: Any = import_module("distributed")
     except ImportError:
-        raise _scheduler_error(
-            'a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"'
-        ) from None
+        message = 'a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"'
+        raise input_error(message, "scheduler") from None
     try:
         with ThreadPoolExecutor(1) as thread:  # notebooks already run an event loop in this thread
-            kind = thread.submit(asyncio.run, _server_kind(address)).result()
+            kind = thread.submit(asyncio.run, _server_kind(distributed, address)).result()
         reason = "" if kind == "Scheduler" else f"a Dask {kind.lower()} does"
     except Exception as error:  # any program may listen there
         reason = str(error) or type(error).__name__
     if reason:
-        raise _scheduler_error(
-            f"no Dask scheduler answers at '{address}' ({reason}); start one with 'dask scheduler', which prints its "
-            "address, tcp://HOST:8786, and workers with 'dask worker ADDRESS --nthreads 1'"
-        )
-    connect: Any = distributed.Client
-    return connect(address, timeout=PATIENCE, set_as_default=False)
+        advice = "start one with 'dask scheduler', which prints its address, tcp://HOST:8786, and workers with"
+        raise input_error(f"no Dask scheduler answers at '{address}' ({reason}); {advice} {_WORKER}", "scheduler")
+    return distributed.Client(address, timeout=PATIENCE, set_as_default=False)
 
 
-async def _server_kind(address: str) -> str:
-    from distributed import Security, rpc
-
-    security: Any = Security
-    connect: Any = rpc
+async def _server_kind(distributed: Any, address: str) -> str:
+    arguments = distributed.Security().get_connection_args("client")
     with suppress(TimeoutError):
-        async with asyncio.timeout(PATIENCE):
-            async with connect(address, connection_args=security().get_connection_args("client")) as server:
-                return str((await server.identity())["type"])
+        async with asyncio.timeout(PATIENCE), distributed.rpc(address, connection_args=arguments) as server:
+            return str((await server.identity())["type"])
     raise OSError(f"nothing within {PATIENCE:.0f} s")
-
-
-def _check_threads(threads: dict[str, int]) -> None:
-    wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
-    if wrong:
-        raise _scheduler_error(
-            f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}: "
-            "start every worker with 'dask worker ADDRESS --nthreads 1'"
-        )
 
 
 def _check_tmsopt(client: Any, place: str) -> None:
@@ -478,10 +377,8 @@ def _check_tmsopt(client: Any, place: str) -> None:
 
     answer = client.run(has_tmsopt, workers=[place], on_error="return").get(place, OSError(place))
     if isinstance(answer, Exception) and not isinstance(answer, OSError):  # OSError: the worker has left
-        raise _scheduler_error(f"worker {place} does not answer: {answer!r}; it needs the same Python and packages")
+        message = f"worker {place} does not answer: {answer!r}; it needs the same Python and packages"
+        raise input_error(message, "scheduler")
     if answer is False:
-        raise _scheduler_error(f"worker {place} has no tmsopt: install the same version there and start it again")
-
-
-def _scheduler_error(message: str) -> InputError:
-    return InputError([Fault(message, ("scheduler",))])
+        message = f"worker {place} has no tmsopt: install the same version there and start it again"
+        raise input_error(message, "scheduler")

@@ -12,7 +12,7 @@ from array import array
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import islice
+from itertools import count, islice
 from math import isnan
 from os import PathLike
 from pathlib import Path
@@ -55,16 +55,14 @@ def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
             temporary = target.with_name(f".{target.name}.unfinished")
             _remove(temporary)
         else:  # the caller may replace this file by a folder
-            handle, name = tempfile.mkstemp(
-                dir=None if special else target.parent, prefix=".tmsopt-", suffix=target.suffix
-            )
+            folder = None if special else target.parent
+            handle, name = tempfile.mkstemp(dir=folder, prefix=".tmsopt-", suffix=target.suffix)
             os.close(handle)
             temporary = Path(name)
         try:
             yield temporary
             if special:
-                with temporary.open("rb") as source, target.open("wb") as sink:
-                    shutil.copyfileobj(source, sink)
+                target.write_bytes(temporary.read_bytes())
                 return
             if not locked:  # temporary files are private to their owner
                 umask = os.umask(0)
@@ -102,12 +100,9 @@ def move_aside(path: Path, companions: tuple[str, ...] = ()) -> Path:
     Raises:
         OSError: if it cannot be moved, e.g. while a program reads it on Windows.
     """
-    suffixes, number = ("", *companions), 0
-    while True:
-        number += 1
-        target = path.with_name(f"{path.stem}.{number}{path.suffix}")
-        if not any(os.path.lexists(f"{target}{suffix}") for suffix in suffixes):
-            break
+    suffixes = ("", *companions)
+    names = (path.with_name(f"{path.stem}.{number}{path.suffix}") for number in count(1))
+    target = next(name for name in names if not any(os.path.lexists(f"{name}{suffix}") for suffix in suffixes))
     for suffix in suffixes:
         if os.path.lexists(f"{path}{suffix}"):
             os.rename(f"{path}{suffix}", f"{target}{suffix}")
@@ -123,6 +118,7 @@ def list_differences(
         known, asked: JSON data, with columns as ``array("d")``.
         sides: words that follow a value of `known` and of `asked`.
     """
+    there, here = sides
     match known, asked:
         case Mapping(), Mapping():
             for name in dict.fromkeys((*known, *asked)):
@@ -131,28 +127,27 @@ def list_differences(
                     yield from list_differences(known[name], asked[name], sides, inner)
                 else:
                     one, other = (_format_value(side[name]) if name in side else "none" for side in (known, asked))
-                    yield f"{inner}: {one} {sides[0]}, {other} {sides[1]}"
+                    yield f"{inner}: {one} {there}, {other} {here}"
         case array(), array():
             if len(known) != len(asked):
-                yield f"{key}: {len(known)} values {sides[0]}, {len(asked)} {sides[1]}"
-            if known.tobytes() == asked.tobytes():
-                return
-            if differ := [row for row, pair in enumerate(zip(known, asked, strict=False)) if not _is_same(*pair)]:
-                most, first = min(len(known), len(asked)), differ[0]
-                values = f"{known[first]!r} {sides[0]}, {asked[first]!r} {sides[1]}"
-                yield f"{key}: {len(differ)} of {most} values differ, the first in row {first}: {values}"
+                yield f"{key}: {len(known)} values {there}, {len(asked)} {here}"
+            pairs = [] if known.tobytes() == asked.tobytes() else list(zip(known, asked, strict=False))
+            if differ := [row for row, pair in enumerate(pairs) if not _is_same(*pair)]:
+                one, other = pairs[differ[0]]
+                values = f"{one!r} {there}, {other!r} {here}"
+                yield f"{key}: {len(differ)} of {len(pairs)} values differ, the first in row {differ[0]}: {values}"
         case list(), list() if len(known) == len(asked):
             for index, (one, other) in enumerate(zip(known, asked, strict=True)):
                 yield from list_differences(one, other, sides, f"{key}[{index}]")
         case _ if not _is_same(known, asked):
-            yield f"{key}: {_format_value(known)} {sides[0]}, {_format_value(asked)} {sides[1]}"
+            yield f"{key}: {_format_value(known)} {there}, {_format_value(asked)} {here}"
 
 
 def _is_same(a: Any, b: Any) -> bool:
     """Equality of doubles bit by bit: 1 equals 1.0 and nan equals nan, but 0.0 differs from −0.0, and true from 1."""
-    if isinstance(a, bool) or isinstance(b, bool) or not (isinstance(a, int | float) and isinstance(b, int | float)):
-        return type(a) is type(b) and bool(a == b)
-    return repr(float(a)) == repr(float(b)) and (a == b or isnan(a))
+    if all(isinstance(x, int | float) and not isinstance(x, bool) for x in (a, b)):
+        return repr(float(a)) == repr(float(b)) and (a == b or isnan(a))
+    return type(a) is type(b) and bool(a == b)
 
 
 def _format_value(value: Any) -> str:
@@ -171,12 +166,7 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
     Raises:
         InputError: if the file is missing, irregular, too long or not UTF-8.
     """
-    with _open(file, kind, largest) as stream:
-        raw = stream.read(largest)
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise _not_text(file, kind, raw[error.start], raw[: error.start].count(b"\n") + 1) from None
+    return "".join(read_lines(file, kind, largest, largest))
 
 
 def read_lines(file: str, kind: str, largest: int, longest: int) -> Generator[str]:
@@ -188,11 +178,13 @@ def read_lines(file: str, kind: str, largest: int, longest: int) -> Generator[st
     with _open(file, kind, largest) as stream:
         text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="surrogateescape", newline="")
         for number, line in enumerate(iter(partial(text.readline, longest + 1), ""), start=1):
+            message = ""
             if len(line) > longest:
                 message = f"the line is longer than {longest} characters; accepted: lines of up to {longest}"
-                raise InputError([Fault(message).at(file, number)])
-            if not line.isascii() and (wrong := _UNDECODED.search(line)):
-                raise _not_text(file, kind, ord(wrong[0]) - 0xDC00, number)
+            elif not line.isascii() and (wrong := _UNDECODED.search(line)):
+                message = f"not {kind.split(maxsplit=1)[0]}: byte {ord(wrong[0]) - 0xDC00:#x} is not UTF-8"
+            if message:
+                raise InputError([Fault(message, file=file, line=number)])
             yield line
 
 
@@ -201,11 +193,9 @@ def _open(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
     """Open a regular file of up to `largest` bytes; a pipe or a device might never end."""
     path = Path(file)
     try:
-        if wrong := _path_fault(path, kind):
+        if wrong := _path_fault(path, kind, largest):
             raise InputError([Fault(wrong, file=file)])
         with path.open("rb") as stream:
-            if os.fstat(stream.fileno()).st_size > largest:
-                raise InputError([Fault(f"is larger than {largest} bytes; accepted: a {kind} of less", file=file)])
             yield stream
     except InputError:
         raise
@@ -214,23 +204,15 @@ def _open(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
         raise InputError([Fault(f"cannot be read: {reason}", file=file)]) from None
 
 
-def _path_fault(path: Path, kind: str) -> str:
-    if path.is_dir():
-        return f"is a directory; accepted: a {kind}"
+def _path_fault(path: Path, kind: str, largest: int) -> str:
     if path.is_file():
-        return ""
-    if path.exists():
-        return f"is not a regular file; accepted: a {kind}"
-    if path.is_symlink():
-        return f"is a link to no file; accepted: a {kind}"
+        return f"is larger than {largest} bytes; accepted: a {kind} of less" if path.stat().st_size > largest else ""
+    if os.path.lexists(path):
+        found = "a directory" if path.is_dir() else "not a regular file" if path.exists() else "a link to no file"
+        return f"is {found}; accepted: a {kind}"
     others = path.parent.glob(f"*.{kind.split(maxsplit=1)[0].lower()}") if path.parent.is_dir() else ()
     near = nearest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)), most=_NEAR)
     return f"no such file; did you mean {' or '.join(map(repr, near))}?" if near else "no such file"
-
-
-def _not_text(file: str, kind: str, byte: int, line: int) -> InputError:
-    form = kind.split(maxsplit=1)[0]
-    return InputError([Fault(f"not {form}: byte {byte:#x} is not UTF-8").at(file, line)])
 
 
 def from_json(text: str, largest: int = LARGEST_JSON) -> Any:
@@ -243,13 +225,15 @@ def from_json(text: str, largest: int = LARGEST_JSON) -> Any:
         raise ValueError(f"more than {largest} characters of JSON, or {_MARKS} lists, tables and texts")
     with suppress(RecursionError):
         data = json.loads(text)
-        level, depth = [data], 0
-        while depth <= _DEEPEST:
-            inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, dict | list)]
-            if not inner:
-                return data
-            level, depth = [value for values in inner for value in values], depth + 1
+        if _depth(data) <= _DEEPEST:
+            return data
     raise ValueError(f"lists and tables more than {_DEEPEST} deep")
+
+
+def _depth(data: Any) -> int:
+    """Levels of lists and tables."""
+    inner = data.values() if isinstance(data, dict) else data if isinstance(data, list) else None
+    return 0 if inner is None else 1 + max((_depth(v) for v in inner if isinstance(v, dict | list)), default=0)
 
 
 def as_path(given: object, what: str) -> Path:

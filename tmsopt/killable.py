@@ -1,6 +1,6 @@
-"""A process for calls of SCIP, which may crash or must end at a deadline.
+"""Processes that can be killed: workers of executors, and SCIP, which may crash or must end at a deadline.
 
-It does not use `multiprocessing`, because Dask workers may not have such children.
+They do not use `multiprocessing`, because Dask workers may not have such children.
 """
 
 import os
@@ -14,6 +14,8 @@ from concurrent.futures import Future
 from contextlib import suppress
 from queue import SimpleQueue
 from typing import IO, Any
+
+from tmsopt.threads import ONE_THREAD
 
 
 class ProcessEnded(RuntimeError):
@@ -36,30 +38,42 @@ class Killable:
         pickle.dump(message, self._process.stdin)
         self._process.stdin.flush()
 
-    def call(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """A future of the result or exception of a call in the process; `ProcessEnded` if it does not answer."""
-        future = Future[Any]()
-        threading.Thread(target=self._exchange, args=(future, (function, arguments)), daemon=True).start()
-        return future
+    def answer(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """The result or exception of a call in the process.
 
-    def _exchange(self, future: "Future[Any]", call: object) -> None:
+        Raises:
+            ProcessEnded: if it does not answer.
+        """
         try:
-            self._send(call)
+            self._send((function, arguments))
             answer, error = pickle.load(self._process.stdout)
         except Exception as ended:
-            answer, error = None, ProcessEnded(str(ended))
-        if error is None:
-            future.set_result(answer)
-        else:
-            future.set_exception(error)
+            raise ProcessEnded(str(ended)) from ended
+        if error is not None:
+            raise error
+        return answer
 
-    def end(self) -> None:
-        """Kill the process."""
+    def call(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """A future of the `answer` to a call."""
+        future = Future[Any]()
+
+        def wait() -> None:
+            try:
+                future.set_result(self.answer(function, *arguments))
+            except Exception as error:
+                future.set_exception(error)
+
+        threading.Thread(target=wait, daemon=True).start()
+        return future
+
+    def end(self) -> str:
+        """Kill the process; ``signal 9`` or ``exit code 1`` if it had ended before."""
         self._process.kill()
-        self._process.wait()
+        code = self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
             with suppress(OSError):  # unsent data in the pipe
                 pipe.close()
+        return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
 def start() -> Any:
@@ -70,6 +84,7 @@ def start() -> Any:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
+        env=os.environ | ONE_THREAD,
         start_new_session=True,  # Ctrl-C does not reach it; some schedulers share time between sessions
     )
 

@@ -69,7 +69,7 @@ class Steps:
         """Begin a task, or continue it if it is the current one."""
         if what != self._what:
             self._before[self._what] = self._done
-            self._what, self._unit, self._note = what, unit, ""
+            self._what, self._unit = what, unit
             self._began, self._due = time.perf_counter(), 0.0
             self._first: tuple[float, float] | None = None
             self._done, self._last = self._before.setdefault(what, 0.0), 0.0
@@ -80,15 +80,15 @@ class Steps:
         if done < self._last:
             self._before[self._what] = self._done
         self._last, before = done, self._before[self._what]
-        self._done, self._note = before + done, note
+        self._done = before + done
         now = time.perf_counter()
         self._first = self._first or (self._done, now)
         if done >= most or now >= self._due:
-            self._send(self._done, before + most)
+            self._send(self._done, before + most, note)
             after = time.perf_counter()
             self._due = after + max(PAUSE, _SHARE * (after - now)) if PAUSE else 0.0
 
-    def _send(self, done: float, most: float) -> None:
+    def _send(self, done: float, most: float, note: str = "") -> None:
         now, left = time.perf_counter(), math.nan
         if self._unit == "s":
             left = most - done
@@ -96,7 +96,7 @@ class Steps:
             steps, took = done - self._first[0], now - self._first[1]
             if took >= _SETTLED and (steps >= _STEPS or steps > _PART * (most - self._first[0])):
                 left = (most - done) * took / steps
-        self._listener(Progress(self._what, done, most, self._unit, now - self._began, left, self._note))
+        self._listener(Progress(self._what, done, most, self._unit, now - self._began, left, note))
 
 
 def begin(steps: Steps | None, what: str, unit: str = "") -> None:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,7 @@ class Printable(Protocol):
 
     def report(self, full: bool = False) -> str:
         """The text that the command line prints; every section if `full`."""
-        return str(_documents().report(self, full))
+        return str(call_documents("report", self, full))
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the result into `ax`, or into new Axes, which a notebook and ``plt.show()`` show.
@@ -38,17 +38,17 @@ class Printable(Protocol):
         Raises:
             InputError: if results of this kind have no figure.
         """
-        axes: Axes = _documents().plot(self, ax)
+        axes: Axes = call_documents("plot", self, ax)
         return axes
 
     def __str__(self) -> str:
         return self.report()
 
     def __repr__(self) -> str:
-        return str(_documents().headline(self))
+        return str(call_documents("headline", self))
 
     def _repr_html_(self) -> str:
-        return str(_documents().to_notebook(self))
+        return str(call_documents("to_notebook", self))
 
 
 class Tabular(Printable, Protocol):
@@ -69,7 +69,7 @@ class Tabular(Printable, Protocol):
 
 def call_documents(name: str, *arguments: Any, **options: Any) -> Any:
     """Call a function of `tmsopt.documents` by name: results cannot import that package, which imports them."""
-    return getattr(_documents(), name)(*arguments, **options)
+    return getattr(import_module("tmsopt.documents"), name)(*arguments, **options)
 
 
 def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
@@ -80,10 +80,6 @@ def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
     """
     table: DataFrame = import_optional("pandas").DataFrame(rows if isinstance(rows, Mapping) else list(rows))
     return table
-
-
-def _documents() -> Any:
-    return import_module("tmsopt.documents")
 
 
 class Table(Mapping[str, V]):
@@ -119,13 +115,8 @@ class Column(Sequence[float]):
         self._values = np.array(values, dtype=np.float64)
         self._values.flags.writeable = False
 
-    @overload
-    def __getitem__(self, where: int) -> float: ...
-
-    @overload
-    def __getitem__(self, where: slice) -> "Column": ...
-
-    def __getitem__(self, where: int | slice) -> "float | Column":
+    def __getitem__(self, where: Any) -> Any:
+        """A float, or a Column for a slice."""
         return Column(self._values[where]) if isinstance(where, slice) else float(self._values[where])
 
     def __len__(self) -> int:

@@ -1,6 +1,7 @@
 """Rows of a study for tests of its store, also in processes that load nothing else."""
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from tmsopt.errors import InputError
 from tmsopt.problem import load
 from tmsopt.records import Table
-from tmsopt.studies import Row, Study, batch_rows
+from tmsopt.studies import Row, Study, view_store
 
 STUDY = Study(
     load(Path(__file__).parents[2] / "problems" / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7
@@ -25,16 +26,30 @@ def row(number, study=STUDY, **given):
     return Row(number, study.seed_of(number), varied, **told)
 
 
-def part(*rows):
-    """Rows as a store takes them."""
-    return batch_rows(rows)
-
-
 def faults(call, *given, **options):
-    """What is wrong with a call."""
+    """What is wrong with a call, or with the context that it returns."""
     with pytest.raises(InputError) as caught:
-        call(*given, **options)
+        _enter(call(*given, **options))
     return str(caught.value)
+
+
+def _enter(found):
+    if isinstance(found, AbstractContextManager):
+        found.__enter__()
+
+
+def numbers_in(store):
+    """The numbers of all rows of a store."""
+    return [number for batch in store.read_batches() for number in batch["number"].tolist()]
+
+
+def stored(path):
+    """Numbers of the rows that a store has, which may not be made yet."""
+    try:
+        with view_store(path) as store:
+            return set(numbers_in(store))
+    except InputError:
+        return set()
 
 
 def flat(row):

@@ -1,25 +1,19 @@
 """Rows that solve nothing: judged at once they are those of one by one, whatever block they are in."""
 
-import os
-import signal
-import subprocess
-import sys
-from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.rows import assert_same
+from helpers.rows import assert_same, numbers_in
 
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
 from tmsopt.documents import describe_row
 from tmsopt.errors import InputError
 from tmsopt.evaluation import LAWS, evaluate_columns, law_rows
 from tmsopt.plots import draw_histogram
-from tmsopt.studies import RowTable, Solver, batch_rows, open_store, solve_row, summarise, view_store
+from tmsopt.studies import RowTable, Solver, batch_rows, open_store, solve_row, summarise
 
 judge = import_module("tmsopt.studies.solving")
 SOLVES = import_module("tmsopt.studies.monte_carlo")
@@ -137,7 +131,7 @@ def test_a_store_gives_back_the_same_rows(tmp_path):
     for rows in (kept.rows, again.rows):
         assert_same(rows, plain.rows)
     with open_store(path, study) as store:
-        assert store.numbers().tolist() == list(range(60))
+        assert numbers_in(store) == list(range(60))
         assert sum(session["rows"] for session in store.sessions()) == 60
         store.forget([3, 4])
         store.add(batch_rows([kept.rows[4]]))
@@ -146,46 +140,6 @@ def test_a_store_gives_back_the_same_rows(tmp_path):
     assert_same(part.rows, plain.rows)
     with pytest.raises(InputError, match="another study"):
         run_study(replace(study, seed=5), path)
-
-
-ENDLESS = """
-import sys
-from pathlib import Path
-from tmsopt import monte_carlo, run_study
-study = monte_carlo(Path(sys.argv[1]), 600_000, 1, "normal", {"chi_B": 0.005, "lambda_s": 0.0087, "Fr": 0.02})
-
-def told(now):
-    if now.unit == "row":
-        print(round(now.done), flush=True)
-
-run_study(study, sys.argv[2], progress=told)
-"""
-
-
-@pytest.mark.long
-def test_kill_9_loses_no_block_and_doubles_none(tmp_path):
-    study, path = built(600_000), tmp_path / "built.sqlite"
-    whole = run_study(study).rows
-    had = [0]
-    for _ in range(4):
-        command = [sys.executable, "-c", ENDLESS, str(PROBLEMS / "ep4.toml"), str(path)]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        assert process.stdout is not None
-        lines = [process.stdout.readline() for _ in range(3)]
-        with suppress(ProcessLookupError):
-            os.kill(process.pid, signal.SIGKILL)
-        process.communicate()
-        with view_store(path) as store:
-            done = store.numbers()
-            assert len(done) == sum(session["rows"] for session in store.sessions())
-        assert len(done) >= int(lines[-1] or 0)
-        had.append(len(done))
-    assert all(later >= earlier for earlier, later in pairwise(had))
-    last = run_study(study, path)
-    assert last.found + last.solved == len(study) == len(last.rows)
-    for name in ("objective", "damping_ratio", "number", "status"):
-        one, other = last.column(name), whole.values(name)
-        assert np.allclose(one, other, rtol=1e-9, atol=0) if one.dtype == float else np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("study", [own(), built(12)], ids=["own", "drawn"])

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from helpers.rows import assert_same
+from helpers.rows import assert_same, stored
 
 from tmsopt.studies import load_study, plan_study, read_results, solve_row, view_store
 
@@ -21,20 +21,11 @@ GRACE = 0.5  # s between the looks of a worker at its parent
 PATIENCE = 60.0  # s for the first row of a study that starts
 
 
-def acknowledged_by(path):
-    """Numbers of the rows that the store has acknowledged."""
-    try:
-        with view_store(path) as store:
-            return set(store.numbers().tolist())
-    except ValueError:  # not made yet
-        return set()
-
-
 def workers_of(pid):
     found = subprocess.run(
         ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False
     )
-    return [int(line.split()[0]) for line in found.stdout.splitlines() if "popen_loky" in line]
+    return [int(line.split()[0]) for line in found.stdout.splitlines() if "tmsopt.killable" in line]
 
 
 @pytest.mark.long
@@ -58,7 +49,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path):
     try:
         for _ in range(KILLS):
             until = time.monotonic() + PATIENCE
-            while len(acknowledged_by(path)) <= len(acknowledged):
+            while len(stored(path)) <= len(acknowledged):
                 assert time.monotonic() < until, "no row came"
                 time.sleep(0.05)
             time.sleep(rng.uniform(*PAUSE))
@@ -73,7 +64,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path):
                 process.wait()
                 killed["study"] += 1
                 process = start()
-            now = acknowledged_by(path)
+            now = stored(path)
             assert acknowledged <= now
             acknowledged = now
         assert process.wait() == 0

@@ -1,6 +1,7 @@
 """The store of a study: no acknowledged row is lost, no other file is touched, numbers come back as they were."""
 
 import csv
+import itertools
 import math
 import os
 import random
@@ -16,13 +17,13 @@ from pathlib import Path
 
 import pytest
 from helpers.oracles import abscissa_60, polynomial_60
-from helpers.rows import STUDY, faults, part, row
+from helpers.rows import STUDY, faults, numbers_in, row, stored
+from helpers.works import little_room
 
-from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
 from tmsopt.records import Table
-from tmsopt.studies import RowTable, Study, check_same, open_store, read_results, run_study, view_store
+from tmsopt.studies import RowTable, Study, batch_rows, check_same, open_store, read_results, run_study, view_store
 
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 OLD = Path(__file__).parent / "stores"
@@ -32,6 +33,13 @@ posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POS
 def rows_of(path, study=STUDY):
     with view_store(path) as opened:
         return list(RowTable(study, opened.read_batches()))
+
+
+def keep(path, *rows, study=STUDY, **options):
+    """Store rows, and give the warnings."""
+    with open_store(path, study, **options) as opened:
+        opened.add(batch_rows(rows))
+        return opened.warnings
 
 
 @pytest.fixture
@@ -49,17 +57,17 @@ import os, random, sys, time
 from pathlib import Path
 sys.path.insert(0, str(Path("tests").resolve()))
 from helpers.oracles import abscissa_60, polynomial_60
-from helpers.rows import STUDY, part, row
-from tmsopt.studies import open_store
+from helpers.rows import STUDY, numbers_in, row
+from tmsopt.studies import batch_rows, open_store
 path, task = sys.argv[1:]
 with open_store(path, STUDY) as opened:
     print(os.getpid(), flush=True)
     if task == "hold":
         time.sleep(60)
-    number = len(opened.numbers())
+    number = len(numbers_in(opened))
     while True:
         batch = [row(n) for n in range(number, number + random.randint(1, 20))]
-        opened.add(part(*batch))
+        opened.add(batch_rows([*batch]))
         number += len(batch)
         print(number, flush=True)
 """
@@ -92,7 +100,7 @@ def test_no_acknowledged_row_is_lost_by_kill_9(path):
             printed = process.stdout.read().split("\n")[:-1]  # the last line may be cut off
         acknowledged = int(printed[-1]) if printed else acknowledged
         with view_store(path) as opened:
-            done = opened.numbers().tolist()
+            done = numbers_in(opened)
             assert len(done) >= acknowledged
             assert done == list(range(len(done)))  # batches are kept as a whole or not at all
             assert [s["ended"] for s in opened.sessions()] == [None] * len(opened.sessions())
@@ -107,9 +115,8 @@ def test_reading_while_another_process_writes(path):
         for _ in range(5):
             acknowledged = int(process.stdout.readline())
             with view_store(path) as opened:
-                there = len(opened.numbers())
-                assert there >= acknowledged
-                assert len(RowTable(STUDY, opened.read_batches())) >= there
+                there = len(numbers_in(opened))
+                assert len(RowTable(STUDY, opened.read_batches())) >= there >= acknowledged
 
 
 def test_a_second_writer_is_refused_until_the_first_is_gone(path):
@@ -121,10 +128,9 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(path):
         process.kill()
         process.wait()
         with open_store(path, STUDY) as opened:
-            opened.add(part(row(0)))
+            opened.add(batch_rows([row(0)]))
             assert str(os.getpid()) in faults(open_store, path, STUDY)  # within one process too
-    with open_store(path, STUDY) as opened:
-        assert opened.numbers().tolist() == [0]
+    assert stored(path) == {0}
     assert [p.name for p in path.parent.iterdir()] == [path.name]  # one plain file, which can be copied
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         assert connection.execute("SELECT number, status, abscissa FROM rows").fetchall() == [(0, "optimal", -1.0)]
@@ -150,9 +156,8 @@ def test_numbers_come_back_and_rows_are_in_order(path):
     ]
     kept += [row(len(SPECIAL), status="failed", cause="two\nlines 'quoted' χ", host="here", proven=True, warm=True)]
     kept += [row(len(kept) + 1, reports=Table({"Fr": -math.inf}), laws=Table({"w0": -math.inf, "epset": -math.nan}))]
-    with open_store(path, study) as opened:
-        for one in reversed(kept):
-            opened.add(part(one))
+    for one in reversed(kept):
+        keep(path, one, study=study)
     found = rows_of(path, study)
     assert dict(found.pop().laws) == {"w0": -math.inf}
     assert list(map(str, found)) == list(map(str, kept[:-1]))
@@ -163,18 +168,17 @@ def test_a_store_holds_more_numbers_than_a_table_of_sqlite_has_columns(path):
     limits = {f"c{k}": f"Fr <= {k}" for k in range(1000)}
     study = replace(study, problem=replace(STUDY.problem, constraints=limits))
     one = row(0, reports=Table(dict.fromkeys(study.report, 1.5)), violations=Table(dict.fromkeys(limits, 0.1)))
-    with open_store(path, study) as opened:
-        opened.add(part(one))
+    keep(path, one, study=study)
     assert rows_of(path, study) == [one]
 
 
 def test_a_row_is_never_overwritten_and_may_be_forgotten(path):
+    keep(path, row(1), row(2))
     with open_store(path, STUDY) as opened:
-        opened.add(part(row(1), row(2)))
-        opened.add(part(row(1, seconds=9.0, host="elsewhere"), row(3)))
-        opened.add(part())
-        assert opened.numbers().tolist() == [1, 2, 3]
-        assert opened.sessions()[0]["rows"] == 3
+        opened.add(batch_rows([row(1, seconds=9.0, host="elsewhere"), row(3)]))
+        opened.add(batch_rows([]))
+        assert numbers_in(opened) == [1, 2, 3]
+        assert [session["rows"] for session in opened.sessions()] == [2, 1]
         opened.forget([2])
     assert rows_of(path) == [row(1), row(3)]
 
@@ -183,20 +187,15 @@ def test_a_row_is_never_overwritten_and_may_be_forgotten(path):
 
 
 def test_what_a_store_says_of_itself(path):
-    with open_store(path, STUDY) as opened:
-        opened.add(part(row(0)))
-    with open_store(path, STUDY) as opened:
-        assert opened.warnings == ()
-        about = opened.about()
+    assert keep(path, row(0)) == keep(path) == ()
+    with view_store(path) as opened:
+        about, sessions = opened.about(), opened.sessions()
     assert about["schema"] == 3
     assert about["definition"]["seed"] == about["seed"] == 7
     assert "columns" not in about["definition"]
     assert set(about["versions"]) == {"python", "tmsopt", "casadi", "numpy", "scipy", "python-flint", "ipopt"}
-    with view_store(path) as opened:
-        assert [(s["rows"], s["pid"], s["ended"] is None) for s in opened.sessions()] == [
-            (1, os.getpid(), False),
-            (0, os.getpid(), False),
-        ]
+    pid = os.getpid()
+    assert [(s["rows"], s["pid"], s["ended"] is None) for s in sessions] == [(1, pid, False), (0, pid, False)]
 
 
 SMALL = Study(STUDY.problem, {"mu": [0.1, 0.2, 0.3], "zeta_B": [-0.4, -0.5, -0.6]}, seed=7)
@@ -221,66 +220,50 @@ SMALL = Study(STUDY.problem, {"mu": [0.1, 0.2, 0.3], "zeta_B": [-0.4, -0.5, -0.6
     ids=str,
 )
 def test_the_store_of_a_changed_study_is_refused(path, change, line):
-    with open_store(path, SMALL) as opened:
-        opened.add(part(row(0)))
+    keep(path, row(0), study=SMALL)
     before = path.read_bytes()
     message = faults(open_store, path, replace(SMALL, **change))
-    assert message.splitlines()[1] == f"  {line}"
-    assert len(message.splitlines()) == (3 if "2 in the file" in line else 2)
-    assert "--fresh" in message
-    assert "--store" in message
+    advice, *lines = message.splitlines()
+    assert lines[0] == f"  {line}"
+    assert len(lines) == (2 if "2 in the file" in line else 1)
+    assert "--fresh" in advice
+    assert "--store" in advice
     assert path.read_bytes() == before
-    with open_store(path, SMALL) as opened:
-        assert opened.numbers().tolist() == [0]
+    assert stored(path) == {0}
 
 
 def test_fresh_moves_aside_and_never_deletes(path):
     for number in range(3):
-        with open_store(path, replace(STUDY, seed=number), fresh=True) as opened:
-            assert opened.warnings == (
-                (f"moved the old store to {path.with_name(f'study.{number}.sqlite')}",) * (number > 0)
-            )
-            assert opened.numbers().size == 0
-            opened.add(part(row(number)))
+        warnings = keep(path, row(number), study=replace(STUDY, seed=number), fresh=True)
+        assert warnings == (f"moved the old store to {path.with_name(f'study.{number}.sqlite')}",) * (number > 0)
     for name, number in (("study.1.sqlite", 0), ("study.2.sqlite", 1), ("study.sqlite", 2)):
         with view_store(path.with_name(name)) as opened:
-            assert opened.about()["seed"] == number
-            assert opened.numbers().tolist() == [number]
+            assert (opened.about()["seed"], numbers_in(opened)) == (number, [number])
     assert len(list(path.parent.iterdir())) == 3
 
 
-def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path):
+@pytest.mark.parametrize("gone", [False, True], ids=["fresh", "the store is gone"])
+def test_what_a_killed_writer_left_in_its_log_is_moved_aside(gone, path):
+    """With the store; or alone, and then it is not played into the new store."""
     with writer(path) as (process, _):
         acknowledged = [int(process.stdout.readline()) for _ in range(3)][-1]
         process.kill()
         process.wait()
     assert path.with_name("study.sqlite-wal").exists()
-    with open_store(path, STUDY, fresh=True) as opened:
-        assert opened.numbers().size == 0
-    with view_store(path.with_name("study.1.sqlite")) as opened:
-        assert len(opened.numbers()) >= acknowledged
-
-
-def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path):
-    with writer(path) as (process, _):
-        process.stdout.readline()
-        process.kill()
-        process.wait()
-    path.unlink()
-    with open_store(path, STUDY) as opened:
-        assert opened.numbers().size == 0
-    assert path.with_name("study.1.sqlite-wal").exists()
+    if gone:
+        path.unlink()
+    keep(path, fresh=not gone)
+    assert stored(path) == set()
+    assert path.with_name("study.1.sqlite-wal").exists() == gone
+    assert gone or len(stored(path.with_name("study.1.sqlite"))) >= acknowledged
 
 
 def test_other_versions_are_a_warning(path, monkeypatch):
-    with open_store(path, STUDY) as opened:
-        opened.add(part(row(0)))
-        there = opened.about()["versions"]["tmsopt"]
-    monkeypatch.setattr("tmsopt.studies.store._versions", lambda: opened_with | {"tmsopt": "0.9.9"})
-    with view_store(path) as reading:
-        opened_with = reading.about()["versions"]
-    with open_store(path, STUDY) as opened:
-        assert opened.warnings == (f'tmsopt: "{there}" in the store, "0.9.9" now',)
+    keep(path, row(0))
+    with view_store(path) as opened:
+        there = opened.about()["versions"]
+    monkeypatch.setattr("tmsopt.studies.store._versions", lambda: there | {"tmsopt": "0.9.9"})
+    assert keep(path) == (f'tmsopt: "{there["tmsopt"]}" in the store, "0.9.9" now',)
 
 
 # Files that are no store, damage, and places that cannot be written
@@ -292,7 +275,7 @@ def other_database(path):
 
 
 def newer_store(path):
-    open_store(path, STUDY).close()
+    keep(path)
     spoil(path, "PRAGMA user_version=4")
 
 
@@ -309,9 +292,9 @@ def newer_store(path):
 def test_a_file_that_is_no_store_is_not_touched(path, make, expected):
     make(path)
     before = path.read_bytes()
-    calls = (lambda: view_store(path), lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True))
-    for call in calls:
-        assert expected in faults(call)
+    assert expected in faults(view_store, path)
+    for fresh in (False, True):
+        assert expected in faults(open_store, path, STUDY, fresh=fresh)
     assert path.read_bytes() == before
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
@@ -368,55 +351,46 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script, path):
         with open_store(path, STUDY) as opened:
             opened.read_batches()
 
-    with open_store(path, STUDY) as opened:
-        opened.add(part(row(0)))
+    keep(path, row(0))
     spoil(path, script)
     for message in (faults(read_whole), faults(go_on)):
         assert "damaged" in message or "another study" in message
         assert "--fresh" in message
         assert len(message) < 2000
-    with open_store(path, STUDY, fresh=True) as opened:
-        assert opened.numbers().size == 0
+    keep(path, fresh=True)
+    assert stored(path) == set()
     assert sorted(p.name for p in path.parent.iterdir()) == ["study.1.sqlite", "study.sqlite"]
 
 
 def test_a_damaged_file_is_said_to_be(path):
-    with open_store(path, STUDY) as opened:
-        opened.add(part(*map(row, range(1000))))
+    keep(path, *map(row, range(1000)))
     whole = path.read_bytes()
     for damaged in (whole[:4096] + b"\xa5" * (len(whole) - 4096), whole[: len(whole) // 2]):
         path.write_bytes(damaged)
         assert "is damaged" in faults(open_store, path, STUDY)
         assert "is damaged" in faults(rows_of, path)
         assert path.read_bytes() == damaged
-    with open_store(path, STUDY, fresh=True) as opened:
-        opened.add(part(row(0)))
+    keep(path, row(0), fresh=True)
     assert path.with_name("study.1.sqlite").exists()
 
 
 @posix
 def test_a_full_disk_costs_no_row_that_was_acknowledged(path):
     """A limit on the size of files stands for the disk: SQLite calls the one an I/O error and the other full."""
-    import resource
+    acknowledged = [0]
+
+    def fill():
+        for first in itertools.count(0, 100):
+            opened.add(batch_rows([*map(row, range(first, first + 100))]))
+            acknowledged.append(first + 100)
 
     with open_store(path, SMALL) as opened:
-        opened.add(part(row(0)))
-        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, hard))
-        acknowledged = 1
-        try:
-            for first in range(1, 20_000, 100):
-                opened.add(part(*map(row, range(first, first + 100))))
-                acknowledged = first + 100
-            pytest.fail("the limit was not reached")
-        except InputError as error:
-            assert "disk" in str(error)
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        assert opened.numbers().tolist() == list(range(acknowledged))
-        opened.add(part(row(acknowledged)))
-    with view_store(path) as opened:
-        assert opened.numbers().tolist() == list(range(acknowledged + 1))
+        with little_room(200_000):
+            assert "disk" in faults(fill)
+        assert numbers_in(opened) == list(range(acknowledged[-1]))
+        opened.add(batch_rows([row(acknowledged[-1])]))
+    assert stored(path) == set(range(acknowledged[-1] + 1))
+    assert acknowledged[-1] > 0
 
 
 # Stores of tmsopt 1.1, whose rows were exported by it: solved ones of schema 1, and judged ones of schema 2
@@ -491,6 +465,6 @@ def test_a_damaged_store_of_version_1_is_refused(path):
         shutil.copy(OLD / f"{name}.sqlite", path)
         spoil(path, script)
         before = path.read_bytes()
-        for call in (lambda: read_results(STUDIES[name], path), lambda: open_store(path, STUDIES[name])):  # noqa: B023
-            assert "is damaged" in faults(call)
+        assert "is damaged" in faults(read_results, STUDIES[name], path)
+        assert "is damaged" in faults(open_store, path, STUDIES[name])
         assert path.read_bytes() == before

@@ -16,12 +16,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from helpers import oracles
-from helpers.rows import assert_same, row as row_of
+from helpers.rows import assert_same, faults, row as row_of, stored
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import laws
 from tmsopt.cli import every as main
-from tmsopt.errors import InputError
 from tmsopt.evaluation import law_rows
 from tmsopt.executor import Crash
 from tmsopt.models import tms
@@ -42,7 +41,6 @@ from tmsopt.studies import (
     run_study,
     solve_row,
     summarise,
-    view_store,
 )
 
 EP4 = load("problems/ep4.toml")
@@ -127,25 +125,12 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
     monkeypatch.setattr(Solver, "answers", counting)
     with pytest.raises(KeyboardInterrupt):
         run_study(GRID, path, workers=1, progress=interrupt)
-    with view_store(path) as store:
-        assert store.numbers().tolist() == [0, 1, 2]
+    assert stored(path) == {0, 1, 2}
     resumed = run_study(GRID, path, workers=1)
     assert resumed.solved == 3
     assert sorted(tried) == list(range(6))
     monkeypatch.undo()
     assert_same(resumed.rows, run_study(GRID, workers=1).rows)
-
-
-@pytest.mark.slow
-def test_a_store_of_another_study_is_refused(tmp_path):
-    path = tmp_path / "s.sqlite"
-    run_study(GRID, path, workers=1)
-    other = over_grid(replace(EP4, fixed={**EP4.fixed, "mu": 0.2}), HEIGHTS, report=["nu_H", "2*Fr"])
-    with pytest.raises(InputError, match=r"problem\.fixed\.mu"):
-        run_study(other, path, workers=1)
-    anew = run_study(other, path, workers=1, fresh=True)
-    assert {row.parameters["mu"] for row in anew.rows} == {0.2}
-    assert len(list(tmp_path.glob("*.sqlite"))) == 2  # the old one is beside it
 
 
 def test_failures_are_rows_with_a_cause():
@@ -175,23 +160,6 @@ def test_a_row_that_breaks_the_program_is_a_row(monkeypatch):
     assert rows[0].cause == "ZeroDivisionError: of a bug"
 
 
-def test_rows_are_drawn_around_a_design():
-    """First-order: moving Fr alone by dFr moves each coefficient as the polynomial in Fr says; here only that rows are
-    those designs, evaluated: their abscissa is that of `solve` with nothing free."""
-    design = solve(EP4)
-    study = monte_carlo(design, 5, seed=3, tolerances={"Fr": 0.02, "chi_B": 0.01})
-    rows = run_study(study, workers=1).rows
-    for row in rows:
-        assert abs(row.parameters["Fr"] - design.parameters["Fr"]) <= 0.02
-        assert row.parameters["lambda_s"] == design.parameters["lambda_s"]
-        lone = solve(Problem(model=tms, fixed=dict(row.parameters)))
-        assert row.abscissa == pytest.approx(lone.abscissa, rel=1e-9)
-        assert row.abscissa > design.abscissa  # EP4 is the best of all
-    told = summarise(rows).product
-    assert told is not None
-    assert told.stable.count == 5
-
-
 def test_a_summary_of_rows_is_what_its_numbers_are_by_definition():
     """Rows that are made up: one of them unstable, three not solved for causes that differ in their numbers or not."""
     given = [(2.0, 1e-9), (1.0, -1e-3), (3.0, 1e-6), (7.0, 0.0)]
@@ -208,26 +176,20 @@ def test_a_summary_of_rows_is_what_its_numbers_are_by_definition():
 
 
 @pytest.mark.slow
-def test_results_are_columns_and_files(tmp_path):
+def test_results_are_columns():
     found = run_study(GRID, workers=1)
     np.testing.assert_array_equal(found.column("varied.zeta_H"), [-0.2, -0.3, -0.35] * 2)
     np.testing.assert_array_equal(found.column("chi_B"), [row.parameters["chi_B"] for row in found.rows])
     np.testing.assert_array_equal(found.column("report.2*Fr"), 2 * found.column("Fr"))
     assert found.summary.counts == {"optimal": 6}
-    found.export(tmp_path / "rows.csv")
-    assert len((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()) == 7
-    assert not any("," in name for row in found.rows for name in row.laws)
     assert "Row(" not in repr(found)
-    with pytest.raises(InputError, match="did you mean 'chi_B'"):
-        found.column("chi_b")
+    assert "did you mean 'chi_B'" in faults(found.column, "chi_b")
 
 
 def test_calls_that_make_no_sense_are_refused():
-    with pytest.raises(InputError, match="accepted: a Study"):
-        run_study(EP4)  # type: ignore[arg-type]
+    assert "accepted: a Study" in faults(run_study, EP4)
     for workers in (0, True, 1.5):
-        with pytest.raises(InputError, match="1 or more"):
-            run_study(GRID, workers=workers)  # type: ignore[arg-type]
+        assert "1 or more" in faults(run_study, GRID, workers=workers)
 
 
 # Warm starts
@@ -297,8 +259,8 @@ def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch)
 
     monkeypatch.setattr(Solver, "_answer", counting)
     problem = replace(TWO, constraints={"fast": "Fr >= 0"})
-    limits = {"fast.limit": [0.0, 1.0, 2.0, 5.0, 5.5, 6.0]}
-    rows = run_study(over_grid(problem, limits, warm=True), workers=1).rows
+    study = over_grid(problem, {"fast.limit": [0.0, 1.0, 2.0, 5.0, 5.5, 6.0]}, warm=True)
+    rows = run_study(study, workers=1).rows
     assert [row.status for row in rows] == ["optimal"] * 3 + ["infeasible"] * 3
     assert dict(tried) == {0: 1, 4: 1, 5: 1}
 
@@ -315,6 +277,8 @@ def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_pat
 
 class Crashing:
     """An executor whose workers die of row 3."""
+
+    name = "2 processes"
 
     def __enter__(self):
         return self
@@ -425,19 +389,19 @@ def test_the_command_writes_no_file_twice_and_none_that_it_reads(tmp_path, monke
 
 @pytest.mark.slow
 def test_the_command_refuses_what_it_cannot_do(file):
-    missing = command(file, "--row", 6)
-    assert missing.exit_code == 2
-    assert "0 to 5" in missing.stderr
-    wrong = command(Path(__file__).parents[2] / "problems" / "ep4.toml")
-    assert wrong.exit_code == 2
-    assert "is one problem, not a study" in wrong.stderr
-    assert command(file, "--export", "rows.xlsx").exit_code == 2
-    assert command(file, "--store", "nowhere/s.sqlite").exit_code == 2
-    assert command("absent.toml").exit_code == 2
-    both = command(file, "--row", 1, "--export", "rows.csv", "--fresh")
-    assert both.exit_code == 2
-    assert [line.split(":")[0] for line in both.stderr.splitlines()] == ["--fresh", "--export"]
-    assert command(file, "--scheduler", "tcp://127.0.0.1:1", "--workers", 2).exit_code == 2
+    for words, said in [
+        ((file, "--row", 6), "0 to 5"),
+        ((Path(__file__).parents[2] / "problems" / "ep4.toml",), "is one problem, not a study"),
+        ((file, "--export", "rows.xlsx"), ".parquet"),
+        ((file, "--store", "nowhere/s.sqlite"), "nowhere"),
+        (("absent.toml",), "no such file"),
+        ((file, "--scheduler", "tcp://127.0.0.1:1", "--workers", 2), "--workers"),
+        ((file, "--row", 1, "--export", "rows.csv", "--fresh"), "--fresh: has no effect with --row"),
+    ]:
+        refused = command(*words)
+        assert refused.exit_code == 2
+        assert said in refused.stderr
+    assert [line.split(":")[0] for line in refused.stderr.splitlines()] == ["--fresh", "--export"]
     assert command(file, "--workers", 1).exit_code == 0
     file.write_text(FILE.replace("mu = 0.1", "mu = 0.2"), encoding="utf-8")
     changed = command(file)
@@ -458,16 +422,9 @@ def test_a_killed_command_goes_on(file, ending):
     run = [sys.executable, "-m", "tmsopt", "study", str(file), "--workers", "2", "--json"]
     store = file.parent / "heights.sqlite"
     process = subprocess.Popen(run, cwd=file.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    kept = set()
-    while len(kept) < 5:
+    while len(kept := stored(store)) < 5:
         assert process.poll() is None
         time.sleep(0.05)
-        if store.exists():
-            try:
-                with view_store(store) as opened:
-                    kept = set(opened.numbers().tolist())
-            except InputError:
-                continue  # being made
     process.send_signal(ending)
     answer, told = process.communicate(timeout=60)
     if ending == signal.SIGINT:
@@ -493,9 +450,8 @@ def test_rows_that_a_study_cannot_have_are_refused(number, tmp_path):
     with open_store(path, study) as store:
         store.add(batch_rows([Row(n, 1, Table({"mu": 0.2}), "failed") for n in (1, number)]))
     told = []
-    for call in (lambda: read_results(study, path), lambda: run_study(study, path, progress=told.append)):
-        with pytest.raises(InputError, match=f"row {number} does not belong to this study"):
-            call()
+    refused = faults(read_results, study, path), faults(run_study, study, path, progress=told.append)
+    assert all(f"row {number} does not belong to this study" in text for text in refused)
     assert {t.what for t in told} == {"waiting for the store", "reading the store"}
 
 
@@ -508,20 +464,21 @@ def test_what_a_row_says_is_printable(tmp_path):
 
 # By the clock
 
+METRES = {"w": 1.0, "m_B": 10.0, "m_H": 1.0, "x_B": 1.3, "z_B": -0.4, "x_H": 1.01, "z_H": -0.2, "lambda_s": 0.2618}
+
 
 def by_clock(row):
     """Eigenvalues of the oracle's polynomial times √(g/w)."""
     p = row.parameters
     w, rate = p["w"], np.sqrt(p["g"] / p["w"])
-    ratios = (p["m_H"] / p["m_B"], p["x_B"] / w, p["x_H"] / w, p["z_B"] / w, p["z_H"] / w, np.tan(p["lambda_s"]))
-    a = oracles.polynomial_exact(p["v"] / (rate * w), *ratios)
+    lengths = (p[name] / w for name in ("x_B", "x_H", "z_B", "z_H"))
+    a = oracles.polynomial_exact(p["v"] / (rate * w), p["m_H"] / p["m_B"], *lengths, np.tan(p["lambda_s"]))
     return float(np.roots([float(c) for c in a]).real.max() * rate)
 
 
 def test_rows_are_ranked_by_the_clock():
     """On the moon it decays as fast per √(g/w), and the speed of the best design is in the box: not so on the earth."""
-    fixed = {"w": 1.0, "m_B": 10.0, "m_H": 1.0, "x_B": 1.3, "z_B": -0.4, "x_H": 1.01, "z_H": -0.2, "lambda_s": 0.2618}
-    problem = Problem(tms, fixed, {"v": (1, 6)}, minimize="abscissa")
+    problem = Problem(tms, METRES, {"v": (1, 6)}, minimize="abscissa")
     found = run_study(over_grid(problem, {"g": [1.62, 3.71, 9.81]}), workers=1)
     decays = [by_clock(row) for row in found.rows]
     assert int(np.argmin([row.abscissa for row in found.rows])) == 0
@@ -535,8 +492,7 @@ def test_rows_are_ranked_by_the_clock():
 
 
 def test_quantiles_of_a_monte_carlo_are_by_the_clock():
-    fixed = {"w": 1.0, "g": 9.81, "v": 4.0, "m_B": 10.0, "m_H": 1.0, "x_B": 1.3, "z_B": -0.4, "x_H": 1.01, "z_H": -0.2}
-    problem = Problem(tms, {**fixed, "lambda_s": 0.2618}, minimize="abscissa")
+    problem = Problem(tms, {**METRES, "g": 9.81, "v": 4.0}, minimize="abscissa")
     found = run_study(monte_carlo(problem, 41, tolerances={"w": 0.005}), workers=1)
     decays = sorted(by_clock(row) for row in found.rows)
     assert found.summary.clocked["quantiles"][2] == pytest.approx(decays[20], rel=1e-9)

@@ -42,7 +42,7 @@ class StudyCommand(WithPage, WithPlot, OnFile):
     export: tuple[Path, ...] = option("Write all rows (csv, parquet, nc), repeatable.")
 
     def run(self) -> int:
-        from tmsopt.studies import check_export, check_unchanged, load_study
+        from tmsopt.studies import check_export, load_study
 
         alone = "has no effect with --row, which solves one row and keeps nothing; leave one of the two out"
         self.refuse_useless(
@@ -58,9 +58,8 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         check_output("--store", path, (path.suffix.lstrip(".").lower(),))
         stated = load_study(self.file)
         self._check_apart(path)
-        if not self.fresh:
-            check_unchanged(stated, path)
-        study, path = _plan_rows(stated), Path(realpath(path))
+        study = _plan_rows(stated, None if self.fresh else path)
+        path = Path(realpath(path))
         results, is_stopped = self._solve_rows(study, path)
         with hold_signals():
             self._answer(results, path, is_stopped)
@@ -140,12 +139,12 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         answer(self.json, [describe_row(study, solved.row), *found.values()], lambda: data)
 
 
-def _plan_rows(stated: "tmsopt.Study | tmsopt.Sampling") -> "tmsopt.Study":
-    """The study with its rows; the design of a Monte Carlo one is solved first."""
+def _plan_rows(stated: "tmsopt.Study | tmsopt.Sampling", store: Path | None = None) -> "tmsopt.Study":
+    """The study with its rows; the design of a Monte Carlo one is solved first, if its store fits."""
     from tmsopt.studies import plan_study
 
     try:
-        return plan_study(stated, progress_listener())
+        return plan_study(stated, progress_listener(), store)
     except tmsopt.NotSolved as error:
         click.echo(f"there is no design to draw around: {error}", err=True)
         sys.exit(BAD_INPUT)

@@ -3,7 +3,7 @@
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any, TypeVar
 
@@ -106,11 +106,6 @@ def validate_tables(
                     faults.setdefault(fault.key, fault)
         pruned = _drop_keys(pruned, {key[:2] for key in faults})
     return list(faults.values()), None
-
-
-def prefix_keys(section: str, faults: Iterable[Fault]) -> list[Fault]:
-    """Faults of a table inside a section, with the section in their keys."""
-    return [replace(f, key=(section, *f.key)) for f in faults]
 
 
 def _drop_keys(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:

@@ -35,8 +35,7 @@ def export(
         InputError: for another ending, a missing package, or a file that cannot be written.
     """
     path = Path(path)
-    check_export(path)
-    write, _ = FORMATS[_suffix(path)]
+    write = check_export(path)
     try:
         with write_atomic(path) as temporary:
             write(rows, temporary, metadata or {}, start_steps(progress, f"writing {path.name}", "row"))
@@ -44,24 +43,22 @@ def export(
         raise InputError([Fault(f"cannot be written: {error.strerror or error}", file=str(path))]) from error
 
 
-def check_export(path: Path) -> None:
-    """Check that rows can be exported to a file, before any work is done; imports the packages for it.
+def check_export(path: Path) -> "Writer":
+    """The function that exports rows to a file, before any work is done; imports the packages for it.
 
     Raises:
         InputError: for another ending, a missing package or folder, or a path that is not a regular file.
     """
-    if _suffix(path) not in FORMATS:
+    write, modules = FORMATS.get(path.suffix.lstrip(".").lower(), (None, ()))
+    if write is None:
         accepted = ", ".join(f".{e}" for e in FORMATS)
         raise input_error(f"found '{path}'; accepted: a file name ending in {accepted}", "export")
     if (path.exists() and not path.is_file()) or not path.parent.is_dir():
         problem = "is not a regular file" if path.exists() else "is in a folder that does not exist"
         raise input_error(f"'{path}' {problem}; give the path of a file to write", "export")
-    for module in FORMATS[_suffix(path)][1]:
+    for module in modules:
         import_optional(module, "export to a .csv file")
-
-
-def _suffix(path: Path) -> str:
-    return path.suffix.lstrip(".").lower()
+    return write
 
 
 def _batches(rows: RowTable, steps: Steps | None) -> Iterator[dict[str, Any]]:
@@ -132,14 +129,8 @@ def build_grid_dataset(rows: RowTable) -> Any:
 
 
 def _names(rows: RowTable) -> dict[str, str]:
-    """Unique name of a variable → header; netCDF allows no slash, and ``row`` is the dimension."""
-    names: dict[str, str] = {}
-    for head in rows.headers:
-        name = head.replace("/", " over ").strip()
-        while name in names or name == "row":
-            name += "_"
-        names[name] = head
-    return names
+    """Name of a variable → header; netCDF allows no slash, and ``row`` is the dimension."""
+    return {head.replace("/", " over ").strip() + "_" * (head == "row"): head for head in rows.headers}
 
 
 def _table(rows: RowTable) -> Any:
@@ -153,7 +144,9 @@ def _dataset(rows: RowTable, table: Any) -> Any:
     return dataset
 
 
-FORMATS: Mapping[str, tuple[Callable[[RowTable, Path, Mapping[str, Any], Steps | None], None], tuple[str, ...]]] = {
+Writer = Callable[[RowTable, Path, Mapping[str, Any], Steps | None], None]
+
+FORMATS: Mapping[str, tuple[Writer, tuple[str, ...]]] = {
     "csv": (_csv, ()),
     "parquet": (_parquet, ("pyarrow", "pyarrow.parquet")),
     "nc": (_netcdf, ("xarray", "netCDF4")),

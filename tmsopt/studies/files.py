@@ -3,7 +3,7 @@
 import csv
 import math
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -18,7 +18,7 @@ from tmsopt.files import read_lines
 from tmsopt.problem.files import as_solvable, problem_from_tables
 from tmsopt.problem.freedom import find_question_faults
 from tmsopt.problem.problem import Posed, Problem
-from tmsopt.problem.toml import Key, Number, Page, Section, prefix_keys, read_page, validate_tables
+from tmsopt.problem.toml import Key, Number, Page, Section, read_page, validate_tables
 from tmsopt.problem.unit_system import dimension_of, si_units
 from tmsopt.problem.units import TABLES, parse_quantity, read_numbers
 from tmsopt.program.options import STARTS
@@ -44,6 +44,7 @@ MOST_COLUMNS, LONGEST_LINE = 1000, 1_000_000
 """Most columns of a CSV file, and most characters of a line."""
 
 _SHOWN = 20  # faults of cells that are listed; a file in another format has one in each cell
+_NO_POINTS = "; a sample has rows, under [study]"
 _RANGE = "{ min = 0.1, max = 1 }, with log = true for equal factors"
 _VARIED = {
     "grid": f"a list of values such as [0.1, 0.2], or {_RANGE.replace(' }', ', points = 10 }')}",
@@ -60,6 +61,11 @@ def unit_of(problem: Posed, name: str) -> str:
     return dimension_of(problem, stem).unit if end == "limit" else si_units(problem).get(stem or name, "1")
 
 
+def _place(faults: Iterable[Fault], *section: str) -> list[Fault]:
+    """Faults of a table inside a section, with the section in their keys."""
+    return [replace(f, key=(*section, *f.key)) for f in faults]
+
+
 def _entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
     """Each name, its place and its value; ``trail.limit = …`` without quotes is a table in TOML."""
     for name, spec in table.items():
@@ -70,7 +76,7 @@ def _entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
 
 
 def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
-    """Name → list of numbers, `Span` of a sample, or span and points of an axis; adds to `faults`."""
+    """Name → list of numbers, or `Span`; adds to `faults`."""
     method, read, wrong_with = written.study.method, {}, name_faults(problem)
     if not written.vary:
         faults.append(Fault(f"nothing varies; add a name under [vary], such as mu = {_VARIED[method]}", ("vary",)))
@@ -88,25 +94,20 @@ def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> di
 
 
 def _range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
-    """A span, and for a grid its number of points."""
-    needed, hint = {"min": "…", "max": "…"}, "; a sample has rows, under [study]"
-    if method == "grid":
-        needed, hint = needed | {"points": "10"}, ""
-    example = ", ".join(f"{end} = {value}" for end, value in needed.items())
-    found = [
-        Fault(f"missing {end} of {name}; write {name} = {{ {example} }}", key) for end in needed if end not in spec
-    ]
-    for end in (end for end in spec if end not in (*needed, "log")):
-        message = f"unknown key {short(end)} of {name}; {suggest(end, (*needed, 'log'))}{hint}"
-        found.append(Fault(message, (*key, end)))
+    """The span of a range, whose `points` are checked too; adds to `faults`."""
+    needed, hint = (("min", "max", "points"), "") if method == "grid" else (("min", "max"), _NO_POINTS)
+    found = [Fault(f"missing {end} of {name}; accepted: {_VARIED[method]}", key) for end in needed if end not in spec]
+    accepted = (*needed, "log")
+    for end in (end for end in spec if end not in accepted):
+        found.append(Fault(f"unknown key {short(end)} of {name}; {suggest(end, accepted)}{hint}", (*key, end)))
     low, high = (_number(spec.get(end, 0.0), unit, (*key, end), found) for end in ("min", "max"))
-    log, count = spec.get("log", False), spec.get("points", 2)
+    log = spec.get("log", False)
     if not isinstance(log, bool):
         found.append(Fault(f"found {short(log)}; accepted: true or false", (*key, "log")))
-    found += [replace(f, key=(*key, "points")) for f in count_faults("points", count, 2, MOST_ROWS)]
+    found += _place(count_faults("points", spec.get("points", 2), 2, MOST_ROWS), *key)
     span = Span(low, high, log)
     faults += found or [replace(f, key=key) for f in span_faults(name, span)]
-    return (span, count) if method == "grid" else span
+    return span
 
 
 def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
@@ -123,18 +124,19 @@ def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
     return 0.0
 
 
-def _rows(read: Mapping[str, Any], options: "_Options") -> dict[str, Any]:
+def _rows(read: Mapping[str, Any], written: "_StudyFile") -> dict[str, Any]:
     """Arguments of the Study for the values of its file: columns, notes and the shape of a grid."""
-    rows = options.rows or 0
+    options, rows = written.study, written.study.rows or 0
     match options.method:
         case "latin_hypercube":
             return {"columns": latin_hypercube(read, rows, options.seed)}
         case "sobol":
-            return {"columns": sobol(read, rows, options.seed), "notes": list(filter(None, [sobol_note(rows)]))}
+            return {"columns": sobol(read, rows, options.seed), "notes": [*filter(None, [sobol_note(rows)])]}
         case "grid":
-            sizes = {name: axis[1] if isinstance(axis, tuple) else len(axis) for name, axis in read.items()}
+            entries = _entries(written.vary)
+            sizes = {name: spec["points"] if isinstance(spec, Mapping) else len(spec) for name, _, spec in entries}
             check_size(list(sizes.values()))
-            axes = {name: axis[0].points(axis[1]) if isinstance(axis, tuple) else axis for name, axis in read.items()}
+            axes = {name: axis.points(sizes[name]) if isinstance(axis, Span) else axis for name, axis in read.items()}
             return {"columns": grid(axes), "grid_shape": sizes}
     return {"columns": read}
 
@@ -188,10 +190,12 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
 
 def _header_faults(names: list[str]) -> Iterator[str]:
     header, example = ",".join(names), "accepted: varied names, separated by commas, such as: mu,lambda_s.max"
+    for mark, word in ((";", "semicolons"), ("\t", "tabs")):
+        if mark in header:
+            yield f"columns separated by {word}; separate them by commas, with decimal points in the numbers"
+            return
     if not header:
         yield f"the first line is empty; {example}"
-    elif mark := next((word for mark, word in ((";", "semicolons"), ("\t", "tabs")) if mark in header), ""):
-        yield f"columns separated by {mark}; separate them by commas, with decimal points in the numbers"
     elif len(names) > MOST_COLUMNS:
         yield f"found {len(names)} columns; accepted: up to {MOST_COLUMNS}"
     else:
@@ -256,39 +260,37 @@ _ACCEPTED = {
 class _Options(Section):
     """How the rows of a study are made and solved."""
 
-    method: StrictStr = Field(default="grid", description="How the rows are made.")
-    rows: StrictInt | None = Field(
-        default=None, description="Number of rows, for latin_hypercube, sobol and monte_carlo."
-    )
-    csv: StrictStr | None = Field(
-        default=None, description='Name of a CSV file with a column for each varied name, for method = "csv".'
-    )
-    distribution: StrictStr | None = Field(
-        default=None, description="Distribution of errors within the tolerances, for monte_carlo."
-    )
-    seed: StrictInt = Field(default=0, description="Seed of the samples and of the starts.")
-    starts: StrictInt = Field(default=STARTS, description="Most starts of a row.")
-    warm: StrictBool = Field(default=False, description="Whether each row starts at the optimum of its neighbour.")
-    report: list[StrictStr] = Field(
-        default_factory=list, description='Expressions recorded for every row, such as ["nu_H", "2*Fr_c"].'
-    )
+    method: StrictStr = "grid"
+    """How the rows are made."""
+    rows: StrictInt | None = None
+    """Number of rows, for latin_hypercube, sobol and monte_carlo."""
+    csv: StrictStr | None = None
+    """Name of a CSV file with a column for each varied name, for method = "csv"."""
+    distribution: StrictStr | None = None
+    """Distribution of errors within the tolerances, for monte_carlo."""
+    seed: StrictInt = 0
+    """Seed of the samples and of the starts."""
+    starts: StrictInt = STARTS
+    """Most starts of a row."""
+    warm: StrictBool = False
+    """Whether each row starts at the optimum of its neighbour."""
+    report: list[StrictStr] = Field(default_factory=list)
+    """Expressions recorded for every row, such as ["nu_H", "2*Fr_c"]."""
 
 
 class _StudyFile(Section):
     """A study: one problem solved for every row of varied values."""
 
-    title: StrictStr = Field(default="", description="One line for reports.")
-    problem: StrictStr | dict[str, Any] = Field(
-        description="Name of a problem file, relative to this one, or its tables as [problem.parameters] and so on."
-    )
-    study: _Options = Field(default_factory=_Options, description="How rows are made and solved.")
-    vary: dict[str, Any] = Field(
-        default_factory=dict,
-        description='Varied names: a fixed parameter, "lambda_s.max" of a free one, or "arm.limit" of a constraint.',
-    )
-    tolerances: dict[str, Number] = Field(
-        default_factory=dict, description="Tolerances of a Monte Carlo study, in place of those of the problem."
-    )
+    title: StrictStr = ""
+    """One line for reports."""
+    problem: StrictStr | dict[str, Any]
+    """Name of a problem file, relative to this one, or its tables as [problem.parameters] and so on."""
+    study: _Options = Field(default_factory=_Options)
+    """How rows are made and solved."""
+    vary: dict[str, Any] = Field(default_factory=dict)
+    """Varied names: a fixed parameter, "lambda_s.max" of a free one, or "arm.limit" of a constraint."""
+    tolerances: dict[str, Number] = Field(default_factory=dict)
+    """Tolerances of a Monte Carlo study, in place of those of the problem."""
 
 
 SHAPE: type[Section] = _StudyFile
@@ -344,7 +346,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
     options, posed = written.study, problem.posed
     faults += [
         *_method_faults(written, {f.key for f in faults}),
-        *prefix_keys("study", common_faults(posed, options.seed, options.starts, options.report)),
+        *_place(common_faults(posed, options.seed, options.starts, options.report), "study"),
     ]
     read: dict[str, Any] = {}
     if options.method == "monte_carlo":
@@ -357,18 +359,25 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
         read = _read_vary(posed, written, faults)
     if faults:
         raise page.error(faults)
-    common: dict[str, Any] = {"problem": problem, "title": written.title.strip() or title, "seed": options.seed}
-    common |= {"starts": options.starts, "report": options.report}
+    common: dict[str, Any] = options.model_dump(include={"seed", "starts", "report"})
+    common |= {"problem": problem, "title": written.title.strip() or title}
     try:
         if options.method == "monte_carlo":
             distribution = options.distribution or DISTRIBUTIONS[0]
             return Sampling(rows=options.rows or 0, distribution=distribution, tolerances=read, **common)
-        return Study(warm=options.warm, method=options.method, **_rows(read, options), **common)
+        return Study(warm=options.warm, method=options.method, **_rows(read, written), **common)
     except InputError as error:
-        places: dict[str, Key] = {"columns": ("vary",), "ranges": ("vary",)}
-        places |= {key: ("study", key) for key in ("rows", "distribution")}
-        placed = [replace(f, key=(*places.get(f.key[0], f.key[:1]), *f.key[1:])) for f in error.faults]
+        placed = [replace(f, key=(*_PLACES.get(f.key[0], f.key[:1]), *f.key[1:])) for f in error.faults]
         raise page.error(placed) from None
+
+
+_PLACES: Mapping[str, Key] = {
+    "columns": ("vary",),
+    "ranges": ("vary",),
+    "rows": ("study", "rows"),
+    "distribution": ("study", "distribution"),
+}
+"""Arguments of a study or a sample → section or key of the file that states them."""
 
 
 def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
@@ -376,7 +385,7 @@ def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
     stated = page.data.get("problem")
     if isinstance(stated, dict):
         found, problem = problem_from_tables(stated, str(page.data.get("title", "")).strip() or title)
-        faults += prefix_keys("problem", [*found, *(find_question_faults(problem.posed) if problem else ())])
+        faults += _place([*found, *(find_question_faults(problem.posed) if problem else ())], "problem")
         return problem
     if isinstance(stated, str):  # anything else is reported as a fault of shape
         try:

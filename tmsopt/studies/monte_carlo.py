@@ -1,15 +1,14 @@
 """Monte Carlo over tolerances: designs drawn around a nominal one."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from os import PathLike
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, count_faults, is_number, limit_advice, short, suggest, text_faults
-from tmsopt.files import as_path
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.freedom import find_question_faults
 from tmsopt.problem.problem import Posed, Problem
@@ -56,17 +55,15 @@ class Sampling:
     rows: int
     seed: int = 0
     distribution: str = "uniform"
-    tolerances: Mapping[str, float] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = Table()
     title: str = ""
     starts: int = STARTS
     report: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         problem = pose(self.problem)
-        object.__setattr__(self, "problem", problem.problem)
-        if not self.tolerances:
-            object.__setattr__(self, "tolerances", problem.tolerances)
-        found = [*find_question_faults(problem), *_tolerance_faults(problem, self.tolerances)]
+        tolerances = self.tolerances or problem.tolerances
+        found = [*find_question_faults(problem), *_tolerance_faults(problem, tolerances)]
         found += [*common_faults(problem, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
         found += count_faults("rows", self.rows, 1, MOST_ROWS)
         if self.distribution not in DISTRIBUTIONS:
@@ -74,18 +71,23 @@ class Sampling:
             found.append(Fault(message, ("distribution",)))
         if found:
             raise InputError(found)
-        object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
+        vars(self).update(problem=problem.problem, tolerances=Table({n: float(t) for n, t in tolerances.items()}))
 
 
-def plan_study(asked: Study | Sampling, progress: Listener | None = None) -> Study:
+def plan_study(asked: Study | Sampling, progress: Listener | None = None, store: Path | None = None) -> Study:
     """The study with all its rows; for a Monte Carlo study, its nominal design is solved first.
+
+    Args:
+        store: the store that the rows will go to, if it must not be the one of another study.
 
     Raises:
         NotSolved: if the nominal design is not found.
-        InputError: if the tolerances take the design out of its physical range.
+        InputError: if the tolerances take the design out of its physical range, or for the store of another study.
     """
     if isinstance(asked, Study):
         return asked
+    if store is not None and store.exists():
+        _check_unchanged(asked, store)
     solution = solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False)
     return _draw_around(asked, solution, progress)
 
@@ -142,12 +144,10 @@ def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
     Raises:
         InputError: if the tolerances take the design out of its physical range.
     """
-    problem = asked.problem
+    problem, faults = asked.problem, list[Fault]()
     equal = [name for name, condition in problem.posed.conditions.items() if condition.equality]
-    left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     kept = {n: text for n, text in problem.constraints.items() if n not in equal}
-    stated: dict[str, Any] = {"free": {}, "start": {}, "tolerances": {}, "locate": None, "constraints": kept}
-    built, faults = replace(problem, fixed=dict(design), **stated), list[Fault]()
+    built = replace(problem, fixed=design, free={}, start={}, tolerances={}, locate=None, constraints=kept)
     for name, value in asked.tolerances.items():
         try:
             replace(built, tolerances={name: value})
@@ -157,6 +157,7 @@ def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
         raise InputError(faults)
     errors = _errors(len(asked.tolerances), asked.rows, asked.seed, asked.distribution)
     each = zip(asked.tolerances.items(), errors, strict=True)
+    left_out = ", ".join([*equal, *([f"the pattern {problem.locate}"] if problem.locate else [])])
     return Study(
         problem=built,
         columns={name: Column(built.fixed[name] + tolerance * error) for (name, tolerance), error in each},
@@ -164,11 +165,11 @@ def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
         seed=asked.seed,
         report=asked.report,
         method="monte_carlo",
-        notes=[f"left out, because no drawn design satisfies it exactly: {', '.join(left_out)}"] if left_out else [],
+        notes=[f"left out, because no drawn design satisfies it exactly: {left_out}"] if left_out else [],
     )
 
 
-def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None:
+def _check_unchanged(asked: Sampling, store: Path) -> None:
     """Refuse the store of another Monte Carlo study before the nominal design is solved.
 
     The study is compared with the store around the design of the store, so only other differences count.
@@ -176,17 +177,14 @@ def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None
     Raises:
         InputError: with the differences; also if the file is not a store, or damaged.
     """
-    path = as_path(store, "an SQLite file")
-    if not isinstance(study, Sampling) or not path.exists():
-        return
-    with view_store(path) as opened:
+    with view_store(store) as opened:
         known = opened.about()["definition"]
     try:
-        design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.posed.parameter_set.names}
-        drawn = _draw_study(study, {**design, **study.problem.fixed})
+        design = {n: float(known["problem"]["fixed"][n]) for n in asked.problem.posed.parameter_set.names}
+        drawn = _draw_study(asked, {**design, **asked.problem.fixed})
     except (InputError, KeyError, TypeError, ValueError):  # of another model, or the tolerances do not fit the design
         return
-    check_same(path, drawn)
+    check_same(store, drawn)
 
 
 def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:

@@ -18,19 +18,14 @@ _LONGEST = 1_000_000  # characters of a row, or of the head of a block
 _CHUNK = 1000  # rows copied at once
 
 
-def read_about(old: sqlite3.Connection) -> dict[str, str]:
-    """The metadata of a store."""
-    return dict(old.execute("SELECT name, value FROM about ORDER BY rowid").fetchall())
-
-
 def read_columns(old: sqlite3.Connection) -> dict[str, bytes]:
     """The columns of the study as little-endian doubles.
 
     Raises:
-        ValueError: for damaged columns.
+        zlib.error: for damaged columns.
     """
-    found = old.execute("SELECT name, count, doubles FROM columns").fetchall()
-    return {name: _unpack(count, doubles) for name, count, doubles in found}
+    found = old.execute("SELECT name, doubles FROM columns").fetchall()
+    return {name: zlib.decompress(doubles) for name, doubles in found}
 
 
 def read_batches(old: sqlite3.Connection) -> Generator[Batch]:
@@ -46,18 +41,6 @@ def read_batches(old: sqlite3.Connection) -> Generator[Batch]:
         with closing(old.execute("SELECT data FROM blocks ORDER BY first")) as blocks:
             for (data,) in blocks:
                 yield _unpack_block(data)
-
-
-def _unpack(count: int, doubles: bytes) -> bytes:
-    """A column of the study; the size is limited, because few bytes can decompress to very many."""
-    stream = zlib.decompressobj()
-    try:
-        values = stream.decompress(doubles, 8 * count + 1)
-    except zlib.error as error:
-        raise ValueError(str(error)) from error
-    if len(values) != 8 * count or not stream.eof:
-        raise ValueError(f"found other than {count} numbers")
-    return values
 
 
 def _unpack_block(data: bytes) -> Batch:

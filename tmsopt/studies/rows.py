@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, overload
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tmsopt.errors import short
 from tmsopt.evaluation.law_rows import LAWS
 from tmsopt.models import tms
-from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import unit_of
 from tmsopt.records import Table
 from tmsopt.search.solve import UNSTABLE
@@ -67,14 +66,14 @@ class Row:
     abscissa_realised: float = math.nan
     damping_ratio: float = math.nan
     structure: str = ""
-    parameters: Table[float] = field(default_factory=Table)
-    reports: Table[float] = field(default_factory=Table)
+    parameters: Table[float] = Table()
+    reports: Table[float] = Table()
     bound: float = -math.inf
     gap: float = math.inf
     proven: bool = False
     method: str = "none"
-    laws: Table[float] = field(default_factory=Table)
-    violations: Table[float] = field(default_factory=Table)
+    laws: Table[float] = Table()
+    violations: Table[float] = Table()
     starts: int = 0
     warm: bool = False
     seconds: float = 0.0
@@ -103,8 +102,7 @@ class Row:
             ValueError: for other data.
         """
         try:
-            given = {f: _from_json(data[f.name]) for f in _FIELDS if data.get(f.name) is not None}
-            row = Row(**{f.name: f.type(value) for f, value in given.items()})
+            row = Row(**{f.name: f.type(_from_json(data[f.name])) for f in _FIELDS if data.get(f.name) is not None})
         except (AttributeError, OverflowError, TypeError) as error:
             raise ValueError(f"{error}") from error
         if row.status not in STATUSES:
@@ -197,20 +195,6 @@ def _merge(batches: Sequence[Batch]) -> Batch:
     }
 
 
-def _violation_causes(problem: Posed, judged: Batch) -> NDArray[Any]:
-    """Causes of infeasible rows that were evaluated without a solver."""
-    texts, unstable = judged["cause"], np.zeros(len(judged["cause"]), dtype=bool)
-    for name, condition in problem.conditions.items():
-        unit, amounts = unit_of(problem, name), judged.get(header("violations", name), np.empty(0))
-        violated = np.flatnonzero(~np.isnan(amounts))
-        for k, amount in zip(violated.tolist(), amounts[violated].tolist(), strict=True):
-            texts[k] += f"{', ' if texts[k] else 'violated: '}{name} by {unit.show(amount, 3)}"
-        if "abscissa" in condition.names:
-            unstable[violated] |= judged["abscissa"][violated] >= 0
-    texts[unstable] += f"; {UNSTABLE}"
-    return texts
-
-
 class RowTable(Sequence[Row]):
     """Rows of a study by ascending number.
 
@@ -276,9 +260,16 @@ class RowTable(Sequence[Row]):
     @cached_property
     def _causes(self) -> NDArray[Any]:
         """Why rows are not optimal; computed from the numbers for rows evaluated without a solver."""
-        texts = self._kept["cause"]
-        judged = np.flatnonzero((self._kept["status"] == "infeasible") & (texts == ""))
-        texts[judged] = _violation_causes(self.study.problem.posed, {head: x[judged] for head, x in self._kept.items()})
+        texts, problem, unstable = self._kept["cause"], self.study.problem.posed, np.zeros(len(self), dtype=bool)
+        evaluated = (self._kept["status"] == "infeasible") & (texts == "")
+        for name, condition in problem.conditions.items():
+            unit, amounts = unit_of(problem, name), self.column(header("violations", name))
+            violated = np.flatnonzero(evaluated & ~amounts.mask)
+            for k, amount in zip(violated.tolist(), amounts[violated].tolist(), strict=True):
+                texts[k] += f"{', ' if texts[k] else 'violated: '}{name} by {unit.show(amount, 3)}"
+            if "abscissa" in condition.names:
+                unstable[violated] = self._kept["abscissa"][violated] >= 0
+        texts[unstable] += f"; {UNSTABLE}"
         return texts
 
     def values(self, head: str) -> NDArray[Any]:
@@ -300,12 +291,9 @@ class RowTable(Sequence[Row]):
                 ideal, realised = self._kept["abscissa"][place], self._kept["abscissa_realised"][place]
                 values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)
             case "varied" | "parameters":
-                varied = key in study.columns
-                given = np.asarray(study.columns[key])[numbers] if varied else study.problem.fixed.get(key, np.nan)
+                column = study.columns.get(key)
+                given = study.problem.fixed.get(key, np.nan) if column is None else np.asarray(column)[numbers]
                 values = np.where(np.isnan(values), given, values)
-                absent = self._unsolved[place] & (name == "parameters")
-            case "reports":
-                absent = self._unsolved[place]
             case "laws" | "violations":
                 absent = np.isnan(values)
-        return np.ma.array(values, mask=absent)
+        return np.ma.array(values, mask=self._unsolved[place] if name in ("parameters", "reports") else absent)

@@ -1,7 +1,7 @@
 """Run a study: an executor solves its rows into a store."""
 
 import time
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
@@ -15,13 +15,12 @@ from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, ignore_
 from tmsopt.files import as_path
 from tmsopt.problem.unit_system import units_of
 from tmsopt.progress import Listener, start_steps
-from tmsopt.records import Printable, frame
+from tmsopt.records import Printable, Table, frame
 from tmsopt.studies.export import build_grid_dataset, export
 from tmsopt.studies.files import load_study
-from tmsopt.studies.monte_carlo import Sampling, check_unchanged, plan_study
-from tmsopt.studies.neighbours import split_into_blocks
+from tmsopt.studies.monte_carlo import Sampling, plan_study
 from tmsopt.studies.rows import Batch, Row, RowTable, batch_rows
-from tmsopt.studies.solving import Solver, can_evaluate, evaluate_rows
+from tmsopt.studies.solving import Solver, can_evaluate, evaluate_rows, split_into_blocks
 from tmsopt.studies.store import Store, open_store, store_error, view_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summarise
@@ -65,11 +64,11 @@ class Results(Printable):
     seconds: float
     engine: str
     found: int = 0
-    about: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    about: Mapping[str, Any] = field(default=Table(), repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.rows, RowTable):
-            object.__setattr__(self, "rows", RowTable(self.study, [batch_rows(self.rows)]))
+            vars(self).update(rows=RowTable(self.study, [batch_rows(self.rows)]))
 
     def column(self, name: str) -> NDArray[Any]:
         """The values of one column, one per row, nan where absent.
@@ -160,18 +159,23 @@ def run_study(
     More: docs/tutorials/study.md
     """
     stated = load_study(study) if isinstance(study, str | PathLike) else study
-    if faults := list(_faults(stated, workers, progress)):
-        raise InputError(faults)
-    if store is not None and not fresh:
-        check_unchanged(stated, store)
-    asked = plan_study(stated, progress)
-    if store is None:
-        return _complete(asked, None, workers, scheduler, note, progress)
+    found = call_faults("progress", progress)
+    if not isinstance(stated, Study | Sampling):
+        accepted = "a Study, such as from tmsopt.over_grid, or the path of a study file"
+        found.append(Fault(f"found {short(stated)}; accepted: {accepted}", ("study",)))
+    if workers is not None:
+        found += count_faults("workers", workers, 1)
+    if found:
+        raise InputError(found)
+    path = None if store is None else as_path(store, "an SQLite file")
+    planned = plan_study(stated, progress, None if fresh else path)
+    if path is None:
+        return _complete(planned, None, workers, scheduler, note, progress)
     start_steps(progress, "waiting for the store")
-    with open_store(as_path(store, "an SQLite file"), asked, fresh=fresh) as opened:
+    with open_store(path, planned, fresh=fresh) as opened:
         for line in opened.warnings:
             note(line)
-        return _complete(asked, opened, workers, scheduler, note, progress)
+        return _complete(planned, opened, workers, scheduler, note, progress)
 
 
 def read_results(study: Study, store: str | PathLike[str]) -> Results:
@@ -199,16 +203,6 @@ def _read_batches(study: Study, store: Store) -> list[Batch]:
     return batches
 
 
-def _faults(study: object, workers: object, progress: object) -> Iterator[Fault]:
-    """Faults of the arguments."""
-    if not isinstance(study, Study | Sampling):
-        message = f"found {short(study)}; accepted: a Study, such as from tmsopt.over_grid, or the path of a study file"
-        yield Fault(message, ("study",))
-    if workers is not None:
-        yield from count_faults("workers", workers, 1)
-    yield from call_faults("progress", progress)
-
-
 def _complete(
     study: Study,
     store: Store | None,
@@ -229,17 +223,17 @@ def _complete(
         note(f"{found} of {len(study)} rows are in {store.path}")
     began, steps = time.perf_counter(), start_steps(progress, "solving rows", "row")
 
-    def keep(batch: Batch) -> None:
-        if store is not None:
-            store.add(batch)
-        batches.append(batch)
-        missing[batch["number"]] = False
-
     def show(more: int) -> None:
         nonlocal count
         count += more
         if steps:
             steps(count, len(study))
+
+    def keep(batch: Batch) -> None:
+        if store is not None:
+            store.add(batch)
+        batches.append(batch)
+        missing[batch["number"]] = False
 
     if found < len(study):
         show(0)
@@ -250,9 +244,10 @@ def _complete(
                 show(len(batch["number"]))
     if missing.any():
         left, fresh, last = set(np.flatnonzero(missing).tolist()), list[Row](), time.perf_counter()
-        executor, engine = _choose_executor(len(left), workers, scheduler, note)
+        executor = _choose_executor(len(left), workers, scheduler, note)
+        engine = executor.name
         try:
-            with closing(_solve_rows(study, left, executor, note)) as rows:
+            with executor, closing(_solve_rows(study, left, executor, note)) as rows:
                 for row in rows:
                     fresh.append(row)
                     show(1)
@@ -260,37 +255,35 @@ def _complete(
                         keep(batch_rows(fresh))
                         fresh, last = [], time.perf_counter()
         finally:
-            if fresh:
-                keep(batch_rows(fresh))  # also after an interruption
+            keep(batch_rows(fresh))  # also after an interruption
     seconds = time.perf_counter() - began if engine else 0.0
     about = {} if store is None else store.about()
     return Results(study, RowTable(study, batches), count - found, seconds, engine, found, about)
 
 
-def _choose_executor(count: int, workers: int | None, scheduler: str | None, note: Note) -> tuple[Executor, str]:
-    """The executor for a number of rows, and its name."""
-    workers = workers or (1 if count <= _FEW else cores())
+def _choose_executor(count: int, workers: int | None, scheduler: str | None, note: Note) -> Executor:
+    """The executor for a number of rows."""
     if scheduler is not None:
-        return cluster(scheduler, note), scheduler
-    return (here(), "in process") if workers == 1 else (processes(workers, note), f"{workers} processes")
+        return cluster(scheduler, note)
+    workers = workers or (1 if count <= _FEW else cores())
+    return here() if workers == 1 else processes(workers, note)
 
 
 def _solve_rows(study: Study, left: set[int], executor: Executor, note: Note) -> Generator[Row]:
     """Rows as they are solved. A block that ends its worker is split into rows; such a row is quarantined."""
-    every = split_into_blocks(study) if study.warm else [(number,) for number in sorted(left)]
-    solver, units = Solver(study), [unit for unit in every if not left.isdisjoint(unit)]
-    with executor:
-        while units:
-            split: list[tuple[int, ...]] = []
-            with closing(executor.map(solver, units)) as answers:
-                for place, answer in answers:
-                    unit = units[place]
-                    if not isinstance(answer, Crash):
-                        yield from (row for row in answer if row.number in left)  # part of a block may be in the store
-                    elif len(unit) > 1:
-                        split += [(number,) for number in unit if number in left]
-                    else:
-                        note(f"row {unit[0]} is quarantined")
-                        cause = f" ({answer.cause})" if answer.cause else ""
-                        yield solver.quarantine(unit[0], f"ended its worker twice{cause}")
-            units = split
+    blocks = split_into_blocks(study) if study.warm else [(number,) for number in sorted(left)]
+    solver, units = Solver(study), [block for block in blocks if not left.isdisjoint(block)]
+    while units:
+        split: list[tuple[int, ...]] = []
+        with closing(executor.map(solver, units)) as answers:
+            for place, answer in answers:
+                unit = units[place]
+                if not isinstance(answer, Crash):
+                    yield from (row for row in answer if row.number in left)  # part of a block may be in the store
+                elif len(unit) > 1:
+                    split += [(number,) for number in unit if number in left]
+                else:
+                    note(f"row {unit[0]} is quarantined")
+                    cause = f"ended its worker twice{f' ({answer.cause})' if answer.cause else ''}"
+                    yield solver.row(unit[0], status="quarantined", cause=cause)
+        units = split

@@ -43,15 +43,10 @@ class Span:
 
     def points(self, count: int) -> list[float]:
         """`count` numbers: exact ends, and numbers between them rounded to 15 digits, such as 0.3 for 0.1 + 0.2."""
-        if self.log:
-            inside = np.geomspace(self.low, self.high, count).tolist()[1:-1]
-            rounded = [float(f"{value:.{_DIGITS}g}") for value in inside]
-        else:
-            largest = max(abs(self.low), abs(self.high))
-            places = _DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
-            inside = np.linspace(self.low, self.high, count).tolist()[1:-1]
-            rounded = [round(value, places) for value in inside]
-        return [float(self.low), *rounded, float(self.high)]
+        inside = (np.geomspace if self.log else np.linspace)(self.low, self.high, count).tolist()[1:-1]
+        largest = max(abs(self.low), abs(self.high)) or 1.0
+        places = (_DIGITS - 1 - math.floor(math.log10(abs(value) if self.log else largest)) for value in inside)
+        return [float(self.low), *map(round, inside, places), float(self.high)]
 
 
 def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
@@ -88,8 +83,7 @@ def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict
 
     More: docs/reference/study_file.md
     """
-    spans = _spans(ranges, rows, seed)
-    return _to_columns(spans, _sampler("LatinHypercube", spans, seed).random(rows))
+    return _sample("LatinHypercube", ranges, rows, seed)
 
 
 def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
@@ -108,8 +102,7 @@ def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Colu
 
     More: docs/reference/study_file.md
     """
-    spans = _spans(ranges, rows, seed)
-    return _to_columns(spans, _sampler("Sobol", spans, seed).random_base2(math.ceil(math.log2(rows)))[:rows])
+    return _sample("Sobol", ranges, rows, seed)
 
 
 def sobol_note(rows: int) -> str:
@@ -180,14 +173,12 @@ def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
     return spans
 
 
-def _sampler(name: str, spans: Mapping[str, Span], seed: int) -> Any:
-    """A sampler of SciPy; version 1.15 renamed the argument for random numbers."""
+def _sample(name: str, ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Column]:
+    """Rows from a sampler of SciPy; version 1.15 renamed its argument for random numbers."""
     from scipy.stats import qmc
 
-    kind = getattr(qmc, name)
+    spans, kind = _spans(ranges, rows, seed), getattr(qmc, name)
     stream = "rng" if "rng" in inspect.signature(kind).parameters else "seed"
-    return kind(len(spans), **{stream: np.random.default_rng(seed)})
-
-
-def _to_columns(spans: Mapping[str, Span], shares: Array) -> dict[str, Column]:
-    return {name: Column(span.at(share)) for (name, span), share in zip(spans.items(), shares.T, strict=True)}
+    drawn = 2 ** math.ceil(math.log2(rows)) if name == "Sobol" else rows
+    shares = kind(len(spans), **{stream: np.random.default_rng(seed)}).random(drawn)[:rows].T
+    return {name: Column(span.at(share)) for (name, span), share in zip(spans.items(), shares, strict=True)}

@@ -21,9 +21,11 @@ from tmsopt.problem.unit_system import amounts_text
 from tmsopt.records import Array, Table
 from tmsopt.search.solve import solve
 from tmsopt.search.state import same_objective
-from tmsopt.studies.neighbours import split_into_blocks
 from tmsopt.studies.rows import PREFIXES, Batch, Row, blank_batch, column_of, header
 from tmsopt.studies.study import Study
+
+ROWS_OF_BLOCK = 32
+"""Rows of a block; the first row of each block starts cold, so that blocks are independent."""
 
 _AFAR = 1
 """Starts of a warm row besides its neighbour's optimum, which find optima that neither end of a block has."""
@@ -68,10 +70,6 @@ class Solver:
                 return self._block(numbers)
             return [self._answer(number) for number in numbers]
 
-    def quarantine(self, number: int, cause: str) -> Row:
-        """The row for one that ended its worker."""
-        return self._row(number, status="quarantined", cause=cause)
-
     def _block(self, numbers: Sequence[int]) -> list[SolvedRow]:
         """Solve both ends from many starts, and the others from their neighbours and from `_AFAR` further starts.
 
@@ -104,9 +102,9 @@ class Solver:
         began, solution = time.perf_counter(), None
         try:
             problem = self.study.row_problem(number)
-            options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False}
             # Slow analyses of infeasible rows are left out, and Ctrl-C stops the whole study.
-            options |= {"alone": False, "stability": 0.0, "interruptible": False}
+            options: dict[str, Any] = {"throw": False, "alone": False, "stability": 0.0, "interruptible": False}
+            options["seed"] = self.study.seed_of(number)
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
                 solution = solve(problem, starts=1 + afar, near=near, **options)
@@ -118,11 +116,11 @@ class Solver:
             found = {"status": "failed", "cause": "; ".join(str(fault) for fault in error.faults)}
         except Exception as error:  # a row that breaks the program must not end a study
             found = {"status": "failed", "cause": f"{type(error).__name__}: {error}"}
-        return SolvedRow(self._row(number, seconds=time.perf_counter() - began, **found), solution)
+        return SolvedRow(self.row(number, seconds=time.perf_counter() - began, **found), solution)
 
-    def _row(self, number: int, **found: Any) -> Row:
-        given, seed = self.study.varied(number), self.study.seed_of(number)
-        return Row(number, seed, given, host=platform.node(), **found)
+    def row(self, number: int, **found: Any) -> Row:
+        """A row with what is found of it."""
+        return Row(number, self.study.seed_of(number), self.study.varied(number), host=platform.node(), **found)
 
 
 def _fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
@@ -185,13 +183,10 @@ def _laws(solution: Solution) -> Mapping[str, float]:
     return {row.name: row.relative for row in law_rows(solution) if row.applies}
 
 
-_EVALUATED = ("objective", "abscissa", "damping_ratio", "bound", "gap", "oscillates", "by_relation")
-
-
 def can_evaluate(study: Study) -> bool:
     """Whether rows can be evaluated without a solver: only fixed parameters vary, and nothing is free."""
-    names = study.problem.posed.parameter_set.names
-    return not study.warm and can_evaluate_columns(study.problem.posed) and all(name in names for name in study.columns)
+    posed = study.problem.posed
+    return not study.warm and can_evaluate_columns(posed) and study.columns.keys() <= {*posed.parameter_set.names}
 
 
 def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
@@ -200,21 +195,21 @@ def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
     Args:
         numbers: numbers of the rows, ascending.
     """
-    given = {name: np.asarray(column) for name, column in study.columns.items()}
+    varied = {name: np.asarray(column) for name, column in study.columns.items()}
     for first in range(0, len(numbers), BLOCK):
         began, some = time.perf_counter(), numbers[first : first + BLOCK]
-        found = evaluate_columns(
-            study.problem.posed, {name: column[some] for name, column in given.items()}, study.report
-        )
+        columns = {name: column[some] for name, column in varied.items()}
+        found = evaluate_columns(study.problem.posed, columns, study.report)
         if found is None:
             return
-        if found.certain.any():
-            tables = {"reports": found.reports, "laws": found.laws, "violations": found.violations}
-            each = {name: getattr(found, name) for name in _EVALUATED}
-            each |= {header(name, key): values for name, table in tables.items() for key, values in table.items()}
-            columns = {name: values[found.certain] for name, values in each.items()}
+        given: dict[str, Any] = {}
+        for name, value in vars(found).items():
+            given |= {header(name, n): x for n, x in value.items()} if isinstance(value, Mapping) else {name: value}
+        certain = given.pop("certain")
+        if certain.any():
             seconds = (time.perf_counter() - began) / len(some)
-            yield evaluated_batch(some[found.certain], columns, seconds, platform.node())
+            kept = {name: values[certain] for name, values in given.items()}
+            yield evaluated_batch(some[certain], kept, seconds, platform.node())
 
 
 def evaluated_batch(numbers: NDArray[np.int64], given: dict[str, Array], seconds: float, host: str) -> Batch:
@@ -223,16 +218,36 @@ def evaluated_batch(numbers: NDArray[np.int64], given: dict[str, Array], seconds
     Args:
         given: header → numbers; also ``oscillates`` and ``by_relation``, which determine structure and method.
     """
-    infeasible = np.zeros(len(numbers), dtype=bool)
-    for name, values in given.items():
-        infeasible |= name.startswith(PREFIXES["violations"]) & ~np.isnan(values)
-    method = np.where(np.isfinite(given["bound"]), 1 + given.pop("by_relation"), 0)
+    violations = [values for name, values in given.items() if name.startswith(PREFIXES["violations"])]
+    infeasible = np.any(~np.isnan([np.full(len(numbers), np.nan), *violations]), axis=0)
     texts = {
         "status": (("optimal", "infeasible"), infeasible),
         "structure": (("real", "pair"), given.pop("oscillates")),
-        "method": (("none", "omega0", "relation"), method),
-        "host": ((host,), 0 * method),
+        "method": (("none", "omega0", "relation"), np.isfinite(given["bound"]) * (1 + given.pop("by_relation"))),
+        "host": ((host,), 0 * numbers),
     }
     batch = blank_batch(len(numbers)) | given | {"number": numbers, "abscissa_realised": given["abscissa"]}
     batch["seconds"] = np.full(len(numbers), seconds)
     return batch | {name: column_of(words, str)[which.astype(int)] for name, (words, which) in texts.items()}
+
+
+def split_into_blocks(study: Study, size: int = ROWS_OF_BLOCK) -> list[tuple[int, ...]]:
+    """Every row once, in blocks of `size` with close consecutive rows.
+
+    A grid is traversed back and forth, so consecutive rows differ in one axis by one step. For other rows, each
+    column but the last is binned by rank and traversed in the same way. Ranks treat logarithmic and linear columns
+    alike.
+    """
+    count = len(study)
+    ranks = [np.unique(np.asarray(column), return_inverse=True)[1] for column in study.columns.values()]
+    moving = [rank for rank in ranks if rank.max() > 0]
+    if study.grid_shape is None:
+        moving = moving[: max(1, int(math.log2(count)))]
+        bins = round(count ** (1 / max(1, len(moving))))
+        moving[:-1] = [rank * min(bins, rank.max() + 1) // (rank.max() + 1) for rank in moving[:-1]]
+    walk = np.zeros(count, dtype=np.int64)
+    for rank in moving:
+        most = rank.max()
+        walk = walk * (most + 1) + np.where(walk % 2 == 1, most - rank, rank)
+    order = np.argsort(walk, kind="stable").tolist()
+    return [tuple(order[k : k + size]) for k in range(0, count, size)]

@@ -9,21 +9,23 @@ import json
 import os
 import platform
 import sqlite3
+import zlib
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Self
+from sys import intern
+from typing import Any
 
 import numpy as np
 from filelock import FileLock, Timeout
-from numpy.typing import NDArray
 
 from tmsopt import files
 from tmsopt.errors import Fault, InputError, input_error
 from tmsopt.files import from_json, list_differences
-from tmsopt.studies.old_stores import read_about, read_batches, read_columns
+from tmsopt.studies.old_stores import read_batches, read_columns
 from tmsopt.studies.rows import BLOCK, SAVED, STATUSES, Batch, column_of
 from tmsopt.studies.study import Study, definition
 from tmsopt.versions import installed_versions, ipopt_version
@@ -50,14 +52,17 @@ CREATE TABLE sessions (id INTEGER PRIMARY KEY, started TEXT NOT NULL, ended TEXT
 CREATE TABLE rows ({", ".join(f"{name} {_SQL[kind]}" for name, kind in SAVED.items())}, numbers BLOB NOT NULL,
     PRIMARY KEY (number));
 """
-_SESSION = ("started", "ended", "pid", "host", "versions", "rows")
+_SESSION = "started, ended, pid, host, versions, rows"
+_ROW = ", ".join((*SAVED, "numbers"))
+_STUDY = ("study", "columns")  # tables of what the rows are of
+_ONE_FILE = "PRAGMA journal_mode=DELETE"  # a single file, unless another process reads it
 _ABSENT = b"\xff"  # eight of them are a nan
 _COMPANIONS = ("-journal", "-wal", "-shm")
 _PATIENCE = 60.0  # s to wait for a lock of another process
 _MOST = 20  # most differences listed
 _PACKAGES = ("tmsopt", "casadi", "numpy", "scipy", "python-flint")  # packages that affect the numbers of a row
 
-DAMAGED = "is damaged; --fresh moves it aside and starts a new store, or give another --store"
+_DAMAGED = "is damaged; --fresh moves it aside and starts a new store, or give another --store"
 _FULL = "reading or writing fails, or the disk is full; make room and run the same command again, the rows are safe"
 _PLACE = "cannot be opened or written here; give a file in a writable folder"
 _BUSY = f"another program kept it locked for {_PATIENCE:g} s; end that and run the same command again"
@@ -91,35 +96,27 @@ def translate_errors(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except sqlite3.DatabaseError as error:
-        meaning = _MEANINGS.get(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF, DAMAGED)
+        meaning = _MEANINGS.get(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF, _DAMAGED)
         raise store_error(path, f"{meaning} ({error!s:.200})") from error  # limited, because it may quote the file
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise store_error(path, f"{DAMAGED} ({error!s:.200})") from error
+    except (AttributeError, KeyError, TypeError, ValueError, zlib.error) as error:
+        raise store_error(path, f"{_DAMAGED} ({error!s:.200})") from error
     except OSError as error:
         raise store_error(path, f"cannot be written: {error.strerror or error}") from error
 
 
+@dataclass(frozen=True)
 class Store:
-    """Rows of one study, open for writing (`open_store`) or reading (`view_store`); a context manager.
+    """Rows of one study, open for writing (`open_store`) or reading (`view_store`).
 
     Attributes:
         path: path of the file.
         warnings: one line each: changed versions of libraries, and where ``fresh`` moved the previous store.
     """
 
-    def __init__(self, path: Path, connection: sqlite3.Connection, stack: ExitStack, session: int = 0) -> None:
-        self.path, self.warnings = path, tuple[str, ...]()
-        self._connection, self._stack, self._session = connection, stack, session
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file and release its lock; may be called twice."""
-        self._stack.close()
+    path: Path
+    _connection: sqlite3.Connection
+    _session: int = 0
+    warnings: tuple[str, ...] = ()
 
     def add(self, batch: Batch) -> None:
         """Add rows durably: they survive ``kill -9`` after the call. An existing row stays unchanged.
@@ -127,32 +124,26 @@ class Store:
         Raises:
             InputError: on a full disk.
         """
-        with self._transaction():
-            heads = dict.fromkeys(_numbers(self._connection))
+        with self._transaction() as connection:
+            heads = dict.fromkeys(_headers(connection))
             new = [h for h, x in batch.items() if h not in SAVED and h not in heads and not np.isnan(x).all()]
-            self._connection.executemany("INSERT INTO numbers VALUES (?)", [(head,) for head in new])
+            connection.executemany("INSERT INTO numbers VALUES (?)", [(head,) for head in new])
             absent = np.full(len(batch["number"]), np.nan)
             table = np.column_stack([batch.get(head, absent) for head in (*heads, *new)] or [absent])
             table[np.isnan(table)] = np.frombuffer(8 * _ABSENT)[0]
             doubles, size = table.astype("<f8").tobytes(), 8 * table.shape[1]
             blobs = [doubles[k : k + size].rstrip(_ABSENT) for k in range(0, len(doubles), size)]
-            fields = ["number", *(name for name in list(SAVED)[1:] if batch[name].any())]  # the others have defaults
-            lines = zip(*(batch[name].tolist() for name in fields), blobs, strict=True)
-            query = f"INSERT OR IGNORE INTO rows ({', '.join(fields)}, numbers) VALUES ({'?, ' * len(fields)}?)"
-            added = self._connection.executemany(query, lines).rowcount
-            self._connection.execute("UPDATE sessions SET rows = rows + ? WHERE id = ?", (max(added, 0), self._session))
+            lines = zip(*(batch[name].tolist() for name in SAVED), blobs, strict=True)
+            query = f"INSERT OR IGNORE INTO rows ({_ROW}) VALUES ({'?, ' * len(SAVED)}?)"
+            added = connection.executemany(query, lines).rowcount
+            connection.execute("UPDATE sessions SET rows = rows + ? WHERE id = ?", (max(added, 0), self._session))
 
     @contextmanager
-    def _transaction(self) -> Iterator[None]:
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
         """A transaction, rolled back on any error."""
-        with translate_errors(self.path):
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield
-                self._connection.execute("COMMIT")
-            finally:
-                if self._connection.in_transaction:
-                    self._connection.execute("ROLLBACK")
+        with translate_errors(self.path), self._connection as connection:
+            connection.execute("BEGIN IMMEDIATE")
+            yield connection
 
     def read_batches(self) -> list[Batch]:
         """All rows as columns, for a `RowTable`.
@@ -160,29 +151,22 @@ class Store:
         Raises:
             InputError: for a damaged store.
         """
-        batches, known = list[Batch](), dict[Any, Any]()  # equal texts share memory
-        query = f"SELECT {', '.join(SAVED)}, numbers FROM rows ORDER BY number"
+        batches = list[Batch]()
+        query = f"SELECT {_ROW} FROM rows ORDER BY number"
         with translate_errors(self.path), closing(self._connection.execute(query)) as found:
             while lines := found.fetchmany(BLOCK):
                 *saved, blobs = zip(*lines, strict=True)
                 batch = {
-                    name: column_of([known.setdefault(v, v) for v in values] if kind is str else values, kind)
+                    name: column_of([*map(intern, values)] if kind is str else values, kind)  # equal texts share memory
                     for (name, kind), values in zip(SAVED.items(), saved, strict=True)
                 }
                 if not set(batch["status"]) <= set(STATUSES):
                     raise ValueError("a row has an unknown status")
-                heads = _numbers(self._connection)
+                heads = _headers(self._connection)
                 doubles = b"".join(blob.ljust(8 * len(heads), _ABSENT) for blob in blobs)
                 table = np.frombuffer(doubles, "<f8").reshape(len(lines), len(heads)).T
-                batch |= {head: values.copy() for head, values in zip(heads, table, strict=True)}
-                batches.append(batch)
+                batches.append(batch | {head: values.copy() for head, values in zip(heads, table, strict=True)})
         return batches
-
-    def numbers(self) -> NDArray[np.int64]:
-        """The numbers of all rows, ascending."""
-        with translate_errors(self.path):
-            found = self._connection.execute("SELECT number FROM rows ORDER BY number").fetchall()
-        return np.array([number for (number,) in found], dtype=np.int64)
 
     def about(self) -> dict[str, Any]:
         """Schema, definition without columns, seed, and when, where and with which versions the store was made."""
@@ -193,18 +177,19 @@ class Store:
     def sessions(self) -> list[dict[str, Any]]:
         """Every writing process in order: started, ended (None if killed), pid, host, versions, rows added."""
         with translate_errors(self.path):
-            found = self._connection.execute(f"SELECT {', '.join(_SESSION)} FROM sessions ORDER BY id").fetchall()
-            sessions = [dict(zip(_SESSION, line, strict=True)) for line in found]
+            found = self._connection.execute(f"SELECT {_SESSION} FROM sessions ORDER BY id").fetchall()
+            sessions = [dict(zip(_SESSION.split(", "), line, strict=True)) for line in found]
             return [session | {"versions": dict(from_json(session["versions"]))} for session in sessions]
 
     def forget(self, numbers: Iterable[int]) -> None:
         """Remove rows, so that they are solved again."""
-        with self._transaction():
-            self._connection.executemany("DELETE FROM rows WHERE number = ?", [(int(number),) for number in numbers])
+        with self._transaction() as connection:
+            connection.executemany("DELETE FROM rows WHERE number = ?", [(int(number),) for number in numbers])
 
 
-def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
-    """Open the store of a study for writing, creating it if absent.
+@contextmanager
+def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Iterator[Store]:
+    """Open the store of a study for writing, creating it if absent; it is locked until the context ends.
 
     Args:
         fresh: move an existing store to ``name.1.sqlite`` or the next free number, and start a new one.
@@ -214,42 +199,39 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Store:
             not a store, is damaged or of a newer tmsopt, or the folder is not writable.
     """
     path, schema = _inspect(path)
-    with translate_errors(path), ExitStack() as undo:
-        lock, moved = FileLock(f"{path}.lock", timeout=0), list[str]()
-        try:
-            lock.acquire()
-        except Timeout:
-            raise store_error(path, _describe_writer(path) if os.path.lexists(lock.lock_file) else _PLACE) from None
-        undo.callback(_release, lock)
-        if fresh and schema:
-            with suppress(sqlite3.Error), closing(_connect(path, "rw")) as old:  # a damaged store is moved unchanged
-                old.execute("PRAGMA journal_mode=DELETE")
-        if (fresh and schema) or (not schema and any(Path(f"{path}{ending}").exists() for ending in _COMPANIONS)):
-            moved, schema = [f"moved the old store to {files.move_aside(path, _COMPANIONS)}"], 0
-        if not schema:
-            with _replace_database(path) as new:
-                _create(new, *_describe_study(study))
-        check_same(path, study)  # before any change
-        if 0 < schema < SCHEMA:
-            with closing(_connect(path, "rw")) as old, _replace_database(path) as new:
-                old.execute("PRAGMA journal_mode=DELETE")
-                _copy(old, new)
-        connection = undo.enter_context(closing(_connect(path, "rw")))
-        connection.execute("PRAGMA journal_mode=WAL")
-        connection.execute("PRAGMA synchronous=NORMAL")  # safe from kill -9
-        today = _versions()
-        line = (_now(), os.getpid(), platform.node(), json.dumps(today))
-        query = "INSERT INTO sessions (started, pid, host, versions) VALUES (?, ?, ?, ?)"
-        session = connection.execute(query, line).lastrowid or 0
-        undo.callback(_end, connection, session)
-        store = Store(path, connection, undo, session)
-        earlier = [then["versions"] for then in store.sessions() if then["rows"] > 0]
-        changed = [line for then in earlier for line in list_differences(then, today, ("in the store", "now"))]
-        store.warnings, store._stack = tuple(dict.fromkeys(changed + moved)), undo.pop_all()
-        return store
+    with ExitStack() as stack:
+        with translate_errors(path):
+            warnings = []
+            stack.enter_context(_lock(path))
+            if fresh and schema:
+                with suppress(sqlite3.Error), closing(_connect(path, "rw")) as old:  # a damaged store is moved as it is
+                    old.execute(_ONE_FILE)
+                schema = 0
+            if not schema:
+                if any(os.path.lexists(f"{path}{ending}") for ending in ("", *_COMPANIONS)):
+                    warnings.append(f"moved the old store to {files.move_aside(path, _COMPANIONS)}")
+                with _replace_database(path) as new:
+                    _create(new, *_describe_study(study))
+            check_same(path, study)  # before any change
+            if 0 < schema < SCHEMA:
+                with closing(_connect(path, "rw")) as old, _replace_database(path) as new:
+                    old.execute(_ONE_FILE)
+                    _copy(old, new)
+            connection = stack.enter_context(closing(_connect(path, "rw")))
+            connection.execute("PRAGMA journal_mode=WAL")
+            connection.execute("PRAGMA synchronous=NORMAL")  # safe from kill -9
+            today = _versions()
+            earlier = [then["versions"] for then in Store(path, connection).sessions() if then["rows"]]
+            changed = [line for then in earlier for line in list_differences(then, today, ("in the store", "now"))]
+            line = (_now(), os.getpid(), platform.node(), json.dumps(today))
+            query = "INSERT INTO sessions (started, pid, host, versions) VALUES (?, ?, ?, ?)"
+            session = connection.execute(query, line).lastrowid or 0
+            stack.callback(_end, connection, session)
+        yield Store(path, connection, session, tuple(dict.fromkeys(changed + warnings)))
 
 
-def view_store(path: Path | str) -> Store:
+@contextmanager
+def view_store(path: Path | str) -> Iterator[Store]:
     """Open a store for reading, even while another process writes it.
 
     Raises:
@@ -258,13 +240,14 @@ def view_store(path: Path | str) -> Store:
     path, schema = _inspect(path)
     if not schema:
         raise store_error(path, "no such file")
-    with translate_errors(path), ExitStack() as undo:
-        connection = undo.enter_context(closing(_connect(path, "ro")))
-        _check_content(connection, path)
-        if schema < SCHEMA:
-            old, connection = connection, undo.enter_context(closing(sqlite3.connect(":memory:", isolation_level=None)))
-            _copy(old, connection)
-        return Store(path, connection, undo.pop_all())
+    with ExitStack() as stack:
+        with translate_errors(path):
+            connection = stack.enter_context(closing(_connect(path, "ro")))
+            _check_content(connection, path)
+            if schema < SCHEMA:
+                old, connection = connection, stack.enter_context(closing(_connect(path, "memory")))
+                _copy(old, connection)
+        yield Store(path, connection)
 
 
 def check_same(path: Path | str, study: Study) -> None:
@@ -273,20 +256,17 @@ def check_same(path: Path | str, study: Study) -> None:
     Raises:
         InputError: with the differences if it does not; also if the file is not a store, or damaged.
     """
-    path, schema = _inspect(path)
-    if not schema:
-        return
-    with view_store(path) as store, translate_errors(path):
-        in_store = _pairs(store._connection, "study"), _pairs(store._connection, "columns")
+    with view_store(path) as store, translate_errors(store.path):
         old, new = (
             from_json(about["definition"]) | {"columns": {name: array("d", x) for name, x in columns.items()}}
-            for about, columns in (in_store, _describe_study(study))
+            for about, columns in ([_pairs(store._connection, n) for n in _STUDY], _describe_study(study))
         )
         found = list(list_differences(old, new, ("in the store", "in the file")))
-    if found:
-        more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
-        advice = "add --fresh to move it aside and start a new store, or give another --store"
-        raise store_error(path, f"holds the rows of another study; {advice}. Differences:", *found[:_MOST], *more)
+        if found:
+            more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
+            advice = "add --fresh to move it aside and start a new store, or give another --store"
+            message = f"holds the rows of another study; {advice}. Differences:"
+            raise store_error(store.path, message, *found[:_MOST], *more)
 
 
 def _describe_study(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
@@ -310,19 +290,19 @@ def _describe_study(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
 def _create(connection: sqlite3.Connection, about: Mapping[str, str], kept: Mapping[str, bytes]) -> None:
     """Create an empty store."""
     connection.executescript(_TABLES)
-    for table, pairs in (("study", about), ("columns", kept)):
+    for table, pairs in zip(_STUDY, (about, kept), strict=True):
         connection.executemany(f"INSERT INTO {table} VALUES (?, ?)", pairs.items())
 
 
 def _copy(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
     """Copy a store of an earlier version to an empty database."""
-    _create(new, read_about(old), read_columns(old))
-    store = Store(Path("copy"), new, ExitStack())
-    with closing(read_batches(old)) as batches:
+    _create(new, _pairs(old, "about"), read_columns(old))
+    store = Store(Path("copy"), new)
+    with closing(read_batches(old)) as batches:  # an open cursor would keep the file locked
         for batch in batches:
             store.add(batch)
-    sessions = old.execute(f"SELECT {', '.join(_SESSION)} FROM sessions ORDER BY id").fetchall()
-    new.executemany(f"INSERT INTO sessions ({', '.join(_SESSION)}) VALUES (?, ?, ?, ?, ?, ?)", sessions)
+    sessions = old.execute(f"SELECT {_SESSION} FROM sessions ORDER BY id").fetchall()
+    new.executemany(f"INSERT INTO sessions ({_SESSION}) VALUES (?, ?, ?, ?, ?, ?)", sessions)
 
 
 @contextmanager
@@ -335,13 +315,23 @@ def _replace_database(path: Path) -> Iterator[sqlite3.Connection]:
 def _end(connection: sqlite3.Connection, session: int) -> None:
     with suppress(sqlite3.Error):  # a full disk has already raised a better error
         connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (_now(), session))
-        connection.execute("PRAGMA journal_mode=DELETE")  # a single file, unless another process reads it
+        connection.execute(_ONE_FILE)
 
 
-def _release(lock: FileLock) -> None:
-    with suppress(OSError):
-        Path(lock.lock_file).unlink()  # before the release; Windows keeps an open file
-    lock.release()
+@contextmanager
+def _lock(path: Path) -> Iterator[None]:
+    """The lock of the only writer."""
+    lock = FileLock(f"{path}.lock", timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise store_error(path, _describe_writer(path) if os.path.lexists(lock.lock_file) else _PLACE) from None
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            Path(lock.lock_file).unlink()  # before the release; Windows keeps an open file
+        lock.release()
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
@@ -380,10 +370,10 @@ def _check_content(connection: sqlite3.Connection, path: Path) -> None:
     """Check that a store has only plain tables, which execute nothing, and that its pages are intact."""
     query = "SELECT type, name FROM sqlite_schema WHERE type NOT IN ('table', 'index') OR sql LIKE '%VIRTUAL%' LIMIT 1"
     for kind, name in connection.execute(query):
-        raise store_error(path, f"{DAMAGED} (a store has no {kind} '{name!s:.60}')")
+        raise store_error(path, f"{_DAMAGED} (a store has no {kind} '{name!s:.60}')")
     ((result,),) = connection.execute("PRAGMA quick_check(1)")
     if result != "ok":
-        raise store_error(path, f"{DAMAGED} ({result!s:.200})")
+        raise store_error(path, f"{_DAMAGED} ({result!s:.200})")
 
 
 def _describe_writer(path: Path) -> str:
@@ -400,7 +390,7 @@ def _pairs(connection: sqlite3.Connection, table: str) -> dict[str, Any]:
     return dict(connection.execute(f"SELECT * FROM {table} ORDER BY rowid").fetchall())
 
 
-def _numbers(connection: sqlite3.Connection) -> list[str]:
+def _headers(connection: sqlite3.Connection) -> list[str]:
     """Headers of the numbers of a row, in order."""
     return [header for (header,) in connection.execute("SELECT header FROM numbers ORDER BY rowid")]
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -64,7 +64,7 @@ class Study:
     """
 
     problem: Problem
-    columns: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    columns: Mapping[str, Sequence[float]] = Table()
     title: str = ""
     seed: int = 0
     starts: int = STARTS
@@ -77,12 +77,12 @@ class Study:
     def __post_init__(self) -> None:
         if found := list(faults(self)):
             raise InputError(found)
-        columns = {n: c if isinstance(c, Column) else Column(c) for n, c in self.columns.items()}
-        object.__setattr__(self, "columns", Table(columns))
-        object.__setattr__(self, "report", tuple(dict.fromkeys(text.strip() for text in self.report)))
-        object.__setattr__(self, "notes", tuple(self.notes))
-        if self.grid_shape is not None:
-            object.__setattr__(self, "grid_shape", Table(self.grid_shape))
+        vars(self).update(
+            columns=Table({name: Column(values) for name, values in self.columns.items()}),
+            report=tuple(dict.fromkeys(text.strip() for text in self.report)),
+            notes=tuple(self.notes),
+            grid_shape=self.grid_shape and Table(self.grid_shape),
+        )
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -105,7 +105,7 @@ class Study:
         if not 0 <= row < len(self):
             message = f"found {row}; accepted: 0 to {len(self) - 1}, because the study has {len(self)} rows"
             raise input_error(message, "row")
-        return Table({name: float(column[row]) for name, column in self.columns.items()})
+        return Table({name: column[row] for name, column in self.columns.items()})
 
     def row_problem(self, row: int) -> Problem:
         """The problem of a row; a start outside the bounds of the row is moved to the nearer bound.
@@ -124,7 +124,7 @@ class Study:
             else:
                 low, high = free[stem]
                 free[stem] = (value, high) if end == "min" else (low, value)
-        start = {name: min(max(value, free[name][0]), free[name][1]) for name, value in problem.start.items()}
+        start = {name: float(np.clip(value, *free[name])) for name, value in problem.start.items()}
         return replace(problem, fixed=fixed, free=free, constraints=constraints, start=start)
 
     def seed_of(self, row: int) -> int:
@@ -184,7 +184,7 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
     else:
         columns = {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
     return {
-        "problem": _problem(study.problem.posed),
+        "problem": _problem(study.problem),
         **columns,
         "seed": int(study.seed),
         "starts": int(study.starts),
@@ -193,7 +193,7 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
     }
 
 
-def _problem(problem: Posed) -> dict[str, Any]:
+def _problem(problem: Problem) -> dict[str, Any]:
     names = ("fixed", "constraints", "tolerances", "weights", "start")
     tables: dict[str, dict[str, Any]] = {name: dict(getattr(problem, name)) for name in names}
     tables["free"] = {name: list(ends) for name, ends in problem.free.items()}
@@ -204,7 +204,7 @@ def _problem(problem: Posed) -> dict[str, Any]:
     goals = {sense: getattr(problem, sense) for sense in ("minimize", "maximize", "locate")}
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
-        "parameters": problem.parameter_set.name,
+        "parameters": problem.posed.parameter_set.name,
         "objective": {sense: text for sense, text in goals.items() if text is not None},
         **tables,
         "order": {name: list(table) for name, table in tables.items() if len(table) > 1 and name != "fixed"},
@@ -306,18 +306,17 @@ def _fills_grid(study: Stated) -> bool:
         return False
     if any(count_faults("points", n, 1) for n in shape.values()) or math.prod(shape.values()) != len(study):
         return False
-    return all(np.array_equal(column, study.columns[name], equal_nan=True) for name, column in grid(study.axes).items())
+    return all(np.array_equal(column, study.columns[name]) for name, column in grid(study.axes).items())
 
 
 def _option_faults(study: Stated) -> Iterator[Fault]:
-    yield from text_faults(study.title, "title")
     if not isinstance(study.method, str) or study.method not in METHODS:
-        yield Fault(f"found {short(study.method)}; {suggest(str(study.method), METHODS)}", ("method",))
+        yield Fault(f"found {short(study.method)}; {suggest(study.method, METHODS)}", ("method",))
     if not isinstance(study.warm, bool):
         yield Fault(f"found {short(study.warm)}; accepted: true or false", ("warm",))
-    yield from list_faults("notes", study.notes, "['left out: the lamp']") or (
-        fault for note in study.notes for fault in text_faults(note, "notes")
-    )
+    notes = list_faults("notes", study.notes, "['left out: the lamp']")
+    yield from notes or (fault for note in study.notes for fault in text_faults(note, "notes"))
+    yield from text_faults(study.title, "title")
     yield from common_faults(study.problem.posed, study.seed, study.starts, study.report)
 
 

@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -94,7 +94,7 @@ class Summary:
     counts: Table[int]
     best: Row | None
     causes: Table[int]
-    spread: Table[tuple[float, float, float]]
+    spread: Table[tuple[float, ...]]
     stable: int
     structures: Table[int]
     proven: int
@@ -102,7 +102,7 @@ class Summary:
     laws: Table[float]
     seconds: float
     product: Yield | None = None
-    clocked: Table[tuple[float, ...]] = field(default_factory=Table)
+    clocked: Table[tuple[float, ...]] = Table()
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -116,30 +116,27 @@ class Summary:
 
 def summarise(rows: RowTable) -> Summary:
     """Summarise the rows of a study."""
-    study, problem = rows.study, rows.study.problem
-    status, structure = rows.values("status"), rows.values("structure")
-    values = {name: rows.values(name) for name in ("objective", "abscissa")}
+    study, status = rows.study, rows.values("status")
     counts, optimal = Counter(status.tolist()), status == "optimal"
+    values = {name: rows.values(name) for name in ("objective", "abscissa")}
     clocked = _to_seconds(rows, values)
-    objective = problem.posed.sign * clocked.get("objective", values["objective"])
+    objective = study.problem.posed.sign * clocked.get("objective", values["objective"])
     ranked = np.where(optimal & np.isfinite(objective), objective, np.inf)
-    best = rows[int(np.argmin(ranked))] if np.isfinite(ranked).any() else None
-    spreads = [{n: ends for n, x in some.items() if (ends := _ends(x[optimal]))} for some in (values, clocked)]
-    in_seconds: dict[str, tuple[float, ...]] = dict(spreads[1])
-    product = None
-    if study.method == "monte_carlo":
-        product = compute_yield(rows)
-        if "abscissa" in clocked:
-            in_seconds["quantiles"] = _quantiles(clocked["abscissa"][optimal | (status == "infeasible")])
+    spread, in_seconds = (
+        {name: ends for name, x in some.items() if (ends := _ends(x[optimal]))} for some in (values, clocked)
+    )
+    product = compute_yield(rows) if study.method == "monte_carlo" else None
+    if product and "abscissa" in clocked:
+        in_seconds["quantiles"] = _quantiles(clocked["abscissa"][optimal | (status == "infeasible")])
     laws = {key: rows.column(head).compressed() for head, (name, key) in rows.headers.items() if name == "laws"}
     return Summary(
         rows=len(study),
         counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
-        best=best,
+        best=rows[int(np.argmin(ranked))] if np.isfinite(ranked).any() else None,
         causes=_causes(rows),
-        spread=Table(spreads[0]),
+        spread=Table(spread),
         stable=int(rows.column("stable").sum() or 0),
-        structures=Table(dict(Counter(structure[optimal].tolist()).most_common())),
+        structures=Table(dict(Counter(rows.values("structure")[optimal].tolist()).most_common())),
         proven=int(rows.values("proven").sum()),
         warm=int(rows.values("warm").sum()),
         laws=Table({name: float(np.abs(residuals).max()) for name, residuals in laws.items() if residuals.size}),
@@ -151,12 +148,11 @@ def summarise(rows: RowTable) -> Summary:
 
 def _to_seconds(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
     """Objective and abscissa of every row converted from √(g/w) to 1/s, where possible; w may vary between rows."""
-    problem, found = rows.study.problem, {}
-    parameters = {name: rows.values(header("parameters", name)) for name in problem.posed.parameter_set.names}
-    for name, text in (("objective", problem.minimize or problem.maximize), ("abscissa", "abscissa")):
-        if text and (rates := rate_of(problem.posed, text, parameters)) is not None:
-            found[name] = values[name] * rates
-    return found
+    problem = rows.study.problem.posed
+    parameters = {name: rows.values(header("parameters", name)) for name in problem.parameter_set.names}
+    texts = {"objective": problem.goal, "abscissa": "abscissa"}
+    rates = {name: rate_of(problem, text, parameters) for name, text in texts.items() if text}
+    return {name: values[name] * rate for name, rate in rates.items() if rate is not None}
 
 
 def _causes(rows: RowTable) -> Table[int]:
@@ -167,9 +163,9 @@ def _causes(rows: RowTable) -> Table[int]:
     return Table({texts[0] if len(texts) == 1 else _AMOUNT.sub("", texts[0]): len(texts) for texts in ranked})
 
 
-def _ends(values: Array) -> tuple[float, float, float] | None:
+def _ends(values: Array) -> tuple[float, ...]:
     known = values[np.isfinite(values)]
-    return (float(known.min()), float(np.median(known)), float(known.max())) if known.size else None
+    return tuple(float(of(known)) for of in (np.min, np.median, np.max)) if known.size else ()
 
 
 def compute_yield(rows: RowTable) -> Yield:
@@ -184,5 +180,5 @@ def compute_yield(rows: RowTable) -> Yield:
 
 
 def _quantiles(abscissa: Array) -> tuple[float, ...]:
-    known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa))
-    return tuple(float(known[math.ceil(q * len(known)) - 1]) for q in QUANTILES if len(known))
+    known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa)).tolist()
+    return tuple(known[math.ceil(q * len(known)) - 1] for q in QUANTILES if known)
