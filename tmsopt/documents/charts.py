@@ -1,17 +1,17 @@
 """Charts: shares of the classes, the best grid point, boundaries and corners."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from tmsopt import plots
 from tmsopt.charts.chart import Chart
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock
+from tmsopt.documents.blocks import Cell, Chapter, Figure, Level, Parts, Sentence, TableBlock, Words
 from tmsopt.documents.curves import describe_domain, tabulate_corners
-from tmsopt.documents.maker import Maker, remove_titles
 from tmsopt.documents.tables import MOST, format_value, write_question
 from tmsopt.models import in_words_of
 from tmsopt.problem.unit_system import common_unit, unit_of
@@ -20,55 +20,57 @@ from tmsopt.roots import CLASSES
 _POINTS = 800 * 800  # of a chart that a picture shows
 
 
-def summarise_chart(chart: Chart) -> Iterator[Badge]:
+def summarise_chart(chart: Chart) -> Words:
     """Its grid, and the commonest classes."""
-    yield Badge(f"{' × '.join(str(len(v)) for v in chart.grid)} designs over {', '.join(chart.axes)}")
+    yield f"{' × '.join(str(len(v)) for v in chart.grid)} designs over {', '.join(chart.axes)}"
     for name, share in sorted(chart.shares.items(), key=lambda item: -item[1])[:2]:
-        yield Badge(f"{100 * share:.3g} % {name}")
+        yield f"{100 * share:.3g} % {name}"
 
 
-def write_chart(chart: Chart, level: Level) -> Iterator[Chapter]:
+def write_chart(chart: Chart, level: Level) -> Parts:
     """The classes with their shares, the best grid point, the boundaries of a plane in memory, and their corners."""
     data: dict[str, Any] = chart.to_json()
     problem = chart.problem.posed
     plane = chart.path is None and len(chart.axes) == 2
     over = " and ".join(chart.axes) if plane else ", ".join(chart.axes)
     size = " × ".join(str(a["points"]) for a in data["axes"].values())
-    yield Chapter("answer", (Sentence(f"{size} designs over {over}", tone="answer"),))
-    yield Chapter("classes", tuple(_write_classes(chart, data, plane)))
+    yield Sentence(f"{size} designs over {over}", tone="answer")
+    yield Chapter("classes")
+    yield from _write_classes(chart, data, plane)
+    yield Chapter("best")
     if best := data["least_abscissa"]:
         where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in chart.axes)
         value = common_unit(problem, "abscissa").show(best["value"], 6)
-        yield Chapter("best", (Sentence(f"{value} at {where}", "least abscissa on the grid", "answer"),))
+        yield Sentence(f"{value} at {where}", "least abscissa on the grid", "answer")
     if chart.domain is not None and plane:
-        corners = (tabulate_corners(chart.domain, problem),) if chart.domain.corners else ()
-        yield Chapter("boundaries", (*describe_domain(chart.domain, problem), *corners))
+        yield Chapter("boundaries")
+        yield from describe_domain(chart.domain, problem)
+        yield from tabulate_corners(chart.domain, problem)
     if data.get("designs"):
-        yield Chapter("speed", (Sentence(f"{data['per_second']:.3g} designs per second with {data['engine']}"),))
+        yield Chapter("speed")
+        yield f"{data['per_second']:.3g} designs per second with {data['engine']}"
     if level == "page":
-        plain = _thin_chart(remove_titles(chart), _POINTS)
-        figures = (
-            Figure(lambda: plots.chart_figure(plain), f"Stability over {' and '.join(chart.axes)}"),
-            Figure(lambda: plots.chart_figure(plain, "abscissa"), f"Spectral abscissa over {' and '.join(chart.axes)}"),
-        )
-        yield Chapter("picture", figures, "Chart", "wide")
-        yield write_question(problem)
-        yield _tabulate_designs(chart)
+        yield Chapter("picture", "Chart", "wide")
+        shown, axes = _thin_chart(chart, _POINTS), " and ".join(chart.axes)
+        yield Figure(plots.chart_figure, shown, f"Stability over {axes}")
+        yield Figure(partial(plots.chart_figure, layer="abscissa"), shown, f"Spectral abscissa over {axes}")
+        yield from write_question(problem)
+        yield from _tabulate_designs(chart)
 
 
-def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Iterator[Block]:
+def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Parts:
     rows = [(in_words_of(chart.problem.model, n), f"{100 * x:.2f}") for n, x in data["classes"].items() if x]
     if rows:
         yield TableBlock((("class", "share in %"), *rows), "Share of each class")
     satisfied = data["satisfied"]
     inequalities = len(chart.problem.constraints) > len(chart.left_aside) if plane else (satisfied or 1) < 1
     if satisfied is not None and inequalities:
-        yield Sentence(f"the constraints hold on {100 * satisfied:.2f} %")
+        yield f"the constraints hold on {100 * satisfied:.2f} %"
     for name in chart.left_aside if plane else ():
-        yield Sentence(f"{name} is an equality, which holds on curves and not on a grid: left aside")
+        yield f"{name} is an equality, which holds on curves and not on a grid: left aside"
 
 
-def _tabulate_designs(chart: Chart) -> Chapter:
+def _tabulate_designs(chart: Chart) -> Parts:
     """Designs of the grid, every so many along each axis where they are too many."""
     problem, shown = chart.problem, _thin_chart(chart, MOST)
     units = {n: unit_of(problem.posed, n) for n in (*chart.axes, "abscissa")}
@@ -87,11 +89,12 @@ def _tabulate_designs(chart: Chart) -> Chapter:
             columns[f"abscissa {units[name].text}".rstrip()] = [Cell(x, units[name], 6) for x in values]
         else:
             columns[name.replace("_", " ")] = [format_value(x) for x in values]
+    yield Chapter("rows", "Designs", "whole")
     rows = [tuple(columns), *zip(*columns.values(), strict=True)]
     left = math.prod(map(len, chart.grid))
-    note = f"{len(rows) - 1} of {left} designs, spread evenly over each axis; --output writes all."
-    notes = (Sentence(note),) if len(rows) <= left else ()
-    return Chapter("rows", (*notes, TableBlock(rows, "Designs of the grid")), "Designs", "whole")
+    if len(rows) <= left:
+        yield f"{len(rows) - 1} of {left} designs, spread evenly over each axis; --output writes all."
+    yield TableBlock(rows, "Designs of the grid")
 
 
 def _thin_chart(chart: Chart, most: int) -> Chart:
@@ -102,6 +105,3 @@ def _thin_chart(chart: Chart, most: int) -> Chart:
         return chart
     layers = {n: layer[(slice(None, None, step),) * len(sizes)] for n, layer in chart.layers.items()}
     return replace(chart, grid=tuple(values[::step] for values in chart.grid), layers=layers)
-
-
-MAKERS: Mapping[str, Maker] = {"Chart": Maker(summarise_chart, write_chart, "draw_chart")}

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tmsopt.documents.blocks import ALL, Cell
+from tmsopt.documents.blocks import ALL, Cell, Row
 from tmsopt.dynamics.speeds import speed_of
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.models import GRAVITY, INERTIAS, Model, Parameter, ParameterSet, Quantity, Values, to_si
@@ -18,8 +18,6 @@ from tmsopt.problem.unit_system import Unit, show_at, unit_at, unit_of
 from tmsopt.problem.units import frequencies
 from tmsopt.problem.verdict.stability import ROUNDED
 from tmsopt.roots import Root
-
-TableRow = Sequence[Cell | str]
 
 NOTHING = 1e-14
 """Share of the size of a root, or of 1: less is rounding."""
@@ -33,7 +31,7 @@ def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def list_parameters(solution: Solution, si: Mapping[str, float], digits: int = ALL) -> list[TableRow]:
+def list_parameters(solution: Solution, si: Mapping[str, float], digits: int = ALL) -> list[Row]:
     """Name, number, unit, role, what it is in the other set, and meaning of each parameter.
 
     Parameters that are 0 by default are left out.
@@ -45,7 +43,7 @@ def list_parameters(solution: Solution, si: Mapping[str, float], digits: int = A
     problem = solution.problem.posed
     of, other = problem.parameter_set, _other_set(problem.model, problem.parameter_set)
     values = {} if other is None else solution.dimensionless if other.rate is None else si
-    rows: list[TableRow] = []
+    rows: list[Row] = []
     for p in of.parameters:
         x, how, unit = round_to_zero(solution, p.name), name_role(solution, p.name), unit_of(problem, p.name)
         if how == "fixed" and x == 0 == p.default:
@@ -57,11 +55,11 @@ def list_parameters(solution: Solution, si: Mapping[str, float], digits: int = A
     return rows
 
 
-def list_quantities(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
+def list_quantities(solution: Solution, si: Mapping[str, float]) -> list[Row]:
     """Name, number, unit, the same in SI for a dimensionless one, and meaning of each quantity that exists."""
     problem, found = solution.problem.posed, solution.quantities
     of = problem.parameter_set
-    rows: list[TableRow] = []
+    rows: list[Row] = []
     scaled = next((s for s in problem.model.sets if s.rate is not None), None)
     values = Values(problem.model, scaled, si) if scaled is not None and scaled is not of else None
     for q in (*problem.model.quantities, *of.quantities):

@@ -1,7 +1,7 @@
 """What an optimum means, what rounding does to it, and how its multiple roots split."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from itertools import takewhile
 
 from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, Response
@@ -10,9 +10,20 @@ from tmsopt.analysis.explain import Explanation
 from tmsopt.analysis.optimality import Optimality, RightmostRoot
 from tmsopt.analysis.rounding import ALONE, RoundedDesign
 from tmsopt.analysis.splitting import DEVIATION, Law
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Sentence, TableBlock, count_things
+from tmsopt.documents.blocks import (
+    Badge,
+    Cell,
+    Chapter,
+    Level,
+    Parts,
+    Row,
+    Sentence,
+    TableBlock,
+    Tone,
+    Words,
+    count_things,
+)
 from tmsopt.documents.design_rows import format_frequency, format_multiplicity
-from tmsopt.documents.maker import Maker
 
 _SHARE, _NIL = 0.05, 1e-9
 """Of decay and objective: what rounding may cost; what is nothing."""
@@ -22,35 +33,31 @@ _UNRESOLVED = (
     "solve with another value to see"
 )
 
-Blocks = Iterator[Block]
 
-
-def summarise_explanation(found: Explanation) -> Iterator[Badge]:
+def summarise_explanation(found: Explanation) -> Words:
     """Structure, verdict, and how many limits and warnings there are."""
-    yield Badge(found.structure)
+    yield found.structure
     yield from summarise_optimality(found.optimality)
-    yield Badge(count_things(len(found.levers), "limit"))
+    yield count_things(len(found.levers), "limit")
     if found.warnings:
-        yield Badge(count_things(len(found.warnings), "warning"))
+        yield count_things(len(found.warnings), "warning")
 
 
-def write_explanation(found: Explanation, _level: Level) -> Iterator[Chapter]:
+def write_explanation(found: Explanation, _level: Level) -> Parts:
     """The meaning, local optimality, warnings, what limits are worth, what rounding costs."""
-    warnings = (Sentence(text, "warning", "doubt") for text in found.warnings)
-    yield Chapter(
-        "meaning", (Sentence(found.summary, "meaning", "answer"), *explain_optimality(found.optimality), *warnings)
-    )
+    yield Chapter("meaning")
+    yield Sentence(found.summary, "meaning", "answer")
+    yield from write_optimality(found.optimality)
+    yield from (Sentence(text, "warning", "doubt") for text in found.warnings)
     if found.levers:
-        head = Sentence("what moving a limit buys, solved again from the optimum:")
-        yield Chapter("limits", (head, *(Sentence(lever.sentence) for lever in found.levers)))
-    yield Chapter("rounding", tuple(_write_rounding(found)))
-
-
-def _write_rounding(found: Explanation) -> Blocks:
+        yield Chapter("limits")
+        yield "what moving a limit buys, solved again from the optimum:"
+        yield from (lever.sentence for lever in found.levers)
+    yield Chapter("rounding")
     if found.precision:
         yield tabulate_rounding(found)
     if found.worst:
-        yield Sentence(f"rounding {found.worst} alone to {ALONE} digits costs most")
+        yield f"rounding {found.worst} alone to {ALONE} digits costs most"
 
 
 def describe_rounding(found: Explanation) -> str:
@@ -122,20 +129,15 @@ def _list_rounded(which: str, to: str, row: RoundedDesign) -> tuple[str, ...]:
     return which, to, abscissa, f"{loss:.2g}", f"{ratio:.4g}", ", ".join(row.violations)
 
 
-def summarise_optimality(found: Optimality) -> Iterator[Badge]:
+def summarise_optimality(found: Optimality) -> Words:
     """The verdict."""
-    tones = {STRICT: Badge(found.verdict, "good"), NOT_MINIMAL: Badge(found.verdict, "bad")}
-    yield tones.get(found.verdict, Badge(found.verdict, "doubt"))
+    tones: dict[str, Tone] = {STRICT: "good", NOT_MINIMAL: "bad"}
+    yield Badge(found.verdict, tones.get(found.verdict, "doubt"))
     if found.order:
-        yield Badge(f"by order {found.order}")
+        yield f"by order {found.order}"
 
 
-def write_optimality(found: Optimality, _level: Level) -> Iterator[Chapter]:
-    """The verdict and its multipliers."""
-    yield Chapter("answer", tuple(explain_optimality(found)))
-
-
-def explain_optimality(found: Optimality) -> Blocks:
+def write_optimality(found: Optimality, _level: Level = "full") -> Parts:
     """The verdict, then the multipliers of each root on the rightmost line."""
     if found.verdict == NOT_COVERED:
         yield Sentence(f"not judged, for {found.reason}", "local optimality")
@@ -145,7 +147,7 @@ def explain_optimality(found: Optimality) -> Blocks:
         of_H = found.roots[0].eigenfrequency is not None
         root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
         balance = f"they balance within {found.residual:.1g}"
-        yield Sentence(f"what it costs, per unit, to change {root} ({balance}):")
+        yield f"what it costs, per unit, to change {root} ({balance}):"
         head = ("root", f"to move it {'down' if of_H else 'left'}", "share of all", "to part it")
         yield TableBlock((head, *map(_list_root, found.roots)), "Multipliers")
 
@@ -169,22 +171,18 @@ def _drop_noise(x: float, size: float = 1.0) -> float:
     return 0.0 if abs(x) <= _ROUNDED * size else x
 
 
-def summarise_diagnosis(found: Diagnosis) -> Iterator[Badge]:
+def summarise_diagnosis(found: Diagnosis) -> Words:
     """The root and its chains."""
-    yield Badge(f"{found.algebraic}-fold {'pair' if found.im else 'root'}")
-    yield Badge(f"{found.re:.5g}" + (f" ± {found.im:.5g}i" if found.im else ""))
-    yield Badge(found.kind)
+    yield f"{found.algebraic}-fold {'pair' if found.im else 'root'}"
+    yield f"{found.re:.5g}" + (f" ± {found.im:.5g}i" if found.im else "")
+    yield found.kind
 
 
-def write_diagnosis(found: Diagnosis, level: Level) -> Iterator[Chapter]:
-    """The kind of the root, and how it splits."""
-    yield Chapter("answer", tuple(explain_diagnosis(found, level != "brief")))
-
-
-def explain_diagnosis(found: Diagnosis, full: bool = False) -> Blocks:
+def write_diagnosis(found: Diagnosis, level: Level = "full") -> Parts:
     """Two sentences: the kind of the root, and how it splits; the laws of every parameter where all is wanted."""
+    full = level != "brief"
     yield Sentence(_describe_root(found), tone="answer")
-    yield Sentence(_describe_splitting(found, full))
+    yield _describe_splitting(found, full)
     if full:
         yield TableBlock(_list_laws(found), "How the root splits")
 
@@ -250,8 +248,8 @@ def _describe_range(law: Law) -> str:
     return f"while {least}|ε| <= {min(law.below, law.above):.2g}"
 
 
-def _list_laws(found: Diagnosis) -> list[Sequence[str]]:
-    rows: list[Sequence[str]] = [("parameter", "change", "roots", "shift", "holds for ε < 0", "holds for ε > 0")]
+def _list_laws(found: Diagnosis) -> list[Row]:
+    rows: list[Row] = [("parameter", "change", "roots", "shift", "holds for ε < 0", "holds for ε > 0")]
     for response in found.responses:
         change = "relative" if response.relative else "absolute"
         for law in response.laws:
@@ -261,10 +259,3 @@ def _list_laws(found: Diagnosis) -> list[Sequence[str]]:
         for count, word in ((response.unmoved, "none"), (response.unresolved, "not resolved")):
             rows += [(response.parameter, change, str(count), word, "", "")] if count else []
     return rows
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Explanation": Maker(summarise_explanation, write_explanation, "draw_rounding"),
-    "Optimality": Maker(summarise_optimality, write_optimality, "draw_roots"),
-    "Diagnosis": Maker(summarise_diagnosis, write_diagnosis, "draw_splitting"),
-}

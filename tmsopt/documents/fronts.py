@@ -1,10 +1,20 @@
 """Fronts: points, gaps, and the limits that are active at each."""
 
-from collections.abc import Iterator, Mapping, Sequence
-
 from tmsopt import plots
-from tmsopt.documents.blocks import Badge, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_things, say_whether
-from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.blocks import (
+    Badge,
+    Cell,
+    Chapter,
+    Figure,
+    Level,
+    Parts,
+    Row,
+    Sentence,
+    TableBlock,
+    Words,
+    count_things,
+    say_whether,
+)
 from tmsopt.documents.tables import write_question
 from tmsopt.evaluation import missed_note
 from tmsopt.fronts.front import Front
@@ -13,15 +23,15 @@ from tmsopt.problem.unit_system import unit_at, unit_of
 _LABEL, _ROWS = 40, 20  # characters of what happens at a point, and points, of a brief report
 
 
-def summarise_front(front: Front) -> Iterator[Badge]:
+def summarise_front(front: Front) -> Words:
     """Objectives and the number of points."""
-    yield Badge(", ".join(front.objectives))
-    yield Badge(count_things(len(front), "point"))
+    yield ", ".join(front.objectives)
+    yield count_things(len(front), "point")
     if unstable := sum(not point.stable for point in front.points):
         yield Badge(f"{unstable} not stable", "bad")
 
 
-def write_front(front: Front, level: Level) -> Iterator[Chapter]:
+def write_front(front: Front, level: Level) -> Parts:
     """Points one a row: objectives, structure, ends and kinks, active limits, free parameters, whether stable."""
     problem, full = front.problem.posed, level != "brief"
     where = f", designs with {problem.locate}" if problem.locate else ""
@@ -29,26 +39,26 @@ def write_front(front: Front, level: Level) -> Iterator[Chapter]:
     counted = "".join(f"{count_things(n, word)}, " for n, word in special if n)
     least = f"front of least {', '.join(t.strip() for t in front.objectives)}{where}"
     effort = f"{front.solved} sub-problems; {front.seconds:.2f} s"
-    yield Chapter(
-        "answer", (Sentence(f"{least}: {count_things(len(front), 'point')}, {counted}{effort}", tone="answer"),)
-    )
+    yield Sentence(f"{least}: {count_things(len(front), 'point')}, {counted}{effort}", tone="answer")
     if level == "page":
-        caption = f"Front of {', '.join(front.objectives)}"
-        yield Chapter("picture", (Figure(lambda: plots.front_figure(remove_titles(front)), caption),), "Front")
-        yield write_question(problem)
+        yield Chapter("picture", "Front")
+        yield Figure(plots.front_figure, front, f"Front of {', '.join(front.objectives)}")
+        yield from write_question(problem)
+    yield Chapter("rows", "Points", "whole")
     labelled = frozenset(k for k, p in enumerate(front.points) if p.label)
     rows = list_points(front, full)
     objectives = len(front.objectives)
     needs = [9] * objectives + [7, 6] + [5] * (len(rows[0]) - objectives - 4) + [4, 3]
-    grid = TableBlock(rows, "Points of the front", needs, _ROWS, labelled, "--full, --csv")
-    yield Chapter("rows", (grid,), "Points", "whole")
-    notes = [Sentence(gap.reason, "gap") for gap in front.gaps] + [Sentence(note, "note") for note in front.notes]
+    yield TableBlock(rows, "Points of the front", needs, _ROWS, labelled, "--full, --csv")
+    yield Chapter("notes")
+    yield from (Sentence(gap.reason, "gap") for gap in front.gaps)
+    yield from (Sentence(note, "note") for note in front.notes)
     for k, p in enumerate(front.points, start=1):
-        notes += [Sentence(note, f"point {k}") for note in missed_note(p.solution.problem.posed, p.solution.missed)]
-    yield Chapter("notes", tuple(notes))
+        for note in missed_note(p.solution.problem.posed, p.solution.missed):
+            yield Sentence(note, f"point {k}")
 
 
-def list_points(front: Front, full: bool = False) -> list[Sequence[Cell | str]]:
+def list_points(front: Front, full: bool) -> list[Row]:
     """Headings, and the cells of each point; all digits and whole labels where it is `full`."""
     texts = [t.strip() for t in front.objectives]
     free = [n for n in front.problem.free if n not in texts]
@@ -56,7 +66,7 @@ def list_points(front: Front, full: bool = False) -> list[Sequence[Cell | str]]:
     some = dict.fromkeys(front.problem.posed.parameter_set.names, 1.0)  # a unit has one name for all designs
     heads = {n: f"{n} {unit_at(front.problem.posed, n, some).text}".rstrip() for n in units}
     head = (*(heads[t] for t in texts), "stable", "special", *(heads[n] for n in free), "structure", "active limits")
-    rows: list[Sequence[Cell | str]] = [head]
+    rows: list[Row] = [head]
     for p in front.points:
         each = (unit_at(front.problem.posed, t, p.solution.parameters) for t in texts)
         numbers = [Cell(v, unit, digits) for unit, v in zip(each, p.objectives, strict=True)]
@@ -64,6 +74,3 @@ def list_points(front: Front, full: bool = False) -> list[Sequence[Cell | str]]:
         label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
         rows.append((*numbers, say_whether(p.stable), label, *design, p.structure, ", ".join(p.limits)))
     return rows
-
-
-MAKERS: Mapping[str, Maker] = {"Front": Maker(summarise_front, write_front, "draw_front")}

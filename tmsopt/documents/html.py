@@ -8,6 +8,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
 from html import escape
 from importlib.resources import files as resources
 from itertools import groupby
@@ -23,6 +24,7 @@ _UNSHOWN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\
 _LONG = 24  # characters of a cell in a column that stays wide
 _FILTERED = 12  # rows from which a table has a field that filters them
 _ON_PAPER = 100  # rows of a table at most, in document.css too
+_HOLDERS = ("problem", "asked", "study", "design")  # attributes of a result that may have a title
 _LARGEST = 500_000  # bytes of a drawing; one with more, such as of thousands of marks, is an image of dots
 _DOTS = 160  # an inch
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -197,34 +199,38 @@ def draw_figure(figure: Figure) -> str:
     Letters are outlines, and a drawing is an image apart from the page: nothing in it is markup of the page.
     """
     try:
-        drawn = figure.draw()
-        whole = drawn.figure.figure if isinstance(drawn, Axes) else drawn
-        data, kind = _save_image(whole, "svg"), "svg+xml"
+        drawn = figure.draw(_remove_titles(figure.result))
+        data, kind = _save_image(drawn, "svg"), "svg+xml"
         if len(data) > _LARGEST:
-            data, kind = _save_image(whole, "png"), "png"
+            data, kind = _save_image(drawn, "png"), "png"
     except Exception:  # of a design without roots, of a chart over three parameters, …
         return ""
-    said, coded = escape_text(figure.caption), base64.b64encode(data).decode()
-    return f'<figure><img alt="{said}" src="data:image/{kind};base64,{coded}"><figcaption>{said}</figcaption></figure>'
+    said = escape_text(figure.caption)
+    source = f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+    return f'<figure><img alt="{said}" src="{source}"><figcaption>{said}</figcaption></figure>'
+
+
+def _remove_titles(result: Any) -> Any:
+    names = {f.name for f in fields(result) if f.init}
+    held = {n: _remove_titles(v) for n in _HOLDERS if n in names and is_dataclass(v := getattr(result, n))}
+    return replace(result, **held, **({"title": ""} if "title" in names else {}))
 
 
 def _draw_thumbnail(draw: Callable[[], Axes], name: str) -> str:
     """The picture for a notebook; none where it cannot be drawn: a display must not break over it."""
     try:
-        image = io.BytesIO()
-        figure: Any = draw().get_figure()
-        figure.savefig(image, format="png", dpi=100, bbox_inches="tight")
+        coded = base64.b64encode(_save_image(draw(), "png", 100)).decode()
     except Exception:  # whatever it was, the rest says what the result is
         return ""
-    coded = base64.b64encode(image.getvalue()).decode()
     return f'<img alt="{escape_text(name)}" style="max-width:100%" src="data:image/png;base64,{coded}">'
 
 
-def _save_image(figure: Any, kind: str) -> bytes:
+def _save_image(drawn: Any, kind: str, dots: int = _DOTS) -> bytes:
     """The same bytes for the same figure, whenever it is drawn."""
     image = io.BytesIO()
+    figure = drawn.figure.figure if isinstance(drawn, Axes) else drawn
     about = {"Date": None} if kind == "svg" else {}
     with rc_context({"svg.hashsalt": "tmsopt", "svg.fonttype": "path"}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph", UserWarning)  # of letters that no font here has: boxes show that
-        figure.savefig(image, format=kind, dpi=_DOTS, bbox_inches="tight", metadata=about)
+        figure.savefig(image, format=kind, dpi=dots, bbox_inches="tight", metadata=about)
     return image.getvalue()

@@ -1,13 +1,12 @@
 """The motion of a design: its cause, peaks, settling times, shapes of modes."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from tmsopt import plots
-from tmsopt.documents.blocks import Badge, Chapter, Figure, Level, Sentence, TableBlock
+from tmsopt.documents.blocks import Chapter, Figure, Level, Parts, Sentence, TableBlock, Words, judge
 from tmsopt.documents.design_rows import format_multiplicity
-from tmsopt.documents.maker import Maker, remove_titles
 from tmsopt.documents.tables import tabulate_records
 from tmsopt.dynamics.speeds import speed_of
 from tmsopt.problem import unit_of
@@ -23,30 +22,34 @@ _ROWS, _SHAPES = 8, 4  # of each table, coordinates of a shape, if not full
 _NOTHING = 1e-12  # of a root: a real part so small is rounding, and on the axis beside the largest
 
 
-def summarise_motion(motion: "Simulation") -> Iterator[Badge]:
+def summarise_simulation(motion: "Simulation") -> Words:
     """How long, and how far its first coordinates go."""
-    yield Badge(f"over {motion['t'][-1]:.4g} {motion.units.get('t', '')}".rstrip())
+    yield f"over {motion['t'][-1]:.4g} {motion.units.get('t', '')}".rstrip()
     for measure in motion.measures[:2]:
-        yield Badge(f"peak {measure.name} = {measure.peak:.4g} {motion.units.get(measure.name, '')}".rstrip())
-    yield Badge(motion.structure)
+        yield f"peak {measure.name} = {measure.peak:.4g} {motion.units.get(measure.name, '')}".rstrip()
+    yield motion.structure
     if motion.stable is not None:
-        yield Badge("stable", "good") if motion.stable else Badge("not stable", "bad")
+        yield judge(motion.stable, "stable")
 
 
-def write_motion(motion: "Simulation", level: Level) -> Iterator[Chapter]:
+def write_simulation(motion: "Simulation", level: Level) -> Parts:
     """What sets a design moving, peak, overshoot and settling time of each angle and torque, and the modes."""
     time, name = _format_with_unit(motion, "t", motion["t"][-1]), speed_of(motion.problem.posed.parameter_set)
     at = f" at {name} = {unit_of(motion.problem.posed, name).show(motion.parameters[name])}" if name else ""
-    answer = [Sentence(f"motion over {time}{at} {_describe_cause(motion)}")]
-    answer += [Sentence(motion.problem.model.omits, "model")] if motion.problem.model.omits else []
-    yield Chapter("answer", tuple(answer))
+    yield f"motion over {time}{at} {_describe_cause(motion)}"
+    if motion.problem.model.omits:
+        yield Sentence(motion.problem.model.omits, "model")
     if level == "page":
-        yield Chapter("picture", (Figure(lambda: plots.draw_motion(remove_titles(motion)), "The motion"),))
-    yield Chapter("peaks", (TableBlock([*_list_peaks(motion)], "Peaks and settling times", most=_ROWS),), "", "wide")
-    yield Chapter("modes", (TableBlock([*_list_modes(motion, level != "brief")], "Modes", most=_ROWS),), "", "wide")
-    yield Chapter("notes", tuple(map(Sentence, _write_notes(motion))))
+        yield Chapter("picture")
+        yield Figure(plots.draw_motion, motion, "The motion")
+    yield Chapter("peaks", width="wide")
+    yield TableBlock([*_list_peaks(motion)], "Peaks and settling times", most=_ROWS)
+    yield Chapter("modes", width="wide")
+    yield TableBlock([*_list_modes(motion, level != "brief")], "Modes", most=_ROWS)
+    yield Chapter("notes")
+    yield from _write_notes(motion)
     if level == "page":
-        yield tabulate_records(motion)
+        yield from tabulate_records(motion)
 
 
 def _describe_cause(motion: "Simulation") -> str:
@@ -190,6 +193,3 @@ def _format_with_unit(motion: "Simulation", name: str, value: float) -> str:
 
 def _format_degrees(value: float) -> str:
     return f"{value + 0.0:.4g} deg" if math.isfinite(value) else "none"
-
-
-MAKERS: Mapping[str, Maker] = {"Simulation": Maker(summarise_motion, write_motion, "draw_motion")}

@@ -9,18 +9,20 @@ from tmsopt import plots
 from tmsopt.algebra.balls import Number, fraction
 from tmsopt.documents.blocks import (
     Badge,
-    Block,
     Cell,
     Chapter,
     Figure,
     Level,
+    Parts,
+    Row,
     Sentence,
     TableBlock,
+    Words,
     count_things,
+    judge,
     say_whether,
 )
 from tmsopt.documents.design_rows import convert_to_si, format_multiplicity
-from tmsopt.documents.maker import Maker, remove_titles
 from tmsopt.documents.solution import tabulate_parameters, write_bicycle, write_growth_picture
 from tmsopt.documents.tables import write_question
 from tmsopt.global_search import Completeness
@@ -39,49 +41,54 @@ if TYPE_CHECKING:
 _OF_OTHERS = re.compile(r"(.*\.)?[bcdW]\d+")  # of factors whose roots are listed
 
 
-def summarise_proof(proof: Proof) -> Iterator[Badge]:
+def summarise_proof(proof: Proof) -> Words:
     """Whether it is proved, and what."""
-    yield Badge("proved", "good") if proof.proved else Badge("not proved", "bad")
-    yield Badge(proof.pattern or "nothing")
-    yield Badge(f"{proof.digits} digits")
+    yield judge(proof.proved, "proved")
+    yield proof.pattern or "nothing"
+    yield f"{proof.digits} digits"
     if proof.stable.holds is not None:
-        yield Badge("stable", "good") if proof.stable.holds else Badge("not stable", "bad")
+        yield judge(proof.stable.holds, "stable")
 
 
-def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Iterator[Chapter]:
+def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Parts:
     """The claim, the numbers with their radii, the facts that follow, and the numbers that were taken exactly.
 
     Args:
         design: what was proved: a page has its pictures and parameters too.
     """
-    claim = Sentence(proof.claim, *(("proved", "good") if proof.proved else ("not proved", "bad")))
-    answer: list[Block] = [claim]
-    answer += [Sentence(proof.reason, "why")] if proof.reason else []
+    verdict = judge(proof.proved, "proved")
+    yield Sentence(proof.claim, verdict.text, verdict.tone)
+    if proof.reason:
+        yield Sentence(proof.reason, "why")
     if proof.problem is None:
-        yield Chapter("answer", tuple(answer))
         return
     problem = proof.problem.posed
     if problem.scenarios or problem.tolerances:
-        answer.append(Sentence("for the worst case that was found"))
-    yield Chapter("answer", tuple(answer))
+        yield "for the worst case that was found"
     if not proof.parameters:
         return
     if rows := list_numbers(problem, proof):
+        yield Chapter("digits", width="wide")
+        if proof.stored and proof.reason:
+            yield "the design as stored:"
         head = ("number", "decimal", "radius", "unit")
-        stored = (Sentence("the design as stored:"),) if proof.stored and proof.reason else ()
-        digits = TableBlock((head, *rows), f"Numbers that were proved, to {proof.digits} digits", needs=(9, 8, 5, 6))
-        yield Chapter("digits", (*stored, digits), "", "wide")
+        yield TableBlock((head, *rows), f"Numbers that were proved, to {proof.digits} digits", needs=(9, 8, 5, 6))
     if level == "page":
-        yield Chapter("roots", (Figure(lambda: plots.draw_roots(remove_titles(proof)), "Roots in the complex plane"),))
-    yield Chapter("method", tuple(_describe_method(problem, proof)))
-    yield Chapter("facts", tuple(_write_facts(proof)))
-    yield Chapter("exact", tuple(_write_exact_numbers(problem, proof)), "Taken exactly")
+        yield Chapter("roots")
+        yield Figure(plots.draw_roots, proof, "Roots in the complex plane")
+    yield Chapter("method")
+    yield from _describe_method(problem, proof)
+    yield Chapter("facts")
+    yield from _write_facts(proof)
+    yield Chapter("exact", "Taken exactly")
+    yield from _write_exact_numbers(problem, proof)
     if level == "page" and design is not None:
         yield from write_bicycle(design)
-        yield Chapter("parameters", (tabulate_parameters(design, convert_to_si(design)),), "", "wide")
+        yield Chapter("parameters", width="wide")
+        yield tabulate_parameters(design, convert_to_si(design))
         yield from write_growth_picture(design)
     elif level == "page":
-        yield write_question(problem)
+        yield from write_question(problem)
 
 
 def list_numbers(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
@@ -125,7 +132,7 @@ def _find_units(problem: Posed, proof: Proof) -> dict[str, str]:
     return units
 
 
-def _describe_method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+def _describe_method(problem: Posed, proof: Proof) -> Parts:
     """How it was proved, how near the stored design is, and how alone."""
     if proof.method == "exact factorisation":
         yield Sentence("square-free factorisation of the polynomial, whose coefficients are fractions", "method")
@@ -136,12 +143,12 @@ def _describe_method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
         also = " and the == constraints" if equations else ""
         yield Sentence(f"Krawczyk's interval Newton test on a_k = a0 c_k{also}", "method")
         alone = f"the only one within {proof.uniqueness:.2g}"
-        yield Sentence(f"located to {proof.radius:.1e} before rounding to these digits; {alone}")
+        yield f"located to {proof.radius:.1e} before rounding to these digits; {alone}"
         explained = f"rounding explains up to {proof.explained:.1e}"
-        yield Sentence(f"the stored design is {proof.distance:.1e} from it; {explained}")
+        yield f"the stored design is {proof.distance:.1e} from it; {explained}"
 
 
-def _write_facts(proof: Proof) -> Iterator[Sentence]:
+def _write_facts(proof: Proof) -> Parts:
     of = " (of the design as stored)" if proof.stored and proof.reason else ""
     asked = "EP" in proof.pattern and proof.defective != NOT_CHECKED
     if asked or proof.geometric_multiplicity is not None:
@@ -153,7 +160,7 @@ def _write_facts(proof: Proof) -> Iterator[Sentence]:
     yield from (Sentence(str(verdict), name) for name, verdict in proof.limits.items())
 
 
-def _write_exact_numbers(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+def _write_exact_numbers(problem: Posed, proof: Proof) -> Parts:
     """Numbers that were taken exactly, and a word on angles."""
     exact = [*(f"{name} = {_format_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
     if exact:
@@ -182,14 +189,14 @@ def _write_verdict(label: str, verdict: Verdict) -> Sentence:
     return Sentence(f"{answer}, {verdict.words}", label)
 
 
-def summarise_every(every: Every) -> Iterator[Badge]:
+def summarise_every(every: Every) -> Words:
     """How many designs, and whether they are all."""
-    yield Badge(count_things(len(every.solutions), "design"))
+    yield count_things(len(every.solutions), "design")
     complete = every.completeness is not None and every.completeness.complete
-    yield Badge("proved to be all", "good") if complete else Badge("not proved to be all")
+    yield Badge("proved to be all", "good") if complete else "not proved to be all"
 
 
-def write_every(every: Every, _level: Level) -> Iterator[Chapter]:
+def write_every(every: Every, _level: Level) -> Parts:
     """All designs with a pattern, one column each, and what the proof or the search says about others."""
     found, coverage, proof = every.solutions, every.coverage, every.completeness
     complete = proof is not None and proof.complete
@@ -197,23 +204,24 @@ def write_every(every: Every, _level: Level) -> Iterator[Chapter]:
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if not found:
         none = f"no design in the box and within the limits has the pattern (proved; {effort})"
-        answer = Sentence(none if complete else "no single solution was met", tone="answer")
-        yield Chapter("answer", (answer,))
+        yield Sentence(none if complete else "no single solution was met", tone="answer")
     else:
         all_of_them = f"these are all: {many} in the box (proved; {effort})"
         located = all_of_them if complete else f"{many} in the box"
-        yield Chapter("answer", (Sentence(located, f"locate {found[0].problem.locate}", "answer"),))
-        yield Chapter("designs", (TableBlock(_list_designs(every, complete), "Designs with the pattern"),), "", "wide")
-    lines = [*(_describe_proof(proof, effort) if proof else ()), *(_describe_coverage(coverage) if coverage else ())]
-    yield Chapter("proof", tuple(map(Sentence, lines)))
+        yield Sentence(located, f"locate {found[0].problem.locate}", "answer")
+        yield Chapter("designs", width="wide")
+        yield TableBlock(_list_designs(every, complete), "Designs with the pattern")
+    yield Chapter("proof")
+    yield from _describe_proof(proof, effort) if proof else ()
+    yield from _describe_coverage(coverage) if coverage else ()
 
 
-def _list_designs(every: Every, complete: bool) -> list[Sequence[Cell | str]]:
+def _list_designs(every: Every, complete: bool) -> list[Row]:
     found, problem = every.solutions, every.solutions[0].problem
     names = [n for n in found[0].parameters if n in problem.free]
     off: Sequence[Mapping[str, float]] = every.errors or ({},) * len(found)
     pairs = list(zip(found, off, strict=True))
-    rows: list[Sequence[Cell | str]] = [("design", *(str(k) for k in range(1, len(found) + 1)))]
+    rows: list[Row] = [("design", *(str(k) for k in range(1, len(found) + 1)))]
     rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
     units = [unit_at(problem.posed, "abscissa", s.parameters) for s in found]
     decays = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
@@ -249,9 +257,3 @@ def _describe_coverage(coverage: Coverage) -> Iterator[str]:
         f"{coverage.expected:.2f} solutions to be expected in all; "
         f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
     )
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Proof": Maker(summarise_proof, write_proof, "draw_roots"),
-    "Every": Maker(summarise_every, write_every, "draw_designs"),
-}

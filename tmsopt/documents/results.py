@@ -2,15 +2,15 @@
 
 import math
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import import_module
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.documents.blocks import Chapter, Document, Level
-from tmsopt.documents.maker import Maker
-from tmsopt.documents.text import WIDTH, to_headline, to_text
+from tmsopt.documents.blocks import Badge, Block, Chapter, Document, Level, Sentence
+from tmsopt.documents.text import to_headline, to_text
 from tmsopt.errors import Fault, InputError, short
 from tmsopt.files import as_path, write_text
 from tmsopt.progress import Listener, start_steps
@@ -21,23 +21,27 @@ if TYPE_CHECKING:
 
     from tmsopt.problem import Solution
 
-_HOMES = {
-    "solution": "Solution",
-    "explanation": "Explanation Optimality Diagnosis",
-    "robustness": "Robustness Nearest",
-    "speeds": "Speeds Growth",
-    "motion": "Simulation",
-    "curves": "Trace Branch Domain Swallowtail",
-    "charts": "Chart",
-    "fronts": "Front",
-    "studies": "Results",
-    "proofs": "Proof Every",
-    "paper": "Comparison Ledger",
-    "descriptions": "Description",
+_RESULTS = {
+    "solution": {"Solution": "draw_growth"},
+    "explanation": {"Explanation": "draw_rounding", "Optimality": "draw_roots", "Diagnosis": "draw_splitting"},
+    "robustness": {"Robustness": "draw_robustness", "Nearest": "draw_robustness"},
+    "speeds": {"Speeds": "draw_speeds", "Growth": "draw_growth"},
+    "motion": {"Simulation": "draw_motion"},
+    "curves": {"Trace": "draw_trace", "Branch": "", "Domain": "draw_domain", "Swallowtail": "draw_swallowtail"},
+    "charts": {"Chart": "draw_chart"},
+    "fronts": {"Front": "draw_front"},
+    "studies": {"Results": "draw_histogram"},
+    "proofs": {"Proof": "draw_roots", "Every": "draw_designs"},
+    "paper": {"Comparison": "draw_comparison", "Ledger": "draw_ledger"},
+    "descriptions": {"Description": ""},
 }
-"""Module → the results that it shows; it is loaded when one of them is shown."""
+"""Module → the results that it shows, each with what draws it in `tmsopt.plots`, empty where nothing does.
 
-HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+The module, loaded when one of them is shown, has for each two generators, such as `summarise_solution` of its words and
+`write_solution` of its parts.
+"""
+
+HOME = {name: module for module, names in _RESULTS.items() for name in names}
 """Class of a result → the module that shows it."""
 
 ENDINGS = ("html", "htm")
@@ -50,18 +54,36 @@ def document_of(result: Any, level: Level = "brief", **options: Any) -> Document
     """The document of a result.
 
     Args:
-        options: of its maker, such as `si` of a solution.
+        options: of its writer, such as `si` of a solution.
     """
-    maker = maker_of(result)
-    sections = tuple(section for section in maker.sections(result, level, **options) if section.blocks)
-    return Document(type(result).__name__, title_of(result), tuple(maker.words(result)), level, sections)
+    blocks: list[Block] = []
+    chapters = {Chapter("answer"): blocks}
+    for part in _maker(result, "write")(result, level, **options):
+        if isinstance(part, Chapter):
+            blocks = chapters.setdefault(part, [])
+        else:
+            blocks.append(Sentence(part) if isinstance(part, str) else part)
+    filled = (replace(chapter, blocks=tuple(blocks)) for chapter, blocks in chapters.items() if blocks)
+    return replace(_cover(result), level=level, sections=tuple(filled))
 
 
-def maker_of(result: Any) -> Maker:
-    """Who shows a result."""
+def picture_of(result: Any) -> str:
+    """The name in `tmsopt.plots` of what draws a result; empty where nothing does."""
     name = type(result).__name__
-    makers: Mapping[str, Maker] = import_module(f"tmsopt.documents.{HOME[name]}").MAKERS
-    return makers[name]
+    return _RESULTS[HOME[name]][name]
+
+
+def _maker(result: Any, verb: str) -> Callable[..., Iterator[Any]]:
+    name = type(result).__name__
+    maker: Callable[..., Iterator[Any]] = getattr(
+        import_module(f"tmsopt.documents.{HOME[name]}"), f"{verb}_{name.lower()}"
+    )
+    return maker
+
+
+def _cover(result: Any) -> Document:
+    words = (Badge(word) if isinstance(word, str) else word for word in _maker(result, "summarise")(result))
+    return Document(type(result).__name__, title_of(result), tuple(words), "brief")
 
 
 def report(result: Any, full: bool = False) -> str:
@@ -71,8 +93,7 @@ def report(result: Any, full: bool = False) -> str:
 
 def headline(result: Any) -> str:
     """What it is and how it ended, then its title as far as there is room."""
-    escape_text = tuple(maker_of(result).words(result))
-    return to_headline(Document(type(result).__name__, title_of(result), escape_text, "brief"), WIDTH)
+    return to_headline(_cover(result))
 
 
 def title_of(result: Any) -> str:
@@ -96,7 +117,7 @@ def draw(result: Any, ax: "Axes | None" = None) -> "Axes":
 
     if not isinstance(ax, Axes | None):
         raise InputError([Fault(f"found {type(ax).__name__}; accepted: Axes of Matplotlib, or None", ("ax",))])
-    if not (name := maker_of(result).picture):
+    if not (name := picture_of(result)):
         advice = "plot a solution of it, or the result that it is a part of"
         raise InputError([Fault(f"there is no picture of a {type(result).__name__} alone; {advice}")])
     axes: Axes = getattr(plots, name)(result, ax=ax)
@@ -189,12 +210,9 @@ def _origin(
     from tmsopt.documents.explored import frame_explorer
     from tmsopt.documents.html import escape_text, mark_list, mark_verbatim
 
-    yield Chapter("explorer", (), "Explorer", "whole"), frame_explorer(result, design)
+    yield Chapter("explorer", width="whole"), frame_explorer(result, design)
     text = mark_verbatim(report(result, full), "report as text")
-    yield (
-        Chapter("text", (), "As text", "whole"),
-        f"<details><summary>The report as text</summary>{text}</details>",
-    )
+    yield Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"
     seed = getattr(getattr(result, "study", None), "seed", seed)
     about = {
         **{name: found or "" for name, found in installed_versions(_PACKAGES).items()},
@@ -208,7 +226,7 @@ def _origin(
         for n, t in ({"command": command} | dict(files)).items()
         if t
     )
-    yield Chapter("origin", (), "Where it is from", "whole"), mark_list(about.items()) + texts
+    yield Chapter("origin", "Where it is from", "whole"), mark_list(about.items()) + texts
 
 
 def response(solution: Any, **asked: Any) -> Any:

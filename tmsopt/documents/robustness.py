@@ -1,11 +1,10 @@
 """How far the boundaries of a design are."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 
 from tmsopt.boundaries.nearest import Nearest, Robustness
-from tmsopt.documents.blocks import Badge, Cell, Chapter, Level, Sentence, TableBlock
-from tmsopt.documents.maker import Maker
+from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, Words, judge
 from tmsopt.models import Model, in_words_of, words_of
 from tmsopt.problem.unit_system import unit_of
 
@@ -23,19 +22,20 @@ _OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
 
-def summarise_robustness(found: Robustness) -> Iterator[Badge]:
+def summarise_robustness(found: Robustness) -> Words:
     """How far stability reaches, and to what."""
     if found.stable is not None:
-        yield Badge("stable", "good") if found.stable else Badge("not stable", "bad")
-    yield Badge(_format_value("radius" if found.stable else "to stability", found.limit.distance))
+        yield judge(found.stable, "stable")
+    yield _format_value("radius" if found.stable else "to stability", found.limit.distance)
     if found.limit.found:
-        yield Badge(f"to {found.limit.kind}")
+        yield f"to {found.limit.kind}"
 
 
-def write_robustness(found: Robustness, _level: Level) -> Iterator[Chapter]:
+def write_robustness(found: Robustness, _level: Level) -> Parts:
     """The sentence, then the nearest point of every boundary."""
-    yield Chapter("answer", (Sentence(describe_robustness(found), "robustness", "answer"),))
-    yield Chapter("boundaries", (tabulate_boundaries(found),))
+    yield Sentence(describe_robustness(found), "robustness", "answer")
+    yield Chapter("boundaries")
+    yield tabulate_boundaries(found)
 
 
 def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
@@ -87,22 +87,22 @@ def tabulate_boundaries(found: Robustness) -> TableBlock:
     return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
 
 
-def summarise_nearest(nearest: Nearest) -> Iterator[Badge]:
+def summarise_nearest(nearest: Nearest) -> Words:
     """Which boundary, and how far."""
-    yield Badge(nearest.kind)
-    yield Badge(_format_value("distance", nearest.distance) if nearest.found else "none found")
+    yield nearest.kind
+    yield _format_value("distance", nearest.distance) if nearest.found else "none found"
 
 
-def write_nearest(found: Nearest, _level: Level) -> Iterator[Chapter]:
+def write_nearest(found: Nearest, _level: Level) -> Parts:
     """How far one boundary is, then its nearest point and the change of each parameter in weights."""
     if not found.found:
-        yield Chapter("answer", (Sentence(f"no point of the boundary of {found.kind} was found"),))
+        yield f"no point of the boundary of {found.kind} was found"
         return
     crossing = "" if found.refined else ", the nearest crossing seen"
-    yield Chapter("answer", (Sentence(f"{found.distance:.6g} in weights{crossing}", f"to {found.kind}", "answer"),))
-    rows: list[Sequence[Cell | str]] = [("", "there", "change in weights")]
-    rows += [(n, Cell(found.parameters[n], digits=8), f"{change:+.4g}") for n, change in found.direction.items()]
-    yield Chapter("boundary", (TableBlock(rows, "Nearest point of the boundary"),))
+    yield Sentence(f"{found.distance:.6g} in weights{crossing}", f"to {found.kind}", "answer")
+    yield Chapter("boundary")
+    rows = [(n, Cell(found.parameters[n], digits=8), f"{change:+.4g}") for n, change in found.direction.items()]
+    yield TableBlock((("", "there", "change in weights"), *rows), "Nearest point of the boundary")
 
 
 def _name_row(n: Nearest, found: Robustness) -> str:
@@ -149,9 +149,3 @@ def _format_percent(x: float, sign: str = "") -> str:
 
 def _format_value(name: str, value: float) -> str:
     return f"{name} = {value:.5g}" if math.isfinite(value) else f"no {name}"
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Robustness": Maker(summarise_robustness, write_robustness, "draw_robustness"),
-    "Nearest": Maker(summarise_nearest, write_nearest, "draw_robustness"),
-}

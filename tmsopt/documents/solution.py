@@ -1,7 +1,7 @@
 """The report of a solution: the answer first, then what it does, its limits, how sure it is, and how to see more."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from tmsopt import plots
 from tmsopt.analysis import Lever, bound_lines, proof_line, structure_line
@@ -9,15 +9,17 @@ from tmsopt.documents.analysis import Analysis
 from tmsopt.documents.blocks import (
     ALL,
     Badge,
-    Block,
     Cell,
     Chapter,
     Figure,
     Level,
+    Parts,
+    Row,
     Sentence,
     TableBlock,
     Tone,
     Verbatim,
+    Words,
 )
 from tmsopt.documents.design_rows import (
     convert_to_si,
@@ -34,8 +36,7 @@ from tmsopt.documents.design_rows import (
     parameters_of_worst_case,
     round_to_zero,
 )
-from tmsopt.documents.explanation import describe_rounding, explain_diagnosis, explain_optimality, tabulate_rounding
-from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.explanation import describe_rounding, tabulate_rounding, write_diagnosis, write_optimality
 from tmsopt.documents.robustness import describe_robustness, tabulate_boundaries
 from tmsopt.documents.speeds import describe_range
 from tmsopt.evaluation import abscissa_as_stored
@@ -52,21 +53,19 @@ _FOLD, _FIXED = 5, 14  # rows of free parameters below each other, and fixed one
 _LIMITS = 3  # limits that a brief report shows
 _OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
 
-Blocks = Iterator[Block]
 
-
-def summarise_solution(solution: Solution) -> Iterator[Badge]:
+def summarise_solution(solution: Solution) -> Words:
     """Status, objective, structure, proof, stability."""
     problem = solution.problem.posed
     yield Badge(status_text(problem, solution.status), "good" if solution.status == "optimal" else "bad")
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
-    yield Badge(f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}")
+    yield f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}"
     if stored := abscissa_as_stored(solution):
-        yield Badge(stored)
+        yield stored
     if solution.missed:
-        yield Badge(f"misses {amounts_text(problem, solution.missed)}")
-    yield Badge(solution.structure)
+        yield f"misses {amounts_text(problem, solution.missed)}"
+    yield solution.structure
     if solution.bound.proven:
         yield Badge("proved", "good")
     if verdict := solution.stability.verdict:
@@ -82,7 +81,7 @@ def write_solution(
     full: bool = False,
     si: Mapping[str, float] | None = None,
     tabulated: bool = False,
-) -> Iterator[Chapter]:
+) -> Parts:
     """The parts of the report in order.
 
     Args:
@@ -92,62 +91,65 @@ def write_solution(
     """
     analysis, scaled = solution.analysis, si or convert_to_si(solution)
     full, page, brief = full or level == "full", level == "page", level == "brief"
-    first = "conflict" if solution.status == "infeasible" else "answer"
-    yield Chapter(first, tuple(_write_answer(solution, analysis, brief, full)))
+    yield Chapter("conflict" if solution.status == "infeasible" else "answer")
+    yield from _write_answer(solution, analysis, brief, full)
     if page:
         yield from write_bicycle(solution)
-    notes = (Sentence(note, "note") for note in solution.notes)
-    yield Chapter(
-        "design",
-        (*_write_design(solution, scaled, brief and not tabulated, si is not None), *notes),
-        "Parameters",
-        "wide",
-    )
-    yield Chapter("motion", tuple(_write_motion(solution, analysis, scaled, brief)))
+    yield Chapter("design", "Parameters", "wide")
+    yield from _write_design(solution, scaled, brief and not tabulated, si is not None)
+    yield from (Sentence(note, "note") for note in solution.notes)
+    yield Chapter("motion")
+    yield from _write_motion(solution, analysis, scaled, brief)
     if page:
         yield from write_growth_picture(solution)
-    yield Chapter("cases", tuple(_write_cases(solution)))
-    limits, sureness = _write_limits(solution, analysis, full, page), _write_sureness(solution, analysis, brief, full)
+    yield Chapter("cases")
+    yield from _write_cases(solution)
+    yield Chapter("limits", width="wide")
+    yield from _write_limits(solution, analysis, full, page)
+    if not brief:
+        yield Chapter("sureness", "How sure it is")
+    yield from _write_sureness(solution, analysis, brief, full)
     if brief:
-        yield Chapter("limits", (*limits, *sureness, _suggest_more(solution, analysis)))
+        yield _suggest_more(solution, analysis)
         return
-    yield Chapter("limits", tuple(limits), "", "wide")
-    yield Chapter("sureness", tuple(sureness), "How sure it is")
     if full:
-        yield Chapter("roots", tuple(_write_roots(solution, analysis)))
-    rows = list_quantities(solution, scaled)
+        yield Chapter("roots")
+        yield from _write_roots(solution, analysis)
+    yield Chapter("quantities", "Derived quantities", "wide")
     head = ("quantity", "value", "unit", "in SI", "meaning")
-    yield Chapter("quantities", (TableBlock((head, *rows), "Quantities of the design"),), "Derived quantities", "wide")
-    yield Chapter("search", tuple(_write_search(solution)))
+    yield TableBlock((head, *list_quantities(solution, scaled)), "Quantities of the design")
+    yield Chapter("search")
+    yield from _write_search(solution)
 
 
-def write_bicycle(solution: Solution) -> Iterator[Chapter]:
+def write_bicycle(solution: Solution) -> Parts:
     """The bicycle to scale, or the sketch that its model has."""
+    yield Chapter("bicycle")
     if solution.problem.model is tms:
         caption = "The bicycle from its right side, to scale, in wheelbases; z points down"
-        yield Chapter("bicycle", (Figure(lambda: plots.draw_bicycle(solution), caption),))
+        yield Figure(plots.draw_bicycle, solution, caption)
     elif sketch := describe(solution).sketch:
-        yield Chapter("bicycle", (Verbatim(sketch, "sketch of the model, not to scale"),))
+        yield Verbatim(sketch, "sketch of the model, not to scale")
 
 
-def write_growth_picture(solution: Solution) -> Iterator[Chapter]:
+def write_growth_picture(solution: Solution) -> Parts:
     """Growth rates and frequencies over the speed, or the first parameter."""
     from tmsopt.dynamics import growth
 
     try:
-        found = growth(remove_titles(solution))
+        found = growth(solution)
     except Exception:  # a root at infinity, or nothing that could vary: nothing to draw
         return
+    yield Chapter("growth", "Growth and frequencies")
     caption = f"Growth rates and frequencies over {found.over.name}; stable where it is shaded"
-    figure = Figure(lambda: plots.growth_figure(found), caption)
-    yield Chapter("growth", (figure,), "Growth and frequencies")
+    yield Figure(plots.growth_figure, found, caption)
 
 
 def tabulate_parameters(solution: Solution, si: Mapping[str, float]) -> TableBlock:
     """Every parameter with its role, its range, what it is in the other set, and its meaning."""
     ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
     other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
-    rows: list[Sequence[Cell | str]] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
+    rows: list[Row] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
     for name, value, unit, how, also, meaning in list_parameters(solution, si):
         rows.append((name, value, unit, how, ranges[str(name)] if how == "free" else "", also, meaning))
     return TableBlock(rows, "Parameters of the design")
@@ -174,18 +176,20 @@ def judge_tone(solution: Solution) -> Tone:
     return "good" if solution.stability.verdict == STABLE else "doubt"
 
 
-def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
+def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Parts:
     ended, asked = write_headline(solution)
     obstacles, further = analysis.obstacles
     if solution.status == "infeasible":
         joined = ": " not in ended.text and obstacles
         yield Sentence(f"{ended.text}: {obstacles[0]}" if joined else ended.text, tone="bad")
-        yield from map(Sentence, obstacles[1:] if joined else obstacles)
+        yield from obstacles[1:] if joined else obstacles
         yield from (Sentence(text, "violated") for text in _list_violations(solution))
         yield Sentence(asked.text, "nearest design")
     else:
-        yield from (ended, asked, *map(Sentence, obstacles))
-    yield from map(Sentence, further if full else ())
+        yield ended
+        yield asked
+        yield from obstacles
+    yield from further if full else ()
     yield Sentence(proof_line(solution), "proof")
     active = [
         f"{name} ({text})" if (text := limit_text(solution.problem.posed, name)) else name for name in solution.active
@@ -202,7 +206,7 @@ def _list_violations(solution: Solution) -> Iterator[str]:
         yield f"{name} ({asked}){by if name not in _OTHER else ''}"
 
 
-def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Blocks:
+def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Parts:
     """Free parameters side by side where they are many, and the fixed ones in a sentence; or all in a table."""
     if not brief:
         yield tabulate_parameters(solution, si)
@@ -226,15 +230,15 @@ def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scal
         yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
 
 
-def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Blocks:
+def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Parts:
     at = describe_speed(solution, solution.worst)
     yield Sentence(f"{f'at {at}: ' if at else ''}{describe_motion(solution)}", "motion")
     if analysis.stable_speeds is not None:
-        yield Sentence(describe_range(analysis.stable_speeds, solution))
+        yield describe_range(analysis.stable_speeds, solution)
     label, text = describe_roots(solution, _DIGITS)
     yield Sentence(text, label)
     if not brief:
-        yield from map(Sentence, describe_stored(solution))
+        yield from describe_stored(solution)
     if "load_rear" in solution.quantities:
         yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution, si)}", "loads")
     if omits := solution.problem.model.omits:
@@ -243,7 +247,7 @@ def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float
         yield Sentence(inertia, "inertia at which it is no longer stable, each alone (radius of gyration)")
 
 
-def _write_cases(solution: Solution) -> Blocks:
+def _write_cases(solution: Solution) -> Parts:
     """The worst case, and what is known of all of them."""
     if solution.worst is None:
         return
@@ -272,7 +276,7 @@ def _describe_case(solution: Solution, case: Case) -> str:
     )
 
 
-def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Blocks:
+def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Parts:
     found = analysis.full_explanation if full else analysis.explanation
     if page and (rows := list_limits(solution)):
         yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
@@ -280,7 +284,7 @@ def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool
         worth = [list_lever(solution, lever) for lever in found.levers]
         head = ("active limit", "stands at", "a move of it", "buys, to first order")
         yield TableBlock((head, *worth), "What the active limits are worth", most=_LIMITS)
-        yield from (Sentence(lever.sentence) for lever in found.levers if full)
+        yield from (lever.sentence for lever in found.levers if full)
     yield from (Sentence(text, "warning", "doubt") for text in (found.warnings if found else ()))
 
 
@@ -329,7 +333,7 @@ def list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
 
 
-def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
+def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Parts:
     robust = analysis.boundaries if full else analysis.robustness
     if robust is not None:
         yield Sentence(describe_robustness(robust, solution.stability.on_edge), "robustness")
@@ -340,25 +344,25 @@ def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: b
         if not brief:
             yield tabulate_rounding(found)
     if not brief:
-        yield from map(Sentence, bound_lines(solution))
+        yield from bound_lines(solution)
     if found is not None and not brief:
-        yield from explain_optimality(found.optimality)
+        yield from write_optimality(found.optimality)
 
 
-def _write_roots(solution: Solution, analysis: Analysis) -> Blocks:
+def _write_roots(solution: Solution, analysis: Analysis) -> Parts:
     if solution.multiple_as_rounded:
-        yield Sentence("roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed")
+        yield "roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed"
     for diagnosis in analysis.diagnoses:
-        yield from explain_diagnosis(diagnosis, full=True)
+        yield from write_diagnosis(diagnosis)
 
 
-def _write_search(solution: Solution) -> Blocks:
+def _write_search(solution: Solution) -> Parts:
     free, starts, problem = solution.freedom, solution.starts, solution.problem
     if problem.locate:
         parameters = "parameter" if free.free == 1 else "parameters"
         conditions = "condition" if free.conditions == 1 else "conditions"
         yield Sentence(f"{free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}", "freedom")
-    yield from map(Sentence, list_branches(solution))
+    yield from list_branches(solution)
     if starts.tried:
         led = starts.tried - starts.runs
         also = f", {led} of which lead{'s' * (led == 1)} straight to where others ended" if starts.runs and led else ""
@@ -388,6 +392,3 @@ def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
     }
     named = ", ".join(name for name, answers in commands.items() if answers)
     return Sentence(f"--full; then tmsopt {named} with the same file" if named else "--full", "more", "dim")
-
-
-MAKERS: Mapping[str, Maker] = {"Solution": Maker(summarise_solution, write_solution, "draw_growth")}

@@ -1,12 +1,23 @@
 """The speeds at which the motion of a design changes, and its roots over a parameter."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from tmsopt import plots
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_things
+from tmsopt.documents.blocks import (
+    Block,
+    Cell,
+    Chapter,
+    Figure,
+    Level,
+    Parts,
+    Row,
+    Sentence,
+    TableBlock,
+    Words,
+    count_things,
+)
 from tmsopt.documents.design_rows import format_frequency, format_multiplicity
-from tmsopt.documents.maker import Maker, remove_titles
 from tmsopt.dynamics.crossings import Crossing, Stretch
 from tmsopt.dynamics.growth import Growth
 from tmsopt.dynamics.speeds import Speeds, speed_of
@@ -17,68 +28,71 @@ from tmsopt.problem.unit_system import Unit, common_unit, unit_of
 _DIGITS = 15
 
 
-def summarise_speeds(found: Speeds) -> Iterator[Badge]:
+def summarise_speeds(found: Speeds) -> Words:
     """Where the design is stable."""
-    yield Badge(found.parameter)
-    yield Badge(f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.parameter))}")
-    yield Badge(count_things(len(found.found), "critical value"))
+    yield found.parameter
+    yield f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.parameter))}"
+    yield count_things(len(found.found), "critical value")
 
 
-def write_speeds(found: Speeds, level: Level) -> Iterator[Chapter]:
+def write_speeds(found: Speeds, level: Level) -> Parts:
     """The stable and the heavily damped bands, and every speed with what happens there."""
     unit, real = unit_of(found.problem.posed, found.parameter), found.problem.model.carrier is None
     end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
     within = f" {unit.text}" if unit.text else ""
     asked = f"{unit.number(found.lower, 6)} < {found.parameter}{end}{within}"
-    answer: list[Block] = [Sentence(f"{asked}, by exact root isolation for the numbers as stored")]
-    answer += [Sentence(found.problem.model.omits, "model")] if found.problem.model.omits else []
-    yield Chapter("range", tuple(answer), "Answer")
-    yield Chapter("speeds", (_tabulate_crossings(found, unit, real),), "Critical speeds", "wide")
-    bands = [Sentence(text) for text in _list_identities(found)]
-    bands.append(Sentence(_describe_bands(found, found.stable), "stable", "good" if found.stable else "bad"))
+    yield Chapter("range", "Answer")
+    yield f"{asked}, by exact root isolation for the numbers as stored"
+    if found.problem.model.omits:
+        yield Sentence(found.problem.model.omits, "model")
+    yield Chapter("speeds", "Critical speeds", "wide")
+    yield _tabulate_crossings(found, unit, real)
+    yield Chapter("bands")
+    yield from _list_identities(found)
+    yield Sentence(_describe_bands(found, found.stable), "stable", "good" if found.stable else "bad")
     if found.always and (found.zeros or "weave" in found.always):
-        bands.append(Sentence(_describe_bands(found, found.marginal), _describe_marginal(found), "doubt"))
+        yield Sentence(_describe_bands(found, found.marginal), _describe_marginal(found), "doubt")
     if real:
-        bands.append(Sentence(_describe_bands(found, found.heavily_damped), "heavily damped"))
-    yield Chapter("bands", tuple(bands))
+        yield Sentence(_describe_bands(found, found.heavily_damped), "heavily damped")
     if level == "page":
-        caption = f"Roots over {found.parameter}"
-        yield Chapter("picture", (Figure(lambda: plots.draw_speeds(remove_titles(found)), caption),))
+        yield Chapter("picture")
+        yield Figure(plots.draw_speeds, found, f"Roots over {found.parameter}")
 
 
-def _tabulate_crossings(found: Speeds, unit: Unit, real: bool) -> Block:
+def _tabulate_crossings(found: Speeds, unit: Unit, real: bool) -> Block | str:
     if not found.found:
         root, axis = ("root", "imaginary") if real else ("eigenfrequency", "real")
         others = f"besides what holds for every {found.parameter}, " if found.always else ""
-        return Sentence(f"{others}no {root} meets another or the {axis} axis")
+        return f"{others}no {root} meets another or the {axis} axis"
     held = {n: x for n, x in found.parameters.items() if n != found.parameter}
     per = common_unit(found.problem.posed, "abscissa", held)
     roots = f"root {per.text}".rstrip() if real else "eigenfrequency"
-    rows: list[Sequence[Cell | str]] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
+    rows: list[Row] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
     for c in found.found:
         place = _format_root(c, per) if real else format_frequency(-c.root.im, c.root.re, 12, c.root.multiplicity)
-        rows.append((in_words_of(found.problem.model, c.kind), Cell(c.at, unit, _DIGITS), place, _describe_change(c)))
+        change = "stability changes" if c.changes else "rightmost" if c.rightmost else ""
+        rows.append((in_words_of(found.problem.model, c.kind), Cell(c.at, unit, _DIGITS), place, change))
     return TableBlock(rows, "Speeds at which the motion changes", needs=(3, 3, 1, 2))
 
 
-def summarise_growth(found: Growth) -> Iterator[Badge]:
+def summarise_growth(found: Growth) -> Words:
     """Where the design is stable."""
-    yield Badge(f"over {found.over.name}")
-    yield Badge(f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.over.name))}")
-    yield Badge(found.structure)
+    yield f"over {found.over.name}"
+    yield f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.over.name))}"
+    yield found.structure
 
 
-def write_growth(found: Growth, _level: Level) -> Iterator[Chapter]:
+def write_growth(found: Growth, _level: Level) -> Parts:
     """Over what, where the design stands, and the stable and the heavily damped bands."""
     unit, real = unit_of(found.problem.posed, found.over.name), found.problem.model.carrier is None
     critical = f", critical value {unit.show(found.critical, 8)}" if math.isfinite(found.critical) else ""
     over = f"over {found.over.name} from {unit.number(found.values[0], 6)} to {unit.show(found.values[-1], 6)}"
     at = f"{found.over.name} = {unit.show(found.design, 8)}, structure {found.structure}{critical}"
-    lines = [Sentence(f"{'roots' if real else 'eigenfrequencies'} {over}"), Sentence(at, "the design")]
+    yield f"{'roots' if real else 'eigenfrequencies'} {over}"
+    yield Sentence(at, "the design")
     for name, bands in [("stable", found.stable), ("heavily damped", found.heavily_damped)][: 2 if real else 1]:
         listed = ", ".join(f"{unit.number(low, 8)} to {unit.show(high, 8)}" for low, high in bands)
-        lines.append(Sentence(listed or "nowhere", name))
-    yield Chapter("answer", tuple(lines))
+        yield Sentence(listed or "nowhere", name)
 
 
 def _list_identities(found: Speeds) -> Iterator[str]:
@@ -113,12 +127,6 @@ def _format_root(c: Crossing, unit: Unit) -> str:
     return f"{real}± {unit.number(c.root.im, 12)}i{times}"
 
 
-def _describe_change(c: Crossing) -> str:
-    if c.changes:
-        return "stability changes"
-    return "rightmost" if c.rightmost else ""
-
-
 def _describe_bands(found: Speeds, bands: Sequence[Stretch]) -> str:
     return _format_bands(bands, (found.lower, found.upper), unit_of(found.problem.posed, found.parameter))
 
@@ -148,9 +156,3 @@ def describe_range(stable: Sequence[Stretch], solution: Solution) -> str:
     unit, ends = unit_of(solution.problem.posed, name), of[name].range
     bands = _format_bands(stable, (ends.lower, ends.upper), unit, 5)
     return f"stable in {name}: {bands}; this design at {unit.show(solution.parameters[name])}"
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Speeds": Maker(summarise_speeds, write_speeds, "draw_speeds"),
-    "Growth": Maker(summarise_growth, write_growth, "draw_growth"),
-}
