@@ -166,7 +166,7 @@ class Document:
 
 
 Words = Iterator[Badge | str]
-"""What a result is and how it ended."""
+"""What a result is and how it ended; empty ones are left out, here and in `Parts`."""
 
 Parts = Iterator[Chapter | Block | str]
 """A document in the order in which it is read: chapters, each before its blocks; a text is a sentence."""

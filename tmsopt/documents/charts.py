@@ -73,20 +73,18 @@ def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Parts:
 def _tabulate_designs(chart: Chart) -> Parts:
     """Designs of the grid, every so many along each axis where they are too many."""
     problem, shown = chart.problem, _thin_chart(chart, MOST)
-    units = {n: unit_of(problem.posed, n) for n in (*chart.axes, "abscissa")}
-    grid = np.meshgrid(*reversed(shown.grid), indexing="ij")
-    columns: dict[str, list[Cell | str]] = {
-        f"{n} {units[n].text}".rstrip(): [Cell(x, units[n], 6) for x in values.ravel().tolist()]
-        for n, values in zip(chart.axes, reversed(grid), strict=True)
-    }
     left_out = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
     left_out += [] if problem.model.carrier is None else ["damping_ratio", "real_roots"]  # eigenfrequencies have none
-    for name, layer in ((n, layer) for n, layer in shown.layers.items() if n not in left_out):
+    grid = reversed(np.meshgrid(*reversed(shown.grid), indexing="ij"))
+    layers = {n: layer for n, layer in shown.layers.items() if n not in left_out}
+    columns: dict[str, list[Cell | str]] = {}
+    for name, layer in (*zip(chart.axes, grid, strict=True), *layers.items()):
         values = np.asarray(layer).ravel().tolist()
         if name == "kind":
             columns["class"] = [in_words_of(problem.model, CLASSES[k]) for k in values]
-        elif name == "abscissa":
-            columns[f"abscissa {units[name].text}".rstrip()] = [Cell(x, units[name], 6) for x in values]
+        elif name in (*chart.axes, "abscissa"):
+            unit = unit_of(problem.posed, name)
+            columns[f"{name} {unit.text}".rstrip()] = [Cell(x, unit, 6) for x in values]
         else:
             columns[name.replace("_", " ")] = [format_value(x) for x in values]
     yield Chapter("rows", "Designs", "whole")

@@ -23,7 +23,7 @@ from tmsopt.documents.blocks import (
     Words,
     count_things,
 )
-from tmsopt.documents.design_rows import format_frequency, format_multiplicity
+from tmsopt.documents.design_rows import format_pair, format_root
 
 _SHARE, _NIL = 0.05, 1e-9
 """Of decay and objective: what rounding may cost; what is nothing."""
@@ -153,17 +153,9 @@ def write_optimality(found: Optimality, _level: Level = "full") -> Parts:
 
 
 def _list_root(root: RightmostRoot) -> tuple[str, ...]:
-    place = _format_place(root.re, root.im, 5)
-    if (omega := root.eigenfrequency) is not None:
-        place = format_frequency(omega.real, omega.imag, 5)
     share = f"{100 * root.share:.3g} %" if root.share < 1 - 1e-9 else ""
     kappa = f"{_drop_noise(root.kappa, root.beta):.4g}" if root.multiplicity > 1 else ""
-    return place + format_multiplicity(root.multiplicity), f"{root.beta:.4g}", share, kappa
-
-
-def _format_place(re: float, im: float, digits: int) -> str:
-    """A root or a pair; a real part that is only rounding is 0."""
-    return f"{_drop_noise(re, math.hypot(re, im)):.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
+    return format_root(root, 5, root.multiplicity), f"{root.beta:.4g}", share, kappa
 
 
 def _drop_noise(x: float, size: float = 1.0) -> float:
@@ -174,7 +166,7 @@ def _drop_noise(x: float, size: float = 1.0) -> float:
 def summarise_diagnosis(found: Diagnosis) -> Words:
     """The root and its chains."""
     yield f"{found.algebraic}-fold {'pair' if found.im else 'root'}"
-    yield f"{found.re:.5g}" + (f" ± {found.im:.5g}i" if found.im else "")
+    yield format_pair(found.re, found.im, 5)
     yield found.kind
 
 
@@ -188,7 +180,6 @@ def write_diagnosis(found: Diagnosis, level: Level = "full") -> Parts:
 
 
 def _describe_root(found: Diagnosis) -> str:
-    place = _format_place(found.re, found.im, 8)
     vectors = count_things(found.geometric, "independent eigenvector")
     if found.jordan is None:
         why = "there are no matrices to judge by, so one chain of eigenvectors, as for a companion matrix"
@@ -201,9 +192,8 @@ def _describe_root(found: Diagnosis) -> str:
     many = "s" if len(found.partial) > 1 else ""
     chains = f"Jordan chain{many} of length {lengths}" if found.partial else "chains not decided"
     what = "pair" if found.im else "root"
-    if (omega := found.eigenfrequency) is not None:
-        what, place = "eigenfrequency", format_frequency(omega.real, omega.imag, 8)
-    return f"{found.algebraic}-fold {what} {place}: {found.kind}, {chains} ({why})"
+    what = what if found.eigenfrequency is None else "eigenfrequency"
+    return f"{found.algebraic}-fold {what} {format_root(found, 8)}: {found.kind}, {chains} ({why})"
 
 
 def _describe_splitting(found: Diagnosis, full: bool) -> str:

@@ -2,8 +2,8 @@
 
 from tmsopt import plots
 from tmsopt.documents.blocks import (
+    ALL,
     Badge,
-    Cell,
     Chapter,
     Figure,
     Level,
@@ -15,10 +15,9 @@ from tmsopt.documents.blocks import (
     count_things,
     say_whether,
 )
-from tmsopt.documents.tables import write_question
+from tmsopt.documents.tables import head_numbers, list_numbers, write_question
 from tmsopt.evaluation import missed_note
 from tmsopt.fronts.front import Front
-from tmsopt.problem.unit_system import unit_at, unit_of
 
 _LABEL, _ROWS = 40, 20  # characters of what happens at a point, and points, of a brief report
 
@@ -60,17 +59,17 @@ def write_front(front: Front, level: Level) -> Parts:
 
 def list_points(front: Front, full: bool) -> list[Row]:
     """Headings, and the cells of each point; all digits and whole labels where it is `full`."""
+    problem, digits = front.problem.posed, ALL if full else 6
     texts = [t.strip() for t in front.objectives]
-    free = [n for n in front.problem.free if n not in texts]
-    units, digits = {n: unit_of(front.problem.posed, n) for n in (*texts, *free)}, 12 if full else 6
-    some = dict.fromkeys(front.problem.posed.parameter_set.names, 1.0)  # a unit has one name for all designs
-    heads = {n: f"{n} {unit_at(front.problem.posed, n, some).text}".rstrip() for n in units}
-    head = (*(heads[t] for t in texts), "stable", "special", *(heads[n] for n in free), "structure", "active limits")
-    rows: list[Row] = [head]
+    free = [n for n in problem.free if n not in texts]
+    first, last = (head_numbers(problem, names) for names in (texts, free))
+    rows: list[Row] = [(*first, "stable", "special", *last, "structure", "active limits")]
     for p in front.points:
-        each = (unit_at(front.problem.posed, t, p.solution.parameters) for t in texts)
-        numbers = [Cell(v, unit, digits) for unit, v in zip(each, p.objectives, strict=True)]
-        design = [Cell(p.solution.parameters[n], units[n], digits) for n in free]
-        label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
-        rows.append((*numbers, say_whether(p.stable), label, *design, p.structure, ", ".join(p.limits)))
+        design, label = (
+            p.solution.parameters,
+            p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…",
+        )
+        objectives = list_numbers(problem, texts, dict(zip(texts, p.objectives, strict=True)), design, digits)
+        numbers = list_numbers(problem, free, design, design, digits)
+        rows.append((*objectives, say_whether(p.stable), label, *numbers, p.structure, ", ".join(p.limits)))
     return rows

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tmsopt import plots
 from tmsopt.documents.blocks import Chapter, Figure, Level, Parts, Sentence, TableBlock, Words, judge
-from tmsopt.documents.design_rows import format_multiplicity
+from tmsopt.documents.design_rows import format_root
 from tmsopt.documents.tables import tabulate_records
 from tmsopt.dynamics.speeds import speed_of
 from tmsopt.problem import unit_of
@@ -37,8 +37,7 @@ def write_simulation(motion: "Simulation", level: Level) -> Parts:
     time, name = _format_with_unit(motion, "t", motion["t"][-1]), speed_of(motion.problem.posed.parameter_set)
     at = f" at {name} = {unit_of(motion.problem.posed, name).show(motion.parameters[name])}" if name else ""
     yield f"motion over {time}{at} {_describe_cause(motion)}"
-    if motion.problem.model.omits:
-        yield Sentence(motion.problem.model.omits, "model")
+    yield Sentence(motion.problem.model.omits, "model")
     if level == "page":
         yield Chapter("picture")
         yield Figure(plots.draw_motion, motion, "The motion")
@@ -93,7 +92,8 @@ def _list_modes(motion: "Simulation", full: bool) -> Iterator[Sequence[str]]:
     heads = ("steer per lean", "steer ahead of lean") if bicycle else ("amplitudes and phases",)
     yield f"{'eigenfrequency' if motion.problem.model.double else 'root'} {unit}".rstrip(), *heads
     for mode in motion.modes:
-        root = _format_root(motion, mode) + format_multiplicity(mode.multiplicity)
+        size = abs(mode.im) if mode.eigenfrequency is None else _largest_size(motion)
+        root = format_root(mode, 6, mode.multiplicity, _NOTHING * size)
         if bicycle:
             ratio = f"{mode.steer_per_lean:.4g}" if math.isfinite(mode.steer_per_lean) else "no lean"
             yield root, ratio, _format_degrees(mode.phases["delta"])
@@ -131,16 +131,6 @@ def _write_notes(motion: "Simulation") -> Iterator[str]:
         angles = [abs(m.peak) for m in motion.measures if motion.units.get(m.name) == "rad"]
         if max(angles) > math.radians(_STEEP):
             yield f"beyond {_STEEP:.0f} deg the equations, which are linear, tell what a smaller push does, enlarged"
-
-
-def _format_root(motion: "Simulation", mode: "ModeShape") -> str:
-    """A root, or an eigenfrequency, of which a part that is rounding is 0."""
-    if mode.eigenfrequency is not None:
-        least = _NOTHING * _largest_size(motion)
-        re, im = (0.0 if abs(x) <= least else x for x in (mode.eigenfrequency.real, mode.eigenfrequency.imag))
-        return f"{re:.6g}" + (f" {'-' if im < 0 else '+'} {abs(im):.6g}i" if im else "")
-    re = 0.0 if abs(mode.re) < _NOTHING * abs(mode.im) else mode.re
-    return f"{re:.6g}" + (f" ± {mode.im:.6g}i" if mode.im else "")
 
 
 def _largest_size(motion: "Simulation") -> float:

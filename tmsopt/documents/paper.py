@@ -45,8 +45,7 @@ def write_comparison(comparison: Comparison, _level: Level) -> Parts:
     design = comparison.design
     model = design.problem.model
     yield from write_headline(design)
-    if model.omits:
-        yield Sentence(model.omits, "model")
+    yield Sentence(model.omits, "model")
     if model is tms:
         yield Chapter("laws", width="wide")
         yield from _write_laws(comparison)

@@ -22,8 +22,8 @@ from tmsopt.documents.blocks import (
     judge,
     say_whether,
 )
-from tmsopt.documents.design_rows import convert_to_si, format_multiplicity
-from tmsopt.documents.solution import tabulate_parameters, write_bicycle, write_growth_picture
+from tmsopt.documents.design_rows import convert_to_si, format_multiplicity, tabulate_parameters
+from tmsopt.documents.solution import write_bicycle, write_growth_picture
 from tmsopt.documents.tables import write_question
 from tmsopt.global_search import Completeness
 from tmsopt.models.user_spectrum import pattern_of
@@ -58,8 +58,7 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
     """
     verdict = judge(proof.proved, "proved")
     yield Sentence(proof.claim, verdict.text, verdict.tone)
-    if proof.reason:
-        yield Sentence(proof.reason, "why")
+    yield Sentence(proof.reason, "why")
     if proof.problem is None:
         return
     problem = proof.problem.posed
@@ -93,31 +92,35 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
 
 def list_numbers(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
     """The numbers solved for, and the roots: name, decimal, radius, unit."""
-    rows = []
+    return [
+        (name, x.value, "exact" if x.radius == "0" else f"± {x.radius}", unit)
+        for name, x, unit in _find_numbers(problem, proof)
+    ]
+
+
+def _find_numbers(problem: Posed, proof: Proof) -> Iterator[tuple[str, Number, str]]:
     units = _find_units(problem, proof)
     per = units.get("abscissa", "")
     for name in proof.moved:
-        unit = problem.parameter_set[name].unit
-        rows.append((name, *_format_ball(proof.parameters[name]), "" if unit == "1" else unit))
+        yield name, proof.parameters[name], units.get(name, "")
         if name in proof.tangents:
-            rows.append((f"tan({name})", *_format_ball(proof.tangents[name]), ""))
-    own = ((name, x) for name, x in proof.unknowns.items() if not _OF_OTHERS.fullmatch(name))
-    rows += [(name, *_format_ball(x), units.get(name, "")) for name, x in own]
+            yield f"tan({name})", proof.tangents[name], ""
+    for name, x in proof.unknowns.items():
+        if not _OF_OTHERS.fullmatch(name):
+            yield name, x, units.get(name, "")
     if proof.abscissa:
-        rows.append(("abscissa", *_format_ball(proof.abscissa), per))
-    if proof.eigenfrequencies:
-        for omega in proof.eigenfrequencies:
-            rows += [(f"eigenfrequency{format_multiplicity(omega.multiplicity)}, re", *_format_ball(omega.re), "")]
-            rows += [("  im", *_format_ball(omega.im), "")]
-        return rows
+        yield "abscissa", proof.abscissa, per
+    for omega in proof.eigenfrequencies:
+        yield f"eigenfrequency{format_multiplicity(omega.multiplicity)}, re", omega.re, ""
+        yield "  im", omega.im, ""
     listed = {number.value for number in proof.unknowns.values()}
-    for root in (r for r in proof.roots if r.re.value not in listed or r.im.value != "0"):
+    for root in () if proof.eigenfrequencies else proof.roots:
         times = format_multiplicity(root.multiplicity)
-        if root.im.value == "0":
-            rows.append((f"root{times}", *_format_ball(root.re), per))
-        elif not root.im.value.startswith("-"):
-            rows += [(f"pair{times}, re", *_format_ball(root.re), per), ("  im ±", *_format_ball(root.im), per)]
-    return rows
+        if root.im.value != "0" and not root.im.value.startswith("-"):
+            yield f"pair{times}, re", root.re, per
+            yield "  im ±", root.im, per
+        elif root.im.value == "0" and root.re.value not in listed:
+            yield f"root{times}", root.re, per
 
 
 def _find_units(problem: Posed, proof: Proof) -> dict[str, str]:
@@ -163,11 +166,9 @@ def _write_facts(proof: Proof) -> Parts:
 def _write_exact_numbers(problem: Posed, proof: Proof) -> Parts:
     """Numbers that were taken exactly, and a word on angles."""
     exact = [*(f"{name} = {_format_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
-    if exact:
-        yield Sentence(", ".join(exact), "taken exactly")
-    of = problem.parameter_set
-    angles = [n for n in proof.held if n in of.names and of[n].tangent and n not in proof.stated]
-    if angles := [n for n in angles if proof.parameters[n].value != "0"]:
+    yield Sentence(", ".join(exact), "taken exactly")
+    tangents = {p.name for p in problem.parameter_set.parameters if p.tangent} - set(proof.stated)
+    if angles := [n for n in proof.held if n in tangents and proof.parameters[n].value != "0"]:
         yield Sentence("the decimal of the double in radians, not an angle in degrees", ", ".join(angles))
 
 
@@ -178,10 +179,6 @@ def _format_fraction(text: str) -> str:
     except ValueError:  # degrees
         return text
     return decimal.value if decimal.radius == "0" and len(decimal.value) <= len(text) + 1 else text
-
-
-def _format_ball(number: Number) -> tuple[str, str]:
-    return number.value, "exact" if number.radius == "0" else f"± {number.radius}"
 
 
 def _write_verdict(label: str, verdict: Verdict) -> Sentence:

@@ -59,10 +59,11 @@ def document_of(result: Any, level: Level = "brief", **options: Any) -> Document
     blocks: list[Block] = []
     chapters = {Chapter("answer"): blocks}
     for part in _maker(result, "write")(result, level, **options):
-        if isinstance(part, Chapter):
-            blocks = chapters.setdefault(part, [])
-        else:
-            blocks.append(Sentence(part) if isinstance(part, str) else part)
+        block = Sentence(part) if isinstance(part, str) else part
+        if isinstance(block, Chapter):
+            blocks = chapters.setdefault(block, [])
+        elif not isinstance(block, Sentence) or block.text:
+            blocks.append(block)
     filled = (replace(chapter, blocks=tuple(blocks)) for chapter, blocks in chapters.items() if blocks)
     return replace(_cover(result), level=level, sections=tuple(filled))
 
@@ -82,7 +83,7 @@ def _maker(result: Any, verb: str) -> Callable[..., Iterator[Any]]:
 
 
 def _cover(result: Any) -> Document:
-    words = (Badge(word) if isinstance(word, str) else word for word in _maker(result, "summarise")(result))
+    words = (Badge(word) if isinstance(word, str) else word for word in _maker(result, "summarise")(result) if word)
     return Document(type(result).__name__, title_of(result), tuple(words), "brief")
 
 

@@ -14,7 +14,6 @@ from tmsopt.documents.blocks import (
     Figure,
     Level,
     Parts,
-    Row,
     Sentence,
     TableBlock,
     Tone,
@@ -22,6 +21,7 @@ from tmsopt.documents.blocks import (
     Words,
 )
 from tmsopt.documents.design_rows import (
+    BRIEF,
     convert_to_si,
     describe_inertia,
     describe_loads,
@@ -30,11 +30,11 @@ from tmsopt.documents.design_rows import (
     describe_roots,
     describe_speed,
     describe_stored,
+    list_cases,
     list_parameters,
     list_quantities,
-    name_role,
     parameters_of_worst_case,
-    round_to_zero,
+    tabulate_parameters,
 )
 from tmsopt.documents.explanation import describe_rounding, tabulate_rounding, write_diagnosis, write_optimality
 from tmsopt.documents.robustness import describe_robustness, tabulate_boundaries
@@ -48,7 +48,6 @@ from tmsopt.problem.unit_system import limit_text
 from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
 from tmsopt.problem.verdict.status import describe_status, describe_verdict
 
-_DIGITS = 5
 _FOLD, _FIXED = 5, 14  # rows of free parameters below each other, and fixed ones named, of a brief report
 _LIMITS = 3  # limits that a brief report shows
 _OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
@@ -61,8 +60,7 @@ def summarise_solution(solution: Solution) -> Words:
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
     yield f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}"
-    if stored := abscissa_as_stored(solution):
-        yield stored
+    yield abscissa_as_stored(solution)
     if solution.missed:
         yield f"misses {amounts_text(problem, solution.missed)}"
     yield solution.structure
@@ -145,16 +143,6 @@ def write_growth_picture(solution: Solution) -> Parts:
     yield Figure(plots.growth_figure, found, caption)
 
 
-def tabulate_parameters(solution: Solution, si: Mapping[str, float]) -> TableBlock:
-    """Every parameter with its role, its range, what it is in the other set, and its meaning."""
-    ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
-    other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
-    rows: list[Row] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
-    for name, value, unit, how, also, meaning in list_parameters(solution, si):
-        rows.append((name, value, unit, how, ranges[str(name)] if how == "free" else "", also, meaning))
-    return TableBlock(rows, "Parameters of the design")
-
-
 def write_headline(solution: Solution) -> tuple[Sentence, Sentence]:
     """How it ended, and what was asked, in words."""
     problem = solution.problem.posed
@@ -194,8 +182,7 @@ def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: boo
     active = [
         f"{name} ({text})" if (text := limit_text(solution.problem.posed, name)) else name for name in solution.active
     ]
-    if brief and active:
-        yield Sentence(", ".join(active), "active limits")
+    yield Sentence(", ".join(active if brief else ()), "active limits")
 
 
 def _list_violations(solution: Solution) -> Iterator[str]:
@@ -211,23 +198,13 @@ def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scal
     if not brief:
         yield tabulate_parameters(solution, si)
         return
-    problem, of = solution.problem.posed, solution.problem.posed.parameter_set
-    other = {row[0]: row[4] for row in list_parameters(solution, si, _DIGITS)} if scaled else {}
-    cells = {
-        p.name: Cell(round_to_zero(solution, p.name), unit_of(problem, p.name), _DIGITS, named=True)
-        for p in of.parameters
-    }
-    rows = [(p.name, cells[p.name], other.get(p.name, "")) for p in of.parameters if p.name in problem.free]
+    listed = [*list_parameters(solution, si, brief=True)]
+    rows = [(name, cell, also if scaled else "") for name, cell, role, also, _ in listed if role == "free"]
     if rows:
         yield TableBlock((("", "", ""), *rows), fold=_FOLD, tone="answer")
-    rest = [
-        f"{p.name} = {cells[p.name]}"
-        for p in of.parameters
-        if name_role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
-    ]
+    rest = [f"{name} = {cell}" for name, cell, role, *_ in listed if role == "fixed"]
     more = f", and {len(rest) - _FIXED} more" if len(rest) > _FIXED else ""
-    if rest:
-        yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
+    yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
 
 
 def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Parts:
@@ -235,16 +212,15 @@ def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float
     yield Sentence(f"{f'at {at}: ' if at else ''}{describe_motion(solution)}", "motion")
     if analysis.stable_speeds is not None:
         yield describe_range(analysis.stable_speeds, solution)
-    label, text = describe_roots(solution, _DIGITS)
+    label, text = describe_roots(solution, BRIEF)
     yield Sentence(text, label)
     if not brief:
         yield from describe_stored(solution)
     if "load_rear" in solution.quantities:
         yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution, si)}", "loads")
-    if omits := solution.problem.model.omits:
-        yield Sentence(omits, "model")
-    if inertia := describe_inertia(solution):
-        yield Sentence(inertia, "inertia at which it is no longer stable, each alone (radius of gyration)")
+    yield Sentence(solution.problem.model.omits, "model")
+    inertia = "inertia at which it is no longer stable, each alone (radius of gyration)"
+    yield Sentence(describe_inertia(solution), inertia)
 
 
 def _write_cases(solution: Solution) -> Parts:
@@ -311,12 +287,10 @@ def _describe_margin(solution: Solution, name: str) -> str:
     problem, condition = solution.problem.posed, solution.problem.posed.conditions[name]
     if condition.equality:
         return ""
-    cases = [case for case in problem.cases if not case.direction]
-    cases += [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
     radius = {n: x for n, x in solution.quantities.items() if n == NO_RADIUS.name}  # the search for it is over
     left = min(
         -condition.sign * float(condition(problem.values(case.applied(solution.parameters)).with_known(radius)))
-        for case in cases or [Case()]
+        for case in list_cases(solution) or [Case()]
     )
     shares = {q.name for q in (*problem.model.quantities, *problem.parameter_set.quantities) if q.share}
     unit = unit_of(problem, name)

@@ -43,8 +43,7 @@ def write_speeds(found: Speeds, level: Level) -> Parts:
     asked = f"{unit.number(found.lower, 6)} < {found.parameter}{end}{within}"
     yield Chapter("range", "Answer")
     yield f"{asked}, by exact root isolation for the numbers as stored"
-    if found.problem.model.omits:
-        yield Sentence(found.problem.model.omits, "model")
+    yield Sentence(found.problem.model.omits, "model")
     yield Chapter("speeds", "Critical speeds", "wide")
     yield _tabulate_crossings(found, unit, real)
     yield Chapter("bands")

@@ -17,8 +17,8 @@ from tmsopt.documents.blocks import (
     count_things,
     say_whether,
 )
-from tmsopt.documents.tables import thin_rows, write_question
-from tmsopt.problem import show_at, status_text, unit_at, unit_of
+from tmsopt.documents.tables import head_numbers, list_numbers, thin_rows, write_question
+from tmsopt.problem import show_at, status_text, unit_of
 from tmsopt.studies.rows import Row
 from tmsopt.studies.run import Results
 from tmsopt.studies.study import Study
@@ -94,21 +94,17 @@ def list_rows(study: Study, rows: Sequence[Row]) -> list[TableRow]:
     text = problem.minimize or problem.maximize
     asked = [text] if text and text != "abscissa" and text not in free else []
     reports = [text for text in study.report if text not in ("abscissa", *study.problem.free, *study.columns)]
-    some = dict.fromkeys(problem.parameter_set.names, 1.0)  # a unit has one name for all designs
     groups = (study.columns, [*asked, "abscissa"], [*free, *reports])
 
     def list_row(row: Row) -> TableRow:
         known = row.status in ("optimal", "not_converged") or (row.status == "infeasible" and not problem.free)
         found = {**row.reports, **row.parameters, **dict.fromkeys(asked, row.objective), "abscissa": row.abscissa}
         values = {**(found if known else {}), **row.varied}
-        varied, ended, rest = (
-            [Cell(values[n], unit_at(problem, n, row.parameters), _DIGITS) if n in values else "" for n in names]
-            for names in groups
-        )
+        varied, ended, rest = (list_numbers(problem, names, values, row.parameters, _DIGITS) for names in groups)
         stable, structure = (say_whether(row.stable), row.structure) if known else ("", "")
         return str(row.number), stable, *varied, status_text(problem, row.status), *ended, structure, *rest
 
-    varied, ended, rest = ([f"{n} {unit_at(problem, n, some).text}".rstrip() for n in names] for names in groups)
+    varied, ended, rest = (head_numbers(problem, names) for names in groups)
     return [("row", "stable", *varied, "status", *ended, "structure", *rest), *map(list_row, rows)]
 
 

@@ -7,9 +7,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tmsopt.documents.blocks import Chapter, Listing, Parts, TableBlock, say_whether
+from tmsopt.documents.blocks import Cell, Chapter, Listing, Parts, TableBlock, say_whether
 from tmsopt.guide import describe
-from tmsopt.problem import Posed
+from tmsopt.problem import Posed, unit_at
 
 T = TypeVar("T")
 
@@ -29,6 +29,19 @@ def write_question(problem: Posed) -> Parts:
     yield Listing(
         tuple((part, "; ".join(f"{n}: {text}" for n, text in keys.items())) for part, keys in described.asked.items())
     )
+
+
+def head_numbers(problem: Posed, names: Iterable[str]) -> list[str]:
+    """Headings of columns of numbers: a unit has one name for all designs."""
+    some = dict.fromkeys(problem.parameter_set.names, 1.0)
+    return [f"{n} {unit_at(problem, n, some).text}".rstrip() for n in names]
+
+
+def list_numbers(
+    problem: Posed, names: Iterable[str], values: Mapping[str, float], design: Mapping[str, float], digits: int
+) -> list[Cell | str]:
+    """Numbers of a design, each in the unit that stands in its heading; empty for one that is not there."""
+    return [Cell(values[n], unit_at(problem, n, design), digits) if n in values else "" for n in names]
 
 
 def tabulate_records(result: Any) -> Parts:
